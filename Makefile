@@ -1,0 +1,32 @@
+# Every target sets up what it needs: python3 with venv, make and git are all that a machine must have.
+VENV := .venv
+PYTHON := $(VENV)/bin/python
+READY := $(VENV)/.ready
+
+.PHONY: demo test lint types clean
+
+demo: $(READY)
+	$(VENV)/bin/derain demo
+
+test: $(READY)
+	$(PYTHON) -m pytest
+
+lint: $(READY)
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+
+# mypy sees the package as it installs: the top-level folders as sub-packages of derain.
+types: $(READY)
+	rm -rf build
+	$(PYTHON) -m pip install --quiet --no-deps --no-build-isolation --target build/types .
+	$(VENV)/bin/mypy build/types/derain
+
+# torch first and alone: with it in place, no other package brings a build of several gigabytes.
+$(READY): pyproject.toml constraints.txt
+	python3 -m venv $(VENV)
+	$(PYTHON) -m pip install --quiet -c constraints.txt torch
+	$(PYTHON) -m pip install --quiet -c constraints.txt -e ".[dev]"
+	touch $@
+
+clean:
+	rm -rf $(VENV) build demo runs *.egg-info

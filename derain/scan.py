@@ -1,0 +1,140 @@
+"""One LiDAR scan, possibly fused with radar: the data everything in derain starts from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+
+# No sensor measures beyond 1,000 km, and no intensity reaches 10 million: what does is a damaged
+# row. The bound also keeps every float32 computation downstream finite.
+LARGEST_COORDINATE = 1e6
+LARGEST_INTENSITY = 1e7
+
+# SemanticKITTI-style range images mark a cell without a return by -1 in every column.
+SENTINEL = -1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """One point cloud, in the order of its file; rows are never dropped or reordered.
+
+    Attributes:
+        xyz: Coordinates, float32 (N, 3), metres in the sensor frame (x forward, y left, z up).
+        intensity: Return intensity, float32 (N,), in the file's own unit; None where the file has
+            none.
+        label: Semantic class ids, int64 (N,), or None.
+        radar: True for points of the radar, bool (N,), or None where the source is not known.
+        fields: Every column of the file as it was read, by name, each of N rows in its own dtype;
+            what a writer needs to give the file back bit for bit. Empty for a scan made in memory.
+        shape: (height, width) of an organised cloud, rows in row-major order; else None.
+        name: Where the scan came from, for messages.
+
+    Raises:
+        InputError: Columns of different lengths.
+    """
+
+    xyz: NDArray[np.float32]
+    intensity: NDArray[np.float32] | None = None
+    label: NDArray[np.int64] | None = None
+    radar: NDArray[np.bool_] | None = None
+    fields: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    shape: tuple[int, int] | None = None
+    name: str = "scan"
+
+    def __post_init__(self) -> None:
+        if self.xyz.ndim != 2 or self.xyz.shape[1] != 3:
+            raise InputError(
+                self.name,
+                f"coordinates have shape {self.xyz.shape}",
+                "Give an array of shape (N, 3).",
+            )
+        columns = {"intensity": self.intensity, "label": self.label, "radar": self.radar}
+        for title, column in {**columns, **self.fields}.items():
+            if column is not None and len(column) != len(self.xyz):
+                raise InputError(
+                    self.name,
+                    f"{title} has {len(column)} rows for {len(self.xyz)} points",
+                    "Give one value per point.",
+                )
+
+    @classmethod
+    def of(cls, points: "Scan | NDArray[Any]", name: str = "array") -> "Scan":
+        """Wraps an array of points; a Scan comes back as it is.
+
+        Args:
+            points: A Scan, or (N, ≥ 3) numbers: x, y, z in metres, then intensity if there is a
+                fourth column. Further columns are ignored.
+            name: What to call the array in messages.
+
+        Raises:
+            InputError: An array of another shape.
+        """
+        if isinstance(points, Scan):
+            return points
+        array = np.asarray(points)
+        if array.ndim != 2 or array.shape[1] < 3:
+            raise InputError(
+                name, f"points have shape {array.shape}", "Give an array of shape (N, 4) or wider."
+            )
+        intensity = to_float32(array[:, 3]) if array.shape[1] > 3 else None
+        return cls(to_float32(array[:, :3]), intensity, name=name)
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    @property
+    def range(self) -> NDArray[np.float32]:
+        """Distance of every point from the sensor, float32 (N,), metres."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.linalg.norm(self.xyz.astype(np.float64), axis=1).astype(np.float32)
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """True for the points that can be judged, bool (N,).
+
+        Not valid: coordinates or intensity not finite or beyond any sensor's reach, points exactly
+        at the origin (no return), and cells that hold −1 in every column (no return in
+        SemanticKITTI-style range images).
+        """
+        # A comparison with NaN is False, so these two lines refuse NaN and infinity as well.
+        valid = (np.abs(self.xyz) <= LARGEST_COORDINATE).all(axis=1)
+        valid &= (self.xyz != 0).any(axis=1)
+        sentinel = (self.xyz == SENTINEL).all(axis=1)
+        if self.intensity is not None:
+            valid &= np.abs(self.intensity) <= LARGEST_INTENSITY
+            sentinel &= self.intensity == SENTINEL
+        result: NDArray[np.bool_] = valid & ~sentinel
+        return result
+
+    def with_label(self, label: NDArray[np.int64]) -> "Scan":
+        """The same scan with semantic class ids, int64 (N,)."""
+        return replace(self, label=label)
+
+    def take(self, rows: NDArray[Any]) -> "Scan":
+        """The scan of some rows only, as an unorganised cloud.
+
+        Args:
+            rows: Row numbers, or a bool mask of shape (N,).
+        """
+
+        def pick(column: NDArray[Any] | None) -> NDArray[Any] | None:
+            return None if column is None else column[rows]
+
+        return Scan(
+            self.xyz[rows],
+            pick(self.intensity),
+            pick(self.label),
+            pick(self.radar),
+            {title: column[rows] for title, column in self.fields.items()},
+            name=self.name,
+        )
+
+
+def to_float32(array: NDArray[Any]) -> NDArray[np.float32]:
+    """Converts to contiguous float32; values beyond its reach become infinite, without a warning."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.ascontiguousarray(array, dtype=np.float32)
