@@ -32,6 +32,8 @@ class Scan:
             what a writer needs to give the file back bit for bit. Empty for a scan made in memory.
         shape: (height, width) of an organised cloud, rows in row-major order; else None.
         name: Where the scan came from, for messages.
+        header: What the file says besides its columns, such as the encoding of a PCD. Only the
+            writer of the same format looks into it.
 
     Raises:
         InputError: Columns of different lengths.
@@ -44,6 +46,7 @@ class Scan:
     fields: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     shape: tuple[int, int] | None = None
     name: str = "scan"
+    header: object = None
 
     def __post_init__(self) -> None:
         if self.xyz.ndim != 2 or self.xyz.shape[1] != 3:
@@ -90,7 +93,8 @@ class Scan:
     def range(self) -> NDArray[np.float32]:
         """Distance of every point from the sensor, float32 (N,), metres."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return np.linalg.norm(self.xyz.astype(np.float64), axis=1).astype(np.float32)
+            distance = np.linalg.norm(self.xyz.astype(np.float64), axis=1)
+            return to_float32(distance)
 
     @property
     def valid(self) -> NDArray[np.bool_]:
@@ -100,15 +104,18 @@ class Scan:
         at the origin (no return), and cells that hold −1 in every column (no return in
         SemanticKITTI-style range images).
         """
-        # A comparison with NaN is False, so these two lines refuse NaN and infinity as well.
-        valid = (np.abs(self.xyz) <= LARGEST_COORDINATE).all(axis=1)
-        valid &= (self.xyz != 0).any(axis=1)
-        sentinel = (self.xyz == SENTINEL).all(axis=1)
+        # Column by column, which is several times faster than along the short axis. A comparison
+        # with NaN is False, so the bounds refuse NaN and infinity as well.
+        at_origin, sentinel = np.ones(len(self), bool), np.ones(len(self), bool)
+        valid = np.ones(len(self), bool)
+        for column in np.ascontiguousarray(self.xyz.T):
+            valid &= np.abs(column) <= LARGEST_COORDINATE
+            at_origin &= column == 0
+            sentinel &= column == SENTINEL
         if self.intensity is not None:
             valid &= np.abs(self.intensity) <= LARGEST_INTENSITY
             sentinel &= self.intensity == SENTINEL
-        result: NDArray[np.bool_] = valid & ~sentinel
-        return result
+        return valid & ~at_origin & ~sentinel
 
     def with_label(self, label: NDArray[np.int64]) -> "Scan":
         """The same scan with semantic class ids, int64 (N,)."""
@@ -131,10 +138,11 @@ class Scan:
             pick(self.radar),
             {title: column[rows] for title, column in self.fields.items()},
             name=self.name,
+            header=self.header,
         )
 
 
 def to_float32(array: NDArray[Any]) -> NDArray[np.float32]:
-    """Converts to contiguous float32; values beyond its reach become infinite, without a warning."""
+    """Converts to contiguous float32; what is beyond its reach becomes infinite, silently."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.ascontiguousarray(array, dtype=np.float32)

@@ -1,0 +1,45 @@
+"""Writing a file whole or not at all."""
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from derain.errors import InputError
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Lends a temporary file that takes the place of `path` when the block ends well.
+
+    Until then `path` stays as it was; after an error the temporary file is gone. It is hidden, has
+    the same suffix and lies in the same folder, which is created if missing.
+
+    Args:
+        path: The file to write.
+
+    Yields:
+        The temporary file, empty.
+
+    Raises:
+        InputError: `path` cannot be written: it is a folder or a device, its folder is not
+            writable, the disk is full.
+    """
+    try:
+        if path.exists() and not path.is_file():
+            raise InputError(path, "is not a file that can be replaced", "Name a file to write.")
+        temporary = path.with_name(f".derain-{secrets.token_hex(8)}{path.suffix}")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            temporary.touch(exist_ok=False)
+            yield temporary
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(
+            path,
+            f"cannot be written ({error.strerror or error})",
+            "Choose a folder that is writable and has room.",
+        ) from error

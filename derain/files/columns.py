@@ -1,0 +1,156 @@
+"""Named columns: what every scan file holds, and the Scan they make."""
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.text import encode
+from derain.scan import Scan, to_float32
+
+# KITTI, SemanticKITTI, WADS and REHEARSE-3D.
+DEFAULT_COLUMNS = ("x", "y", "z", "intensity")
+
+# What files call the strength of a return; the first that is present counts.
+INTENSITY_NAMES = ("intensity", "i", "reflectivity", "remission", "signal")
+
+
+def name_columns(
+    path: Path, table: NDArray[Any], columns: Sequence[str]
+) -> dict[str, NDArray[Any]]:
+    """Gives the columns of a table without names the names stated by the user.
+
+    Args:
+        path: The file, for messages.
+        table: Numbers, (N, C).
+        columns: C names.
+
+    Returns:
+        Name → column (N,), in the table's order and dtype.
+
+    Raises:
+        InputError: Another number of names than columns, or a name given twice.
+    """
+    stated = ",".join(columns)
+    if table.shape[1] != len(columns):
+        raise InputError(
+            path,
+            f"has {table.shape[1]} columns, but {len(columns)} are stated ({stated})",
+            "Name every column of the file with --columns, x, y and z among them.",
+        )
+    if len(set(columns)) < len(columns):
+        raise InputError("--columns", f"a name comes twice in {stated}", "Name each column once.")
+    return {name: table[:, place] for place, name in enumerate(columns)}
+
+
+def scan_of(
+    path: Path,
+    fields: Mapping[str, NDArray[Any]],
+    shape: tuple[int, int] | None = None,
+    header: object = None,
+) -> Scan:
+    """Makes a Scan of a file's columns.
+
+    Args:
+        path: The file.
+        fields: Name → column, each of N rows: either `x`, `y` and `z` (N,) or `xyz` (N, 3), metres
+            in the sensor frame; `intensity` (or another of INTENSITY_NAMES) if there is one; and
+            whatever else the file holds. Upper and lower case are the same.
+        shape: (height, width) of an organised cloud.
+        header: What the file says besides its columns, for the writer of its format.
+
+    Raises:
+        InputError: No coordinates, or coordinates that are not numbers.
+    """
+    numbers = {
+        name.lower(): column for name, column in fields.items() if column.dtype.kind in "iuf"
+    }
+    flat = {name: column for name, column in numbers.items() if column.ndim == 1}
+    if "xyz" in numbers:
+        xyz = to_float32(numbers["xyz"])
+    elif {"x", "y", "z"} <= flat.keys():
+        xyz = np.stack([to_float32(flat[axis]) for axis in "xyz"], axis=1)
+    else:
+        raise InputError(
+            path,
+            f"has no x, y and z among its columns ({', '.join(fields)})",
+            "Name the coordinates x, y and z, for .bin and .npy with --columns.",
+        )
+    intensity = next((to_float32(flat[name]) for name in INTENSITY_NAMES if name in flat), None)
+    return Scan(
+        # Copies, for what is done to a scan's numbers must not reach the columns of its file.
+        xyz.copy(),
+        None if intensity is None else intensity.copy(),
+        fields=dict(fields),
+        shape=shape,
+        name=str(path),
+        header=header,
+    )
+
+
+def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
+    """The columns that stand for a scan in a file.
+
+    Returns:
+        Name → column of N rows: the columns of the scan's own file, or x, y, z (and intensity) of a
+        scan made in memory. Coordinates held in one `xyz` array come out as x, y and z, which every
+        format can hold.
+    """
+    fields: dict[str, NDArray[Any]] = dict(scan.fields)
+    if not fields:
+        fields["xyz"] = scan.xyz
+        if scan.intensity is not None:
+            fields["intensity"] = scan.intensity
+    columns: dict[str, NDArray[Any]] = {}
+    for name, column in fields.items():
+        if name == "xyz":
+            columns |= {axis: column[:, place] for place, axis in enumerate("xyz")}
+        else:
+            columns[name] = column
+    return columns
+
+
+def describable_columns(path: Path, scan: Scan, types: Collection[str]) -> dict[str, NDArray[Any]]:
+    """The columns of a scan for a format that has a line of text for each.
+
+    Args:
+        path: The file, for messages.
+        scan: The scan.
+        types: Types of the format in NumPy's spelling, such as "f4".
+
+    Returns:
+        Columns as `columns_of` gives them, truth values as uint8.
+
+    Raises:
+        InputError: A column of a type that the format does not have, of a name that is not one
+            word, or without a value.
+    """
+    columns = {
+        name: column.astype(np.uint8) if column.dtype == bool else column
+        for name, column in columns_of(scan).items()
+    }
+    for name, column in columns.items():
+        one_word = encode(name).split() == [encode(name)]
+        if not one_word or column.dtype.str[1:] not in types or 0 in column.shape[1:]:
+            raise InputError(
+                path,
+                f"{path.suffix} has no place for the column '{name}' ({column.dtype})",
+                "Write .npz.",
+            )
+    return columns
+
+
+def records(columns: Mapping[str, NDArray[Any]], row: np.dtype[Any]) -> NDArray[Any]:
+    """Columns of N rows each as one structured array (N,).
+
+    Args:
+        columns: The columns.
+        row: Dtype of the array, with a field for each column in the same order.
+    """
+    table = np.empty(len(next(iter(columns.values()))), row)
+    for field, column in zip(row.names or (), columns.values(), strict=True):
+        table[field] = column
+    return table

@@ -1,0 +1,82 @@
+"""Per-point labels in SemanticKITTI's format (`.label`): uint32, class low, instance high.
+
+Source: Behley et al. 2019, SemanticKITTI; github.com/PRBonn/semantic-kitti-api, README.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.atomic import replacing
+from derain.files.reading import reading
+
+LARGEST_ID = 0xFFFF
+
+
+def read_labels(path: Path, points: int) -> NDArray[np.uint32]:
+    """Reads the labels of a scan as they are in the file.
+
+    Args:
+        path: The file.
+        points: Number of points of the scan.
+
+    Returns:
+        uint32 (points,): class in the low, instance in the high 16 bits.
+
+    Raises:
+        InputError: A file that cannot be read, or that does not hold one label per point.
+    """
+    with reading(path):
+        content = path.read_bytes()
+    if len(content) != 4 * points:
+        raise InputError(
+            path,
+            f"holds {len(content) / 4:g} labels of 4 bytes for a scan of {points} points",
+            "Give the label file that belongs to the scan, and all of the scan's --columns.",
+        )
+    return np.frombuffer(content, "<u4").astype(np.uint32)
+
+
+def semantic(raw: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """Semantic class ids, int64 (N,), of labels as `read_labels` gives them."""
+    return (raw & LARGEST_ID).astype(np.int64)
+
+
+def instance(raw: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """Instance ids, int64 (N,), of labels as `read_labels` gives them."""
+    return (raw >> 16).astype(np.int64)
+
+
+def write_labels(path: Path, semantic: NDArray[Any], instance: NDArray[Any] | None = None) -> None:
+    """Writes one label per point.
+
+    Args:
+        path: The file to write.
+        semantic: Class ids, integers or bool (N,), 0 to 65,535.
+        instance: Instance ids, integers (N,), 0 to 65,535; None writes 0.
+
+    Raises:
+        InputError: An id out of range, another number of instances than classes, or a file that
+            cannot be written.
+    """
+    if instance is None:
+        instance = np.zeros_like(semantic)
+    if len(instance) != len(semantic):
+        raise InputError(
+            path,
+            f"{len(instance)} instances for {len(semantic)} classes",
+            "Give one of each per point.",
+        )
+    for ids in (semantic, instance):
+        if ((ids < 0) | (ids > LARGEST_ID)).any():
+            raise InputError(
+                path,
+                f"a label lies outside 0 to {LARGEST_ID}",
+                "A label file has 16 bits for each id.",
+            )
+    raw = semantic.astype("<u4") | instance.astype("<u4") << np.uint32(16)
+    with replacing(path) as temporary:
+        raw.tofile(temporary)

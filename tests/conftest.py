@@ -1,0 +1,116 @@
+"""Fixtures shared by all tests."""
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from derain.cli.main import main
+from derain.export.runtime import METADATA_KEY
+from derain.hard_cases import scene
+from derain.scan import Scan
+
+if TYPE_CHECKING:
+    from derain.models.outdet import OutDet
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """Folder with real scans and oracles; tests that need it skip where it is absent."""
+    folder = Path(os.environ.get("DERAIN_SHARED", REPOSITORY.parent / "shared"))
+    if not (folder / "data").is_dir():
+        pytest.skip(f"no real scans at {folder}; set DERAIN_SHARED to the folder that has them")
+    return folder
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command of derain came to: its exit code and what it printed."""
+
+    code: int
+    out: str
+    err: str
+
+
+RunDerain = Callable[..., Outcome]
+
+
+@pytest.fixture
+def run_derain(capsys: pytest.CaptureFixture[str]) -> RunDerain:
+    """Runs a command of derain in this process."""
+
+    def run(*arguments: str | Path) -> Outcome:
+        capsys.readouterr()
+        try:
+            code = main([str(argument) for argument in arguments])
+        except SystemExit as leaving:  # argparse's way out
+            code = leaving.code if isinstance(leaving.code, int) else 0
+        return Outcome(code, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def random_outdet() -> "OutDet":
+    """3D-OutDet with random weights and the statistics of WADS; it calls half of a scene rain."""
+    import torch
+
+    from derain.cards import load_card
+    from derain.models.outdet import OutDet
+
+    with torch.random.fork_rng(), torch.inference_mode():
+        torch.manual_seed(0)
+        model = OutDet().eval()
+        model.adopt(model.spec_for(load_card("wads")))
+        for norm in (model.network.norm1, model.network.norm2):
+            norm.running_mean.normal_(0, 0.3)
+            norm.running_var.uniform_(0.5, 1.5)
+            norm.weight.uniform_(0.5, 1.5)
+            norm.bias.normal_(0, 0.3)
+        view = model.spec.make_view()(Scan.of(scene()))
+        logits = model(**{name: torch.from_numpy(a) for name, a in view.inputs().items()})
+        # Between the two middle points, so that none lies on the threshold.
+        model.network.head.bias[0] += (logits[:, 1] - logits[:, 0]).quantile(0.5)
+    return model
+
+
+@pytest.fixture(scope="session")
+def checkpoint(random_outdet: "OutDet", tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A checkpoint of that network."""
+    from derain.models.checkpoint import save_model
+
+    path = tmp_path_factory.mktemp("checkpoint") / "outdet.ckpt"
+    save_model(random_outdet, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def onnx_model(random_outdet: "OutDet", tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same network, exported."""
+    from derain.export.onnx_file import export
+
+    path = tmp_path_factory.mktemp("onnx") / "outdet.onnx"
+    export(random_outdet, path)
+    return path
+
+
+@pytest.fixture
+def saying(onnx_model: Path, tmp_path: Path) -> Callable[[object], Path]:
+    """Makes a copy of the exported network that says something else of itself."""
+    import onnx
+
+    def say(metadata: object) -> Path:
+        proto = onnx.load(onnx_model)
+        onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps(metadata)})
+        path = tmp_path / "model" / "changed.onnx"
+        path.parent.mkdir(exist_ok=True)
+        onnx.save(proto, path)
+        return path
+
+    return say

@@ -1,0 +1,56 @@
+"""What the tests of all formats share."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from derain import Scan
+from derain.files import read_scan, write_scan
+from derain.open3d_import import import_open3d
+
+Columns = dict[str, NDArray[Any]]
+
+
+@pytest.fixture
+def columns() -> Columns:
+    """Five points with columns of many types."""
+    generator = np.random.default_rng(0)
+    return {
+        "x": generator.normal(0, 20, 5).astype(np.float32),
+        "y": generator.normal(0, 20, 5).astype(np.float32),
+        "z": generator.normal(0, 2, 5).astype(np.float32),
+        "intensity": np.array([0, 1, 17, 254, 255], np.uint8),
+        "ring": np.array([0, 63, 64, 127, 65535], np.uint16),
+        "offset": np.array([-(2**31), -1, 0, 1, 2**31 - 1], np.int32),
+        "time": np.array([0.0, 1e-9, 0.1, 1 / 3, 1.7e9 + 1e-6]),
+    }
+
+
+@pytest.fixture
+def scan(columns: Columns) -> Scan:
+    """The scan of those columns."""
+    xyz = np.stack([columns[axis] for axis in "xyz"], axis=1)
+    return Scan(xyz, columns["intensity"].astype(np.float32), fields=columns)
+
+
+@pytest.fixture(scope="session")
+def open3d() -> Any:
+    """Open3D, a reader of PCD and PLY that shares no line with ours."""
+    return import_open3d()
+
+
+@pytest.fixture
+def copied(tmp_path: Path) -> Callable[[Scan, str, object], Scan]:
+    """Writes a scan as if it came from a file with this header, and reads it."""
+
+    def copy(scan: Scan, suffix: str, header: object = None) -> Scan:
+        path = tmp_path / f"scan{suffix}"
+        write_scan(path, replace(scan, header=header))
+        return read_scan(path)
+
+    return copy

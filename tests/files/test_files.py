@@ -1,0 +1,179 @@
+"""Reading, writing and finding scans by suffix, and the real scans of many sensors."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain import InputError, Scan
+from derain.files import DEFAULT_COLUMNS, find_scans, read_scan, write_scan
+from derain.files.pcd_header import PcdHeader
+
+RADAR = (
+    *("x", "y", "z", "range_rate", "rcs", "range"),
+    *("azimuth", "elevation", "probability", "class"),
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "points", "shape", "columns"),
+    [
+        ("clean/kitti_hdl64.bin", 124_668, None, 4),
+        ("clean/kitti_front.bin", 17_238, None, 4),
+        ("clean/pandaset_pandar64.pcd", 118_784, (64, 1856), 4),
+        ("clean/ouster_os1_128.npz", 131_072, (128, 1024), 6),
+        ("clean/ouster_os0_32_dual.npz", 32_768, (32, 1024), 11),
+        ("clean/hesai_at128_front.pcd", 10_198, None, 3),
+        ("clean/velodyne_vlp16_dual.pcd", 14_831, None, 10),
+        ("radar/ars548_detections.npy", 308, None, 10),
+        ("wads/sample.bin", 115_881, None, 4),
+        ("snowykitti/velodyne/000000.bin", 131_072, None, 4),
+    ],
+)
+def test_real_scans_come_back_bit_for_bit(
+    tmp_path: Path,
+    shared: Path,
+    name: str,
+    points: int,
+    shape: tuple[int, int] | None,
+    columns: int,
+) -> None:
+    source = shared / "data" / name
+    stated = RADAR if source.suffix == ".npy" else DEFAULT_COLUMNS
+    scan = read_scan(source, stated)
+    assert (len(scan), scan.shape, len(scan.fields)) == (points, shape, columns)
+    assert np.median(scan.range[scan.valid]) > 1
+    write_scan(tmp_path / source.name, scan)
+    copy = read_scan(tmp_path / source.name, stated)
+    assert copy.shape == shape
+    assert list(copy.fields) == list(scan.fields)
+    for title, column in scan.fields.items():
+        assert copy.fields[title].dtype == column.dtype
+        assert copy.fields[title].tobytes() == column.tobytes()
+
+
+@pytest.mark.parametrize(
+    "name", ["pandaset_pandar64.pcd", "hesai_at128_front.pcd", "velodyne_vlp16_dual.pcd"]
+)
+def test_real_pcds_are_read_as_open3d_reads_them(shared: Path, name: str, open3d: object) -> None:
+    path = shared / "data" / "clean" / name
+    cloud = open3d.t.io.read_point_cloud(str(path))  # type: ignore[attr-defined]
+    scan = read_scan(path)
+    for title in scan.fields.keys() - set("xyz"):
+        theirs = cloud.point[title].numpy().ravel()
+        np.testing.assert_array_equal(scan.fields[title], theirs, strict=True)
+    positions = np.stack([scan.fields[axis] for axis in "xyz"], axis=1)
+    np.testing.assert_array_equal(positions, cloud.point["positions"].numpy(), strict=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "intensity"),
+    [
+        ("intensity", True),
+        ("Intensity", True),
+        ("i", True),
+        ("reflectivity", True),
+        ("remission", True),
+        ("rcs", False),
+    ],
+)
+def test_intensity_is_found_under_its_many_names(
+    tmp_path: Path, name: str, intensity: bool
+) -> None:
+    np.save(tmp_path / "scan.npy", np.arange(8.0).reshape(2, 4))
+    scan = read_scan(tmp_path / "scan.npy", ("X", "Y", "Z", name))
+    assert (scan.intensity is not None) == intensity
+    assert list(scan.fields) == ["X", "Y", "Z", name]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "header"),
+    [
+        *[(suffix, None) for suffix in (".bin", ".npy", ".npz", ".pcd", ".ply")],
+        (".pcd", PcdHeader((), 0, 0, 0, "binary_compressed")),
+    ],
+)
+def test_the_numbers_of_a_scan_can_be_changed_without_changing_its_columns(
+    copied: Callable[[Scan, str, object], Scan], suffix: str, header: object
+) -> None:
+    ones = np.ones((3, 3), np.float32)
+    for fields in ({}, {"xyz": ones, "intensity": ones[:, 0].copy()}):
+        scan = copied(Scan(ones, ones[:, 0], fields=fields), suffix, header)
+        assert scan.intensity is not None
+        scan.xyz[:] = 7
+        scan.intensity[:] = 7
+        assert all((column == 1).all() for column in scan.fields.values())
+
+
+@pytest.mark.parametrize("suffix", [".bin", ".npy", ".npz", ".pcd", ".ply"])
+def test_every_format_reports_a_missing_file_and_an_unwritable_place(
+    tmp_path: Path, suffix: str
+) -> None:
+    path = tmp_path / f"scan{suffix.upper()}"
+    with pytest.raises(InputError, match="there is no such file"):
+        read_scan(path)
+    path.mkdir()
+    with pytest.raises(InputError, match="is a folder"):
+        read_scan(path)
+    with pytest.raises(InputError, match="is not a file that can be replaced"):
+        write_scan(path, Scan(np.ones((2, 3), np.float32)))
+
+
+def test_names_in_upper_case_and_names_as_text_are_understood(tmp_path: Path) -> None:
+    xyz = np.ones((2, 3), np.float32)
+    for suffix in (".NPY", ".NPZ", ".Pcd", ".PLY"):
+        write_scan(str(tmp_path / f"scan{suffix}"), Scan(xyz))
+        copy = read_scan(str(tmp_path / f"scan{suffix}"), ("x", "y", "z"))
+        np.testing.assert_array_equal(copy.xyz, xyz)
+    assert len(find_scans([str(tmp_path)])) == 4
+
+
+@pytest.mark.parametrize("use", [read_scan, lambda path: write_scan(path, None)])
+def test_an_unknown_suffix_is_refused_with_the_known_ones(
+    tmp_path: Path, use: Callable[[Path], object]
+) -> None:
+    for name in ("scan.las", "scan"):
+        with pytest.raises(InputError, match=r"Known are \.bin, \.npy, \.npz, \.pcd, \.ply\."):
+            use(tmp_path / name)
+
+
+def test_folders_stand_for_their_scans_in_order_and_files_for_themselves(tmp_path: Path) -> None:
+    folder = tmp_path / "velodyne"
+    (folder / "deeper.bin").mkdir(parents=True)
+    for name in ("2.bin", "10.pcd", "1.ply", "1.label", "notes.txt", "._1.ply", "3.npz", "0.npy"):
+        (folder / name).touch()
+    single = tmp_path / "any.thing"
+    single.touch()
+    found = find_scans([single, folder, folder / "2.bin"])
+    names = ["0.npy", "1.ply", "10.pcd", "2.bin", "3.npz"]
+    assert found == [single, *(folder / name for name in names), folder / "2.bin"]
+
+
+def test_a_missing_path_and_a_folder_without_scans_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").touch()
+    with pytest.raises(InputError, match=r"holds no scans \(\.bin, \.npy"):
+        find_scans([tmp_path])
+    with pytest.raises(InputError, match="there is no such file or folder"):
+        find_scans([tmp_path / "missing"])
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_files_and_folders_without_permission_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scan.bin"
+    path.touch(0o200)
+    with pytest.raises(InputError, match=r"cannot be read \(Permission denied\)"):
+        read_scan(path)
+    (tmp_path / "locked").mkdir(0o300)
+    with pytest.raises(InputError, match=r"locked: cannot be read \(Permission denied\)"):
+        find_scans([tmp_path / "locked"])
+
+
+def test_reading_scans_needs_no_heavy_library() -> None:
+    heavy = ("torch", "lightning", "open3d", "matplotlib", "sklearn", "onnxruntime")
+    code = f"import sys, derain.files; print([m for m in {heavy} if m in sys.modules])"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"

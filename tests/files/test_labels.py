@@ -1,0 +1,74 @@
+"""Label files: class in the low half, instance in the high half."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from derain import InputError
+from derain.files.labels import instance, read_labels, semantic, write_labels
+
+LABELS = arrays(np.uint32, st.integers(0, 20))
+
+
+def test_halves_lie_where_semantickitti_puts_them(tmp_path: Path) -> None:
+    path = tmp_path / "scan.label"
+    path.write_bytes(bytes([110, 0, 7, 0, 0xFC, 0x00, 0x01, 0x02]))
+    raw = read_labels(path, points=2)
+    assert semantic(raw).tolist() == [110, 252]
+    assert instance(raw).tolist() == [7, 0x0201]
+    assert semantic(raw).dtype == instance(raw).dtype == np.int64
+
+
+@given(raw=LABELS)
+def test_both_halves_come_back(tmp_path_factory: pytest.TempPathFactory, raw: np.ndarray) -> None:
+    path = tmp_path_factory.mktemp("labels") / "scan.label"
+    write_labels(path, semantic(raw), instance(raw))
+    assert path.read_bytes() == raw.astype("<u4").tobytes()
+    np.testing.assert_array_equal(read_labels(path, len(raw)), raw)
+
+
+def test_a_mask_is_written_as_classes_0_and_1(tmp_path: Path) -> None:
+    path = tmp_path / "scan.label"
+    write_labels(path, np.array([True, False, True]))
+    assert read_labels(path, 3).tolist() == [1, 0, 1]
+
+
+@pytest.mark.parametrize(("size", "found"), [(8, "2"), (16, "4"), (13, "3.25"), (0, "0")])
+def test_labels_of_another_length_are_refused_with_both_numbers(
+    tmp_path: Path, size: int, found: str
+) -> None:
+    path = tmp_path / "scan.label"
+    path.write_bytes(bytes(size))
+    with pytest.raises(InputError, match=rf"holds {found} labels .* for a scan of 3 points"):
+        read_labels(path, points=3)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        read_labels(tmp_path / "scan.label", points=3)
+
+
+@pytest.mark.parametrize("label", [-1, 65536])
+def test_an_id_that_needs_more_than_16_bits_is_not_written(tmp_path: Path, label: int) -> None:
+    ids = np.array([0, label])
+    for halves in ((ids, None), (np.zeros(2, np.int64), ids)):
+        with pytest.raises(InputError, match="outside 0 to 65535"):
+            write_labels(tmp_path / "scan.label", *halves)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_number_of_instances_than_classes_is_not_written(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="2 instances for 3 classes"):
+        write_labels(tmp_path / "scan.label", np.zeros(3, np.int64), np.zeros(2, np.int64))
+
+
+def test_real_labels_come_back(tmp_path: Path, shared: Path) -> None:
+    source = shared / "data" / "wads" / "sample.label"
+    raw = read_labels(source, points=115_881)
+    assert np.count_nonzero(semantic(raw) == 110) == 14_276
+    write_labels(tmp_path / "scan.label", semantic(raw), instance(raw))
+    assert (tmp_path / "scan.label").read_bytes() == source.read_bytes()

@@ -1,0 +1,238 @@
+"""NumPy's own files."""
+
+import pickle
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from derain import InputError, Scan
+from derain.files import read_scan, write_scan
+
+HEIGHT, WIDTH = 4, 6
+
+
+@pytest.fixture
+def organised() -> dict[str, np.ndarray]:
+    """Arrays of a spinning sensor with 4 beams and 6 columns."""
+    generator = np.random.default_rng(1)
+    return {
+        "xyz": generator.normal(0, 9, (HEIGHT, WIDTH, 3)).astype(np.float32),
+        "signal": generator.integers(0, 9000, (HEIGHT, WIDTH), np.uint16),
+        "reflectivity": generator.integers(0, 255, (HEIGHT, WIDTH), np.uint8),
+        "timestamp": np.arange(WIDTH, dtype=np.uint64) + 2**63,
+        "beam_angles": np.linspace(-20, 20, HEIGHT),
+        "file": np.array("made by hand"),
+    }
+
+
+def test_organised_arrays_are_flattened_row_by_row(
+    tmp_path: Path, organised: dict[str, np.ndarray]
+) -> None:
+    np.savez(tmp_path / "scan.npz", **{k: v for k, v in organised.items() if k != "file"})
+    scan = read_scan(tmp_path / "scan.npz")
+    assert scan.shape == (HEIGHT, WIDTH)
+    row, column = 2, 5
+    point = row * WIDTH + column
+    np.testing.assert_array_equal(scan.xyz[point], organised["xyz"][row, column])
+    assert scan.fields["signal"][point] == organised["signal"][row, column]
+    assert scan.fields["timestamp"][point] == organised["timestamp"][column]
+    assert scan.fields["timestamp"].dtype == np.uint64
+    assert "beam_angles" not in scan.fields
+
+
+def test_reflectivity_comes_before_signal_as_intensity(
+    tmp_path: Path, organised: dict[str, np.ndarray]
+) -> None:
+    for name in ("reflectivity", "signal"):
+        np.savez(tmp_path / "scan.npz", xyz=organised["xyz"], **{name: organised[name]})
+        np.testing.assert_array_equal(
+            read_scan(tmp_path / "scan.npz").intensity, organised[name].ravel()
+        )
+    np.savez(tmp_path / "scan.npz", **{k: organised[k] for k in ("signal", "reflectivity", "xyz")})
+    np.testing.assert_array_equal(
+        read_scan(tmp_path / "scan.npz").intensity, organised["reflectivity"].ravel()
+    )
+
+
+def test_an_npz_comes_back_with_its_grid_and_the_arrays_that_are_not_per_point(
+    tmp_path: Path, organised: dict[str, np.ndarray]
+) -> None:
+    with zipfile.ZipFile(tmp_path / "scan.npz", "w") as archive:
+        for name, array in organised.items():
+            with archive.open(f"{name}.npy", "w") as file:
+                np.lib.format.write_array(file, array)
+    write_scan(tmp_path / "copy.npz", read_scan(tmp_path / "scan.npz"))
+    with np.load(tmp_path / "copy.npz", allow_pickle=False) as copy:
+        assert sorted(copy) == sorted(organised)
+        for name, array in organised.items():
+            expected = np.tile(array, (HEIGHT, 1)) if name == "timestamp" else array
+            np.testing.assert_array_equal(copy[name], expected)
+            assert copy[name].dtype == array.dtype
+
+
+def test_a_cleaned_npz_holds_the_remaining_points_of_every_array(
+    tmp_path: Path, organised: dict[str, np.ndarray]
+) -> None:
+    np.savez(tmp_path / "scan.npz", xyz=organised["xyz"], timestamp=organised["timestamp"])
+    keep = np.arange(HEIGHT * WIDTH) % 3 > 0
+    write_scan(tmp_path / "clean.npz", read_scan(tmp_path / "scan.npz").take(keep))
+    with np.load(tmp_path / "clean.npz") as clean:
+        np.testing.assert_array_equal(clean["xyz"], organised["xyz"].reshape(-1, 3)[keep])
+        np.testing.assert_array_equal(
+            clean["timestamp"], np.tile(organised["timestamp"], HEIGHT)[keep]
+        )
+
+
+def test_separate_coordinates_are_read(tmp_path: Path) -> None:
+    x, y, z = np.arange(12.0).reshape(3, 4)
+    np.savez(tmp_path / "scan.npz", X=x, Y=y, Z=z, weights=np.ones(7), unit=np.array("m"))
+    scan = read_scan(tmp_path / "scan.npz")
+    assert scan.shape is None
+    np.testing.assert_array_equal(scan.xyz, np.stack([x, y, z], axis=1))
+    assert list(scan.fields) == ["X", "Y", "Z"]
+
+
+def test_coordinates_in_one_array_are_split_for_formats_that_need_it(
+    tmp_path: Path, organised: dict[str, np.ndarray]
+) -> None:
+    np.savez(tmp_path / "scan.npz", xyz=organised["xyz"], signal=organised["signal"])
+    scan = read_scan(tmp_path / "scan.npz")
+    for suffix in (".pcd", ".ply", ".npy", ".bin"):
+        write_scan(tmp_path / f"scan{suffix}", scan)
+        copy = read_scan(tmp_path / f"scan{suffix}", ("x", "y", "z", "signal"))
+        assert list(copy.fields) == ["x", "y", "z", "signal"]
+        np.testing.assert_array_equal(copy.xyz, scan.xyz)
+        np.testing.assert_array_equal(copy.intensity, scan.intensity)
+
+
+def test_a_table_needs_its_columns_stated(tmp_path: Path) -> None:
+    rows = np.arange(20.0).reshape(4, 5)
+    np.save(tmp_path / "scan.npy", rows)
+    with pytest.raises(InputError, match=r"has 5 columns, but 4 are stated .*--columns"):
+        read_scan(tmp_path / "scan.npy")
+    scan = read_scan(tmp_path / "scan.npy", ("x", "rcs", "z", "y", "speed"))
+    np.testing.assert_array_equal(scan.xyz, rows[:, [0, 3, 2]])
+    assert scan.fields["speed"].dtype == np.float64
+
+
+def test_a_table_comes_back_as_a_table_and_a_grid_as_a_grid(tmp_path: Path) -> None:
+    for shape in ((6, 4), (2, 3, 4), (0, 4)):
+        rows = np.arange(np.prod(shape), dtype=">f8").reshape(shape)
+        np.save(tmp_path / "scan.npy", rows)
+        scan = read_scan(tmp_path / "scan.npy")
+        assert scan.shape == (shape[:2] if len(shape) == 3 else None)
+        write_scan(tmp_path / "copy.npy", scan)
+        np.testing.assert_array_equal(np.load(tmp_path / "copy.npy"), rows, strict=True)
+
+
+def test_a_structured_array_keeps_names_types_and_grid(tmp_path: Path) -> None:
+    for row in (
+        [("x", "f4"), ("y", "f4"), ("z", "f4"), ("i", "u2"), ("normal", "f4", (3,))],
+        [("x", "f4"), ("y", "f4"), ("z", "f4"), ("i", "f4")],
+        [("xyz", "f4", (3,)), ("i", "f4")],
+    ):
+        table = np.zeros((2, 3), row)
+        table["i"] = np.arange(6).reshape(2, 3)
+        np.save(tmp_path / "scan.npy", table)
+        scan = read_scan(tmp_path / "scan.npy")
+        assert scan.intensity is not None
+        assert scan.intensity.tolist() == [0, 1, 2, 3, 4, 5]
+        write_scan(tmp_path / "copy.npy", scan)
+        np.testing.assert_array_equal(np.load(tmp_path / "copy.npy"), table, strict=True)
+
+
+def test_columns_of_several_values_become_a_structured_array(tmp_path: Path, scan: Scan) -> None:
+    fields = {axis: scan.fields[axis] for axis in "xyz"} | {"normal": scan.xyz}
+    write_scan(tmp_path / "scan.npy", Scan(scan.xyz, fields=fields))
+    table = np.load(tmp_path / "scan.npy")
+    np.testing.assert_array_equal(table["normal"], scan.xyz, strict=True)
+
+
+def test_columns_of_several_types_become_a_structured_array(tmp_path: Path, scan: Scan) -> None:
+    write_scan(tmp_path / "scan.npy", scan)
+    table = np.load(tmp_path / "scan.npy")
+    assert table.dtype.names == tuple(scan.fields)
+    np.testing.assert_array_equal(table["time"], scan.fields["time"], strict=True)
+
+
+class Fuse:
+    """What must never go off while a file is read."""
+
+    def __reduce__(self) -> tuple[Callable[[str], Any], tuple[str]]:
+        return pytest.fail, ("a pickle was executed",)
+
+
+def test_pickles_are_never_executed(tmp_path: Path) -> None:
+    array = np.array([Fuse()], object)
+    np.save(tmp_path / "scan.npy", array, allow_pickle=True)
+    np.savez(tmp_path / "scan.npz", xyz=array, allow_pickle=True)
+    (tmp_path / "plain.npy").write_bytes(pickle.dumps(Fuse()))
+    for name in ("scan.npy", "scan.npz", "plain.npy"):
+        with pytest.raises(InputError, match="cannot be read as"):
+            read_scan(tmp_path / name)
+
+
+def test_what_numpy_says_in_many_lines_is_told_in_one(tmp_path: Path) -> None:
+    np.save(tmp_path / "scan.npy", np.zeros(1, [(f"field{place}", "f4") for place in range(2000)]))
+    with pytest.raises(InputError, match=r"^[^\n]*large[^\n]*$"):
+        read_scan(tmp_path / "scan.npy")
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".npz"])
+def test_truncated_files_are_refused(tmp_path: Path, scan: Scan, suffix: str) -> None:
+    path = tmp_path / f"scan{suffix}"
+    write_scan(path, scan)
+    content = path.read_bytes()
+    for size in (0, 1, 5, 20, len(content) // 2, len(content) - 1):
+        path.write_bytes(content[:size])
+        with pytest.raises(InputError, match=rf"cannot be read as \{suffix}"):
+            read_scan(path)
+
+
+@pytest.mark.parametrize(
+    "array",
+    [np.float64(3), np.arange(4.0), np.zeros((2, 2, 2, 4)), np.zeros(3, [("a", "f4")])],
+    ids=["number", "line", "four axes", "no coordinates"],
+)
+def test_arrays_that_are_no_points_are_refused(tmp_path: Path, array: np.ndarray) -> None:
+    np.save(tmp_path / "scan.npy", array)
+    with pytest.raises(InputError, match=r"scan\.npy: "):
+        read_scan(tmp_path / "scan.npy")
+
+
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        {"points": np.zeros((5, 3))},
+        {"xyz": np.zeros((5, 2))},
+        {"xyz": np.zeros((5, 3), "U1")},
+        {"x": np.zeros(5), "y": np.zeros(5)},
+        {"x": np.zeros(5), "y": np.zeros(5), "z": np.zeros(4)},
+        {"xyz": np.zeros((2, 2, 2, 3))},
+        {"xyz": np.zeros(3)},
+    ],
+)
+def test_archives_without_coordinates_are_refused(
+    tmp_path: Path, arrays: dict[str, np.ndarray]
+) -> None:
+    np.savez(tmp_path / "scan.npz", **arrays)
+    with pytest.raises(InputError, match=r"scan\.npz: "):
+        read_scan(tmp_path / "scan.npz")
+
+
+def test_a_scan_made_in_memory_is_written(tmp_path: Path) -> None:
+    xyz = np.arange(6, dtype=np.float32).reshape(2, 3)
+    scan = Scan(xyz, np.array([7, 8], np.float32))
+    for suffix in (".npy", ".npz", ".bin", ".pcd", ".ply"):
+        for source in (scan, replace(scan, intensity=None)):
+            names = ("x", "y", "z", "intensity")[: 3 + (source.intensity is not None)]
+            write_scan(tmp_path / f"scan{suffix}", source)
+            copy = read_scan(tmp_path / f"scan{suffix}", names)
+            assert list(copy.fields) == list(names)
+            np.testing.assert_array_equal(copy.xyz, xyz)
+            np.testing.assert_array_equal(copy.intensity, source.intensity)

@@ -1,0 +1,109 @@
+"""Whatever columns a scan has, every format that can hold them gives them back bit for bit."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from derain import Scan
+from derain.files import DEFAULT_COLUMNS, read_scan, write_scan
+from derain.files.columns import scan_of
+from derain.files.pcd_header import ENCODINGS, VALUE_TYPES, PcdHeader
+from derain.files.ply import BYTE_ORDERS, PlyHeader
+
+FLOATS = ("f4", "f8")
+NAMES = st.text("abcdefgh_0123456789-.äλ", min_size=2, max_size=6)
+# A test's own folder serves all of its examples.
+EXAMPLES = settings(
+    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+@st.composite
+def scans(
+    draw: st.DrawFn,
+    types: tuple[str, ...],
+    names: st.SearchStrategy[str] = NAMES,
+    counts: tuple[tuple[int, ...], ...] = ((),),
+) -> Scan:
+    """A scan of up to six points with up to four further columns of random bits."""
+    points = draw(st.integers(0, 6))
+    columns = [(axis, draw(st.sampled_from(FLOATS)), ()) for axis in "xyz"]
+    further = draw(st.lists(names, max_size=4, unique_by=str.lower))
+    columns += [
+        (name, draw(st.sampled_from(types)), draw(st.sampled_from(counts))) for name in further
+    ]
+    fields = {}
+    for name, kind, shape in draw(st.permutations(columns)):
+        bits = draw(arrays(f"u{kind[1]}", (points, *shape)))
+        fields[name] = bits.view(f"<{kind}")
+    return scan_of(Path("drawn"), fields)
+
+
+def check_same(copy: Scan, scan: Scan, *, payload: bool = True) -> None:
+    """The columns are the same bits, or, without the payload of NaN, the same values."""
+    assert list(copy.fields) == list(scan.fields)
+    for name, column in scan.fields.items():
+        other = copy.fields[name]
+        assert other.dtype.newbyteorder("<") == column.dtype
+        assert other.shape == column.shape
+        if payload or column.dtype.kind != "f":
+            assert other.astype(f"V{column.itemsize}").tobytes() == column.tobytes()
+        else:
+            np.testing.assert_array_equal(other, column)
+            whole = ~np.isnan(column)
+            np.testing.assert_array_equal(np.signbit(other[whole]), np.signbit(column[whole]))
+    np.testing.assert_array_equal(copy.xyz, scan.xyz)
+
+
+@EXAMPLES
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@given(scan=scans(VALUE_TYPES, counts=((), (2,), (7,))))
+def test_pcd(tmp_path: Path, encoding: str, scan: Scan) -> None:
+    path = tmp_path / "scan.pcd"
+    write_scan(path, replace(scan, header=PcdHeader((), 0, 0, 0, encoding)))
+    check_same(read_scan(path), scan, payload=encoding != "ascii")
+
+
+@EXAMPLES
+@pytest.mark.parametrize("encoding", BYTE_ORDERS)
+@given(scan=scans(("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")))
+def test_ply(tmp_path: Path, encoding: str, scan: Scan) -> None:
+    path = tmp_path / "scan.ply"
+    write_scan(path, replace(scan, header=PlyHeader(encoding)))
+    check_same(read_scan(path), scan, payload=encoding == "binary_little_endian")
+
+
+@EXAMPLES
+@pytest.mark.parametrize("suffix", [".npz", ".npy"])
+@given(scan=scans((*VALUE_TYPES, "f2"), st.text("abcd_0123456789-.", min_size=2), ((), (2, 3))))
+def test_numpy(tmp_path: Path, suffix: str, scan: Scan) -> None:
+    path = tmp_path / f"scan{suffix}"
+    write_scan(path, scan)
+    check_same(read_scan(path, tuple(scan.fields)), scan)
+
+
+@EXAMPLES
+@given(rows=arrays(np.uint32, st.tuples(st.integers(0, 6), st.just(4))))
+def test_bin(tmp_path: Path, rows: np.ndarray) -> None:
+    rows[:, 3] &= 0x7FFF_FFFF  # no intensity is negative
+    (tmp_path / "scan.bin").write_bytes(rows.astype("<u4").tobytes())
+    scan = read_scan(tmp_path / "scan.bin")
+    assert list(scan.fields) == list(DEFAULT_COLUMNS)
+    write_scan(tmp_path / "copy.bin", scan)
+    assert (tmp_path / "copy.bin").read_bytes() == rows.astype("<u4").tobytes()
+
+
+@EXAMPLES
+@given(scan=scans(("u2", "f8")), data=st.data())
+def test_a_cleaned_file_holds_the_other_rows_of_every_column(
+    tmp_path: Path, scan: Scan, data: st.DataObject
+) -> None:
+    rain = data.draw(arrays(bool, len(scan)))
+    write_scan(tmp_path / "scan.pcd", scan)
+    write_scan(tmp_path / "clean.pcd", read_scan(tmp_path / "scan.pcd").take(~rain))
+    check_same(read_scan(tmp_path / "clean.pcd"), scan.take(~rain))
