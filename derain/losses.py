@@ -1,0 +1,128 @@
+"""What a supervised derainer learns from: weighted cross-entropy and the Lovász-softmax loss.
+
+Losses take one row a point. Whoever has an image picks its valid pixels first:
+``logits.movedim(1, -1)[valid]``. Each has a defined, finite value and gradient for every scan:
+without points, without rain, or with nothing but rain. All compute in float32 or wider.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from derain.errors import InputError
+
+
+class SegmentationLoss(NamedTuple):
+    """A loss and the parts it is the sum of, each a scalar."""
+
+    total: Tensor
+    cross_entropy: Tensor
+    lovasz: Tensor
+
+
+def segmentation_loss(logits: Tensor, target: Tensor, class_weight: Tensor) -> SegmentationLoss:
+    """Weighted cross-entropy plus Lovász-softmax, as 3D-OutDet is trained.
+
+    Source: sporsho/3D_OutDet, train_wads.py. SalsaNext (Cortinhal et al. 2020) learns from the same
+    sum, with the logarithm of probabilities clamped at 1e-8 in place of the log-softmax.
+
+    Args:
+        logits: Scores before the softmax, float (N, C).
+        target: Class of every point, 0 … C − 1, int64 (N,).
+        class_weight: Weight of each class, float (C,), at least 0; see :func:`class_weights`.
+    """
+    cross_entropy = weighted_cross_entropy(logits, target, class_weight)
+    lovasz = lovasz_softmax(_at_least_float32(logits).softmax(dim=1), target)
+    return SegmentationLoss(cross_entropy + lovasz, cross_entropy, lovasz)
+
+
+def weighted_cross_entropy(logits: Tensor, target: Tensor, class_weight: Tensor) -> Tensor:
+    """Mean cross-entropy with each point weighted by its class.
+
+    What :func:`torch.nn.functional.cross_entropy` gives, save where that is 0 / 0: without points,
+    or where the classes of all points weigh nothing. There it is 0, with gradient 0.
+
+    Args:
+        logits: Scores before the softmax, float (N, C).
+        target: Class of every point, 0 … C − 1, int64 (N,).
+        class_weight: Weight of each class, float (C,), at least 0.
+    """
+    logits = _at_least_float32(logits)
+    class_weight = class_weight.to(logits)
+    total = functional.cross_entropy(logits, target, class_weight, reduction="sum")
+    weight = class_weight[target].sum()
+    return total / weight.clamp(min=torch.finfo(weight.dtype).tiny)
+
+
+def lovasz_softmax(probability: Tensor, target: Tensor) -> Tensor:
+    """Lovász extension of the Jaccard loss, 1 − IoU, averaged over the classes present.
+
+    At hard 0/1 probabilities it is the mean 1 − IoU itself. Where all points are of one class c,
+    as in a scan without rain or with nothing but rain, it is the mean of 1 − p_c. Without points
+    it is 0.
+
+    Source: Berman, Rannen Triki and Blaschko, "The Lovász-Softmax loss", CVPR 2018, definition 2
+    and the loss over the classes present.
+
+    Args:
+        probability: Probability of each class, float (N, C).
+        target: Class of every point, 0 … C − 1, int64 (N,).
+    """
+    probability = _at_least_float32(probability)
+    foreground = functional.one_hot(target, probability.shape[1]).bool()
+    error = torch.where(foreground, 1 - probability, probability)
+    error, order = error.sort(dim=0, descending=True)
+    steps = _jaccard_steps(foreground.gather(0, order), error.dtype)
+    loss = (error * steps).sum(dim=0)  # 0 for a class without a point
+    present = foreground.any(dim=0).sum()
+    return loss.sum() / present.clamp(min=1)
+
+
+def _jaccard_steps(foreground: Tensor, dtype: torch.dtype) -> Tensor:
+    """What each point adds to the Jaccard loss when it joins those got wrong before it.
+
+    With the first i points wrong, the loss is 1 − intersection / union. A foreground point takes
+    one from the intersection, any other adds one to the union. Both differences are written out:
+    subtracting neighbouring losses would cancel all but a few digits in a scan of 400,000 points.
+
+    Args:
+        foreground: Which points are of the class, in the order they go wrong, bool (N, C).
+        dtype: Floating-point type of the result.
+
+    Returns:
+        (N, C), the gradient of the Lovász extension; zero for a class without a point.
+    """
+    size = foreground.sum(dim=0)
+    intersection = (size - foreground.cumsum(dim=0)).to(dtype)
+    union = (size + (~foreground).cumsum(dim=0)).to(dtype)
+    union_before = (union - 1).clamp(min=1)  # is 0 only where the class has no point
+    return torch.where(foreground, 1 / union, intersection / (union * union_before))
+
+
+def class_weights(shares: Sequence[float], floor: float = 1e-3) -> Tensor:
+    """Weights that make rare classes count, 1 / (share + floor).
+
+    Source: sporsho/3D_OutDet, train_wads.py; TiagoCortinhal/SalsaNext, trainer.py.
+
+    Args:
+        shares: Share of each class among the training points, 0 to 1.
+        floor: What is added to each share so that a class next to absent keeps a finite weight.
+
+    Returns:
+        float32 (C,).
+
+    Raises:
+        InputError: A share outside 0 to 1.
+    """
+    if not all(0 <= share <= 1 for share in shares):
+        raise InputError(
+            "class shares", f"{list(shares)} are not all within 0 and 1", "Count the points again."
+        )
+    return torch.tensor([1 / (share + floor) for share in shares])
+
+
+def _at_least_float32(tensor: Tensor) -> Tensor:
+    return tensor.to(torch.promote_types(tensor.dtype, torch.float32))
