@@ -1,0 +1,66 @@
+"""Several scans on their way through a network."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from derain.neighbours import Neighbourhoods
+from derain.scan import Scan
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One scan and what a network sees of it.
+
+    Attributes:
+        scan: The whole scan, with its labels where they are known.
+        view: The network's view of it.
+        target: What the network is to say of each of its points, int64 (M,); None without labels.
+    """
+
+    scan: Scan
+    view: Neighbourhoods
+    target: Tensor | None
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Several scans, packed.
+
+    Attributes:
+        inputs: The network's inputs by name, scans one after the other.
+        target: What the network is to say of each point, int64; None without labels.
+        samples: The scans, in order.
+    """
+
+    inputs: dict[str, Tensor]
+    target: Tensor | None
+    samples: Sequence[Sample]
+
+    @classmethod
+    def of(cls, samples: Sequence[Sample]) -> "Batch":
+        """Packs samples; the scans' points stay neighbours of their own scan only."""
+        packed = type(samples[0].view).pack([sample.view for sample in samples])
+        targets = [sample.target for sample in samples if sample.target is not None]
+        return cls(
+            inputs={name: torch.from_numpy(array) for name, array in packed.items()},
+            target=torch.cat(targets) if len(targets) == len(samples) else None,
+            samples=samples,
+        )
+
+    def to(self, device: torch.device, non_blocking: bool = False) -> "Batch":
+        """The same batch with its tensors on a device; the scans stay in main memory."""
+        inputs = {
+            name: tensor.to(device, non_blocking=non_blocking)
+            for name, tensor in self.inputs.items()
+        }
+        target = self.target
+        if target is not None:
+            target = target.to(device, non_blocking=non_blocking)
+        return Batch(inputs, target, self.samples)
+
+    def split(self, scores: Tensor) -> list[Tensor]:
+        """Takes per-point scores, (M, ...), apart into those of each scan."""
+        return list(scores.split([len(sample.view.first) for sample in self.samples]))

@@ -1,0 +1,114 @@
+"""Data cards: what must be known of a data set to train on it and to use what was trained."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from derain.errors import InputError
+
+
+@dataclass(frozen=True)
+class DataCard:
+    """What must be known of a data set.
+
+    Attributes:
+        name: Name of the data set, for tables and models.
+        classes: Names of its semantic classes, by id.
+        rain: Ids of the classes that are to be removed.
+        licence: Licence of the data.
+        intensity_unit: Unit or span of its intensities, such as ``0..255``.
+        mean: Mean of x, y, z (metres) and intensity over the training points; None if not known.
+        std: Their standard deviations; None if not known.
+        rain_share: Share of rain among the training points; None if not known.
+        split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
+    """
+
+    name: str
+    classes: Mapping[int, str]
+    rain: tuple[int, ...]
+    licence: str = "not stated"
+    intensity_unit: str = "not stated"
+    mean: tuple[float, ...] | None = None
+    std: tuple[float, ...] | None = None
+    rain_share: float | None = None
+    split: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def has_statistics(self) -> bool:
+        """True where mean, standard deviation and rain share are all known."""
+        return None not in (self.mean, self.std, self.rain_share)
+
+    def with_statistics(
+        self, mean: tuple[float, ...], std: tuple[float, ...], rain_share: float
+    ) -> "DataCard":
+        """The same card with statistics taken from training scans."""
+        return replace(self, mean=mean, std=std, rain_share=rain_share)
+
+
+def packaged_cards() -> dict[str, Path]:
+    """Files of the data cards that come with derain, by name."""
+    folder = Path(str(resources.files("derain.cards")))
+    return {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+
+
+def load_card(name: str | Path) -> DataCard:
+    """Reads a data card.
+
+    Args:
+        name: Name of a packaged card, or a YAML file with the attributes of :class:`DataCard`.
+
+    Raises:
+        InputError: No such card, or a file that is not one.
+    """
+    cards = packaged_cards()
+    path = cards.get(str(name), Path(name))
+    if not path.is_file():
+        raise InputError(
+            name, "no such data card", f"Give a YAML file or one of {', '.join(cards)}."
+        )
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        return _card(content)
+    except (yaml.YAMLError, UnicodeDecodeError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(
+            path, f"not a data card ({error})", "It needs name, classes (id: name) and rain (ids)."
+        ) from error
+
+
+def _card(content: dict[str, Any]) -> DataCard:
+    card = DataCard(
+        **{
+            **content,
+            "classes": {int(id_): str(name) for id_, name in content.get("classes", {}).items()},
+            "rain": tuple(int(id_) for id_ in content.get("rain", ())),
+            "split": {part: _names(names) for part, names in content.get("split", {}).items()},
+            "mean": _channels(content.get("mean")),
+            "std": _channels(content.get("std")),
+        }
+    )
+    if not set(card.rain) <= set(card.classes) or not card.rain:
+        raise ValueError(f"rain {list(card.rain)} must name ids of its classes")
+    if card.std is not None and min(card.std) <= 0:
+        raise ValueError(f"std {list(card.std)} must be positive")
+    if card.rain_share is not None and not 0 <= card.rain_share <= 1:
+        raise ValueError(f"rain_share {card.rain_share} must be within 0 and 1")
+    return card
+
+
+def _channels(values: Any) -> tuple[float, ...] | None:
+    if values is None:
+        return None
+    numbers = tuple(map(float, values))
+    if len(numbers) != 4:
+        raise ValueError(f"{list(numbers)} must be one number each for x, y, z and intensity")
+    return numbers
+
+
+def _names(names: Any) -> tuple[str, ...]:
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise TypeError(f"{names} must be a list of sequences, each quoted: 010 alone is a number")
+    return tuple(names)

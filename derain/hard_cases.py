@@ -1,0 +1,96 @@
+"""Scans that break derainers: every method must survive them with a finite, defined answer."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.scan import Scan
+
+
+def scene(points: int = 3000, seed: int = 0) -> NDArray[np.float32]:
+    """An ordinary small scene: a road, a wall, and drops in the air between.
+
+    Args:
+        points: Number of points.
+        seed: Of the random generator.
+
+    Returns:
+        x, y, z in metres and intensity 0..255, float32 (points, 4).
+    """
+    rng = np.random.default_rng(seed)
+    road, drops = points // 2, points // 10
+    wall = points - road - drops
+    x = np.concatenate(
+        [rng.uniform(3, 60, road), rng.normal(40, 0.02, wall), rng.gamma(2, 4, drops)]
+    )
+    y = rng.uniform(-15, 15, points)
+    z = np.concatenate(
+        [rng.normal(-1.8, 0.02, road), rng.uniform(-1.8, 6, wall), rng.uniform(-1.5, 4, drops)]
+    )
+    intensity = np.concatenate(
+        [rng.uniform(5, 60, road), rng.uniform(20, 200, wall), rng.uniform(0, 4, drops)]
+    )
+    return np.stack([x, y, z, intensity], axis=1).astype(np.float32)
+
+
+def hard_cases(largest: int = 20_000) -> Iterator[tuple[str, Scan]]:
+    """Yields hard scans by name.
+
+    Args:
+        largest: Points of the largest scan.
+    """
+    ordinary = scene()
+    yield "empty", Scan.of(ordinary[:0])
+    yield "one point", Scan.of(ordinary[:1])
+    yield "fewer points than neighbours", Scan.of(ordinary[:5])
+    yield "all points identical", Scan.of(np.repeat(ordinary[:1], 500, axis=0))
+    yield "40 % duplicates", Scan.of(np.concatenate([ordinary, ordinary[:2000]]))
+    yield "NaN and infinite rows", Scan.of(_with_rows(ordinary, [np.nan, np.inf, -np.inf]))
+    yield "points at the origin", Scan.of(_with_rows(ordinary, [0.0]))
+    yield "sentinel cells", Scan.of(_with_rows(ordinary, [-1.0]))
+    yield "nothing valid", Scan.of(np.full((100, 4), np.nan, np.float32))
+    yield "range 1e-6 m", Scan.of(_scaled_to_range(ordinary, 1e-6))
+    yield "range 1e4 m", Scan.of(_scaled_to_range(ordinary, 1e4))
+    yield (
+        "near and far together",
+        Scan.of(
+            np.concatenate([_scaled_to_range(ordinary, 1e-6), _scaled_to_range(ordinary, 1e4)])
+        ),
+    )
+    yield "azimuth ±π", Scan.of(_behind(ordinary))
+    yield "on a line", Scan.of(ordinary * np.array([1, 0, 0, 1], np.float32))
+    yield "intensity 0", Scan.of(ordinary * np.array([1, 1, 1, 0], np.float32))
+    yield "intensity 65,535", Scan.of(_with_intensity(ordinary, 65_535))
+    yield "no intensity", Scan(ordinary[:, :3].copy())
+    yield "nothing but drops", Scan.of(ordinary[-300:])
+    yield "no drops", Scan.of(ordinary[:-300])
+    yield f"{largest:,} points", Scan.of(scene(largest))
+
+
+def _with_rows(points: NDArray[np.float32], values: list[float]) -> NDArray[np.float32]:
+    """Overwrites every tenth row with one of the values."""
+    points = points.copy()
+    rows = np.arange(0, len(points), 10)
+    points[rows] = np.resize(np.array(values, np.float32), len(rows))[:, None]
+    return points
+
+
+def _scaled_to_range(points: NDArray[np.float32], reach: float) -> NDArray[np.float32]:
+    points = points.copy()
+    points[:, :3] *= reach / np.linalg.norm(points[:, :3], axis=1, keepdims=True)
+    return points
+
+
+def _behind(points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Puts every point exactly behind the sensor, y being 0.0 or -0.0."""
+    points = points * np.array([-1, 0, 1, 1], np.float32)
+    points[::2, 1] = 0.0
+    points[1::2, 1] = -0.0
+    return points
+
+
+def _with_intensity(points: NDArray[np.float32], intensity: float) -> NDArray[np.float32]:
+    points = points.copy()
+    points[:, 3] = intensity
+    return points

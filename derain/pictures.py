@@ -1,0 +1,155 @@
+"""Pictures of scans: from above, as the sensor sees them, and what a derainer made of them."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from derain.files.atomic import replacing
+from derain.scan import Scan
+
+# Bright on dark, and told apart by colour-blind eyes.
+BACKGROUND = "#10151c"
+SOLID = "#7d8a99"
+RAIN = "#39c5ff"
+MISSED = "#ffd23f"
+LOST = "#ff5d5d"
+
+# What a point is and what it was called, as a number and a colour.
+OUTCOMES = {
+    "solid, kept": SOLID,
+    "rain, removed": RAIN,
+    "rain, left": MISSED,
+    "solid, lost": LOST,
+}
+
+
+def judgement_figure(
+    scan: Scan, predicted: NDArray[np.bool_], rain: NDArray[np.bool_], title: str
+) -> Figure:
+    """Input, truth, prediction and error of one scan, from above and as the sensor sees it.
+
+    Args:
+        scan: The scan.
+        predicted: Points called rain, bool (N,).
+        rain: Points that are rain, bool (N,).
+        title: Heading.
+    """
+    figure = Figure(figsize=(16, 7), layout="constrained")
+    figure.suptitle(title)
+    columns = figure.subplots(2, 4, sharex="row", sharey="row").T
+    error = np.select([rain & predicted, rain & ~predicted, predicted], [1, 2, 3], default=0)
+    colourings = {
+        "input: intensity": None,
+        "truth": rain.astype(int),
+        "prediction": predicted.astype(int),
+        "error": error,
+    }
+    for (above, ahead), (name, outcome) in zip(columns, colourings.items(), strict=True):
+        above.set_title(name)
+        _from_above(above, scan, outcome)
+        _as_seen(ahead, scan, outcome)
+    _label_once(columns[0])
+    figure.legend(
+        handles=[Patch(color=colour, label=name) for name, colour in OUTCOMES.items()],
+        loc="outside lower center",
+        ncols=len(OUTCOMES),
+        frameon=False,
+    )
+    return figure
+
+
+def before_after_figure(scan: Scan, predicted: NDArray[np.bool_], title: str) -> Figure:
+    """One scan as it came, with what was found in it, and what is left.
+
+    Args:
+        scan: The scan.
+        predicted: Points called rain, bool (N,).
+        title: Heading.
+    """
+    figure = Figure(figsize=(14, 9), layout="constrained")
+    figure.suptitle(title)
+    columns = figure.subplots(2, 2, sharex="row", sharey="row", height_ratios=(3, 2)).T
+    kept = scan.take(~predicted)
+    parts = {
+        f"before: {len(scan):,} points, {predicted.sum():,} of them rain": (scan, predicted),
+        f"after: {len(kept):,} points": (kept, np.zeros(len(kept), bool)),
+    }
+    for (above, ahead), (name, (part, rain)) in zip(columns, parts.items(), strict=True):
+        above.set_title(name)
+        _from_above(above, part, rain.astype(int))
+        _as_seen(ahead, part, rain.astype(int))
+    _label_once(columns[0])
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Writes a figure as PNG.
+
+    Raises:
+        InputError: An output that cannot be written.
+    """
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=110)
+
+
+def _from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
+    """Draws x forward and y to the left, in metres, as far as most points reach."""
+    seen = scan.valid
+    x, y, _ = scan.xyz[seen].T
+    _scatter(axes, -y, x, _colours(scan, outcome, seen))
+    axes.set_aspect("equal")
+    if len(x):
+        nearest, farthest = np.percentile(x, [1, 97])
+        centre, half = float(np.median(-y)), 0.6 * (farthest - nearest)
+        axes.set_xlim(centre - half, centre + half)
+        axes.set_ylim(nearest, farthest)
+
+
+def _as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
+    """Draws azimuth, left being left, and inclination, in degrees."""
+    seen = scan.valid
+    x, y, z = scan.xyz[seen].astype(np.float64).T
+    azimuth = np.degrees(np.arctan2(y, x))
+    inclination = np.degrees(np.arctan2(z, np.hypot(x, y)))
+    _scatter(axes, -azimuth, inclination, _colours(scan, outcome, seen))
+    if len(azimuth):
+        axes.set_xlim(*np.percentile(-azimuth, [0, 100]))
+        axes.set_ylim(*np.percentile(inclination, [0.1, 99.9]))
+
+
+def _colours(
+    scan: Scan, outcome: NDArray[np.int64] | None, rows: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """RGBA of each row: its outcome's colour, or its intensity from dark to bright."""
+    if outcome is not None:
+        return ListedColormap(list(OUTCOMES.values()))(outcome[rows])
+    if scan.intensity is None or not rows.any():
+        return ListedColormap([SOLID])(np.zeros(rows.sum(), int))
+    intensity = np.maximum(scan.intensity[rows], 0)
+    brightness = intensity / max(float(np.percentile(intensity, 98)), 1e-6)
+    shade = 0.25 + 0.75 * np.sqrt(np.clip(brightness, 0, 1))
+    return np.stack([shade, shade, shade, np.ones_like(shade)], axis=1)
+
+
+def _scatter(
+    axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colours: NDArray[np.float64]
+) -> None:
+    # Grey points first, so that the few coloured ones lie on top; small where there are many.
+    order = np.argsort(np.ptp(colours[:, :3], axis=1), kind="stable")
+    size = np.clip(60_000 / max(len(x), 1), 0.3, 3)
+    axes.scatter(x[order], y[order], s=size, c=colours[order], linewidths=0, rasterized=True)
+    axes.set_facecolor(BACKGROUND)
+    axes.tick_params(labelsize=8)
+
+
+def _label_once(column: NDArray[np.object_]) -> None:
+    above, ahead = column
+    above.set_ylabel("forward / m")
+    above.set_xlabel("right / m")
+    ahead.set_ylabel("inclination / °")
+    ahead.set_xlabel("azimuth, to the right / °")

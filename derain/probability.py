@@ -1,0 +1,17 @@
+"""From a network's logits to the probability of rain."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def probability_of_rain(logits: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Softmax over the two classes, in a form that no logit overflows.
+
+    Args:
+        logits: Scores of "not rain" and "rain", float32 (M, 2).
+
+    Returns:
+        Probability of rain, float32 (M,).
+    """
+    margin = logits[:, 1].astype(np.float64) - logits[:, 0]
+    return (0.5 + 0.5 * np.tanh(0.5 * margin)).astype(np.float32)
