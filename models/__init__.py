@@ -1,0 +1,1 @@
+"""LightningModules and their networks, one file a model."""

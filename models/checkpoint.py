@@ -1,0 +1,80 @@
+"""Checkpoints on disk: every model of derain, by the name in its Spec."""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import lightning
+
+from derain.errors import InputError
+from derain.files.atomic import replacing
+from derain.models.base import DerainingModule
+from derain.models.outdet import OutDet
+from derain.models.published import read_checkpoint
+from derain.spec import Spec
+
+MODELS: dict[str, type[DerainingModule]] = {OutDet.NAME: OutDet}
+
+
+def load_model(path: Path) -> DerainingModule:
+    """Reads a checkpoint that derain wrote. It is not trusted: only plain values are unpickled.
+
+    Raises:
+        InputError: A missing or damaged file, or a checkpoint of something else.
+    """
+    content = read_checkpoint(path)
+    try:
+        parameters = content["hyper_parameters"]
+        spec = Spec.from_dict(parameters["spec"], path)
+        weights = content["state_dict"]
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError(
+            path,
+            "not a checkpoint of derain",
+            "Published weights become one through `derain import-weights`.",
+        ) from error
+    if spec.network not in MODELS:
+        raise InputError(
+            path, f"a checkpoint of {spec.network!r}", f"Known are {', '.join(MODELS)}."
+        )
+    model_class = MODELS[spec.network]
+    try:
+        model = model_class(**{k: v for k, v in parameters.items() if not k.startswith("_")})
+        model.load_state_dict(weights)
+    except (TypeError, RuntimeError) as error:
+        raise InputError(
+            path,
+            f"its weights do not fit {spec.network} ({error})",
+            "Train or import the model again.",
+        ) from error
+    return model.eval()
+
+
+def save_model(model: DerainingModule, path: Path) -> None:
+    """Writes a checkpoint as a training run would, for ``derain test``, ``fit`` and ``export``.
+
+    Raises:
+        InputError: An output that cannot be written.
+    """
+    # LightningCLI finds the class of a checkpoint's model by this name.
+    model.hparams["_class_path"] = f"{type(model).__module__}.{type(model).__qualname__}"
+    with _quiet():
+        trainer = lightning.Trainer(
+            accelerator="cpu", logger=False, enable_checkpointing=False, enable_model_summary=False
+        )
+    trainer.strategy.connect(model)
+    with replacing(path) as temporary:
+        trainer.save_checkpoint(temporary, weights_only=True)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keeps the trainer from telling of its hardware: it does nothing but write."""
+    logger = logging.getLogger("lightning.pytorch.utilities.rank_zero")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
