@@ -1,0 +1,148 @@
+"""The things that stand on the simulated track, each at the origin of its own frame.
+
+Reflectivities are modelling choices for a near-infrared LiDAR, drawn per object; sizes are those of
+everyday objects.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation import shapes
+from derain.simulation.classes import TrackClass
+from derain.simulation.shapes import Triangles
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles of one class.
+
+    Attributes:
+        triangles: Corners, float64 (T, 3, 3), metres.
+        label: Class of all of them.
+        reflectivity: Of each triangle, float64 (T,), or of all of them, in 0..1.
+    """
+
+    triangles: Triangles
+    label: TrackClass
+    reflectivity: NDArray[np.float64] | float
+
+    def placed(self, x: float, y: float, heading: float = 0.0) -> "Surface":
+        """The same surface, turned by a heading in radians, then moved to (x, y)."""
+        return replace(self, triangles=shapes.placed(self.triangles, x, y, heading))
+
+
+def asphalt(
+    x: tuple[float, float], y: tuple[float, float], generator: np.random.Generator
+) -> Surface:
+    """A patch of road, from dry asphalt to a film of water that mirrors most of the light away."""
+    reflectivity = np.exp(generator.uniform(np.log(0.01), np.log(0.2)))
+    return Surface(shapes.rectangle(x, y, 0), TrackClass.ROAD, reflectivity)
+
+
+def ground(
+    x: tuple[float, float], y: tuple[float, float], generator: np.random.Generator
+) -> Surface:
+    """The ground under and beside the road, a centimetre lower so that the road is on top."""
+    plane = shapes.rectangle(x, y, -0.01)
+    return Surface(plane, TrackClass.BACKGROUND, generator.uniform(0.05, 0.3))
+
+
+def car(generator: np.random.Generator) -> Surface:
+    """A car, from black paint to white."""
+    length, width = generator.uniform(3.9, 4.9), generator.uniform(1.7, 1.95)
+    bonnet, roof = generator.uniform(0.75, 0.95), generator.uniform(1.4, 1.8)
+    profile = np.array([[-0.48, bonnet], [0.22, bonnet], [0.05, roof], [-0.4, roof]])
+    cabin = shapes.prism(profile * (length, 1), -0.42 * width, 0.42 * width)
+    body = shapes.box(length, width, 0.25, bonnet)
+    return Surface(
+        np.concatenate([body, shapes.on_its_side(cabin)]),
+        TrackClass.CAR,
+        generator.uniform(0.02, 0.6),
+    )
+
+
+def pedestrian(generator: np.random.Generator) -> Surface:
+    """A standing child or adult."""
+    height = generator.uniform(1.1, 1.9)
+    legs = [shapes.placed(shapes.cylinder(0.08, 0, 0.48 * height), 0, y) for y in (-0.1, 0.1)]
+    torso = shapes.cylinder(0.2, 0.48 * height, 0.84 * height)
+    head = shapes.cylinder(0.1, 0.86 * height, height)
+    return Surface(
+        np.concatenate([*legs, torso, head]), TrackClass.PEDESTRIAN, generator.uniform(0.03, 0.5)
+    )
+
+
+def bike(generator: np.random.Generator) -> Surface:
+    """A bicycle with its rider."""
+    wheel = shapes.raised(shapes.on_its_side(shapes.cylinder(0.34, -0.02, 0.02)), 0.34)
+    wheels = [shapes.placed(wheel, x, 0) for x in (-0.52, 0.52)]
+    frame = shapes.box(0.9, 0.05, 0.5, 0.62)
+    rider = [shapes.cylinder(0.17, 0.8, 1.5), shapes.cylinder(0.1, 1.52, 1.75)]
+    return Surface(
+        np.concatenate([*wheels, frame, *rider]), TrackClass.BIKE, generator.uniform(0.03, 0.5)
+    )
+
+
+def target(generator: np.random.Generator) -> Surface:
+    """A calibration plate on a stand, facing the sensor: black, grey or white."""
+    width, bottom = generator.uniform(0.5, 1.2), generator.uniform(0.3, 1.0)
+    plate = shapes.box(0.03, width, bottom, bottom + width)
+    stand = shapes.cylinder(0.03, 0, bottom)
+    return Surface(
+        np.concatenate([plate, stand]), TrackClass.TARGET, generator.choice([0.05, 0.1, 0.5, 0.9])
+    )
+
+
+def sprinkler(generator: np.random.Generator) -> Surface:
+    """A mast with an arm towards the side −y."""
+    height, arm = generator.uniform(3.0, 5.0), generator.uniform(1.0, 2.5)
+    mast = shapes.cylinder(generator.uniform(0.04, 0.1), 0, height)
+    pipe = shapes.placed(shapes.box(0.06, arm, height - 0.06, height), 0, -arm / 2)
+    foot = shapes.box(0.6, 0.6, 0, 0.25)
+    return Surface(
+        np.concatenate([mast, pipe, foot]), TrackClass.SPRINKLER, generator.uniform(0.05, 0.5)
+    )
+
+
+def pole(generator: np.random.Generator) -> Surface:
+    """A thin post: of a fence, a sign or a lamp."""
+    post = shapes.cylinder(generator.uniform(0.01, 0.06), 0, generator.uniform(0.8, 6.0))
+    return Surface(post, TrackClass.BACKGROUND, generator.uniform(0.02, 0.5))
+
+
+def trunk(generator: np.random.Generator) -> Surface:
+    """The trunk of a tree."""
+    stem = shapes.cylinder(generator.uniform(0.08, 0.25), 0, 3)
+    return Surface(stem, TrackClass.BACKGROUND, generator.uniform(0.05, 0.3))
+
+
+def building(generator: np.random.Generator) -> Surface:
+    """A flat-roofed building."""
+    length, width = generator.uniform(5, 15), generator.uniform(10, 40)
+    walls = shapes.box(length, width, 0, generator.uniform(3, 9))
+    return Surface(walls, TrackClass.BACKGROUND, generator.uniform(0.1, 0.6))
+
+
+def foliage(
+    radii: tuple[float, float, float], height: float, generator: np.random.Generator
+) -> Surface:
+    """Leaves and twigs in an ellipsoid: many small, scattered returns, most of them weak.
+
+    A ray hits a leaf or misses it, while a beam is often filled by it only in part; hence the wide
+    spread of reflectivity, down to that of a rain drop.
+
+    Args:
+        radii: Half-axes of the ellipsoid, metres.
+        height: Height of its centre, metres.
+        generator: Source of chance.
+    """
+    surface_area = radii[0] * radii[1] + radii[1] * radii[2] + radii[2] * radii[0]
+    count = int(generator.uniform(30, 250) * surface_area)
+    leaves = shapes.leaves(shapes.inside_ellipsoid(count, radii, generator), 0.02, generator)
+    return Surface(
+        shapes.raised(leaves, height),
+        TrackClass.BACKGROUND,
+        np.exp(generator.uniform(np.log(0.003), np.log(0.4), count)),
+    )

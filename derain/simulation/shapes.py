@@ -1,0 +1,98 @@
+"""Shapes of triangles: float64 arrays of shape (T, 3, 3), T triangles of 3 corners in metres."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Triangles = NDArray[np.float64]
+
+
+def rectangle(x: tuple[float, float], y: tuple[float, float], height: float) -> Triangles:
+    """A horizontal rectangle between two x and two y, at one height."""
+    corners = np.array([[x[i], y[j], height] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
+    return corners[[[0, 1, 2], [0, 2, 3]]]
+
+
+def prism(outline: NDArray[np.float64], bottom: float, top: float) -> Triangles:
+    """A vertical prism with its ends closed.
+
+    Args:
+        outline: Corners of the convex base in order, (K, 2).
+        bottom: Height of the lower end.
+        top: Height of the upper end.
+    """
+    lower = np.column_stack([outline, np.full(len(outline), bottom)])
+    upper = np.column_stack([outline, np.full(len(outline), top)])
+    next_lower, next_upper = np.roll(lower, -1, axis=0), np.roll(upper, -1, axis=0)
+    sides = [
+        np.stack([lower, next_lower, next_upper], axis=1),
+        np.stack([lower, next_upper, upper], axis=1),
+    ]
+    ends = [
+        np.stack([np.broadcast_to(end[0], end[2:].shape), end[1:-1], end[2:]], axis=1)
+        for end in (lower, upper)
+    ]
+    return np.concatenate(sides + ends)
+
+
+def box(length: float, width: float, bottom: float, top: float) -> Triangles:
+    """A box about the z axis: length along x, width along y."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (length / 2, width / 2)
+    return prism(corners, bottom, top)
+
+
+def cylinder(radius: float, bottom: float, top: float) -> Triangles:
+    """A twelve-sided cylinder about the z axis."""
+    angle = np.arange(12) * (2 * np.pi / 12)
+    return prism(radius * np.column_stack([np.cos(angle), np.sin(angle)]), bottom, top)
+
+
+def on_its_side(triangles: Triangles) -> Triangles:
+    """Turns a shape about the x axis so that its z axis lies along y."""
+    return triangles[..., [0, 2, 1]] * (1, -1, 1)
+
+
+def placed(triangles: Triangles, x: float, y: float, heading: float = 0.0) -> Triangles:
+    """Turns a shape by a heading in radians about the z axis, then moves it to (x, y)."""
+    cosine, sine = np.cos(heading), np.sin(heading)
+    turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    moved: Triangles = triangles @ turn + (x, y, 0)
+    return moved
+
+
+def raised(triangles: Triangles, height: float) -> Triangles:
+    """Moves a shape up by a height in metres."""
+    lifted: Triangles = triangles + np.array([0, 0, height])
+    return lifted
+
+
+def sloped(triangles: Triangles, ahead: float, left: float) -> Triangles:
+    """Raises a shape by a share of its x and of its y, as on sloping ground."""
+    shear = np.array([[1, 0, ahead], [0, 1, left], [0, 0, 1]])
+    leaning: Triangles = triangles @ shear
+    return leaning
+
+
+def leaves(centres: NDArray[np.float64], size: float, generator: np.random.Generator) -> Triangles:
+    """One small triangle, turned at random, about every centre.
+
+    Args:
+        centres: Centres in metres, (L, 3).
+        size: Standard deviation of a corner's distance from the centre along an axis, metres.
+        generator: Source of chance.
+    """
+    return centres[:, None, :] + generator.normal(0, size, (len(centres), 3, 3))
+
+
+def inside_ellipsoid(
+    count: int, radii: tuple[float, float, float], generator: np.random.Generator
+) -> NDArray[np.float64]:
+    """Points uniform in an ellipsoid about the origin, (count, 3), metres.
+
+    Args:
+        count: How many.
+        radii: Half-axes along x, y and z, metres.
+        generator: Source of chance.
+    """
+    direction = generator.normal(size=(count, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    return direction * np.cbrt(generator.random((count, 1))) * radii

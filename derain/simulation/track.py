@@ -1,0 +1,82 @@
+"""A test track as triangles, and what a standing sensor sees of it through clear air."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.open3d_import import import_open3d
+from derain.simulation.classes import TrackClass
+from derain.simulation.objects import Surface
+from derain.simulation.sensor import Returns, Sensor
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Everything on the track.
+
+    Attributes:
+        triangles: Corners, float32 (T, 3, 3), metres; x forward, y left, z up, with the origin on
+            the road under the sensor.
+        reflectivity: Reflectivity of each triangle, float64 (T,), in 0..1.
+        label: TrackClass of each triangle, int64 (T,).
+    """
+
+    triangles: NDArray[np.float32]
+    reflectivity: NDArray[np.float64]
+    label: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, surfaces: Iterable[Surface]) -> "Track":
+        """Joins surfaces, at least one, into a track."""
+        triangles, reflectivity, label = zip(
+            *(
+                (
+                    surface.triangles,
+                    np.broadcast_to(surface.reflectivity, len(surface.triangles)),
+                    np.full(len(surface.triangles), surface.label, dtype=np.int64),
+                )
+                for surface in surfaces
+            ),
+            strict=True,
+        )
+        return cls(
+            np.concatenate(triangles).astype(np.float32),
+            np.concatenate(reflectivity),
+            np.concatenate(label),
+        )
+
+    def cast(self, sensor: Sensor) -> Returns:
+        """What every beam of a sensor would return through clear air, were its detector perfect.
+
+        A beam is one ray. Surfaces scatter like Lambert's: their apparent reflectivity falls with
+        the cosine of the angle of incidence.
+
+        Args:
+            sensor: The sensor; it stands at the origin, at its mounting height.
+
+        Raises:
+            InputError: Open3D cannot be imported.
+        """
+        open3d = import_open3d()
+        tensor = open3d.core.Tensor
+        scene = open3d.t.geometry.RaycastingScene()
+        corners = np.arange(3 * len(self.triangles), dtype=np.uint32).reshape(-1, 3)
+        scene.add_triangles(tensor(self.triangles.reshape(-1, 3)), tensor(corners))
+
+        beams = sensor.beams()
+        origin = np.broadcast_to((0, 0, sensor.mounting_height), beams.shape)
+        rays = np.concatenate([origin, beams], axis=1).astype(np.float32)
+        hits = {name: hit.numpy() for name, hit in scene.cast_rays(tensor(rays)).items()}
+
+        hit = hits["t_hit"] <= sensor.maximum_range
+        triangle = hits["primitive_ids"][hit]
+        cosine = np.abs((hits["primitive_normals"][hit] * beams[hit]).sum(axis=1))
+        distance = np.full(len(beams), sensor.maximum_range)
+        reflectivity = np.zeros(len(beams))
+        label = np.full(len(beams), TrackClass.BACKGROUND, dtype=np.int64)
+        distance[hit] = hits["t_hit"][hit]
+        reflectivity[hit] = self.reflectivity[triangle] * cosine
+        label[hit] = self.label[triangle]
+        return Returns(distance, reflectivity, label)

@@ -1,0 +1,68 @@
+"""Shapes against the areas and volumes of school geometry."""
+
+import numpy as np
+import pytest
+
+from derain.simulation import shapes
+from derain.simulation.shapes import Triangles
+
+
+def area(triangles: Triangles) -> float:
+    edges = triangles[:, 1:] - triangles[:, :1]
+    return float(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum() / 2)
+
+
+def test_a_box_has_the_area_of_its_six_sides() -> None:
+    sides = 2 * (3 * 2 + 2 * 1.5 + 3 * 1.5)
+    assert area(shapes.box(3, 2, 0.5, 2.0)) == pytest.approx(sides)
+
+
+def test_a_cylinder_has_the_area_of_a_twelve_sided_prism() -> None:
+    base = 12 / 2 * np.sin(2 * np.pi / 12) * 0.4**2
+    side = 12 * 2 * np.sin(np.pi / 12) * 0.4 * 1.7
+    assert area(shapes.cylinder(0.4, 0.3, 2.0)) == pytest.approx(2 * base + side)
+
+
+def test_a_rectangle_spans_what_it_is_told() -> None:
+    flat = shapes.rectangle((-1, 4), (2, 5), 0.5)
+    assert area(flat) == pytest.approx(15)
+    assert flat.min(axis=(0, 1)).tolist() == [-1, 2, 0.5]
+    assert flat.max(axis=(0, 1)).tolist() == [4, 5, 0.5]
+
+
+def test_moving_a_shape_keeps_its_area_and_turns_x_towards_y() -> None:
+    post = shapes.box(2, 0.1, 0, 1)
+    moved = shapes.placed(post, 10, 3, np.pi / 2)
+    assert area(moved) == pytest.approx(area(post))
+    assert np.ptp(moved, axis=(0, 1)) == pytest.approx([0.1, 2, 1])
+    assert moved.mean(axis=(0, 1)) == pytest.approx(post.mean(axis=(0, 1)) + np.array([10, 3, 0]))
+
+
+def test_a_shape_on_its_side_has_its_height_along_y() -> None:
+    profile = np.array([[0, 0], [4, 0], [4, 1], [0, 1]])
+    lying = shapes.on_its_side(shapes.prism(profile, -0.5, 0.5))
+    assert lying.min(axis=(0, 1)) == pytest.approx([0, -0.5, 0])
+    assert lying.max(axis=(0, 1)) == pytest.approx([4, 0.5, 1])
+
+
+def test_a_slope_lifts_by_a_share_of_the_distance() -> None:
+    flat = shapes.rectangle((0, 100), (-10, 10), 0)
+    lifted = shapes.sloped(flat, 0.04, -0.1)
+    assert lifted[..., :2] == pytest.approx(flat[..., :2])
+    assert lifted[..., 2] == pytest.approx(0.04 * flat[..., 0] - 0.1 * flat[..., 1])
+
+
+def test_points_fill_an_ellipsoid_evenly() -> None:
+    radii = (1.0, 2.0, 0.5)
+    points = shapes.inside_ellipsoid(20_000, radii, np.random.default_rng(0)) / radii
+    radius = np.linalg.norm(points, axis=1)
+    assert radius.max() <= 1
+    assert (radius < 0.5).mean() == pytest.approx(1 / 8, abs=0.01)
+    assert np.abs(points.mean(axis=0)).max() < 0.02
+
+
+def test_leaves_stay_about_their_centres() -> None:
+    centres = np.random.default_rng(0).uniform(-5, 5, (500, 3))
+    leaves = shapes.leaves(centres, 0.02, np.random.default_rng(1))
+    assert np.abs(leaves - centres[:, None]).max() < 0.1
+    assert (leaves - centres[:, None]).std() == pytest.approx(0.02, rel=0.1)

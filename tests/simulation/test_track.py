@@ -1,0 +1,103 @@
+"""The ray-cast track against closed forms and a test of every ray with every triangle."""
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from derain.simulation import objects, shapes
+from derain.simulation.classes import TrackClass
+from derain.simulation.layout import lay_out_track
+from derain.simulation.objects import Surface
+from derain.simulation.sensor import Sensor
+from derain.simulation.track import Track
+
+SENSOR = Sensor(rows=16, columns=40)
+ON_THE_TRACK = set(TrackClass) - {TrackClass.RAIN}
+
+
+def test_flat_ground_lies_where_its_angle_says_and_darkens_with_it(open3d: ModuleType) -> None:
+    plane = shapes.rectangle((-500, 500), (-500, 500), 0)
+    clear = Track.of([Surface(plane, TrackClass.ROAD, 0.3)]).cast(SENSOR)
+    sine = -SENSOR.beams()[:, 2]
+    distance = SENSOR.mounting_height / np.where(sine > 0, sine, np.nan)
+    hit = distance < SENSOR.maximum_range
+    assert 0 < hit.sum() < len(hit)
+    assert (clear.returned == hit).all()
+    assert np.allclose(clear.range[hit], distance[hit], rtol=1e-4)
+    assert np.allclose(clear.reflectivity[hit], 0.3 * sine[hit], rtol=1e-4)
+    assert (clear.label[hit] == TrackClass.ROAD).all()
+    assert (clear.range[~hit] == SENSOR.maximum_range).all()
+
+
+def test_casting_finds_the_nearest_of_all_triangles(open3d: ModuleType) -> None:
+    generator = np.random.default_rng(0)
+    corners = generator.uniform((5, -10, 0), (30, 10, 4), (60, 1, 3))
+    triangles = corners + generator.normal(0, 2, (60, 3, 3))
+    reflectivity = generator.uniform(0.1, 1, 60)
+    clear = Track.of([Surface(triangles, TrackClass.CAR, reflectivity)]).cast(SENSOR)
+
+    # Möller and Trumbore's intersection of every ray with every triangle.
+    beams, origin = SENSOR.beams()[:, None], np.array([0, 0, SENSOR.mounting_height])
+    first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    cross = np.cross(beams, second)
+    determinant = (cross * first).sum(-1)
+    offset = origin - triangles[:, 0]
+    u = (cross * offset).sum(-1) / determinant
+    v = (beams * np.cross(offset, first)).sum(-1) / determinant
+    distance = (second * np.cross(offset, first)).sum(-1) / determinant
+    inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0)
+    distance = np.where(inside, distance, np.inf)
+    nearest, hit = distance.argmin(axis=1), np.isfinite(distance.min(axis=1))
+
+    assert hit.sum() > 50
+    assert (clear.returned == hit).all()
+    assert np.allclose(clear.range[hit], distance.min(axis=1)[hit], rtol=1e-4)
+    normal = np.cross(first, second)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    cosine = np.abs((SENSOR.beams() * normal[nearest]).sum(axis=1))
+    assert np.allclose(clear.reflectivity[hit], (reflectivity[nearest] * cosine)[hit], atol=1e-4)
+
+
+def test_every_class_but_rain_stands_on_every_track() -> None:
+    for seed in range(5):
+        track = lay_out_track(np.random.default_rng(seed))
+        assert {TrackClass(label) for label in track.label} == ON_THE_TRACK
+        assert len(track.label) == len(track.triangles) == len(track.reflectivity)
+        assert track.reflectivity.min() > 0
+        assert track.reflectivity.max() <= 1
+        assert np.isfinite(track.triangles).all()
+
+
+def test_a_seed_gives_the_same_track_again_and_another_seed_another_one() -> None:
+    first, again, other = (lay_out_track(np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert np.array_equal(first.triangles, again.triangles)
+    assert not np.array_equal(first.triangles[:1000], other.triangles[:1000])
+
+
+@pytest.mark.parametrize(
+    ("make", "size"),
+    [
+        (objects.car, (5, 2, 2)),
+        (objects.bike, (2, 0.5, 2)),
+        (objects.pedestrian, (0.5, 0.5, 2)),
+        (objects.target, (0.1, 1.3, 2.5)),
+        (objects.sprinkler, (1, 3.5, 5.5)),
+    ],
+)
+def test_things_stand_on_the_ground_and_have_everyday_sizes(
+    make: object, size: tuple[float, float, float]
+) -> None:
+    assert callable(make)
+    for seed in range(20):
+        triangles = make(np.random.default_rng(seed)).triangles
+        assert 0 <= triangles[..., 2].min() <= 0.3
+        assert (np.ptp(triangles, axis=(0, 1)) < size).all()
+
+
+def test_foliage_returns_scattered_points_as_weak_as_rain(open3d: ModuleType) -> None:
+    bush = objects.foliage((1.0, 1.0, 1.0), 1.0, np.random.default_rng(0)).placed(6, 0)
+    sensor = Sensor(azimuth=(-10, 10), rows=60, columns=200)
+    clear = Track.of([bush]).cast(sensor)
+    assert 20 < clear.returned.sum() < 0.3 * len(clear.returned)
+    assert (clear.reflectivity[clear.returned] < 0.02).mean() > 0.3
