@@ -1,0 +1,1 @@
+"""Packaged configurations, one YAML per model and data set, found by name."""

@@ -1,0 +1,223 @@
+"""From a data set's files to batches of views."""
+
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import lightning
+import numpy as np
+import torch
+from torch.utils.data import DataLoader, Dataset
+
+from derain.batch import Batch, Sample
+from derain.cards import DataCard
+from derain.datamodules.augmentation import Augmentation
+from derain.datamodules.statistics import evenly_spaced, measured
+from derain.errors import InputError
+from derain.files import DEFAULT_COLUMNS, read_scan
+from derain.files.labels import read_labels, semantic
+from derain.morton import distinct_positions
+from derain.neighbours import NeighbourView
+from derain.scan import Scan
+
+Part = Literal["train", "validation", "test", "predict"]
+
+
+@dataclass(frozen=True)
+class ScanFile:
+    """Where one scan lies, and where its labels do if it has any."""
+
+    scan: Path
+    label: Path | None = None
+
+
+class ScanDataset(Dataset[Sample | InputError]):
+    """Reads scans and views them.
+
+    Args:
+        files: The scans.
+        read: Reads one of them.
+        view: What the network sees.
+        rain: Ids of the classes that count as rain.
+        augmentation: Changes each scan anew; None leaves them as they are.
+    """
+
+    def __init__(
+        self,
+        files: Sequence[ScanFile],
+        read: Callable[[ScanFile], Scan],
+        view: NeighbourView,
+        rain: tuple[int, ...],
+        augmentation: Augmentation | None = None,
+    ) -> None:
+        self.files = files
+        self.read = read
+        self.view = view
+        self.rain = rain
+        self.augmentation = augmentation
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    def __getitem__(self, number: int) -> Sample | InputError:
+        # What a worker raises becomes a RuntimeError with a traceback in the training process;
+        # what it returns crosses as it is, and is raised there.
+        try:
+            return self._sample(self.files[number])
+        except InputError as error:
+            return error
+
+    def _sample(self, file: ScanFile) -> Sample:
+        scan = self.read(file)
+        if self.augmentation is not None:
+            # torch's generator differs by run seed, epoch and worker; NumPy's global one does not.
+            seed = int(torch.randint(2**62, ()).item())
+            scan = self.augmentation(scan, np.random.default_rng(seed))
+        view = self.view(scan)
+        if scan.label is None:
+            return Sample(scan, view, None)
+        target = view.target(np.isin(scan.label, self.rain))
+        return Sample(scan, view, torch.from_numpy(target))
+
+
+@dataclass(frozen=True)
+class Loading:
+    """How scans are read and batched.
+
+    Attributes:
+        batch_size: Scans in a batch.
+        workers: Processes that read and view scans; 0 does it in the training process.
+        columns: Names of the columns of ``.bin`` and ``.npy`` files.
+        deduplicate: Measure on distinct points, each counted once. Predictions are for every row
+            in any case.
+        augmentation: What training changes about its scans.
+    """
+
+    batch_size: int = 1
+    workers: int = 0
+    columns: tuple[str, ...] = DEFAULT_COLUMNS
+    deduplicate: bool = False
+    augmentation: Augmentation = field(default_factory=Augmentation)
+
+
+class ScanDataModule(lightning.LightningDataModule):
+    """Batches of views of scans, for training, validation, test and prediction.
+
+    Which view is the model's to say: its loaders ask the model that the trainer holds.
+
+    Args:
+        card: Data card of the scans; statistics it lacks are taken from the training scans.
+        loading: How the scans are read and batched.
+    """
+
+    def __init__(self, card: DataCard, loading: Loading) -> None:
+        super().__init__()
+        self.card = card
+        self.loading = loading
+
+    @abstractmethod
+    def files(self, part: Part) -> list[ScanFile]:
+        """The scans of a part of the data, in order.
+
+        Raises:
+            InputError: Missing folders or files.
+        """
+
+    def setup(self, stage: str) -> None:
+        """Completes the data card from the training scans where it has no statistics."""
+        if stage == "fit" and not self.card.has_statistics:
+            files = self.files("train")
+            self.card = measured(self.card, map(self.read, evenly_spaced(files)))
+
+    def train_dataloader(self) -> DataLoader[Sample | InputError]:
+        """Training scans, shuffled and augmented."""
+        return self._loader("train", self.loading.augmentation)
+
+    def val_dataloader(self) -> DataLoader[Sample | InputError]:
+        """Validation scans, in order."""
+        return self._loader("validation")
+
+    def test_dataloader(self) -> DataLoader[Sample | InputError]:
+        """Test scans, in order."""
+        return self._loader("test")
+
+    def predict_dataloader(self) -> DataLoader[Sample | InputError]:
+        """Test scans, whether or not they have labels, every row of them."""
+        return self._loader("predict")
+
+    def read(self, file: ScanFile) -> Scan:
+        """Reads a scan with its labels.
+
+        Raises:
+            InputError: A file that cannot be read, or labels that are not in the data card.
+        """
+        scan = replace(read_scan(file.scan, self.loading.columns), fields={})
+        if file.label is None:
+            return scan
+        label = semantic(read_labels(file.label, len(scan)))
+        unknown = np.setdiff1d(label, list(self.card.classes))
+        if len(unknown):
+            raise InputError(
+                file.label,
+                f"ids {unknown[:5].tolist()} are no classes of {self.card.name}",
+                "Name them in the data card.",
+            )
+        return scan.with_label(label)
+
+    def on_before_batch_transfer(self, batch: Batch | InputError, dataloader_idx: int) -> Batch:
+        """Raises what went wrong where the batch was made, perhaps in another process."""
+        if isinstance(batch, InputError):
+            raise batch
+        return batch
+
+    def _loader(
+        self, part: Part, augmentation: Augmentation | None = None
+    ) -> DataLoader[Sample | InputError]:
+        model = self.trainer.lightning_module
+        if model.spec is None:
+            raise InputError("model", "it has not been trained", "Give --ckpt_path.")
+        dataset = ScanDataset(
+            self.files(part),
+            self._read_distinct if self.loading.deduplicate and part != "predict" else self.read,
+            model.spec.make_view(threads=1 if self.loading.workers else 0),
+            self.card.rain,
+            augmentation,
+        )
+        return DataLoader(
+            dataset,
+            batch_size=self.loading.batch_size,
+            shuffle=part == "train",
+            num_workers=self.loading.workers,
+            persistent_workers=self.loading.workers > 0,
+            collate_fn=_packed,
+        )
+
+    def _read_distinct(self, file: ScanFile) -> Scan:
+        scan = self.read(file)
+        judged = np.flatnonzero(scan.valid)
+        first, _ = distinct_positions(scan.xyz[judged])
+        return scan.take(np.sort(judged[first]))
+
+
+def _packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:
+    for error in samples:
+        if isinstance(error, InputError):
+            return error
+    return Batch.of([sample for sample in samples if isinstance(sample, Sample)])
+
+
+def labelled(scans: Sequence[Path], label_of: Callable[[Path], Path]) -> list[ScanFile]:
+    """Pairs scans with their label files.
+
+    Raises:
+        InputError: A scan without its label file.
+    """
+    files = [ScanFile(scan, label_of(scan)) for scan in scans]
+    for file in files:
+        if file.label is not None and not file.label.is_file():
+            raise InputError(
+                file.scan, f"its labels are not at {file.label}", "Add them or leave the scan out."
+            )
+    return files

@@ -1,0 +1,62 @@
+"""Any scans and labels, wherever they lie."""
+
+from glob import glob
+from pathlib import Path
+
+from derain.cards import load_card
+from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile, labelled
+from derain.errors import InputError
+
+
+class Folder(ScanDataModule):
+    """Scans picked by patterns; a scan's labels are ``<stem>.label`` beside it or in ``../labels``.
+
+    Args:
+        root: Folder that the patterns start from.
+        card: Name of a packaged data card, or a YAML file: it maps label ids to class names and
+            says which are rain.
+        train: Patterns of the training scans, such as ``velodyne/*.bin`` or ``**/*.pcd``.
+        validation: Patterns of the validation scans.
+        test: Patterns of the scans that are tested and predicted.
+        loading: How the scans are read and batched.
+    """
+
+    def __init__(
+        self,
+        root: str,
+        card: str,
+        train: list[str] = [],
+        validation: list[str] = [],
+        test: list[str] = [],
+        loading: Loading = Loading(),
+    ) -> None:
+        super().__init__(load_card(card), loading)
+        self.root = Path(root)
+        self.patterns = {"train": train, "validation": validation, "test": test, "predict": test}
+
+    def files(self, part: Part) -> list[ScanFile]:
+        """The scans that a part's patterns find, each pattern's in sorted order.
+
+        Raises:
+            InputError: A pattern that finds nothing, or a scan without labels.
+        """
+        patterns = self.patterns[part]
+        if not patterns:
+            raise InputError(self.root, f"no patterns for {part}", f"Give --data.{part}.")
+        scans = [scan for pattern in patterns for scan in self._matches(pattern)]
+        if part == "predict":
+            return [ScanFile(scan) for scan in scans]
+        return labelled(scans, label_beside)
+
+    def _matches(self, pattern: str) -> list[Path]:
+        found = sorted(glob(pattern, root_dir=self.root, recursive=True))
+        matches = [self.root / path for path in found if not path.endswith(".label")]
+        if not matches:
+            raise InputError(self.root / pattern, "matches no scan", "Check root and pattern.")
+        return matches
+
+
+def label_beside(scan: Path) -> Path:
+    """Label file of a scan: beside it if there is one, else in the sibling folder ``labels``."""
+    beside = scan.with_suffix(".label")
+    return beside if beside.is_file() else scan.parent.parent / "labels" / beside.name

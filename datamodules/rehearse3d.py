@@ -1,0 +1,29 @@
+"""REHEARSE-3D: emulated rain, a MEMS LiDAR fused with a 4D radar."""
+
+from derain.cards import load_card
+from derain.datamodules.base import Loading
+from derain.datamodules.sequences import Layout, SequenceDataModule
+
+
+class Rehearse3D(SequenceDataModule):
+    """REHEARSE-3D as published: merged LiDAR and radar clouds, and the official split.
+
+    The merged files hold x, y, z and intensity; which points are the radar's they do not say.
+
+    Args:
+        root: Folder ``REHEARSE3D_PUBLIC``.
+        layout: Names of its folders.
+        split: Sequences of ``train``, ``validation`` and ``test``, in place of the official ones.
+        loading: How the scans are read and batched.
+
+    Source: sporsho/sporsho.github.io, REHEARSE3D.md, and the published ``data_cfg.yaml``.
+    """
+
+    def __init__(
+        self,
+        root: str,
+        layout: Layout = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels"),
+        split: dict[str, list[str]] | None = None,
+        loading: Loading = Loading(),
+    ) -> None:
+        super().__init__(root, load_card("rehearse3d"), layout, split, loading)

@@ -1,0 +1,74 @@
+"""The layout of SemanticKITTI and its kin: a folder of sequences, each with scans and labels."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from derain.cards import DataCard
+from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile, labelled
+from derain.errors import InputError
+from derain.files import find_scans
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where scans and labels lie: ``root/<sequences>/<sequence>/<scans>/<frame>.bin``.
+
+    Attributes:
+        sequences: Name of the folder of sequences.
+        scans: Name of a sequence's folder of scans.
+        labels: Name of a sequence's folder of labels, ``<frame>.label``.
+    """
+
+    sequences: str = "sequences"
+    scans: str = "velodyne"
+    labels: str = "labels"
+
+
+class SequenceDataModule(ScanDataModule):
+    """Scans and labels in sequences, which a split assigns to train, validation and test.
+
+    Args:
+        root: Folder of the data set.
+        card: Data card of the scans.
+        layout: Names of its folders.
+        split: Sequences of ``train``, ``validation`` and ``test``; by default the data card's.
+        loading: How the scans are read and batched.
+    """
+
+    def __init__(
+        self,
+        root: str,
+        card: DataCard,
+        layout: Layout,
+        split: Mapping[str, Sequence[str]] | None,
+        loading: Loading,
+    ) -> None:
+        super().__init__(card, loading)
+        self.root = Path(root)
+        self.layout = layout
+        self.split = split or card.split
+
+    def files(self, part: Part) -> list[ScanFile]:
+        """The scans of a part's sequences, in order; for prediction those of the test part.
+
+        Raises:
+            InputError: A missing sequence, scan folder or label file.
+        """
+        sequences = self.split.get("test" if part == "predict" else part, ())
+        if not sequences:
+            raise InputError(self.root, f"no sequences are named for {part}", "Give a split.")
+        return [file for name in sequences for file in self._sequence(name, part)]
+
+    def _sequence(self, name: str, part: Part) -> list[ScanFile]:
+        folder = self.root / self.layout.sequences / name
+        if not (folder / self.layout.scans).is_dir():
+            raise InputError(
+                folder / self.layout.scans,
+                f"no such folder, though the split names sequence {name}",
+                "Check --data.root, or give a --data.split of the sequences that are there.",
+            )
+        scans = find_scans([folder / self.layout.scans])
+        if part == "predict":
+            return [ScanFile(scan) for scan in scans]
+        return labelled(scans, lambda scan: folder / self.layout.labels / f"{scan.stem}.label")

@@ -1,0 +1,31 @@
+"""WADS: real snow on a 64-beam LiDAR."""
+
+from derain.cards import load_card
+from derain.datamodules.base import Loading
+from derain.datamodules.sequences import Layout, SequenceDataModule
+
+
+class Wads(SequenceDataModule):
+    """WADS as published, with the split of 3D-OutDet.
+
+    Its raw scans hold about 40 % of their points twice. They are measured on distinct points, as
+    the published results are; predictions are for every row of the raw file.
+
+    Args:
+        root: Folder of the data set.
+        layout: Names of its folders.
+        split: Sequences of ``train``, ``validation`` and ``test``, in place of the published ones.
+        loading: How the scans are read and batched.
+
+    Source: A. Kurup, J. Bos, "DSOR: A Scalable Statistical Filter for Removing Falling Snow from
+    LiDAR Point Clouds in Severe Winter Weather", 2021; split: sporsho/3D_OutDet.
+    """
+
+    def __init__(
+        self,
+        root: str,
+        layout: Layout = Layout(scans="velodyne", labels="labels"),
+        split: dict[str, list[str]] | None = None,
+        loading: Loading = Loading(deduplicate=True),
+    ) -> None:
+        super().__init__(root, load_card("wads"), layout, split, loading)
