@@ -1,0 +1,108 @@
+"""Writes a trained network as one self-contained ONNX file."""
+
+import json
+import logging
+import platform
+import warnings
+from pathlib import Path
+
+import numpy
+import onnx
+import onnxruntime
+import torch
+
+import derain
+from derain.errors import InputError
+from derain.export.proof import Proof, prove
+from derain.export.runtime import METADATA_KEY
+from derain.files.atomic import replacing
+from derain.hard_cases import hard_cases, scene
+from derain.models.base import DerainingModule
+from derain.scan import Scan
+from derain.spec import Spec
+
+# Pinned: what a file may contain is then the same whatever torch exports by default.
+# 18 is the oldest opset that torch 2.13's exporter writes without converting.
+OPSET = 18
+
+
+def export(model: DerainingModule, path: Path) -> Proof:
+    """Exports a model, proves it, and only then puts the file in its place.
+
+    Args:
+        model: A trained model.
+        path: The ONNX file to write.
+
+    Returns:
+        The proof, which the file's metadata holds as well.
+
+    Raises:
+        InputError: A model without a Spec, an output that cannot be written, or a proof that
+            fails; no file is left then.
+    """
+    if model.spec is None:
+        raise InputError(path, "the model has not been trained", "Train it or import weights.")
+    model = model.eval().cpu()
+    with replacing(path) as temporary:
+        proto = _traced(model, model.spec)
+        _describe(proto, model.spec, {})
+        onnx.save(proto, temporary)
+        proof = prove(model, temporary, hard_cases())
+        if not proof.holds:
+            raise InputError(path, f"the exported model differs:\n{proof}", "No file was left.")
+        _describe(proto, model.spec, proof.as_dict())
+        onnx.checker.check_model(proto, full_check=True)
+        onnx.save(proto, temporary)
+    return proof
+
+
+def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
+    """The deployed network as an ONNX graph with any number of points."""
+    # 50 points: neither 0 nor 1, which the exporter would take for constants, nor any other size.
+    example = spec.make_view()(Scan.of(scene(50)))
+    inputs = {name: torch.from_numpy(array) for name, array in example.inputs().items()}
+    points = torch.export.Dim("points", min=0)
+    # The exporter's own parts warn of each other, and of torchvision; what it makes is checked.
+    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        program = torch.onnx.export(
+            model.folded().eval(),
+            kwargs=inputs,
+            input_names=list(inputs),
+            output_names=["logits"],
+            opset_version=OPSET,
+            dynamo=True,
+            external_data=False,
+            dynamic_shapes={name: {0: points} for name in inputs},
+            verbose=False,
+        )
+    assert program is not None  # only None when it was told to write a file itself
+    proto: onnx.ModelProto = program.model_proto
+    return proto
+
+
+def _describe(proto: onnx.ModelProto, spec: Spec, proof: dict[str, object]) -> None:
+    """Writes into the file what a user needs besides its graph."""
+    versions = {
+        "derain": derain.__version__,
+        "torch": torch.__version__,
+        "onnx": onnx.__version__,
+        "onnxruntime": onnxruntime.__version__,
+        "numpy": numpy.__version__,
+        "python": platform.python_version(),
+    }
+    description = f"{spec.network} trained on {spec.data}: probability of rain for LiDAR points"
+    proto.doc_string = description
+    proto.producer_name, proto.producer_version = "derain", derain.__version__
+    onnx.helper.set_model_props(
+        proto,
+        {
+            METADATA_KEY: json.dumps(
+                {"spec": spec.as_dict(), "proof": proof, "versions": versions}
+            ),
+            "description": description,
+            "license": f"network: MIT; training data: {spec.licence}",
+            "version": derain.__version__,
+        },
+    )

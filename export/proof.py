@@ -1,0 +1,131 @@
+"""Proves an exported model against the network it was exported from."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from derain.export.runtime import Derainer
+from derain.probability import probability_of_rain
+from derain.scan import Scan
+from derain.spec import Spec
+
+# Largest difference of a logit, as a share of the scan's largest logit where that is above 1:
+# float32 keeps seven digits, and a sum of 288 products may lose three of them.
+TOLERANCE = 1e-4
+
+# Share of a scan's points that may change sides, points within rounding of the threshold. One
+# always may: it is no share of a small scan.
+FLIPPED = 1e-4
+
+THREADS = (1, 2)
+
+
+@dataclass(frozen=True)
+class Case:
+    """How one scan came out.
+
+    Attributes:
+        name: What is hard about the scan.
+        points: Points that the network judged.
+        threads: Threads of onnxruntime.
+        difference: Largest difference of a logit from PyTorch's, as a share of the scan's largest
+            logit where that is above 1.
+        flipped: Points on the other side of the threshold.
+        finite: Whether every probability is finite.
+    """
+
+    name: str
+    points: int
+    threads: int
+    difference: float
+    flipped: int
+    finite: bool
+
+    @property
+    def holds(self) -> bool:
+        """Whether the exported model may be trusted on this scan."""
+        flipped = max(1, FLIPPED * self.points)
+        return self.finite and self.difference <= TOLERANCE and self.flipped <= flipped
+
+
+@dataclass(frozen=True)
+class Proof:
+    """How an exported model compares with PyTorch on every scan tried."""
+
+    cases: tuple[Case, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether every case does."""
+        return all(case.holds for case in self.cases)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The proof as JSON-able primitives."""
+        return {
+            "largest_difference": max(case.difference for case in self.cases),
+            "flipped": sum(case.flipped for case in self.cases),
+            "points": sum(case.points for case in self.cases),
+            "tolerance": TOLERANCE,
+            "cases": [asdict(case) for case in self.cases],
+        }
+
+    def __str__(self) -> str:
+        worst = max(self.cases, key=lambda case: case.difference)
+        lines = [
+            f"{'' if case.holds else 'FAILED '}{case.name}: {case.points:,} points, "
+            f"{case.threads} threads, largest difference {case.difference:.1e}, "
+            f"{case.flipped} flipped"
+            for case in self.cases
+            if not case.holds or case is worst
+        ]
+        points = sum(case.points for case in self.cases)
+        flipped = sum(case.flipped for case in self.cases)
+        lines.append(
+            f"{len(self.cases)} cases, {points:,} points: largest logit difference "
+            f"{worst.difference:.1e} (may be {TOLERANCE:.0e}), {flipped} labels flipped"
+        )
+        return "\n".join(lines)
+
+
+def prove(forward: Callable[..., Tensor], model: Path, scans: Iterable[tuple[str, Scan]]) -> Proof:
+    """Runs an exported model and its network on the same scans.
+
+    Args:
+        forward: The network in evaluation mode, from raw inputs to logits.
+        model: The exported file.
+        scans: Names and scans.
+    """
+    derainers = [Derainer(model, threads) for threads in THREADS]
+    cases = [
+        _compare(forward, derainer, name, scan) for name, scan in scans for derainer in derainers
+    ]
+    return Proof(tuple(cases))
+
+
+def _compare(forward: Callable[..., Tensor], derainer: Derainer, name: str, scan: Scan) -> Case:
+    view = derainer.view(scan)
+    tensors = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
+    with torch.inference_mode():
+        expected = forward(**tensors).numpy()
+    logits = derainer.session.run(None, view.inputs())[0]
+    magnitude = max(1.0, float(np.abs(expected).max(initial=0)))
+    # What is not a number differs as much as can be, and must not be lost in a maximum.
+    difference = np.nan_to_num(np.abs(logits - expected) / magnitude, nan=np.inf, posinf=np.inf)
+    return Case(
+        name=name,
+        points=len(expected),
+        threads=derainer.threads,
+        difference=float(difference.max(initial=0)),
+        flipped=int((_is_rain(logits, derainer.spec) != _is_rain(expected, derainer.spec)).sum()),
+        finite=bool(np.isfinite(derainer.probability(scan)).all()),
+    )
+
+
+def _is_rain(logits: NDArray[np.float32], spec: Spec) -> NDArray[np.bool_]:
+    return probability_of_rain(logits) > spec.threshold

@@ -1,0 +1,125 @@
+"""Runs an exported model on a CPU: NumPy, onnxruntime and the kNN library, nothing else."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.neighbours import usable_cores
+from derain.probability import probability_of_rain
+from derain.scan import Scan
+from derain.spec import Spec
+from derain.stopwatch import Stopwatch
+
+# The one metadata key under which an exported model carries its Spec, its proof and its versions.
+METADATA_KEY = "derain"
+
+
+class Derainer:
+    """An exported model, ready to judge scans.
+
+    Example:
+        >>> derainer = Derainer("model.onnx")  # doctest: +SKIP
+        >>> clean = points[~derainer(points)]  # doctest: +SKIP
+
+    Args:
+        model: ONNX file written by ``derain export``.
+        threads: Threads for view and network; 0 takes every core this process may use.
+
+    Attributes:
+        spec: How the model sees a scan and what it was trained on.
+        metadata: Everything else the file says of itself: proof, versions, licence.
+
+    Raises:
+        InputError: A missing file, one that is not ONNX, or one that derain did not export.
+    """
+
+    def __init__(self, model: str | Path, threads: int = 0) -> None:
+        path = Path(model)
+        self.threads = threads or usable_cores()
+        self.session = open_session(path, self.threads)
+        self.metadata = read_metadata(self.session, path)
+        self.spec = Spec.from_dict(self.metadata["spec"], path)
+        self.view = self.spec.make_view(self.threads)
+
+    def __call__(self, points: Scan | NDArray[Any]) -> NDArray[np.bool_]:
+        """Says which points are rain.
+
+        Args:
+            points: A Scan, or (N, ≥ 4) numbers: x, y, z in metres and intensity in the unit of
+                the training data (``spec.units``).
+
+        Returns:
+            True for rain, bool (N,), in input order; False for rows that cannot be judged.
+        """
+        return self.probability(points) > self.spec.threshold
+
+    def probability(
+        self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> NDArray[np.float32]:
+        """Probability that each point is rain.
+
+        Args:
+            points: As for calling the model.
+            stopwatch: Takes the times of the stages view, network and back.
+
+        Returns:
+            float32 (N,), in input order; 0 for rows that cannot be judged.
+        """
+        stopwatch = stopwatch or Stopwatch()
+        scan = Scan.of(points)
+        with stopwatch.stage("view"):
+            view = self.view(scan)
+        with stopwatch.stage("network"):
+            logits = self.session.run(None, view.inputs())[0]
+        with stopwatch.stage("back"):
+            return view.back(probability_of_rain(logits))
+
+
+def open_session(path: Path, threads: int) -> onnxruntime.InferenceSession:
+    """Opens an ONNX file for the CPU.
+
+    Raises:
+        InputError: A missing file, or one that onnxruntime cannot read.
+    """
+    if not path.is_file():
+        raise InputError(path, "no such file", "Give a model written by `derain export`.")
+    options = onnxruntime.SessionOptions()
+    # Always stated: the default counts the host's cores, not those a container may use.
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 3
+    # Threads may spin while the network runs; after it, the cores are for the next scan's view.
+    options.add_session_config_entry("session.force_spinning_stop", "1")
+    try:
+        return onnxruntime.InferenceSession(
+            path.read_bytes(), options, providers=["CPUExecutionProvider"]
+        )
+    except Exception as error:  # onnxruntime's exceptions share no base of their own
+        raise InputError(
+            path,
+            f"not an ONNX model that onnxruntime can run ({str(error).splitlines()[0]})",
+            "Give a model written by `derain export`.",
+        ) from error
+
+
+def read_metadata(session: onnxruntime.InferenceSession, path: Path) -> dict[str, Any]:
+    """What an exported model says of itself.
+
+    Raises:
+        InputError: A model without derain's metadata.
+    """
+    text = session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
+    try:
+        metadata = json.loads(text or "")
+        if not isinstance(metadata.get("spec"), dict):
+            raise ValueError("no Spec")
+    except (ValueError, AttributeError) as error:
+        raise InputError(
+            path, "it has no Spec: derain did not export it", "Export it with `derain export`."
+        ) from error
+    return metadata  # type: ignore[no-any-return]
