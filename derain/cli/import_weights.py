@@ -1,0 +1,43 @@
+"""``derain import-weights``: a checkpoint of derain from weights that others published."""
+
+import argparse
+from pathlib import Path
+
+SUMMARY = "make a checkpoint from published weights"
+
+DESCRIPTION = """\
+Makes a checkpoint of derain from published weights.
+
+  derain import-weights outdet saved_models/bin_desnow_wads/outdet.pt --stats wads --out outdet.ckpt
+  derain import-weights outdet rehearse3d_outdet.pt --stats wads --out outdet.ckpt
+
+--stats names the data card whose mean and standard deviation the weights were trained with: a
+packaged one or a YAML file. The published REHEARSE-3D weights fit those of WADS best (inferred).
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's arguments."""
+    parser.add_argument("network", help="which network: outdet")
+    parser.add_argument("weights", type=Path, help="the published state_dict")
+    parser.add_argument(
+        "--stats", required=True, help="data card: wads, kitti, spray, or a YAML file"
+    )
+    parser.add_argument("--out", type=Path, required=True, help="the checkpoint to write")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Runs the command."""
+    from derain.cards import load_card
+    from derain.errors import InputError
+    from derain.models.checkpoint import MODELS, save_model
+    from derain.models.published import read_state_dict
+
+    if arguments.network not in MODELS:
+        raise InputError(arguments.network, "no such network", f"Known are {', '.join(MODELS)}.")
+    model = MODELS[arguments.network].from_published(
+        read_state_dict(arguments.weights), load_card(arguments.stats)
+    )
+    save_model(model, arguments.out)
+    print(f"Wrote {arguments.out}: {model.NAME} with the statistics of {model.spec.data}")
+    return 0

@@ -1,0 +1,130 @@
+"""``derain info``: what is in a scan, a label file or a model."""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files import read_scan
+from derain.files.labels import read_labels, semantic
+from derain.morton import distinct_positions
+from derain.scan import Scan
+
+SUMMARY = "say what is in a scan, a label file or a model"
+
+DESCRIPTION = """\
+Says what is in a scan, a label file, an exported model or a checkpoint.
+
+  derain info scan.bin
+  derain info scan.bin --columns x,y,z,intensity,ring --json
+  derain info labels/000000.label
+  derain info model.onnx
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's arguments."""
+    parser.add_argument("files", nargs="+", type=Path, help="scans, labels, models, checkpoints")
+    parser.add_argument("--json", action="store_true", help="print one JSON object a file")
+    parser.add_argument(
+        "--columns",
+        default="x,y,z,intensity",
+        help="names of the columns of .bin and .npy files (default: %(default)s)",
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Runs the command."""
+    for path in arguments.files:
+        facts = _facts(path, arguments.columns.split(","))
+        if arguments.json:
+            print(json.dumps({"file": str(path), **facts}))
+        else:
+            print(path)
+            print(_indented(facts))
+    return 0
+
+
+def _facts(path: Path, columns: list[str]) -> dict[str, Any]:
+    match path.suffix.lower():
+        case ".label":
+            return _of_labels(path)
+        case ".onnx":
+            from derain.export.runtime import open_session, read_metadata
+
+            return read_metadata(open_session(path, threads=1), path)
+        case ".ckpt":
+            from derain.models.checkpoint import load_model
+
+            model = load_model(path)
+            weights = sum(parameter.numel() for parameter in model.parameters())
+            return {"spec": dict(model.hparams["spec"]), "parameters": weights}
+        case _:
+            return _of_scan(read_scan(path, columns))
+
+
+def _of_scan(scan: Scan) -> dict[str, Any]:
+    valid = scan.valid
+    points = scan.xyz[valid].astype(np.float64)
+    azimuth = np.degrees(np.arctan2(points[:, 1], points[:, 0]))
+    inclination = np.degrees(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1])))
+    return {
+        "points": len(scan),
+        "valid": int(valid.sum()),
+        "distinct positions": len(distinct_positions(scan.xyz[valid])[0]),
+        "organised": "no" if scan.shape is None else f"{scan.shape[0]} x {scan.shape[1]}",
+        "fields": {name: str(column.dtype) for name, column in scan.fields.items()},
+        "x / m": _span(points[:, 0]),
+        "y / m": _span(points[:, 1]),
+        "z / m": _span(points[:, 2]),
+        "range / m": _span(scan.range[valid]),
+        "azimuth / deg": _span(azimuth),
+        "inclination / deg": _span(inclination),
+        "intensity": "none" if scan.intensity is None else _span(scan.intensity[valid]),
+    }
+
+
+def _of_labels(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        raise InputError(path, "there is no such file", "Check the path.")
+    labels, rest = divmod(path.stat().st_size, 4)
+    if rest:
+        raise InputError(path, "is not whole labels of 4 bytes", "Make the file again.")
+    label = semantic(read_labels(path, labels))
+    ids, counts = np.unique(label, return_counts=True)
+    return {
+        "points": len(label),
+        "points by class id": dict(zip(map(str, ids), counts.tolist(), strict=True)),
+    }
+
+
+def _span(values: NDArray[Any]) -> dict[str, float] | str:
+    if not len(values):
+        return "none"
+    lowest, median, highest = np.percentile(values, [0, 50, 100])
+    return {
+        "min": round(float(lowest), 4),
+        "median": round(float(median), 4),
+        "max": round(float(highest), 4),
+    }
+
+
+def _indented(facts: Any, depth: int = 1) -> str:
+    lines = []
+    for name, fact in facts.items():
+        if isinstance(fact, dict) and any(
+            isinstance(value, dict | list) for value in fact.values()
+        ):
+            lines.append(f"{'  ' * depth}{name}:\n{_indented(fact, depth + 1)}")
+        elif isinstance(fact, dict):
+            inline = ", ".join(f"{key} {value}" for key, value in fact.items())
+            lines.append(f"{'  ' * depth}{name}: {inline}")
+        elif isinstance(fact, list) and fact and isinstance(fact[0], dict):
+            lines.append(f"{'  ' * depth}{name}: {len(fact)}")
+        else:
+            lines.append(f"{'  ' * depth}{name}: {fact}")
+    return "\n".join(lines)

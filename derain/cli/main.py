@@ -1,0 +1,91 @@
+"""The command ``derain``: finds the subcommand, and turns errors of the user's into one line."""
+
+import argparse
+import os
+import sys
+from types import ModuleType
+
+from derain import __version__
+from derain.cli import demo, export, import_weights, info, run
+from derain.errors import InputError
+
+DESCRIPTION = """\
+Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
+
+  derain demo                                           the whole story on simulated rain
+  derain run model.onnx scans/ --out cleaned            clean scans on a CPU
+  derain fit --config outdet_wads.yaml --data.root WADS train on your data
+  derain export outdet.ckpt --out model.onnx            make a file that runs without torch
+"""
+
+COMMANDS: dict[str, ModuleType] = {
+    "run": run,
+    "info": info,
+    "export": export,
+    "import-weights": import_weights,
+    "demo": demo,
+}
+
+# Lightning's own, which parses its arguments itself.
+TRAINING = {
+    "fit": "train a derainer",
+    "validate": "measure a checkpoint on the validation scans",
+    "test": "measure a checkpoint on the test scans",
+    "predict": "write the labels that a checkpoint gives the test scans",
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs a command.
+
+    Args:
+        arguments: Command line without the program's name; by default that of the process.
+
+    Returns:
+        Exit code: 0, or 2 where the user's input cannot be used.
+    """
+    arguments = sys.argv[1:] if arguments is None else arguments
+    try:
+        code = _run(arguments)
+        sys.stdout.flush()  # here, where a pipe that broke is still ours to handle
+        return code
+    except InputError as error:
+        print(f"derain: {error}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        # Whoever read our output has had enough; Python must not try to flush the rest.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        print("derain: interrupted", file=sys.stderr)
+        return 130
+
+
+def _run(arguments: list[str]) -> int:
+    if arguments and arguments[0] in TRAINING:
+        from derain.cli.train import train
+
+        train(arguments)
+        return 0
+    chosen = _parser().parse_args(arguments)
+    return int(COMMANDS[chosen.command].main(chosen))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "derain", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--version", action="version", version=f"derain {__version__}")
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, summary in TRAINING.items():
+        subparsers.add_parser(name, help=summary)
+    for name, module in COMMANDS.items():
+        module.add_arguments(
+            subparsers.add_parser(
+                name,
+                help=module.SUMMARY,
+                description=module.DESCRIPTION,
+                formatter_class=argparse.RawDescriptionHelpFormatter,
+            )
+        )
+    return parser
