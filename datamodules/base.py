@@ -21,6 +21,7 @@ from derain.files.labels import read_labels, semantic
 from derain.morton import distinct_positions
 from derain.neighbours import NeighbourView
 from derain.scan import Scan
+from derain.spec import Spec
 
 Part = Literal["train", "validation", "test", "predict"]
 
@@ -40,7 +41,7 @@ class ScanDataset(Dataset[Sample | InputError]):
         files: The scans.
         read: Reads one of them.
         view: What the network sees.
-        rain: Ids of the classes that count as rain.
+        card: Data card that says which labels are rain.
         augmentation: Changes each scan anew; None leaves them as they are.
     """
 
@@ -49,13 +50,13 @@ class ScanDataset(Dataset[Sample | InputError]):
         files: Sequence[ScanFile],
         read: Callable[[ScanFile], Scan],
         view: NeighbourView,
-        rain: tuple[int, ...],
+        card: DataCard,
         augmentation: Augmentation | None = None,
     ) -> None:
         self.files = files
         self.read = read
         self.view = view
-        self.rain = rain
+        self.card = card
         self.augmentation = augmentation
 
     def __len__(self) -> int:
@@ -78,8 +79,7 @@ class ScanDataset(Dataset[Sample | InputError]):
         view = self.view(scan)
         if scan.label is None:
             return Sample(scan, view, None)
-        target = view.target(np.isin(scan.label, self.rain))
-        return Sample(scan, view, torch.from_numpy(target))
+        return Sample(scan, view, torch.from_numpy(view.target(self.card.rain_of(scan))))
 
 
 @dataclass(frozen=True)
@@ -175,14 +175,14 @@ class ScanDataModule(lightning.LightningDataModule):
     def _loader(
         self, part: Part, augmentation: Augmentation | None = None
     ) -> DataLoader[Sample | InputError]:
-        model = self.trainer.lightning_module
-        if model.spec is None:
-            raise InputError("model", "it has not been trained", "Give --ckpt_path.")
+        spec: Spec = self.trainer.lightning_module.spec  # type: ignore[union-attr, assignment]
+        # Jitter would pull equal points apart, which the view takes for one in deployment.
+        distinct = part == "train" or (self.loading.deduplicate and part != "predict")
         dataset = ScanDataset(
             self.files(part),
-            self._read_distinct if self.loading.deduplicate and part != "predict" else self.read,
-            model.spec.make_view(threads=1 if self.loading.workers else 0),
-            self.card.rain,
+            self._read_distinct if distinct else self.read,
+            spec.make_view(threads=1 if self.loading.workers else 0),
+            self.card,
             augmentation,
         )
         return DataLoader(

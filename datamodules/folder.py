@@ -6,6 +6,7 @@ from pathlib import Path
 from derain.cards import load_card
 from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile, labelled
 from derain.errors import InputError
+from derain.files.labels import label_beside
 
 
 class Folder(ScanDataModule):
@@ -54,9 +55,3 @@ class Folder(ScanDataModule):
         if not matches:
             raise InputError(self.root / pattern, "matches no scan", "Check root and pattern.")
         return matches
-
-
-def label_beside(scan: Path) -> Path:
-    """Label file of a scan: beside it if there is one, else in the sibling folder ``labels``."""
-    beside = scan.with_suffix(".label")
-    return beside if beside.is_file() else scan.parent.parent / "labels" / beside.name

@@ -36,8 +36,7 @@ def measured(card: DataCard, scans: Iterable[Scan]) -> DataCard:
         count += len(points)
         total += points.sum(axis=0)
         squares += (points**2).sum(axis=0)
-        if scan.label is not None:
-            rain += int(np.isin(scan.label[valid], card.rain).sum())
+        rain += int(card.rain_of(scan)[valid].sum())
     mean = total / max(count, 1)
     variance = np.maximum(squares / max(count, 1) - mean**2, 0)
     # A channel that never changes says nothing, and is not to be divided by 0.

@@ -63,4 +63,4 @@ class Batch:
 
     def split(self, scores: Tensor) -> list[Tensor]:
         """Takes per-point scores, (M, ...), apart into those of each scan."""
-        return list(scores.split([len(sample.view.first) for sample in self.samples]))
+        return list(torch.split(scores, [len(sample.view.first) for sample in self.samples]))

@@ -105,9 +105,10 @@ def _from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> No
     axes.set_aspect("equal")
     if len(x):
         nearest, farthest = np.percentile(x, [1, 97])
-        centre, half = float(np.median(-y)), 0.6 * (farthest - nearest)
-        axes.set_xlim(centre - half, centre + half)
-        axes.set_ylim(nearest, farthest)
+        half = 0.5 * max(farthest - nearest, 1e-3)
+        middle, centre = 0.5 * (nearest + farthest), float(np.median(-y))
+        axes.set_xlim(centre - 1.2 * half, centre + 1.2 * half)
+        axes.set_ylim(middle - half, middle + half)
 
 
 def _as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
@@ -117,7 +118,8 @@ def _as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
     azimuth = np.degrees(np.arctan2(y, x))
     inclination = np.degrees(np.arctan2(z, np.hypot(x, y)))
     _scatter(axes, -azimuth, inclination, _colours(scan, outcome, seen))
-    if len(azimuth):
+    # Points in one direction leave the limits to matplotlib.
+    if len(azimuth) and np.ptp(azimuth) and np.ptp(inclination):
         axes.set_xlim(*np.percentile(-azimuth, [0, 100]))
         axes.set_ylim(*np.percentile(inclination, [0.1, 99.9]))
 

@@ -40,8 +40,6 @@ def export(model: DerainingModule, path: Path) -> Proof:
         InputError: A model without a Spec, an output that cannot be written, or a proof that
             fails; no file is left then.
     """
-    if model.spec is None:
-        raise InputError(path, "the model has not been trained", "Train it or import weights.")
     model = model.eval().cpu()
     with replacing(path) as temporary:
         proto = _traced(model, model.spec)
@@ -79,6 +77,9 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
         )
     assert program is not None  # only None when it was told to write a file itself
     proto: onnx.ModelProto = program.model_proto
+    # The exporter writes the number of answers as a formula over the blocks; it is that of points.
+    proto.graph.output[0].type.tensor_type.shape.dim[0].dim_param = points.__name__
+    del proto.graph.value_info[:]
     return proto
 
 

@@ -35,10 +35,13 @@ class Derainer:
         metadata: Everything else the file says of itself: proof, versions, licence.
 
     Raises:
-        InputError: A missing file, one that is not ONNX, or one that derain did not export.
+        InputError: A missing file, one that is not ONNX, or one that derain did not export; a
+            negative number of threads.
     """
 
     def __init__(self, model: str | Path, threads: int = 0) -> None:
+        if threads < 0:
+            raise InputError("threads", f"{threads} is negative", "Give 0 for every core.")
         path = Path(model)
         self.threads = threads or usable_cores()
         self.session = open_session(path, self.threads)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Protocol, Self
 import lightning
 import numpy as np
 import torch
+from lightning.pytorch.loggers import TensorBoardLogger
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
@@ -34,7 +35,7 @@ class DerainingModule(lightning.LightningModule):
     Attributes:
         NAME: Name of the network in a Spec and on the command line.
         network: The network itself.
-        spec: How the network is used; None until data or a checkpoint says.
+        card: Data card of the data it is trained or tested on.
     """
 
     NAME: ClassVar[str]
@@ -43,14 +44,26 @@ class DerainingModule(lightning.LightningModule):
     std: Tensor
     class_weight: Tensor
     metrics: RainMetrics
+    card: DataCard
 
     def __init__(self) -> None:
         super().__init__()
-        self.spec: Spec | None = None
+        self._spec: Spec | None = None
         # Not in the state_dict: the Spec holds them.
         self.register_buffer("mean", torch.zeros(4), persistent=False)
         self.register_buffer("std", torch.ones(4), persistent=False)
         self.register_buffer("class_weight", torch.ones(2), persistent=False)
+
+    @property
+    def spec(self) -> Spec:
+        """How the network is used.
+
+        Raises:
+            InputError: Neither data nor a checkpoint has said so yet.
+        """
+        if self._spec is None:
+            raise InputError(self.NAME, "has not been trained", "Give a checkpoint: --ckpt_path.")
+        return self._spec
 
     @abstractmethod
     def view_parameters(self) -> dict[str, Any]:
@@ -81,14 +94,15 @@ class DerainingModule(lightning.LightningModule):
         """
         if spec is None:
             return
-        self.spec = spec if isinstance(spec, Spec) else Spec.from_dict(spec, "checkpoint")
-        if self.spec.network != self.NAME:
+        spec = spec if isinstance(spec, Spec) else Spec.from_dict(spec, "checkpoint")
+        if spec.network != self.NAME:
             raise InputError(
-                "checkpoint", f"a model of {self.spec.network}", f"Give one of {self.NAME}."
+                "checkpoint", f"a model of {spec.network}", f"Give one of {self.NAME}."
             )
-        self.hparams["spec"] = self.spec.as_dict()
-        self.mean.copy_(torch.tensor(self.spec.mean))
-        self.std.copy_(torch.tensor(self.spec.std))
+        self._spec = spec
+        self.hparams["spec"] = spec.as_dict()
+        self.mean.copy_(torch.tensor(spec.mean))
+        self.std.copy_(torch.tensor(spec.std))
 
     def spec_for(self, card: DataCard) -> Spec:
         """Spec of this network on a data set.
@@ -118,11 +132,12 @@ class DerainingModule(lightning.LightningModule):
     def setup(self, stage: str) -> None:
         """Learns from the data what the Spec, the loss and the metrics need."""
         data: HasCard = self.trainer.datamodule  # type: ignore[attr-defined]
-        if self.spec is None and stage == "fit":
-            self.adopt(self.spec_for(data.card))
-        if (share := data.card.rain_share) is not None:
+        self.card = data.card
+        if self._spec is None and stage == "fit":
+            self.adopt(self.spec_for(self.card))
+        if (share := self.card.rain_share) is not None:
             self.class_weight.copy_(class_weights([1 - share, share]))
-        self.metrics = RainMetrics(data.card.classes, data.card.rain)
+        self.metrics = RainMetrics(self.card.classes, self.card.rain)
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """Takes the Spec from the checkpoint that a run starts from.
@@ -134,6 +149,13 @@ class DerainingModule(lightning.LightningModule):
         if spec is None:
             raise InputError("checkpoint", "it has no Spec", "Give a checkpoint of derain.")
         self.adopt(spec)
+
+    def on_train_start(self) -> None:
+        """Enters the run in TensorBoard's table of hyper-parameters, to be ranked by its IoU."""
+        parameters = {name: value for name, value in self.hparams.items() if name != "spec"}
+        for logger in self.loggers:
+            if isinstance(logger, TensorBoardLogger):
+                logger.log_hyperparams(parameters, {"hp_metric": 0.0})
 
     def training_step(self, batch: Batch) -> Tensor:
         """Loss of one batch."""
@@ -177,6 +199,7 @@ class DerainingModule(lightning.LightningModule):
         ]
 
     def _loss(self, batch: Batch, logits: Tensor, part: str) -> Tensor:
+        assert batch.target is not None  # the data modules pair these scans with labels
         loss = segmentation_loss(logits, batch.target, self.class_weight)
         parts = {"loss": loss.total, "cross_entropy": loss.cross_entropy, "lovasz": loss.lovasz}
         self.log_dict(
@@ -205,3 +228,5 @@ class DerainingModule(lightning.LightningModule):
         scores = self.metrics.compute()
         self.log_dict({f"{part}/{name}": score for name, score in scores.items()})
         self.log(f"{part}_iou", scores["iou"], prog_bar=True, logger=False)
+        if part == "val":
+            self.log("hp_metric", scores["iou"])

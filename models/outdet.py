@@ -221,6 +221,7 @@ class OutDet(DerainingModule):
     """
 
     NAME: ClassVar[str] = "outdet"
+    network: OutDetNetwork
 
     def __init__(
         self,

@@ -3,7 +3,6 @@
 from typing import Any
 
 import lightning
-import numpy as np
 from lightning.pytorch.loggers import TensorBoardLogger
 
 from derain.batch import Batch
@@ -38,7 +37,7 @@ class ScanPanels(lightning.Callback):
         if not self.left or not isinstance(trainer.logger, TensorBoardLogger):
             return
         for sample, probability in zip(batch.samples, outputs, strict=True):
-            rain = np.isin(sample.scan.label, trainer.datamodule.card.rain)
+            rain = model.card.rain_of(sample.scan)
             if not self.left or not rain.any():
                 continue
             figure = judgement_figure(

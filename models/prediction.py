@@ -25,6 +25,12 @@ class PredictionWriter(BasePredictionWriter):
     def __init__(self, folder: str = "predictions") -> None:
         super().__init__(write_interval="batch")
         self.folder = Path(folder)
+        self.root = "."
+
+    def on_predict_start(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
+        """Finds the folder that all scans lie below."""
+        files = trainer.datamodule.files("predict")  # type: ignore[attr-defined]
+        self.root = os.path.commonpath([file.scan.parent for file in files])
 
     def write_on_batch_end(
         self,
@@ -40,8 +46,6 @@ class PredictionWriter(BasePredictionWriter):
         Raises:
             InputError: A folder that cannot be written.
         """
-        scans = [file.scan for file in trainer.datamodule.files("predict")]
-        root = os.path.commonpath([scan.parent for scan in scans])
         for sample, probability in zip(batch.samples, prediction, strict=True):
-            path = self.folder / os.path.relpath(sample.scan.name, root)
+            path = self.folder / os.path.relpath(sample.scan.name, self.root)
             write_labels(path.with_suffix(".label"), probability > model.spec.threshold)

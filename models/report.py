@@ -17,7 +17,7 @@ class TestReport(lightning.Callback):
 
     def on_test_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
         """Prints the report, and writes it beside the run's log where there is one."""
-        print(as_text(model.metrics, trainer.datamodule.card.name))
+        print(as_text(model.metrics, model.card.name))
         if trainer.log_dir is not None:
             path = Path(trainer.log_dir) / "test.json"
             with replacing(path) as temporary:
@@ -53,11 +53,12 @@ def as_text(metrics: RainMetrics, data: str) -> str:
     for band, counts in metrics.by_range().items():
         lines.append(band.ljust(width) + _row([getattr(counts, score) for score in SCORES]))
     lines += ["", "class".ljust(width) + "   points  called rain   share"]
-    for name, counts in metrics.by_class().items():
-        if counts.points:
-            name += " (rain)" if counts.rain else ""
+    for name, of_class in metrics.by_class().items():
+        if of_class.points:
+            name += " (rain)" if of_class.rain else ""
             lines.append(
-                f"{name:<{width}}{counts.points:9,}{counts.called_rain:13,}{counts.share_lost:8.2%}"
+                f"{name:<{width}}{of_class.points:9,}{of_class.called_rain:13,}"
+                f"{of_class.share_lost:8.2%}"
             )
     return "\n".join(lines)
 

@@ -6,9 +6,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from derain.errors import InputError
+from derain.scan import Scan
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,16 @@ class DataCard:
     def has_statistics(self) -> bool:
         """True where mean, standard deviation and rain share are all known."""
         return None not in (self.mean, self.std, self.rain_share)
+
+    def rain_of(self, scan: Scan) -> NDArray[np.bool_]:
+        """Which points of a labelled scan are rain, bool (N,).
+
+        Raises:
+            InputError: A scan without labels.
+        """
+        if scan.label is None:
+            raise InputError(scan.name, "it has no labels", "Give its label file.")
+        return np.isin(scan.label, self.rain)
 
     def with_statistics(
         self, mean: tuple[float, ...], std: tuple[float, ...], rain_share: float

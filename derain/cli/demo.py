@@ -74,8 +74,6 @@ def _derain(*arguments: str) -> None:
 
 def _table(model: Path, simulated: "Simulated") -> str:
     """Error and time of the exported model, and of the rule that it has to beat."""
-    import numpy as np
-
     from derain.datamodules.base import ScanFile
     from derain.export.comparison import Method, as_table, compare
     from derain.export.runtime import Derainer
@@ -84,7 +82,7 @@ def _table(model: Path, simulated: "Simulated") -> str:
 
     labels = {file.scan: file for file in simulated.files("test")}
     training = [simulated.read(file) for file in simulated.files("train")]
-    rule = OneLineRule.best((scan, np.isin(scan.label, simulated.card.rain)) for scan in training)
+    rule = OneLineRule.best((scan, simulated.card.rain_of(scan)) for scan in training)
     derainer = Derainer(model)
     methods: dict[str, Method] = {
         "3D-OutDet, ONNX": lambda scan, stopwatch: (

@@ -33,10 +33,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
+    from derain.errors import InputError
     from derain.export.latency import measure_latency
     from derain.export.onnx_file import export
     from derain.models.checkpoint import load_model
 
+    if arguments.scan is not None and not arguments.scan.is_file():
+        raise InputError(arguments.scan, "there is no such file", "Check --scan.")
     proof = export(load_model(arguments.checkpoint), arguments.out)
     print(proof)
     print(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")

@@ -16,7 +16,7 @@ from derain.cli.arguments import factor, threads
 from derain.errors import InputError
 from derain.export.runtime import Derainer
 from derain.files import find_scans, read_scan, write_scan
-from derain.files.labels import write_labels
+from derain.files.labels import label_beside, write_labels
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
 
@@ -82,33 +82,41 @@ def main(arguments: argparse.Namespace) -> int:
     warned: set[str] = set()
     for path in tqdm(scans, unit="scan", disable=None):
         try:
-            stopwatch = Stopwatch()
-            with stopwatch.stage("read"):
-                scan = read_scan(path, arguments.columns.split(","))
-            seen = _in_unit_of_model(scan, arguments.intensity_scale)
-            _warn_once(warned, _intensity_warning(seen, derainer))
-            rain = derainer.probability(seen, stopwatch) > derainer.spec.threshold
-            with stopwatch.stage("write"):
-                _write(arguments.out / path.name, scan, rain)
+            cleaned = _clean(path, derainer, arguments, warned)
         except InputError as error:
             failed += 1
             tqdm.write(f"derain: {error}", sys.stderr)
             continue
-        cleaned = Cleaned(
-            str(path), len(scan), int(scan.valid.sum()), int(rain.sum()), stopwatch.milliseconds
-        )
         tqdm.write(json.dumps(asdict(cleaned)) if arguments.json else str(cleaned), sys.stdout)
     if failed:
         print(f"derain: {failed} of {len(scans)} scans could not be cleaned", file=sys.stderr)
     return 2 if failed else 0
 
 
+def _clean(
+    path: Path, derainer: Derainer, arguments: argparse.Namespace, warned: set[str]
+) -> Cleaned:
+    stopwatch = Stopwatch()
+    with stopwatch.stage("read"):
+        scan = read_scan(path, arguments.columns.split(","))
+    seen = _in_unit_of_model(scan, arguments.intensity_scale)
+    _warn_once(warned, _intensity_warning(seen, derainer))
+    rain = derainer.probability(seen, stopwatch) > derainer.spec.threshold
+    with stopwatch.stage("write"):
+        _write(arguments.out / path.name, scan, rain)
+    return Cleaned(
+        str(path), len(scan), int(scan.valid.sum()), int(rain.sum()), stopwatch.milliseconds
+    )
+
+
 def _refuse_clashes(scans: Sequence[Path], out: Path) -> None:
-    """Refuses to overwrite a scan by its cleaned self, or one scan's labels by another's."""
+    """Refuses to overwrite a scan by its cleaned self, or labels by others."""
     stems = Counter(scan.stem for scan in scans)
     for scan in scans:
         if (out / scan.name).resolve() == scan.resolve():
             raise InputError(out, f"would overwrite {scan}", "Give --out another folder.")
+        if out.resolve() == label_beside(scan).parent.resolve():
+            raise InputError(out, f"holds the labels of {scan}", "Give --out another folder.")
         if stems[scan.stem] > 1:
             raise InputError(
                 scan, "another scan has the same name", "Clean them in two runs, each to its --out."

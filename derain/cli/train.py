@@ -7,7 +7,7 @@ from pathlib import Path
 
 from jsonargparse import DefaultHelpFormatter
 from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
-from lightning.pytorch.cli import LightningArgumentParser, LightningCLI
+from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
 
 # Imported so that a configuration may name them without their modules.
 from derain.datamodules.base import ScanDataModule
@@ -17,6 +17,7 @@ from derain.datamodules.simulated import Simulated
 from derain.datamodules.wads import Wads
 from derain.errors import InputError
 from derain.models.base import DerainingModule
+from derain.models.checkpoint import load_model
 from derain.models.outdet import OutDet
 from derain.models.panels import ScanPanels
 from derain.models.prediction import PredictionWriter
@@ -51,6 +52,10 @@ Writes the labels that a checkpoint gives the test scans, which need none of the
 }
 
 
+# What `--ckpt_path` may be besides a file: checkpoints that Lightning looks for itself.
+FOUND_BY_LIGHTNING = ("last", "hpc")
+
+
 class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatter):
     """Leaves the line breaks of the examples alone."""
 
@@ -81,11 +86,24 @@ class DerainCLI(LightningCLI):
             }
         )
 
-    def before_instantiate_classes(self) -> None:
-        """Refuses checkpoints from the network: Lightning would unpickle anything in them."""
-        path = self.config[self.subcommand].get("ckpt_path")
-        if path is not None and "://" in str(path):
+    def parse_arguments(self, parser: LightningArgumentParser, args: ArgsType) -> None:
+        """Refuses a checkpoint that is none of ours before Lightning reads it."""
+        super().parse_arguments(parser, args)
+        path = self.config[self.config.subcommand].get("ckpt_path")
+        if path in (None, *FOUND_BY_LIGHTNING):
+            return
+        if "://" in str(path):  # Lightning would unpickle anything in it
             raise InputError(path, "is an address", "Download it and give the file.")
+        load_model(Path(path))
+
+    def instantiate_classes(self) -> None:
+        """Instantiates data, model and trainer; what they find wrong is not the parser's error."""
+        try:
+            super().instantiate_classes()
+        except ValueError as error:
+            if isinstance(error.__cause__, InputError):
+                raise error.__cause__ from None
+            raise
 
 
 def train(arguments: list[str]) -> None:

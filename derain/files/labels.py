@@ -16,6 +16,12 @@ from derain.files.reading import reading
 LARGEST_ID = 0xFFFF
 
 
+def label_beside(scan: Path) -> Path:
+    """Where a scan's labels lie: beside it if they are there, else in the sibling `labels`."""
+    beside = scan.with_suffix(".label")
+    return beside if beside.is_file() else scan.parent.parent / "labels" / beside.name
+
+
 def read_labels(path: Path, points: int) -> NDArray[np.uint32]:
     """Reads the labels of a scan as they are in the file.
 

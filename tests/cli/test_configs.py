@@ -1,0 +1,116 @@
+"""Every packaged configuration trains, tests, predicts and exports, on a small made-up data set."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from derain.cli.train import packaged_configs
+from derain.errors import InputError
+from derain.export import onnx_file
+from derain.export.runtime import Derainer
+from derain.files import read_scan
+from derain.hard_cases import scene
+from derain.open3d_import import import_open3d
+from derain.scan import Scan
+
+WriteScan = Callable[..., None]
+
+# Fills a folder with a data set; returns the options it needs and its folder of test scans.
+Prepare = Callable[[Path, WriteScan], tuple[list[str], Path]]
+
+QUICK = ["--trainer.enable_progress_bar", "false"]
+SPLIT = '{train: ["00", "01"], validation: ["02"], test: ["03"]}'
+
+
+def in_sequences(scans: str, labels: str, rain: int) -> Prepare:
+    """Four sequences of two scans each."""
+
+    def prepare(root: Path, write_labelled: WriteScan) -> tuple[list[str], Path]:
+        for sequence in ("00", "01", "02", "03"):
+            folder = root / "sequences" / sequence
+            for frame in (f"{sequence}0000", f"{sequence}0001"):
+                scan, label = folder / scans / f"{frame}.bin", folder / labels / f"{frame}.label"
+                write_labelled(scan, label, rain)
+        return ["--data.split", SPLIT, "--data.loading.workers", "0"], folder / scans
+
+    return prepare
+
+
+def sequence_36(root: Path, write_labelled: WriteScan) -> tuple[list[str], Path]:
+    """The scans of WADS's sequence 36 that the patterns of the configuration name."""
+    folder = root / "sequences/36"
+    for frame in ("042220", "042231", "042233", "042235", "042237", "042239", "042241"):
+        write_labelled(folder / f"velodyne/{frame}.bin", folder / f"labels/{frame}.label", 110)
+    write_labelled(root / "sample.bin", root / "sample.label", 110)
+    return [], root
+
+
+def small_track(root: Path, write_labelled: WriteScan) -> tuple[list[str], Path]:
+    """Nothing but options: the data set is made at its first use."""
+    try:
+        import_open3d()
+    except InputError as error:
+        pytest.skip(str(error))
+    campaign = {
+        **{"train": 2, "validation": 1, "test": 1, "scans": 1, "rain_rates": "[50.0]"},
+        **{"sensor.rows": 16, "sensor.columns": 60},
+    }
+    options = [f"--data.campaign.{name}={value}" for name, value in campaign.items()]
+    return options, root / "sequences/003/lidar_radar_pcd"
+
+
+PREPARATIONS: dict[str, Prepare] = {
+    "outdet_rehearse3d.yaml": in_sequences("lidar_radar_pcd", "lidar_radar_labels", rain=3),
+    "outdet_simulated.yaml": small_track,
+    "outdet_wads.yaml": in_sequences("velodyne", "labels", rain=110),
+    "outdet_wads36.yaml": sequence_36,
+}
+
+
+def test_every_packaged_configuration_is_put_to_the_test() -> None:
+    assert list(packaged_configs()) == list(PREPARATIONS)
+
+
+@pytest.mark.usefixtures("one_block")
+@pytest.mark.parametrize(("config", "prepare"), PREPARATIONS.items(), ids=PREPARATIONS.keys())
+def test_a_packaged_configuration_goes_from_training_to_a_deployed_model(
+    run_derain,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    write_labelled: WriteScan,
+    config: str,
+    prepare: Prepare,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    options, test_folder = prepare(Path("data"), write_labelled)
+    data = ["--config", config, "--data.root", "data", *options, *QUICK]
+    run = Path("runs") / config.removesuffix(".yaml")
+
+    assert run_derain("fit", *data, "--trainer.max_epochs", "1", "--panels.scans", "1").code == 0
+    checkpoint = run / "version_0/checkpoints/last.ckpt"
+    assert checkpoint.is_file()
+    assert list((run / "version_0").glob("events.out.tfevents.*"))
+    stored = yaml.safe_load((run / "version_0/config.yaml").read_text())
+    assert stored["data"]["init_args"]["root"] == "data"
+
+    outcome = run_derain("test", *data, "--ckpt_path", checkpoint)
+    assert outcome.code == 0
+    assert "pooled over points" in outcome.out
+    report = json.loads((run / "version_1/test.json").read_text())
+    scans = sorted(test_folder.glob("*.bin"))
+    assert report["scans"] == len(scans) > 0
+    assert all(0 <= score <= 1 for score in report["scores"].values())
+
+    assert run_derain("predict", *data, "--ckpt_path", checkpoint).code == 0
+    # The whole proof has tests of its own.
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
+    timed_on = ["--scan", scans[0], "--repeats", "1"]
+    assert run_derain("export", checkpoint, "--out", "model.onnx", *timed_on).code == 0
+    derainer = Derainer("model.onnx")
+    for scan in scans:
+        label = np.fromfile(Path("predictions") / f"{scan.stem}.label", "<u4")
+        np.testing.assert_array_equal(label, derainer(read_scan(scan)))

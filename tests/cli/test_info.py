@@ -1,0 +1,160 @@
+"""``derain info`` says what is in a scan, labels, a model and a checkpoint."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.export.runtime import Derainer
+from derain.files import write_scan
+from derain.files.labels import write_labels
+from derain.hard_cases import hard_cases
+from derain.models.outdet import OutDet
+from derain.scan import Scan
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Path:
+    """Six rows: four points at three positions, one row of NaN and one at the origin."""
+    rows = np.array(
+        [
+            [3, 0, 4, 0],
+            [0, 2, 0, 10],
+            [0, 2, 0, 20],
+            [-1, 0, 0, 30],
+            [np.nan, 1, 1, 1],
+            [0, 0, 0, 99],
+        ],
+        np.float32,
+    )
+    path = tmp_path / "scan.bin"
+    rows.tofile(path)
+    return path
+
+
+def strict_json(text: str) -> dict[str, object]:
+    """JSON as the standard has it: without NaN and infinity, which Python lets pass."""
+
+    def refuse(constant: str) -> None:
+        raise ValueError(constant)
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_a_scan_is_described_by_its_valid_points(run_derain, scan: Path) -> None:
+    outcome = run_derain("info", scan, "--json")
+    assert (outcome.code, outcome.err) == (0, "")
+    assert strict_json(outcome.out) == {
+        "file": str(scan),
+        "points": 6,
+        "valid": 4,
+        "distinct positions": 3,
+        "organised": "no",
+        "fields": dict.fromkeys(["x", "y", "z", "intensity"], "float32"),
+        "x / m": {"min": -1.0, "median": 0.0, "max": 3.0},
+        "y / m": {"min": 0.0, "median": 1.0, "max": 2.0},
+        "z / m": {"min": 0.0, "median": 0.0, "max": 4.0},
+        "range / m": {"min": 1.0, "median": 2.0, "max": 5.0},
+        "azimuth / deg": {"min": 0.0, "median": 90.0, "max": 180.0},
+        "inclination / deg": {"min": 0.0, "median": 0.0, "max": 53.1301},
+        "intensity": {"min": 0.0, "median": 15.0, "max": 30.0},
+    }
+
+
+def test_the_text_says_the_same_line_by_line(run_derain, scan: Path) -> None:
+    outcome = run_derain("info", scan)
+    assert outcome.code == 0
+    lines = outcome.out.splitlines()
+    assert lines[0] == str(scan)
+    assert "  points: 6" in lines
+    assert "  range / m: min 1.0, median 2.0, max 5.0" in lines
+    assert "  fields: x float32, y float32, z float32, intensity float32" in lines
+
+
+def test_an_organised_scan_without_intensity_says_so(run_derain, tmp_path: Path) -> None:
+    np.savez(tmp_path / "frame.npz", xyz=np.ones((4, 6, 3), np.float32))
+    facts = strict_json(run_derain("info", tmp_path / "frame.npz", "--json").out)
+    assert (facts["points"], facts["organised"], facts["intensity"]) == (24, "4 x 6", "none")
+
+
+def test_columns_are_taken_as_stated(run_derain, tmp_path: Path) -> None:
+    np.ones((8, 5), np.float32).tofile(tmp_path / "wide.bin")
+    stated = ["--columns", "x,y,z,intensity,ring"]
+    facts = strict_json(run_derain("info", tmp_path / "wide.bin", "--json", *stated).out)
+    assert facts["points"] == 8
+    assert list(facts["fields"]) == ["x", "y", "z", "intensity", "ring"]
+
+
+@pytest.mark.parametrize(("name", "scan"), [(name, scan) for name, scan in hard_cases(100)])
+def test_every_hard_case_is_described(run_derain, tmp_path: Path, name: str, scan: Scan) -> None:
+    write_scan(tmp_path / "hard.npz", scan)
+    outcome = run_derain("info", tmp_path / "hard.npz", "--json")
+    facts = strict_json(outcome.out)
+    assert (facts["points"], facts["valid"]) == (len(scan), scan.valid.sum())
+    assert run_derain("info", tmp_path / "hard.npz").code == 0
+
+
+def test_labels_are_counted_by_class(run_derain, tmp_path: Path) -> None:
+    path = tmp_path / "scan.label"
+    write_labels(path, np.array([110, 0, 110, 40]), np.array([7, 0, 8, 0]))
+    facts = strict_json(run_derain("info", path, "--json").out)
+    assert facts["points"] == 4
+    assert facts["points by class id"] == {"0": 1, "40": 1, "110": 2}
+    assert "  points by class id: 0 1, 40 1, 110 2" in run_derain("info", path).out.splitlines()
+
+
+def test_a_model_says_its_spec_proof_and_versions(run_derain, onnx_model: Path) -> None:
+    facts = strict_json(run_derain("info", onnx_model, "--json").out)
+    assert facts == {"file": str(onnx_model), **Derainer(onnx_model).metadata}
+    text = run_derain("info", onnx_model).out
+    assert "network: outdet" in text
+    assert "data: WADS" in text
+    assert "licence: CC BY-NC-SA 4.0" in text
+    assert "flipped: 0" in text
+
+
+def test_a_checkpoint_says_its_spec_and_size(
+    run_derain, checkpoint: Path, random_outdet: OutDet
+) -> None:
+    facts = strict_json(run_derain("info", checkpoint, "--json").out)
+    assert facts["spec"] == random_outdet.spec.as_dict()
+    assert facts["parameters"] == sum(p.numel() for p in random_outdet.parameters())
+    assert "  parameters: 11019" in run_derain("info", checkpoint).out.splitlines()
+
+
+def test_several_files_give_one_object_each(
+    run_derain, scan: Path, onnx_model: Path, tmp_path: Path
+) -> None:
+    outcome = run_derain("info", scan, onnx_model, "--json")
+    objects = [strict_json(line) for line in outcome.out.splitlines()]
+    assert [item["file"] for item in objects] == [str(scan), str(onnx_model)]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("none.bin", None, "there is no such file"),
+        ("none.label", None, "there is no such file"),
+        ("none.onnx", None, "no such file"),
+        ("none.ckpt", None, "no such file"),
+        ("cut.bin", b"12345", "5 bytes are not whole rows of 16 bytes"),
+        ("cut.label", b"12345", "is not whole labels of 4 bytes"),
+        ("noise.onnx", b"12345", "not an ONNX model"),
+        ("noise.ckpt", b"12345", "damaged"),
+        ("noise.pcd", b"12345", "noise.pcd"),
+        ("notes.txt", b"12345", "'.txt' is not the suffix of a scan"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_one_line_and_exit_code_2(
+    run_derain, tmp_path: Path, name: str, content: bytes | None, reason: str
+) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    outcome = run_derain("info", path)
+    assert (outcome.code, outcome.out) == (2, "")
+    (line,) = outcome.err.splitlines()
+    assert line.startswith(f"derain: {path}: ")
+    assert reason in line
+    assert line.endswith(".")

@@ -1,0 +1,67 @@
+"""The command itself: help, version, and one line and exit code 2 for what cannot be used."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import derain
+from derain.cli.main import COMMANDS, TRAINING
+from derain.hard_cases import scene
+
+MAIN = "import sys; from derain.cli.main import main; sys.exit(main())"
+
+
+def test_the_version_is_that_of_the_package(run_derain) -> None:
+    outcome = run_derain("--version")
+    assert (outcome.code, outcome.out) == (0, f"derain {derain.__version__}\n")
+
+
+def test_help_starts_with_examples_and_names_every_command(run_derain) -> None:
+    outcome = run_derain("--help")
+    assert outcome.code == 0
+    before_the_options = outcome.out.split("positional arguments")[0]
+    assert before_the_options.count("\n  derain ") >= 4
+    listed = [line.split()[0] for line in outcome.out.split("COMMAND\n")[-1].splitlines() if line]
+    assert {*COMMANDS, *TRAINING} <= set(listed)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_a_command_starts_with_examples_of_it(run_derain, command: str) -> None:
+    outcome = run_derain(command, "--help")
+    assert outcome.code == 0
+    assert f"\n  derain {command}" in outcome.out.split("options:")[0]
+
+
+@pytest.mark.parametrize("arguments", [["wash"], [], ["run"], ["run", "model.onnx", "scan.bin"]])
+def test_a_command_that_cannot_be_understood_exits_with_2(run_derain, arguments) -> None:
+    outcome = run_derain(*arguments)
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert outcome.err.splitlines()[-1].startswith("derain")
+    assert "Traceback" not in outcome.err
+
+
+def test_an_interruption_is_no_traceback(run_derain, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(arguments: object) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(COMMANDS["info"], "main", interrupted)
+    outcome = run_derain("info", "scan.bin")
+    assert (outcome.code, outcome.err) == (130, "derain: interrupted\n")
+
+
+def test_a_reader_that_has_had_enough_ends_the_command_quietly(tmp_path: Path) -> None:
+    scene(100).tofile(tmp_path / "scan.bin")
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with subprocess.Popen(
+        [sys.executable, "-c", MAIN, "info", tmp_path / "scan.bin"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=buffered,
+    ) as process:
+        process.stdout.close()  # before the command prints anything
+        assert process.stderr.read() == b""
+        assert process.wait() == 0

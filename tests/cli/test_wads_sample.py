@@ -1,0 +1,71 @@
+"""The published weights, imported, exported and run here, give the published results on WADS."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from derain.cli.main import main
+from derain.export.runtime import Derainer
+from derain.files import read_scan
+from derain.files.labels import read_labels, semantic
+from derain.metrics import RainMetrics
+from derain.models.checkpoint import load_model
+
+FALLING_SNOW = 110
+
+
+def derain(*arguments: str | Path) -> None:
+    assert main([str(argument) for argument in arguments]) == 0
+
+
+@pytest.fixture(scope="module")
+def folder(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The three commands a user types, in a folder of its own."""
+    folder = tmp_path_factory.mktemp("wads")
+    weights, sample = shared / "oracles/outdet_wads.pt", shared / "data/wads/sample.bin"
+    checkpoint, model = folder / "w.ckpt", folder / "w.onnx"
+    derain("import-weights", "outdet", weights, "--stats", "wads", "--out", checkpoint)
+    derain("export", checkpoint, "--out", model, "--scan", sample, "--repeats", "1")
+    derain("run", model, sample, "--out", folder / "cleaned", "--json", "--threads", "2")
+    return folder
+
+
+def test_the_scores_are_the_published_ones(folder: Path, shared: Path) -> None:
+    points = 115_881
+    truth = semantic(read_labels(shared / "data/wads/sample.label", points))
+    found = read_labels(folder / "cleaned/sample.label", points)
+    metrics = RainMetrics({0: "other", FALLING_SNOW: "falling snow"}, {FALLING_SNOW})
+    metrics.update(
+        predicted=torch.from_numpy(found == 1),
+        label=torch.from_numpy(np.where(truth == FALLING_SNOW, truth, 0)),
+        range=torch.zeros(points),
+        scan=torch.zeros(points, dtype=torch.int64),
+        scans=1,
+    )
+    scores = metrics.pooled()
+    assert scores.precision == pytest.approx(0.8950, abs=5e-4)
+    assert scores.recall == pytest.approx(0.9243, abs=5e-4)
+    assert scores.iou == pytest.approx(0.8339, abs=5e-4)
+
+
+def test_the_cleaned_scan_is_the_sample_without_its_rain(folder: Path, shared: Path) -> None:
+    rain = np.fromfile(folder / "cleaned/sample.label", "<u4") == 1
+    sample = np.fromfile(shared / "data/wads/sample.bin", "<f4").reshape(-1, 4)
+    assert (folder / "cleaned/sample.bin").read_bytes() == sample[~rain].tobytes()
+
+
+@pytest.mark.parametrize("deployed", [False, True], ids=["PyTorch", "onnxruntime"])
+def test_the_logits_are_those_of_the_oracle(folder: Path, shared: Path, deployed: bool) -> None:
+    derainer = Derainer(folder / "w.onnx")
+    view = derainer.view(read_scan(shared / "data/wads/sample.bin"))
+    if deployed:
+        logits = derainer.session.run(None, view.inputs())[0]
+    else:
+        inputs = {name: torch.from_numpy(array) for name, array in view.inputs().items()}
+        with torch.inference_mode():
+            logits = load_model(folder / "w.ckpt")(**inputs).numpy()
+    expected = np.load(shared / "oracles/outdet_wads.npz")["logits"]
+    np.testing.assert_allclose(logits[view.inverse], expected, atol=1e-4, rtol=0)

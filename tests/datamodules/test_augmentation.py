@@ -1,0 +1,86 @@
+"""Augmentation turns and jitters a scan, and changes nothing else about it."""
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from derain.datamodules.augmentation import Augmentation
+from derain.hard_cases import hard_cases, scene
+from derain.scan import Scan
+
+HARD_CASES = dict(hard_cases(largest=5000))
+TURN = Augmentation(rotation_probability=1, jitter_probability=0)
+JITTER = Augmentation(rotation_probability=0, jitter_probability=1)
+BOTH = Augmentation(rotation_probability=1, jitter_probability=1)
+NEITHER = Augmentation(rotation_probability=0, jitter_probability=0)
+
+
+def street() -> Scan:
+    return Scan.of(scene(2000)).with_label(np.arange(2000))
+
+
+@given(st.integers(0, 2**32))
+def test_a_turn_is_about_the_vertical_axis_and_the_same_for_all_points(seed: int) -> None:
+    scan = street()
+    turned = TURN(scan, np.random.default_rng(seed))
+    before, after = (s.xyz[:, 0] + 1j * s.xyz[:, 1] for s in (scan, turned))
+    np.testing.assert_array_equal(turned.xyz[:, 2], scan.xyz[:, 2])
+    np.testing.assert_allclose(np.abs(after), np.abs(before), rtol=1e-5)
+    np.testing.assert_allclose(after / before, (after / before)[0], atol=1e-5)
+
+
+def test_turns_go_all_the_way_round() -> None:
+    ahead = Scan.of(np.array([[10.0, 0, 1, 0]]))
+    rng = np.random.default_rng(0)
+    xyz = np.concatenate([TURN(ahead, rng).xyz for _ in range(400)])
+    quarters = np.histogram(np.arctan2(xyz[:, 1], xyz[:, 0]), bins=4, range=(-np.pi, np.pi))[0]
+    assert (quarters > 70).all()
+
+
+def test_jitter_is_in_metres_and_the_same_in_every_direction() -> None:
+    scan = Scan.of(scene(20_000))
+    moved = Augmentation(0, 1, jitter=0.05)(scan, np.random.default_rng(0)).xyz - scan.xyz
+    np.testing.assert_allclose(moved.std(axis=0), 0.05, rtol=0.05)
+    np.testing.assert_allclose(moved.mean(axis=0), 0, atol=0.002)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_each_happens_to_its_share_of_scans(share: float) -> None:
+    scan = Scan.of(scene(10))
+    rng = np.random.default_rng(0)
+    for augmentation in (Augmentation(share, 0), Augmentation(0, share)):
+        changed = [bool((augmentation(scan, rng).xyz != scan.xyz).any()) for _ in range(400)]
+        assert np.mean(changed) == pytest.approx(share, abs=0.1 if share == 0.5 else 0)
+
+
+def test_everything_else_stays() -> None:
+    scan = street()
+    before = scan.xyz.copy()
+    changed = BOTH(scan, np.random.default_rng(0))
+    assert changed.intensity is scan.intensity
+    assert changed.label is scan.label
+    assert changed.xyz.dtype == np.float32
+    np.testing.assert_array_equal(scan.xyz, before)
+
+
+def test_the_same_generator_gives_the_same_scan() -> None:
+    one, other = (BOTH(street(), np.random.default_rng(7)).xyz for _ in range(2))
+    np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
+def test_points_that_cannot_be_judged_stay_as_they_are(scan: Scan) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        changed = BOTH(scan, np.random.default_rng(0))
+    np.testing.assert_array_equal(changed.valid, scan.valid)
+    np.testing.assert_array_equal(changed.xyz[~scan.valid], scan.xyz[~scan.valid])
+    assert (changed.xyz[scan.valid] != scan.xyz[scan.valid]).any() or not scan.valid.any()
+
+
+def test_with_neither_a_scan_stays_as_it_is() -> None:
+    scan = street()
+    np.testing.assert_array_equal(NEITHER(scan, np.random.default_rng(0)).xyz, scan.xyz)

@@ -1,0 +1,254 @@
+"""From files to batches: what a model gets to see, and what is said of files it cannot see."""
+
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from derain.batch import Batch
+from derain.datamodules.augmentation import Augmentation
+from derain.datamodules.base import Loading, ScanDataModule, ScanFile
+from derain.datamodules.folder import Folder
+from derain.errors import InputError
+from derain.files.labels import write_labels
+from derain.hard_cases import scene
+from derain.neighbours import NeighbourView
+from derain.scan import Scan
+
+Write = Callable[..., None]
+Connect = Callable[..., ScanDataModule]
+STILL = Augmentation(rotation_probability=0, jitter_probability=0)
+SCANS = 6
+SNOW = 110
+
+
+@pytest.fixture
+def folder(tmp_path: Path, write: Write) -> Callable[..., Folder]:
+    """Makes a data module of six scans, of 40, 41, ... points."""
+    for number in range(SCANS):
+        file = tmp_path / f"{number}.bin"
+        write(file, file.with_suffix(".label"), [0, SNOW, 111], scene(40 + number, seed=number))
+
+    def make(**loading: Any) -> Folder:
+        everything = {part: ["*.bin"] for part in ("train", "validation", "test")}
+        return Folder(str(tmp_path), "wads", **everything, loading=Loading(**loading))
+
+    return make
+
+
+def batches(data: ScanDataModule, part: str) -> list[Batch]:
+    """One epoch, as the trainer gives it to the model."""
+    # All of it first: a worker that is left in the middle takes seconds to end.
+    received = list(getattr(data, f"{part}_dataloader")())
+    return [data.on_before_batch_transfer(batch, 0) for batch in received]
+
+
+def scans(data: ScanDataModule, part: str) -> list[Scan]:
+    return [sample.scan for batch in batches(data, part) for sample in batch.samples]
+
+
+def lengths(data: ScanDataModule, part: str) -> list[int]:
+    return [len(scan) for scan in scans(data, part)]
+
+
+def test_what_is_not_trained_on_comes_in_order_and_untouched(
+    folder: Callable[..., Folder], connect: Connect
+) -> None:
+    data = connect(folder())
+    for part in ("val", "test", "predict"):
+        for _ in range(2):
+            for number, scan in enumerate(scans(data, part)):
+                points = scene(40 + number, seed=number)
+                np.testing.assert_array_equal(np.c_[scan.xyz, scan.intensity], points)
+
+
+def test_training_scans_come_in_another_order_every_epoch(
+    folder: Callable[..., Folder], connect: Connect
+) -> None:
+    torch.manual_seed(0)
+    data = connect(folder())
+    epochs = [lengths(data, "train") for _ in range(5)]
+    assert {tuple(sorted(epoch)) for epoch in epochs} == {tuple(range(40, 40 + SCANS))}
+    assert len({tuple(epoch) for epoch in epochs}) > 1
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_training_scans_are_augmented_anew_every_epoch(
+    folder: Callable[..., Folder], connect: Connect, workers: int
+) -> None:
+    def epochs(seed: int) -> list[list[Scan]]:
+        torch.manual_seed(seed)
+        turned = Augmentation(rotation_probability=1, jitter_probability=0)
+        loader = connect(folder(augmentation=turned, workers=workers)).train_dataloader()
+        drawn = [[batch.samples[0].scan for batch in loader] for _ in range(2)]
+        return [sorted(epoch, key=len) for epoch in drawn]
+
+    first, second = epochs(seed=0)
+    again, _ = epochs(seed=0)
+    for one, other, repeated in zip(first, second, again, strict=True):
+        assert not np.allclose(one.xyz, other.xyz)
+        np.testing.assert_array_equal(one.xyz, repeated.xyz)
+
+
+def test_scans_are_packed_in_batches_of_the_size_asked_for(
+    folder: Callable[..., Folder], connect: Connect
+) -> None:
+    first, second = batches(connect(folder(batch_size=4)), "val")
+    assert (len(first.samples), len(second.samples)) == (4, 2)
+    assert len(first.inputs["points"]) == 40 + 41 + 42 + 43
+
+
+def test_the_target_is_one_where_the_card_says_rain(
+    folder: Callable[..., Folder], connect: Connect
+) -> None:
+    for batch in batches(connect(folder()), "val"):
+        (sample,) = batch.samples
+        assert sample.scan.label is not None
+        assert batch.target is not None
+        expected = sample.scan.label[sample.view.first] == SNOW
+        np.testing.assert_array_equal(batch.target.numpy(), expected)
+        assert 0 < expected.sum() < len(expected)
+
+
+def test_prediction_scans_have_no_target(folder: Callable[..., Folder], connect: Connect) -> None:
+    assert {batch.target for batch in batches(connect(folder()), "predict")} == {None}
+
+
+@pytest.mark.parametrize("neighbours", [3, 9])
+def test_the_view_is_the_models(
+    folder: Callable[..., Folder], connect: Connect, neighbours: int
+) -> None:
+    (sample,) = batches(connect(folder(), neighbours), "val")[0].samples
+    assert sample.view.neighbours.shape == (40, neighbours)
+    expected = NeighbourView(neighbours)(sample.scan)
+    np.testing.assert_array_equal(sample.view.neighbours, expected.neighbours)
+    np.testing.assert_array_equal(sample.view.distances, expected.distances)
+
+
+def test_a_worker_gives_what_the_process_itself_gives(
+    folder: Callable[..., Folder], connect: Connect
+) -> None:
+    here, there = (batches(connect(folder(workers=workers)), "val") for workers in (0, 1))
+    for own, sent in zip(here, there, strict=True):
+        for name, tensor in own.inputs.items():
+            assert torch.equal(tensor, sent.inputs[name])
+        assert own.target is not None
+        assert torch.equal(own.target, sent.target)
+
+
+def test_a_data_set_can_be_sent_to_a_worker(
+    folder: Callable[..., Folder], connect: Connect
+) -> None:
+    # Where processes do not fork, workers get the data set by pickling.
+    dataset: Any = connect(folder(deduplicate=True)).val_dataloader().dataset
+    sent = pickle.loads(pickle.dumps(dataset))
+    assert len(sent) == SCANS
+    np.testing.assert_array_equal(sent[3].view.points, dataset[3].view.points)
+
+
+def test_duplicates_are_measured_once_and_every_row_is_predicted(
+    tmp_path: Path, write: Write, connect: Connect
+) -> None:
+    distinct = scene(30)
+    rows = np.random.default_rng(0).permutation(np.resize(np.arange(30), 75))
+    points = np.concatenate([distinct[rows], np.full((5, 4), np.nan, np.float32)])
+    write(tmp_path / "a.bin", tmp_path / "a.label", [0, SNOW], points)
+    parts = {part: ["a.bin"] for part in ("train", "validation", "test")}
+    loading = Loading(deduplicate=True, augmentation=STILL)
+    data = connect(Folder(str(tmp_path), "wads", **parts, loading=loading))
+    for part in ("train", "val", "test"):
+        (scan,) = scans(data, part)
+        # The rows that remain are the first of their kind, in the order of the file.
+        first = np.sort(np.unique(rows, return_index=True)[1])
+        np.testing.assert_array_equal(scan.xyz, points[first, :3])
+        np.testing.assert_array_equal(scan.label, np.resize([0, SNOW], 80)[first])
+    ((sample,),) = (batch.samples for batch in batches(data, "predict"))
+    score = np.arange(1, 31, dtype=np.float32)
+    back = sample.view.back(score)
+    assert len(back) == 80
+    np.testing.assert_array_equal(back[75:], 0)
+    assert len(set(back[:75].tolist())) == 30
+    for row in range(30):
+        assert len(set(back[:75][rows == row].tolist())) == 1
+
+
+def test_without_asking_duplicates_are_counted_as_often_as_they_are_there(
+    tmp_path: Path, write: Write, connect: Connect
+) -> None:
+    write(tmp_path / "a.bin", tmp_path / "a.label", [0], np.repeat(scene(10), 3, axis=0))
+    data = connect(Folder(str(tmp_path), "wads", train=["a.bin"], test=["a.bin"]))
+    assert lengths(data, "test") == [30]
+
+
+def test_statistics_are_taken_from_the_training_scans_where_the_card_has_none(
+    tmp_path: Path, write: Write
+) -> None:
+    for number in range(3):
+        file = tmp_path / f"{number}.bin"
+        write(file, file.with_suffix(".label"), [3, 0, 0, 0], scene(40, seed=number))
+    data = Folder(str(tmp_path), "simulated", train=["[01].bin"], test=["2.bin"])
+    data.setup("test")
+    assert not data.card.has_statistics
+    data.setup("fit")
+    points = np.concatenate([scene(40, seed=0), scene(40, seed=1)]).astype(np.float64)
+    np.testing.assert_allclose(data.card.mean, points.mean(axis=0))
+    np.testing.assert_allclose(data.card.std, points.std(axis=0))
+    assert data.card.rain_share == 0.25
+
+
+def test_the_statistics_of_a_card_are_left_alone(folder: Callable[..., Folder]) -> None:
+    data = folder()
+    card = data.card
+    data.setup("fit")
+    assert data.card is card
+
+
+def test_columns_are_as_stated(tmp_path: Path) -> None:
+    rows = np.arange(10, dtype=np.float32).reshape(2, 5)
+    rows.tofile(tmp_path / "a.bin")
+    loading = Loading(columns=("x", "y", "z", "ring", "intensity"))
+    scan = Folder(str(tmp_path), "wads", loading=loading).read(ScanFile(tmp_path / "a.bin"))
+    np.testing.assert_array_equal(scan.xyz, rows[:, :3])
+    np.testing.assert_array_equal(scan.intensity, rows[:, 4])
+
+
+def test_the_instance_of_a_label_is_not_its_class(tmp_path: Path, write: Write) -> None:
+    write(tmp_path / "a.bin", points=scene(3))
+    write_labels(tmp_path / "a.label", np.array([0, SNOW, 40]), np.array([7, 8, 65535]))
+    data = Folder(str(tmp_path), "wads")
+    scan = data.read(ScanFile(tmp_path / "a.bin", tmp_path / "a.label"))
+    assert scan.label is not None
+    assert scan.label.tolist() == [0, SNOW, 40]
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        ("unknown class", r"2\.label: ids \[777, 778\] are no classes of WADS\. Name them"),
+        ("short labels", r"2\.label: holds 2 labels of 4 bytes for a scan of 42 points"),
+        ("half a row", r"2\.bin: 6 bytes are not whole rows of 16 bytes"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_named_from_a_worker_as_well(
+    folder: Callable[..., Folder],
+    connect: Connect,
+    tmp_path: Path,
+    damage: str,
+    message: str,
+    workers: int,
+) -> None:
+    data = connect(folder(workers=workers))
+    if damage == "unknown class":
+        write_labels(tmp_path / "2.label", np.resize([778, 0, 777], 42))
+    elif damage == "short labels":
+        write_labels(tmp_path / "2.label", np.zeros(2, np.int64))
+    else:
+        (tmp_path / "2.bin").write_bytes(b"abcdef")
+    with pytest.raises(InputError, match=message) as refusal:
+        batches(data, "val")
+    assert "Traceback" not in str(refusal.value)

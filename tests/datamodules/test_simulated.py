@@ -1,0 +1,66 @@
+"""Simulated rain is made where it is missing, and read like any other data set."""
+
+from pathlib import Path
+
+import pytest
+
+from derain.datamodules.simulated import Simulated
+from derain.errors import InputError
+from derain.open3d_import import import_open3d
+from derain.simulation.dataset import Campaign
+from derain.simulation.sensor import Sensor
+
+TINY = Campaign(
+    train=2,
+    validation=1,
+    test=1,
+    scans=2,
+    rain_rates=(50.0,),
+    sensor=Sensor(rows=8, columns=40),
+)
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    try:
+        import_open3d()
+    except InputError as error:
+        pytest.skip(str(error))
+    root = tmp_path_factory.mktemp("simulated") / "track"
+    Simulated(str(root), TINY).prepare_data()
+    return root
+
+
+def test_every_part_has_its_sequences_and_every_scan_its_labels(root: Path) -> None:
+    data = Simulated(str(root), TINY)
+    counts = {part: len(data.files(part)) for part in ("train", "validation", "test", "predict")}
+    assert counts == {"train": 4, "validation": 2, "test": 2, "predict": 2}
+    sequences = {
+        file.scan.parts[-3] for part in ("train", "validation", "test") for file in data.files(part)
+    }
+    assert sequences == {"000", "001", "002", "003"}
+    scan = data.read(data.files("train")[0])
+    assert scan.label is not None
+    assert (scan.label == 3).any()
+
+
+def test_what_is_there_is_not_made_again(root: Path) -> None:
+    files = [file for file in root.rglob("*") if file.is_file()]
+    before = [file.stat().st_mtime_ns for file in files]
+    Simulated(str(root), TINY).prepare_data()
+    assert [file.stat().st_mtime_ns for file in files] == before
+
+
+def test_the_card_gets_its_statistics_from_the_training_scans(root: Path) -> None:
+    data = Simulated(str(root), TINY)
+    assert not data.card.has_statistics
+    data.setup("fit")
+    assert data.card.has_statistics
+    assert 0 < data.card.rain_share < 0.5
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("years of work")
+    with pytest.raises(InputError, match="holds something other than a simulated data set"):
+        Simulated(str(tmp_path), TINY).prepare_data()
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]

@@ -1,0 +1,68 @@
+"""Statistics of training scans are those of all their valid points."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from derain.cards import DataCard
+from derain.datamodules.statistics import evenly_spaced, measured
+from derain.hard_cases import hard_cases
+from derain.scan import Scan
+
+CARD = DataCard("ours", {0: "ground", 3: "rain", 4: "spray"}, rain=(3, 4))
+
+
+def random_scan(seed: int, points: int) -> Scan:
+    rng = np.random.default_rng(seed)
+    columns = rng.normal([10, -5, 1, 40], [20, 10, 2, 30], (points, 4))
+    columns[rng.random(points) < 0.2] = np.nan
+    return Scan.of(columns).with_label(rng.choice([0, 3, 4], points))
+
+
+@given(st.lists(st.tuples(st.integers(0, 2**32), st.integers(0, 50)), min_size=1, max_size=5))
+def test_they_are_numpys_over_all_points_at_once(scans: list[tuple[int, int]]) -> None:
+    drawn = [random_scan(seed, points) for seed, points in scans]
+    columns = np.concatenate([np.c_[s.xyz, s.intensity, s.label][s.valid] for s in drawn])
+    card = measured(CARD, iter(drawn))
+    if len(columns) < 2:
+        return
+    np.testing.assert_allclose(card.mean, columns[:, :4].mean(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(card.std, columns[:, :4].std(axis=0), rtol=1e-5)
+    assert card.rain_share == pytest.approx((columns[:, 4] > 0).mean())
+    assert (card.name, card.classes, card.rain) == (CARD.name, CARD.classes, CARD.rain)
+
+
+def test_a_channel_that_never_changes_is_divided_by_one() -> None:
+    points = np.array([[1.0, 2, 3, 7], [4, 2, 3, 7], [7, 2, 3, 7]])
+    card = measured(CARD, [Scan.of(points).with_label(np.zeros(3, np.int64))])
+    assert card.mean == (4, 2, 3, 7)
+    assert card.std == (pytest.approx(math.sqrt(6)), 1, 1, 1)
+    assert card.rain_share == 0
+
+
+def test_hard_scans_give_statistics_that_can_be_divided_by() -> None:
+    for name, scan in hard_cases(largest=1000):
+        card = measured(CARD, [scan.with_label(np.full(len(scan), 3))])
+        assert card.has_statistics, name
+        assert np.isfinite([*card.mean, *card.std]).all(), name
+        assert min(card.std) > 0, name
+        assert card.rain_share == (1 if scan.valid.any() else 0), name
+
+
+def test_no_scans_give_statistics_that_change_nothing() -> None:
+    assert measured(CARD, []) == CARD.with_statistics((0.0,) * 4, (1.0,) * 4, 0.0)
+
+
+@given(st.integers(0, 60), st.integers(1, 20))
+def test_items_are_spread_evenly_from_first_to_last(count: int, most: int) -> None:
+    items = list(range(count))
+    spaced = evenly_spaced(items, most)
+    assert len(spaced) == min(count, most)
+    steps = np.diff(spaced)
+    assert (steps > 0).all()
+    assert not len(steps) or steps.max() - steps.min() <= 1
+    if count and most > 1:
+        assert (spaced[0], spaced[-1]) == (0, count - 1)

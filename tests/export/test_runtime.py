@@ -1,0 +1,220 @@
+"""The runtime gives PyTorch's answers, for any array and in its order, without torch."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.export.runtime import Derainer
+from derain.hard_cases import hard_cases, scene
+from derain.models.outdet import OutDet
+from derain.scan import Scan
+
+Points = NDArray[np.float32]
+
+
+@pytest.fixture(scope="module")
+def derainer(onnx_model: Path) -> Derainer:
+    return Derainer(onnx_model, threads=1)
+
+
+def test_the_answers_are_those_of_pytorch(derainer: Derainer, random_outdet: OutDet) -> None:
+    for name, scan in hard_cases(largest=3000):
+        view = random_outdet.spec.make_view()(scan)
+        inputs = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
+        with torch.inference_mode():
+            expected = random_outdet(**inputs).softmax(dim=1)[:, 1].numpy()
+        probability = derainer.probability(scan)
+        np.testing.assert_allclose(probability, view.back(expected), atol=2e-5, err_msg=name)
+        np.testing.assert_array_equal(derainer(scan), probability > 0.5, err_msg=name)
+
+
+def test_about_half_of_the_scene_is_called_rain(derainer: Derainer) -> None:
+    # What the other tests compare is worth comparing.
+    assert 0.4 < derainer(scene()).mean() < 0.6
+
+
+@pytest.mark.parametrize(
+    "convert",
+    [
+        lambda points: np.column_stack([points, np.arange(len(points), dtype=np.float32)]),
+        lambda points: points.astype(np.float64),
+        np.asfortranarray,
+        lambda points: np.repeat(points, 2, axis=0)[::2],
+        lambda points: points.astype(">f4"),
+        lambda points: Scan(points[:, :3].copy(), points[:, 3].copy()),
+        Scan.of,
+    ],
+    ids=["5 columns", "float64", "Fortran order", "strided", "big-endian", "Scan", "Scan.of"],
+)
+def test_points_come_in_any_form(derainer: Derainer, convert: Callable[[Points], Any]) -> None:
+    points = scene()
+    given_points = convert(points)
+    mask = derainer(given_points)
+    assert mask.dtype == bool
+    np.testing.assert_array_equal(mask, derainer(points))
+    probability = derainer.probability(given_points)
+    assert probability.dtype == np.float32
+    np.testing.assert_array_equal(probability, derainer.probability(points))
+
+
+def test_the_points_given_are_left_as_they_were(derainer: Derainer) -> None:
+    points = scene()
+    derainer(points)
+    np.testing.assert_array_equal(points, scene())
+
+
+def test_an_empty_scan_gets_an_empty_answer(derainer: Derainer) -> None:
+    assert derainer(np.zeros((0, 4))).shape == (0,)
+    assert derainer(np.zeros((0, 4))).dtype == bool
+
+
+def test_points_without_intensity_get_the_mean_of_the_training_data(derainer: Derainer) -> None:
+    points = scene()
+    points[:, 3] = derainer.spec.mean[3]
+    np.testing.assert_array_equal(derainer.probability(points[:, :3]), derainer.probability(points))
+
+
+@pytest.mark.parametrize("shape", [(4,), (10, 2), (0,), (2, 5, 4)])
+def test_an_array_of_another_shape_is_refused(derainer: Derainer, shape: tuple[int, ...]) -> None:
+    with pytest.raises(InputError, match="Give an array of shape"):
+        derainer(np.zeros(shape))
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        [np.nan, 1, 1, 1],
+        [1, np.inf, 1, 1],
+        [1, 1, -np.inf, 1],
+        [1, 1, 1, np.nan],
+        [0, 0, 0, 50],
+        [-1, -1, -1, -1],
+        [1e30, 1, 1, 1],
+    ],
+    ids=str,
+)
+def test_a_row_that_cannot_be_judged_is_not_rain_and_changes_no_other(
+    derainer: Derainer, row: list[float]
+) -> None:
+    points = scene(500)
+    places = [0, 250, 502]
+    mixed = np.insert(points, [0, 249, 500], np.array(row, np.float32), axis=0)
+    probability = derainer.probability(mixed)
+    np.testing.assert_array_equal(probability[places], 0)
+    assert not derainer(mixed)[places].any()
+    np.testing.assert_array_equal(np.delete(probability, places), derainer.probability(points))
+
+
+@settings(deadline=None, max_examples=20)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_permuted_points_get_the_permuted_answer(derainer: Derainer, seed: int) -> None:
+    points = scene(700)
+    order = np.random.default_rng(seed).permutation(len(points))
+    answer = derainer.probability(points)
+    np.testing.assert_allclose(derainer.probability(points[order]), answer[order], atol=1e-6)
+
+
+def test_duplicates_get_one_answer_and_change_no_other(derainer: Derainer) -> None:
+    points = scene()
+    copies = np.random.default_rng(0).integers(0, len(points), 2000)
+    probability = derainer.probability(np.concatenate([points, points[copies]]))
+    np.testing.assert_array_equal(probability[len(points) :], probability[copies])
+    np.testing.assert_array_equal(probability[: len(points)], derainer.probability(points))
+
+
+def test_the_number_of_threads_does_not_change_the_mask(onnx_model: Path) -> None:
+    points = scene(20_000)
+    one, two = (Derainer(onnx_model, threads) for threads in (1, 2))
+    assert (one.threads, two.threads) == (1, 2)
+    np.testing.assert_array_equal(one(points), two(points))
+    np.testing.assert_allclose(one.probability(points), two.probability(points), atol=1e-6)
+
+
+def test_the_threshold_is_that_of_the_file(
+    onnx_model: Path, saying: Callable[[object], Path]
+) -> None:
+    spec = {**Derainer(onnx_model).metadata["spec"], "threshold": 0.75}
+    stricter = Derainer(saying({"spec": spec}))
+    np.testing.assert_array_equal(stricter(scene()), stricter.probability(scene()) > 0.75)
+    assert 0 < stricter(scene()).sum() < Derainer(onnx_model)(scene()).sum()
+
+
+def test_a_model_runs_where_there_is_no_torch(onnx_model: Path, derainer: Derainer) -> None:
+    script = """
+import sys
+for name in ("torch", "lightning", "open3d", "onnx", "matplotlib", "scipy", "sklearn"):
+    sys.modules[name] = None  # importing it is an error
+from derain.export.runtime import Derainer
+from derain.hard_cases import scene
+print(Derainer(sys.argv[1], threads=1)(scene()).nonzero()[0].tolist())
+"""
+    printed = subprocess.run(
+        [sys.executable, "-c", script, onnx_model], check=True, capture_output=True, text=True
+    ).stdout
+    assert json.loads(printed) == derainer(scene()).nonzero()[0].tolist()
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda spec: {"spec": {**spec, "schema": 2}}, "schema 2, newer than this derain's 1"),
+        (lambda spec: {}, "it has no Spec"),
+        (lambda spec: None, "it has no Spec"),
+        (lambda spec: {"spec": "none"}, "it has no Spec"),
+        (lambda spec: {"spec": {}}, "its Spec is damaged"),
+        (lambda spec: {"spec": {**spec, "classes": {"rain": "rain"}}}, "its Spec is damaged"),
+        (lambda spec: {"spec": {**spec, "view": {"kind": "hologram"}}}, "unknown view 'hologram'"),
+    ],
+)
+def test_a_spec_that_cannot_be_used_is_refused(
+    derainer: Derainer,
+    saying: Callable[[object], Path],
+    change: Callable[[dict[str, Any]], object],
+    reason: str,
+) -> None:
+    model = saying(change(derainer.metadata["spec"]))
+    with pytest.raises(InputError, match=reason):
+        Derainer(model)
+
+
+def test_an_onnx_file_of_another_maker_is_refused(onnx_model: Path, tmp_path: Path) -> None:
+    proto = onnx.load(onnx_model)
+    del proto.metadata_props[:]
+    onnx.save(proto, tmp_path / "plain.onnx")
+    with pytest.raises(InputError, match=r"plain\.onnx: it has no Spec.*Export it with `derain"):
+        Derainer(tmp_path / "plain.onnx")
+
+
+@pytest.mark.parametrize("kept", [0, 10, 1000, 20_000])
+def test_a_damaged_file_is_refused(onnx_model: Path, tmp_path: Path, kept: int) -> None:
+    damaged = tmp_path / "damaged.onnx"
+    damaged.write_bytes(onnx_model.read_bytes()[:kept])
+    with pytest.raises(InputError, match=r"damaged\.onnx: (not an ONNX model|it has no Spec)"):
+        Derainer(damaged)
+
+
+def test_bytes_that_are_no_model_are_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "noise.onnx"
+    path.write_bytes(np.random.default_rng(0).bytes(5000))
+    with pytest.raises(InputError, match=r"noise\.onnx: not an ONNX model") as error:
+        Derainer(path)
+    assert "\n" not in str(error.value)
+
+
+def test_a_missing_model_is_reported(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none\.onnx: no such file. Give a model written by"):
+        Derainer(tmp_path / "none.onnx")
+    with pytest.raises(InputError, match="no such file"):
+        Derainer(tmp_path)

@@ -1,0 +1,97 @@
+"""What the tests of models share."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import lightning
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from derain.batch import Sample
+from derain.models.outdet import OutDet
+from derain.neighbours import NeighbourView
+from derain.scan import Scan
+from derain.spec import Spec
+
+
+def randomise(network: nn.Module, seed: int) -> None:
+    """Draws weights and BatchNorm statistics as a long training might leave them."""
+    generator = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        for name, tensor in network.state_dict().items():
+            if name.endswith("running_var"):
+                tensor.uniform_(0.5, 1.5, generator=generator)
+            elif tensor.is_floating_point():
+                fan_in = max(tensor[0].numel(), 1)
+                tensor.normal_(0, fan_in**-0.5, generator=generator)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread() -> Iterator[None]:
+    """Threads that wait for each other come to a crawl where other programs want the cores."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture
+def outdet() -> Callable[..., OutDet]:
+    """Makes a 3D-OutDet in evaluation mode, of random weights, statistics and normalisation."""
+
+    def make(seed: int = 0, neighbours: int = 9) -> OutDet:
+        rng = np.random.default_rng(seed)
+        model = OutDet(neighbours=neighbours)
+        randomise(model.network, seed)
+        model.adopt(
+            Spec(
+                network="outdet",
+                view=model.view_parameters(),
+                mean=tuple(rng.normal(0, 3, 4).tolist()),
+                std=tuple(rng.uniform(0.5, 20, 4).tolist()),
+                classes={0: "other", 1: "rain"},
+                rain=(1,),
+                data="random",
+                licence="none",
+                units=("m", "m", "m", "0..255"),
+            )
+        )
+        return model.eval()
+
+    return make
+
+
+@pytest.fixture
+def sample() -> Callable[..., Sample]:
+    """Views a scan or an array of points, with a random truth or one class for all."""
+
+    def view(points: Scan | np.ndarray, neighbours: int = 9, rain: float = 0.3) -> Sample:
+        scan = Scan.of(points)
+        truth = np.random.default_rng(len(scan)).random(len(scan)) < rain
+        neighbourhoods = NeighbourView(neighbours, threads=1)(scan)
+        target = torch.from_numpy(neighbourhoods.target(truth))
+        return Sample(scan.with_label(truth.astype(np.int64)), neighbourhoods, target)
+
+    return view
+
+
+@pytest.fixture(scope="module")
+def make_trainer() -> Iterator[Callable[..., lightning.Trainer]]:
+    """Makes a trainer that writes nothing, and adds its sums in the same order every time."""
+
+    def make(epochs: int, **arguments: Any) -> lightning.Trainer:
+        return lightning.Trainer(
+            accelerator="cpu",
+            deterministic=True,
+            max_epochs=epochs,
+            logger=False,
+            enable_checkpointing=False,
+            enable_progress_bar=False,
+            enable_model_summary=False,
+            **arguments,
+        )
+
+    yield make
+    torch.use_deterministic_algorithms(False)

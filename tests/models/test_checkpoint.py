@@ -1,0 +1,217 @@
+"""Checkpoints give back what was saved, and nothing that is not a checkpoint of derain."""
+
+import json
+import pickle
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from derain.batch import Batch, Sample
+from derain.errors import InputError
+from derain.hard_cases import scene
+from derain.models.checkpoint import load_model, save_model
+from derain.models.outdet import OutDet
+from derain.models.published import read_checkpoint, read_state_dict
+from derain.spec import SCHEMA
+
+MakeModel = Callable[..., OutDet]
+DAMAGED = "damaged, or holds more than tensors and plain values"
+
+
+class Code:
+    """Unpickled, creates a file."""
+
+    def __init__(self, witness: Path) -> None:
+        self.witness = witness
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Path.touch, (self.witness,)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "model.ckpt"
+
+
+@pytest.fixture
+def content(outdet: MakeModel, path: Path) -> dict[str, Any]:
+    """What a checkpoint holds, in the file as well."""
+    save_model(outdet(neighbours=5), path)
+    return torch.load(path, weights_only=True)
+
+
+def test_a_model_comes_back_as_it_was(
+    outdet: MakeModel, sample: Callable[..., Sample], path: Path
+) -> None:
+    model = outdet(seed=1, neighbours=5)
+    model.hparams.update(learning_rate=0.5, milestones=(1, 2), threshold=0.25)
+    save_model(model, path)
+    copy = load_model(path)
+    assert isinstance(copy, OutDet)
+    assert not copy.training
+    assert copy.spec == model.spec
+    assert dict(copy.hparams) == {k: v for k, v in model.hparams.items() if k != "_class_path"}
+    batch = Batch.of([sample(scene(200), neighbours=5)])
+    assert torch.equal(copy(**batch.inputs), model(**batch.inputs))
+
+
+def test_a_copy_of_a_copy_is_the_same(outdet: MakeModel, path: Path) -> None:
+    save_model(outdet(), path)
+    first = load_model(path)
+    save_model(first, path)
+    second = load_model(path)
+    assert second.spec == first.spec
+    for name, tensor in first.state_dict().items():
+        assert torch.equal(second.state_dict()[name], tensor)
+
+
+def test_hyper_parameters_are_primitives_only(content: dict[str, Any]) -> None:
+    parameters = dict(content["hyper_parameters"])
+    milestones = parameters.pop("milestones")
+    assert json.loads(json.dumps(parameters)) == parameters
+    assert milestones == (30, 40, 45)
+    assert parameters["spec"]["view"] == {"kind": "neighbours", "neighbours": 5}
+
+
+def test_the_weights_do_not_repeat_what_the_spec_says(content: dict[str, Any]) -> None:
+    assert all(name.startswith("network.") for name in content["state_dict"])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"hyper_parameters": None},
+        {"hyper_parameters": {"learning_rate": 1e-3}},
+        {"hyper_parameters": {"spec": None}},
+        {"state_dict": None},
+    ],
+    ids=str,
+)
+def test_a_checkpoint_of_something_else_is_refused(
+    content: dict[str, Any], path: Path, change: dict[str, Any]
+) -> None:
+    changed = {key: value for key, value in {**content, **change}.items() if value is not None}
+    torch.save(changed, path)
+    with pytest.raises(InputError, match=r"model\.ckpt: not a checkpoint of derain"):
+        load_model(path)
+
+
+def with_spec(content: dict[str, Any], **change: Any) -> dict[str, Any]:
+    parameters = content["hyper_parameters"]
+    spec = {**parameters["spec"], **change}
+    return {**content, "hyper_parameters": {**parameters, "spec": spec}}
+
+
+def test_a_checkpoint_of_an_unknown_network_is_refused(content: dict[str, Any], path: Path) -> None:
+    torch.save(with_spec(content, network="pointnet"), path)
+    with pytest.raises(InputError, match=r"model\.ckpt: a checkpoint of 'pointnet'\. Known are"):
+        load_model(path)
+
+
+def test_a_newer_spec_asks_for_an_upgrade(content: dict[str, Any], path: Path) -> None:
+    torch.save(with_spec(content, schema=SCHEMA + 1), path)
+    with pytest.raises(InputError, match=r"model\.ckpt: its Spec has schema .*Upgrade derain\."):
+        load_model(path)
+
+
+def test_a_damaged_spec_is_refused(content: dict[str, Any], path: Path) -> None:
+    torch.save(with_spec(content, classes=None), path)
+    with pytest.raises(InputError, match=r"model\.ckpt: its Spec is damaged"):
+        load_model(path)
+
+
+@pytest.mark.parametrize("part", ["weights", "parameters", "mean"])
+def test_weights_that_do_not_fit_are_refused_in_one_line(
+    content: dict[str, Any], path: Path, part: str
+) -> None:
+    if part == "weights":
+        content["state_dict"].pop("network.head.bias")
+    elif part == "parameters":
+        content["hyper_parameters"]["layers"] = 3
+    else:
+        content = with_spec(content, mean=[1.0, 2.0])
+    torch.save(content, path)
+    with pytest.raises(InputError, match=r"model\.ckpt: its weights do not fit outdet") as refusal:
+        load_model(path)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.9999])
+def test_a_truncated_file_is_refused(content: dict[str, Any], path: Path, share: float) -> None:
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(InputError, match=rf"model\.ckpt: {DAMAGED}"):
+        load_model(path)
+
+
+@pytest.mark.parametrize("text", [b"hello", b"\x80\x02.", bytes(1000)], ids=repr)
+def test_a_file_of_something_else_is_refused(path: Path, text: bytes) -> None:
+    path.write_bytes(text)
+    with pytest.raises(InputError, match=rf"model\.ckpt: {DAMAGED}"):
+        load_model(path)
+
+
+@pytest.mark.parametrize("writer", ["torch", "pickle"])
+@pytest.mark.parametrize("read", [load_model, read_state_dict])
+def test_code_in_a_file_does_not_run(
+    content: dict[str, Any], tmp_path: Path, path: Path, writer: str, read: Callable[[Path], Any]
+) -> None:
+    witness = tmp_path / "the code ran"
+    content["callbacks"] = Code(witness)
+    if writer == "torch":
+        torch.save(content, path)
+    else:
+        path.write_bytes(pickle.dumps(Code(witness), protocol=2))
+    with pytest.raises(InputError, match=rf"model\.ckpt: {DAMAGED}"):
+        read(path)
+    assert not witness.exists()
+    # The file is what it is meant to be: torch would run the code if it were told to.
+    with suppress(RuntimeError):
+        torch.load(path, weights_only=False)
+    assert witness.exists()
+
+
+@pytest.mark.parametrize("read", [load_model, read_state_dict, read_checkpoint])
+def test_a_file_that_is_not_there_is_named(tmp_path: Path, read: Callable[[Path], Any]) -> None:
+    with pytest.raises(InputError, match=r"nowhere\.pt: no such file"):
+        read(tmp_path / "nowhere.pt")
+
+
+def test_an_output_that_cannot_be_written_leaves_nothing(outdet: MakeModel, tmp_path: Path) -> None:
+    taken = tmp_path / "taken"
+    taken.mkdir()
+    with pytest.raises(InputError, match="taken: is not a file that can be replaced"):
+        save_model(outdet(), taken)
+    assert list(tmp_path.rglob("*")) == [taken]
+
+
+def test_a_published_state_dict_is_read_as_it_is(path: Path) -> None:
+    weights = {"module.fc.bias": torch.ones(2), "module.fc.weight": torch.zeros(2, 32)}
+    torch.save(weights, path)
+    read = read_state_dict(path)
+    assert read.keys() == weights.keys()
+    assert torch.equal(read["module.fc.bias"], torch.ones(2))
+
+
+def test_a_state_dict_is_found_in_a_training_checkpoint(path: Path) -> None:
+    torch.save({"epoch": 3, "state_dict": {"fc.bias": torch.ones(2)}}, path)
+    assert read_state_dict(path).keys() == {"fc.bias"}
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ([torch.ones(2)], "holds a list"),
+        ({"epoch": 3}, "not a state_dict of tensors"),
+        ({"state_dict": [1, 2]}, "not a state_dict of tensors"),
+        ({3: torch.ones(2)}, "not a state_dict of tensors"),
+    ],
+)
+def test_what_is_no_state_dict_is_refused(path: Path, content: Any, reason: str) -> None:
+    torch.save(content, path)
+    with pytest.raises(InputError, match=rf"model\.ckpt: {reason}"):
+        read_state_dict(path)

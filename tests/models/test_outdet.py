@@ -1,0 +1,257 @@
+"""3D-OutDet computes what was published, whatever it is given."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from derain.batch import Batch, Sample
+from derain.cards import load_card
+from derain.errors import InputError
+from derain.hard_cases import scene
+from derain.metrics import Counts
+from derain.models.outdet import PUBLISHED_KEYS, OutDet, OutDetNetwork
+from derain.models.published import read_state_dict
+from derain.neighbours import NeighbourView
+from derain.scan import Scan
+
+MakeModel = Callable[..., OutDet]
+MakeSample = Callable[..., Sample]
+
+
+def published(network: OutDetNetwork) -> dict[str, Tensor]:
+    """The network's tensors under the published keys."""
+    return {PUBLISHED_KEYS[name]: tensor for name, tensor in network.state_dict().items()}
+
+
+def as_published(
+    state_dict: dict[str, Tensor],
+    points: NDArray[np.float64],
+    distances: NDArray[np.float64],
+    neighbours: NDArray[np.int64],
+    training: bool = False,
+) -> NDArray[np.float64]:
+    """The published formula, term by term, without dropout (reference: 3D_OutDet, _out_det.py)."""
+    p = {key: tensor.double().numpy() for key, tensor in state_dict.items()}
+
+    def batch_norm(x: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+        mean, var = p[f"{name}.running_mean"], p[f"{name}.running_var"]
+        if training:
+            mean, var = x.mean(axis=0), x.var(axis=0)
+        return (x - mean) / np.sqrt(var + 1e-5) * p[f"{name}.weight"] + p[f"{name}.bias"]
+
+    def leaky(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(x > 0, x, 0.2 * x)
+
+    d = (p["convs.0.conv1.dw"] * (distances + 1.0))[..., None]
+    seen = np.concatenate([points[neighbours], d], axis=-1)
+    h = np.einsum("ijk,klj->il", seen, p["convs.0.conv1.weight"]) + p["convs.0.conv1.b"]
+    h = leaky(batch_norm(h, "convs.0.bn1"))
+    h = np.einsum("ijk,klj->il", h[neighbours], p["convs.0.conv2.weight"])
+    h = batch_norm(h, "convs.0.bn2")
+    h = leaky(h + points @ p["convs.0.downsample.weight"][..., 0].T)
+    return h @ p["fc.weight"].T + p["fc.bias"]
+
+
+def inputs_of(sample: Sample) -> dict[str, Tensor]:
+    return Batch.of([sample]).inputs
+
+
+@pytest.mark.parametrize("training", [False, True], ids=["evaluation", "training"])
+@pytest.mark.parametrize(("seed", "neighbours"), [(0, 9), (1, 9), (2, 4), (3, 1)])
+def test_the_network_is_the_published_formula(
+    outdet: MakeModel, sample: MakeSample, seed: int, neighbours: int, training: bool
+) -> None:
+    network = outdet(seed, neighbours).network.double().train(training)
+    network.dropout.p = 0.0
+    view = sample(scene(400, seed), neighbours).view
+    points = np.random.default_rng(seed).normal(size=view.points.shape)
+    distances = view.distances.astype(np.float64)
+    state_dict = {key: tensor.clone() for key, tensor in published(network).items()}
+    expected = as_published(state_dict, points, distances, view.neighbours, training)
+    logits = network(
+        torch.from_numpy(points), torch.from_numpy(distances), torch.from_numpy(view.neighbours)
+    )
+    np.testing.assert_allclose(logits.detach(), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_the_model_normalises_what_the_network_sees(outdet: MakeModel, sample: MakeSample) -> None:
+    model, view = outdet(4), sample(scene(400)).view
+    points = (view.points.astype(np.float64) - model.spec.mean) / model.spec.std
+    expected = as_published(
+        published(model.network), points, view.distances.astype(np.float64), view.neighbours
+    )
+    logits = model(**{name: torch.from_numpy(array) for name, array in view.inputs().items()})
+    np.testing.assert_allclose(logits.detach(), expected, atol=2e-4)
+
+
+def test_training_drops_half_of_the_features_and_doubles_the_rest(
+    outdet: MakeModel, sample: MakeSample
+) -> None:
+    network, inputs = outdet().network.train(), inputs_of(sample(scene(400)))
+    network.head = torch.nn.Identity()
+    torch.manual_seed(0)
+    dropped = network(**inputs)
+    network.dropout.p = 0.0
+    whole = network(**inputs)
+    kept = dropped != 0
+    assert kept.float().mean() == pytest.approx(0.5, abs=0.03)
+    torch.testing.assert_close(dropped[kept], 2 * whole[kept])
+
+
+def test_it_has_as_many_parameters_as_published() -> None:
+    assert sum(parameter.numel() for parameter in OutDet().parameters()) == 11_019
+
+
+def test_the_neighbourhood_is_as_large_as_asked_for(sample: MakeSample) -> None:
+    model = OutDet(neighbours=5)
+    assert model.view_parameters() == {"kind": "neighbours", "neighbours": 5}
+    assert model(**inputs_of(sample(scene(100), neighbours=5))).shape == (100, 2)
+
+
+@pytest.mark.parametrize("neighbours", [9, 3])
+@pytest.mark.parametrize("prefix", ["", "module."])
+def test_published_weights_are_taken_over(
+    outdet: MakeModel, sample: MakeSample, prefix: str, neighbours: int
+) -> None:
+    network = outdet(5, neighbours).network
+    weights = {prefix + key: tensor for key, tensor in published(network).items()}
+    inputs = inputs_of(sample(scene(200), neighbours))
+    copy = OutDetNetwork.from_published(weights).eval()
+    assert torch.equal(copy(**inputs), network(**inputs))
+    model = OutDet.from_published(weights, load_card("wads"))
+    assert model.spec.view == {"kind": "neighbours", "neighbours": neighbours}
+    assert (model.spec.data, model.spec.mean) == ("WADS", load_card("wads").mean)
+
+
+def test_weights_need_a_card_with_statistics(outdet: MakeModel) -> None:
+    with pytest.raises(InputError, match="REHEARSE-3D: the data card has no statistics"):
+        OutDet.from_published(published(outdet().network), load_card("rehearse3d"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"fc.bias": torch.ones(3)},
+        {"convs.0.conv1.dw": torch.ones(7)},
+        {"convs.0.conv1.dw": torch.tensor(1.0)},
+        {"convs.1.conv1.dw": torch.ones(9)},
+        {"fc.bias": None},
+    ],
+    ids=["head", "neighbours", "scalar", "surplus", "missing"],
+)
+def test_weights_of_another_network_are_refused(
+    outdet: MakeModel, change: dict[str, Tensor | None]
+) -> None:
+    weights = {**published(outdet().network), **change}
+    weights = {key: tensor for key, tensor in weights.items() if tensor is not None}
+    with pytest.raises(InputError, match="3D-OutDet: the state_dict is of another network"):
+        OutDetNetwork.from_published(weights)
+
+
+@pytest.mark.parametrize("name", ["salsanext", "lisnownet"])
+def test_weights_of_the_other_published_networks_are_refused(shared: Path, name: str) -> None:
+    shapes = json.loads((shared / "oracles/shapes.json").read_text())[name]
+    weights = {key: torch.zeros(shape) for key, shape in shapes.items()}
+    with pytest.raises(InputError, match="3D-OutDet: the state_dict is of another network"):
+        OutDetNetwork.from_published(weights)
+
+
+@pytest.fixture(scope="module")
+def on_wads(shared: Path) -> tuple[OutDet, Sample, Tensor]:
+    """The published weights, the published scan, and the logits of the one for the other."""
+    model = OutDet.from_published(
+        read_state_dict(shared / "oracles/outdet_wads.pt"), load_card("wads")
+    ).eval()
+    points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)
+    label = np.fromfile(shared / "data/wads/sample.label", np.uint32) & 0xFFFF
+    scan = Scan.of(points).with_label(label.astype(np.int64))
+    one = Sample(scan, NeighbourView()(scan), None)
+    with torch.no_grad():
+        return model, one, model(**inputs_of(one))
+
+
+def test_published_weights_give_the_published_logits(
+    shared: Path, on_wads: tuple[OutDet, Sample, Tensor]
+) -> None:
+    model, one, logits = on_wads
+    oracle = np.load(shared / "oracles/outdet_wads.npz")["logits"]
+    assert sorted(one.view.first) == list(range(len(oracle)))
+    np.testing.assert_allclose(logits.numpy(), oracle[one.view.first], atol=1e-4, rtol=0)
+    with torch.no_grad():
+        folded = model.folded()(**inputs_of(one))
+    np.testing.assert_allclose(folded.numpy(), oracle[one.view.first], atol=1e-4, rtol=0)
+
+
+def test_published_weights_reach_the_published_scores(
+    on_wads: tuple[OutDet, Sample, Tensor],
+) -> None:
+    model, one, logits = on_wads
+    (probability,) = model.probabilities(Batch.of([one]), logits)
+    predicted, snow = probability > model.spec.threshold, one.scan.label == 110
+    counts = Counts(
+        true_positive=np.count_nonzero(predicted & snow),
+        false_positive=np.count_nonzero(predicted & ~snow),
+        false_negative=np.count_nonzero(~predicted & snow),
+        true_negative=np.count_nonzero(~predicted & ~snow),
+    )
+    scores = (counts.precision, counts.recall, counts.iou)
+    assert scores == pytest.approx((0.8950, 0.9243, 0.8339), abs=0.0005)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("neighbours", [9, 4])
+def test_the_folded_network_computes_the_same(
+    outdet: MakeModel, sample: MakeSample, seed: int, neighbours: int
+) -> None:
+    model = outdet(seed, neighbours)
+    inputs = inputs_of(sample(scene(500, seed), neighbours))
+    logits, folded = model(**inputs), model.folded()(**inputs)
+    assert logits.std() > 0.1
+    torch.testing.assert_close(folded, logits, atol=2e-4, rtol=2e-4)
+
+
+def test_folding_leaves_the_model_as_it_was(outdet: MakeModel) -> None:
+    model = outdet()
+    before = {name: tensor.clone() for name, tensor in model.state_dict().items()}
+    folded = model.folded()
+    assert not any(parameter.requires_grad for parameter in folded.parameters())
+    for name, tensor in model.state_dict().items():
+        assert torch.equal(tensor, before[name])
+
+
+def test_packed_scans_get_the_logits_they_get_alone(outdet: MakeModel, sample: MakeSample) -> None:
+    model = outdet()
+    samples = [sample(scene(points, points)) for points in (300, 0, 7, 1, 500)]
+    batch = Batch.of(samples)
+    for logits, own in zip(batch.split(model(**batch.inputs)), samples, strict=True):
+        torch.testing.assert_close(logits, model(**inputs_of(own)), atol=1e-5, rtol=1e-5)
+
+
+def test_batch_statistics_are_those_of_all_points_of_all_scans(
+    outdet: MakeModel, sample: MakeSample
+) -> None:
+    network = outdet().network.double().train()
+    network.dropout.p = 0.0
+    for parameter in (network.norm1, network.norm2):
+        parameter.reset_running_stats()
+    samples = [sample(scene(points, points)) for points in (300, 0, 7, 1, 500)]
+    inputs = {
+        name: tensor.double() if tensor.is_floating_point() else tensor
+        for name, tensor in Batch.of(samples).inputs.items()
+    }
+    expected = as_published(
+        published(network), *(tensor.numpy() for tensor in inputs.values()), training=True
+    )
+    np.testing.assert_allclose(network(**inputs).detach(), expected, rtol=1e-9, atol=1e-9)
+    # The first layer's statistics, with PyTorch's momentum 0.1 and its unbiased variance.
+    distances = network.distance_weight * (inputs["distances"] + 1)
+    seen = torch.cat([inputs["points"][inputs["neighbours"]], distances[..., None]], dim=-1)
+    first = torch.einsum("ijk,klj->il", seen, network.weight1) + network.bias1
+    torch.testing.assert_close(network.norm1.running_mean, 0.1 * first.mean(dim=0))
+    torch.testing.assert_close(network.norm1.running_var, 0.9 + 0.1 * first.var(dim=0))

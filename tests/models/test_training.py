@@ -1,0 +1,263 @@
+"""Training learns, goes on where it stopped, and does the same again from the same seed."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import lightning
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from derain.datamodules.augmentation import Augmentation
+from derain.datamodules.base import Loading
+from derain.datamodules.folder import Folder
+from derain.datamodules.simulated import Simulated
+from derain.errors import InputError
+from derain.files.labels import write_labels
+from derain.hard_cases import scene
+from derain.losses import class_weights
+from derain.models.checkpoint import load_model
+from derain.models.outdet import OutDet
+from derain.one_line_rule import OneLineRule
+from derain.open3d_import import import_open3d
+from derain.scan import Scan
+from derain.simulation.dataset import Campaign
+from derain.simulation.sensor import Sensor
+
+MakeTrainer = Callable[..., lightning.Trainer]
+RAIN = 3
+
+
+class Losses(lightning.Callback):
+    """Keeps the training loss of every epoch."""
+
+    def __init__(self) -> None:
+        self.values: list[float] = []
+
+    def on_train_epoch_end(self, trainer: lightning.Trainer, *_: Any) -> None:
+        self.values.append(trainer.callback_metrics["train/loss"].item())
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished training."""
+
+    model: OutDet
+    data: Simulated
+    losses: list[float]
+    scores: dict[str, float]
+    probabilities: list[NDArray[np.float32]]
+
+
+def iou(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
+    return np.count_nonzero(predicted & rain) / np.count_nonzero(predicted | rain)
+
+
+def truths(data: Simulated, part: str) -> list[tuple[Scan, NDArray[np.bool_]]]:
+    scans = [data.read(file) for file in data.files(part)]
+    return [(scan, scan.label == RAIN) for scan in scans]
+
+
+@pytest.fixture(scope="module")
+def run(make_trainer: MakeTrainer, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A 3D-OutDet trained for a few seconds on a tiny simulated campaign."""
+    try:
+        import_open3d()
+    except InputError as error:
+        pytest.skip(str(error))
+    campaign = Campaign(
+        train=8, validation=1, test=1, scans=1, rain_rates=(25,), sensor=Sensor(rows=24, columns=60)
+    )
+    data = Simulated(str(tmp_path_factory.mktemp("simulated") / "track"), campaign)
+    lightning.seed_everything(0)
+    model, losses = OutDet(learning_rate=0.02, weight_decay=0, milestones=(10, 13)), Losses()
+    trainer = make_trainer(epochs=15, callbacks=[losses], limit_val_batches=0)
+    trainer.fit(model, data)
+    (probabilities,) = trainer.predict(model, data)
+    (scores,) = trainer.test(model, data, verbose=False)
+    return Run(model, data, losses.values, scores, probabilities)
+
+
+def test_the_loss_falls(run: Run) -> None:
+    assert len(run.losses) == 15
+    assert run.losses[-1] < 0.5 * run.losses[0]
+
+
+def test_a_trained_network_beats_rules_that_need_no_network(run: Run) -> None:
+    rule = OneLineRule.best(truths(run.data, "train"))
+    ((scan, rain),) = truths(run.data, "test")
+    everything = iou(np.ones(len(scan), bool), rain)
+    assert run.scores["test/iou"] > iou(rule(scan), rain) > everything
+
+
+def test_the_scores_of_a_test_are_those_of_its_predictions(run: Run) -> None:
+    ((_, rain),) = truths(run.data, "test")
+    predicted = run.probabilities[0] > run.model.spec.threshold
+    assert run.scores["test/iou"] == pytest.approx(iou(predicted, rain))
+    assert run.scores["test/recall"] == pytest.approx((predicted & rain).sum() / rain.sum())
+    by_class = run.model.metrics.by_class()
+    assert by_class["rain"].called_rain == (predicted & rain).sum()
+    assert sum(counts.points for counts in by_class.values()) == len(rain)
+
+
+def test_the_model_learns_spec_and_class_weights_from_its_data(run: Run) -> None:
+    card, spec = run.data.card, run.model.spec
+    assert card.has_statistics
+    assert (spec.mean, spec.std, spec.rain) == (card.mean, card.std, card.rain)
+    assert (spec.data, spec.units[3]) == ("simulated rain", "0..255")
+    torch.testing.assert_close(run.model.mean, torch.tensor(card.mean))
+    assert torch.equal(
+        run.model.class_weight, class_weights([1 - card.rain_share, card.rain_share])
+    )
+
+
+@pytest.fixture
+def scenes(tmp_path: Path) -> Callable[..., Folder]:
+    """Makes a data module of four small labelled scenes."""
+    for number in range(4):
+        scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
+        write_labels(tmp_path / f"{number}.label", RAIN * (np.arange(300) >= 270))
+
+    def make(train: str = "[012].bin", **loading: Any) -> Folder:
+        parts = {"train": [train], "validation": ["3.bin"], "test": ["3.bin"]}
+        return Folder(str(tmp_path), "simulated", **parts, loading=Loading(**loading))
+
+    return make
+
+
+def assert_same(one: torch.nn.Module, other: torch.nn.Module) -> None:
+    for name, tensor in one.state_dict().items():
+        assert torch.equal(tensor, other.state_dict()[name]), name
+
+
+def differ(one: torch.nn.Module, other: torch.nn.Module) -> bool:
+    pairs = zip(one.state_dict().values(), other.state_dict().values(), strict=True)
+    return any(not torch.equal(a, b) for a, b in pairs)
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_the_same_seed_gives_the_same_weights_and_another_does_not(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder], workers: int
+) -> None:
+    def trained(seed: int) -> OutDet:
+        lightning.seed_everything(seed)
+        model = OutDet()
+        make_trainer(epochs=2).fit(model, scenes(batch_size=2, workers=workers))
+        return model
+
+    first = trained(seed=1)
+    assert_same(first, trained(seed=1))
+    assert differ(first, trained(seed=2))
+
+
+class SameDropout(lightning.Callback):
+    """Draws the dropout of a step from its number: generators are not in a checkpoint."""
+
+    def on_train_batch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
+        torch.manual_seed(trainer.global_step)
+
+
+def test_a_run_goes_on_from_a_checkpoint_as_if_it_had_not_stopped(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+) -> None:
+    still = Augmentation(rotation_probability=0, jitter_probability=0)
+
+    def fit(epochs: int, checkpoint: Path | None = None) -> lightning.Trainer:
+        lightning.seed_everything(0)
+        trainer = make_trainer(epochs=epochs, callbacks=[SameDropout()])
+        data = scenes(train="0.bin", augmentation=still)
+        trainer.fit(OutDet(milestones=(1, 3)), data, ckpt_path=checkpoint)
+        return trainer
+
+    straight, stopped = fit(epochs=4), fit(epochs=2)
+    stopped.save_checkpoint(tmp_path / "half.ckpt")
+    resumed = fit(epochs=4, checkpoint=tmp_path / "half.ckpt")
+    assert resumed.global_step == straight.global_step == 4
+    assert_same(resumed.lightning_module, straight.lightning_module)
+    assert differ(resumed.lightning_module, stopped.lightning_module)
+    assert [group["lr"] for group in resumed.optimizers[0].param_groups] == [pytest.approx(1e-5)]
+
+
+def test_a_checkpoint_of_a_run_is_a_model(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+) -> None:
+    model = OutDet(neighbours=6)
+    trainer = make_trainer(epochs=1)
+    trainer.fit(model, scenes())
+    trainer.save_checkpoint(tmp_path / "run.ckpt")
+    copy = load_model(tmp_path / "run.ckpt")
+    assert copy.spec == model.spec
+    assert copy.spec.view == {"kind": "neighbours", "neighbours": 6}
+    assert_same(copy, model)
+
+
+def test_a_test_takes_the_normalisation_from_the_checkpoint(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+) -> None:
+    trainer = make_trainer(epochs=1)
+    trainer.fit(OutDet(), scenes())
+    trainer.save_checkpoint(tmp_path / "run.ckpt")
+    trained = trainer.lightning_module.eval()
+    other = OutDet()
+    make_trainer(epochs=1).test(other, scenes(), ckpt_path=tmp_path / "run.ckpt", verbose=False)
+    assert other.spec == trained.spec
+    assert torch.equal(other.mean, trained.mean)
+    assert torch.equal(other.std, trained.std)
+
+
+@pytest.mark.parametrize("content", [{}, {"hyper_parameters": {"lr": 1}}], ids=str)
+def test_a_run_does_not_start_from_a_checkpoint_of_something_else(
+    make_trainer: MakeTrainer,
+    scenes: Callable[..., Folder],
+    tmp_path: Path,
+    content: dict[str, Any],
+) -> None:
+    foreign = {"pytorch-lightning_version": lightning.__version__, "state_dict": {}, **content}
+    torch.save(foreign, tmp_path / "foreign.ckpt")
+    with pytest.raises(InputError, match="it has no Spec"):
+        make_trainer(epochs=1).test(OutDet(), scenes(), ckpt_path=tmp_path / "foreign.ckpt")
+
+
+def test_a_spec_of_another_network_is_refused(outdet: Callable[..., OutDet]) -> None:
+    spec = {**outdet().spec.as_dict(), "network": "salsanext"}
+    with pytest.raises(InputError, match="a model of salsanext"):
+        OutDet(spec=spec)
+
+
+def test_an_untrained_model_is_not_tested(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder]
+) -> None:
+    with pytest.raises(InputError, match="has not been trained"):
+        make_trainer(epochs=1).test(OutDet(), scenes())
+
+
+def test_a_run_goes_through_scans_of_no_point_and_of_one(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+) -> None:
+    for points in (0, 1):
+        scene(300)[:points].tofile(tmp_path / f"tiny{points}.bin")
+        write_labels(tmp_path / f"tiny{points}.label", np.zeros(points, np.int64))
+    data = scenes(train="tiny*.bin")
+    data.patterns["validation"] = data.patterns["test"] = ["*.bin"]
+    model, trainer = OutDet(), make_trainer(epochs=2)
+    trainer.fit(model, data)
+    assert trainer.global_step == 4
+    assert all(tensor.isfinite().all() for tensor in model.state_dict().values())
+    trainer.test(model, data, verbose=False)
+    assert len(model.metrics.per_scan()) == 6
+    assert sum(counts.points for counts in model.metrics.by_class().values()) == 4 * 300 + 1
+
+
+def test_a_scan_that_cannot_be_read_stops_a_run_with_its_name(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+) -> None:
+    trainer = make_trainer(epochs=1)
+    data = scenes(workers=1)
+    data.card = data.card.with_statistics((0.0,) * 4, (1.0,) * 4, 0.1)
+    (tmp_path / "1.bin").write_bytes(b"damaged")
+    with pytest.raises(InputError, match=r"1\.bin: 7 bytes are not whole rows") as refusal:
+        trainer.fit(OutDet(), data)
+    assert "Traceback" not in str(refusal.value)

@@ -1,0 +1,67 @@
+"""Batches of scans: packed together, taken apart again."""
+
+import numpy as np
+import pytest
+import torch
+
+from derain.batch import Batch, Sample
+from derain.neighbours import NeighbourView
+from derain.scan import Scan
+
+SIZES = (12, 0, 1, 30)
+
+
+def sample(points: int, labelled: bool = True) -> Sample:
+    rng = np.random.default_rng(points)
+    scan = Scan.of(rng.normal(size=(points, 4)))
+    view = NeighbourView(5)(scan)
+    target = torch.from_numpy(view.target(rng.random(points) < 0.5))
+    return Sample(scan, view, target if labelled else None)
+
+
+SAMPLES = [sample(points) for points in SIZES]
+
+
+def test_a_batch_is_its_scans_one_after_the_other() -> None:
+    batch = Batch.of(SAMPLES)
+    assert list(batch.inputs) == ["points", "distances", "neighbours"]
+    inputs = [batch.split(tensor) for tensor in batch.inputs.values()]
+    assert batch.target is not None
+    for own, points, distances, neighbours, target in zip(
+        SAMPLES, *inputs, batch.split(batch.target), strict=True
+    ):
+        np.testing.assert_array_equal(points, own.view.points)
+        np.testing.assert_array_equal(distances, own.view.distances)
+        assert torch.equal(target, own.target)
+        # Wherever they lie in the batch, neighbours are at the coordinates they were at alone.
+        np.testing.assert_array_equal(
+            batch.inputs["points"][neighbours], own.view.points[own.view.neighbours]
+        )
+
+
+def test_scores_are_split_by_the_points_of_each_scan() -> None:
+    scores = torch.rand(sum(SIZES), 2)
+    parts = Batch.of(SAMPLES).split(scores)
+    assert [len(part) for part in parts] == list(SIZES)
+    assert torch.equal(torch.cat(parts), scores)
+
+
+def test_a_batch_of_an_empty_scan_is_an_empty_batch() -> None:
+    batch = Batch.of([sample(0)])
+    assert {len(tensor) for tensor in batch.inputs.values()} == {0}
+    assert [len(part) for part in batch.split(torch.zeros(0, 2))] == [0]
+
+
+@pytest.mark.parametrize("unlabelled", [1, 2])
+def test_a_batch_has_targets_only_if_every_scan_has(unlabelled: int) -> None:
+    samples = [sample(9, labelled=False)] * unlabelled + [sample(5)] * (2 - unlabelled)
+    assert Batch.of(samples).target is None
+
+
+def test_tensors_follow_to_another_device_and_scans_stay() -> None:
+    batch = Batch.of(SAMPLES)
+    moved = batch.to(torch.device("meta"))
+    assert moved.target is not None
+    assert {tensor.device.type for tensor in [*moved.inputs.values(), moved.target]} == {"meta"}
+    assert moved.samples is batch.samples
+    assert Batch.of([sample(3, labelled=False)]).to(torch.device("meta")).target is None

@@ -1,0 +1,155 @@
+"""Data cards: the packaged ones say what was published, and a user's own are read with care."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from derain.cards import DataCard, load_card, packaged_cards
+from derain.errors import InputError
+from derain.losses import class_weights
+from derain.scan import Scan
+
+OWN: dict[str, Any] = {
+    "name": "our yard",
+    "classes": {0: "ground", 3: "rain", 4: "spray"},
+    "rain": [3, 4],
+    "mean": [1, 2, 3, 4],
+    "std": [5.0, 6.0, 7.0, 8.0],
+    "rain_share": 0.25,
+    "split": {"train": ["00", "010"], "test": ["008"]},
+}
+
+
+@pytest.fixture
+def card_file(tmp_path: Path) -> Path:
+    return tmp_path / "yard.yaml"
+
+
+@pytest.mark.parametrize("name", packaged_cards())
+def test_a_packaged_card_can_be_read(name: str) -> None:
+    card = load_card(name)
+    assert set(card.rain) <= set(card.classes)
+    assert len(set(card.classes.values())) == len(card.classes)
+    assert card.std is None or min(card.std) > 0
+
+
+# Source: sporsho/3D_OutDet, class weights that its recipes were trained with.
+@pytest.mark.parametrize(
+    ("name", "weights", "rain"),
+    [
+        ("wads", (1.135, 8.282), (110,)),
+        ("kitti", (1.110, 9.901), (1,)),
+        ("spray", (1.011, 76.1), (2,)),
+        ("rehearse3d", (1.070, 14.840), (3,)),
+    ],
+)
+def test_the_rain_share_gives_the_published_class_weights(
+    name: str, weights: tuple[float, float], rain: tuple[int, ...]
+) -> None:
+    card = load_card(name)
+    assert card.rain_share is not None
+    assert class_weights([1 - card.rain_share, card.rain_share]).tolist() == pytest.approx(
+        weights, rel=1e-3
+    )
+    assert card.rain == rain
+
+
+def test_a_split_is_of_different_sequences() -> None:
+    for name in packaged_cards():
+        parts = load_card(name).split.values()
+        sequences = [sequence for part in parts for sequence in part]
+        assert len(set(sequences)) == len(sequences)
+
+
+def test_a_card_of_ones_own_holds_what_its_file_says(card_file: Path) -> None:
+    card_file.write_text(yaml.safe_dump(OWN))
+    assert load_card(card_file) == DataCard(
+        name="our yard",
+        classes={0: "ground", 3: "rain", 4: "spray"},
+        rain=(3, 4),
+        mean=(1.0, 2.0, 3.0, 4.0),
+        std=(5.0, 6.0, 7.0, 8.0),
+        rain_share=0.25,
+        split={"train": ("00", "010"), "test": ("008",)},
+    )
+
+
+def test_a_card_without_all_its_statistics_says_so(card_file: Path) -> None:
+    for missing in ("mean", "std", "rain_share"):
+        card_file.write_text(yaml.safe_dump({k: v for k, v in OWN.items() if k != missing}))
+        card = load_card(card_file)
+        assert not card.has_statistics
+        assert card.with_statistics((0.0,) * 4, (1.0,) * 4, 0.5).has_statistics
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"classes": None},
+        {"classes": ["ground", "rain"]},
+        {"classes": {"three": "rain"}},
+        {"rain": []},
+        {"rain": 3},
+        {"rain": [5]},
+        {"mean": [1, 2, 3]},
+        {"mean": 1},
+        {"std": [1, 1, 1, 0]},
+        {"std": ["a", "b", "c", "d"]},
+        {"rain_share": 1.5},
+        {"rain_share": "much"},
+        {"split": {"train": "00"}},
+        {"split": ["00"]},
+        {"resolution": 5},
+    ],
+    ids=str,
+)
+def test_a_card_that_makes_no_sense_is_refused(card_file: Path, change: dict[str, Any]) -> None:
+    card_file.write_text(yaml.safe_dump({**OWN, **change}))
+    with pytest.raises(InputError, match=r"yard\.yaml: not a data card"):
+        load_card(card_file)
+
+
+def test_a_sequence_that_yaml_reads_as_a_number_is_refused(card_file: Path) -> None:
+    text = yaml.safe_dump({**OWN, "split": {}}).replace("split: {}", "split: {train: [010]}")
+    card_file.write_text(text)
+    with pytest.raises(InputError, match=r"\[8\] must be a list of sequences, each quoted"):
+        load_card(card_file)
+
+
+@pytest.mark.parametrize("text", ["", "name only", "a: [1", "name: x", "\x00"], ids=repr)
+def test_a_file_that_is_no_card_is_refused_in_one_line(card_file: Path, text: str) -> None:
+    card_file.write_text(text)
+    with pytest.raises(InputError, match=r"yard\.yaml: not a data card") as refusal:
+        load_card(card_file)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_file_that_is_not_text_is_refused(card_file: Path) -> None:
+    card_file.write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(InputError, match=r"yard\.yaml: not a data card"):
+        load_card(card_file)
+
+
+def test_rain_is_every_class_that_the_card_says(card_file: Path) -> None:
+    card_file.write_text(yaml.safe_dump(OWN))
+    scan = Scan.of(np.ones((4, 4)), name="a.bin")
+    rain = load_card(card_file).rain_of(scan.with_label(np.array([0, 3, 4, 3])))
+    assert rain.tolist() == [False, True, True, True]
+    with pytest.raises(InputError, match=r"a\.bin: it has no labels"):
+        load_card(card_file).rain_of(scan)
+
+
+def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
+    with pytest.raises(InputError, match=r"rehearse: no such data card\. .*rehearse3d.*wads"):
+        load_card("rehearse")
+
+
+def test_the_class_shares_of_a_card_are_of_all_points() -> None:
+    # data_cfg.yaml of the published SalsaNext run: rain has 0.0664 of the points.
+    share = load_card("rehearse3d").rain_share
+    assert share is not None
+    assert math.isclose(share, 0.06638644365199696, rel_tol=1e-6)

@@ -1,0 +1,83 @@
+"""Every hard case goes through ``derain run``: finite, defined, and no row lost."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.cli.main import main
+from derain.export.runtime import Derainer
+from derain.files import read_scan, write_scan
+from derain.hard_cases import hard_cases, scene
+from derain.scan import Scan
+
+# A .bin file of x, y, z and intensity cannot lack the intensity.
+SUFFIXES = {"no intensity": (".pcd", ".npz", ".ply")}
+
+
+CASES = [
+    pytest.param(f"{number:02d}_{suffix[1:]}{suffix}", scan, id=f"{name}{suffix}")
+    for number, (name, scan) in enumerate(hard_cases())
+    for suffix in SUFFIXES.get(name, (".bin",))
+]
+
+
+@pytest.fixture(scope="module")
+def cleaned(onnx_model: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the hard cases, cleaned in one run."""
+    folder = tmp_path_factory.mktemp("hard")
+    for case in CASES:
+        name, scan = case.values
+        write_scan(folder / "scans" / name, scan)
+    arguments = ["run", onnx_model, folder / "scans", "--out", folder / "cleaned", "--threads", "2"]
+    assert main([str(argument) for argument in arguments]) == 0
+    return folder / "cleaned"
+
+
+def check(cleaned: Path, name: str, scan: Scan, onnx_model: Path) -> None:
+    label = np.fromfile((cleaned / name).with_suffix(".label"), "<u4")
+    assert label.shape == (len(scan),)
+    assert np.isin(label, [0, 1]).all()
+    assert not label[~scan.valid].any()
+    left = read_scan(cleaned / name)
+    np.testing.assert_array_equal(left.xyz, scan.xyz[label == 0])
+    probability = Derainer(onnx_model, threads=2).probability(scan)
+    assert np.isfinite(probability).all()
+    np.testing.assert_array_equal(label, probability > 0.5)
+
+
+@pytest.mark.parametrize(("name", "scan"), CASES)
+def test_a_hard_scan_gets_a_label_for_every_row_and_loses_only_rain(
+    cleaned: Path, onnx_model: Path, name: str, scan: Scan
+) -> None:
+    check(cleaned, name, scan, onnx_model)
+
+
+def test_a_scan_of_400_000_points_is_cleaned_like_any_other(
+    onnx_model: Path, tmp_path: Path
+) -> None:
+    scan = Scan.of(scene(400_000))
+    write_scan(tmp_path / "large.bin", scan)
+    out = tmp_path / "out"
+    assert main(["run", str(onnx_model), str(tmp_path / "large.bin"), "--out", str(out)]) == 0
+    check(out, "large.bin", scan, onnx_model)
+
+
+def test_no_hard_case_is_hard_in_name_only() -> None:
+    scans = dict(hard_cases(largest=50))
+    valid = {name: int(scan.valid.sum()) for name, scan in scans.items()}
+    assert (len(scans["empty"]), len(scans["one point"])) == (0, 1)
+    assert 1 < len(scans["fewer points than neighbours"]) < 9
+    assert len(np.unique(scans["all points identical"].xyz, axis=0)) == 1
+    assert len(np.unique(scans["40 % duplicates"].xyz, axis=0)) == 3000 < 5000
+    assert valid["nothing valid"] == 0
+    for name in ("NaN and infinite rows", "points at the origin", "sentinel cells"):
+        assert valid[name] == 2700, name
+    for name, reach in (("range 1e-6 m", 1e-6), ("range 1e4 m", 1e4)):
+        np.testing.assert_allclose(scans[name].range, reach, rtol=1e-5)
+    azimuth = np.arctan2(*scans["azimuth ±π"].xyz[:, 1::-1].T)
+    assert set(azimuth) == {np.float32(np.pi), np.float32(-np.pi)}
+    assert scans["no intensity"].intensity is None
+    assert set(scans["intensity 0"].intensity) == {0}
+    assert set(scans["intensity 65,535"].intensity) == {65_535}
+    assert len(scans["50 points"]) == 50

@@ -1,0 +1,72 @@
+"""What runs on a small computer loads no more than it needs."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from derain.hard_cases import scene
+
+HEAVY = {"torch", "torchmetrics", "lightning", "pytorch_lightning", "open3d", "matplotlib"}
+
+# Runs its first argument, then prints the packages that this loaded: those of the start, which an
+# editable installation or a profiler may add to, are not its doing.
+LOADED_BY = """
+import json, sys
+before = set(sys.modules)
+try:
+    exec(sys.argv.pop(1))
+finally:
+    loaded = {name.split(".")[0] for name in set(sys.modules) - before}
+    print(json.dumps(sorted(loaded - sys.stdlib_module_names)))
+"""
+
+COMMAND = "from derain.cli.main import main; main(sys.argv[1:])"
+
+
+def loaded_by(code: str, *arguments: str | Path) -> set[str]:
+    """Top-level packages outside the standard library that some code loads."""
+    finished = subprocess.run(
+        [sys.executable, "-c", LOADED_BY, code, *arguments], capture_output=True, text=True
+    )
+    assert finished.returncode == 0, finished.stderr
+    return set(json.loads(finished.stdout.splitlines()[-1]))
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Path:
+    path = tmp_path / "scan.bin"
+    scene(100).tofile(path)
+    return path
+
+
+def test_the_root_of_the_package_needs_numpy_alone() -> None:
+    assert loaded_by("import derain") == {"derain", "numpy"}
+
+
+def test_the_runtime_needs_numpy_onnxruntime_and_the_knn_library() -> None:
+    loaded = loaded_by("import derain.export.runtime")
+    assert loaded == {"derain", "numpy", "onnxruntime", "small_gicp"}
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["info", "--help"]])
+def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
+    loaded = loaded_by(COMMAND, *arguments)
+    assert "derain" in loaded
+    assert not loaded & HEAVY
+
+
+def test_info_loads_nothing_heavy(scan: Path, onnx_model: Path) -> None:
+    assert not loaded_by(COMMAND, "info", scan, onnx_model) & HEAVY
+
+
+def test_run_loads_nothing_heavy(scan: Path, onnx_model: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert not loaded_by(COMMAND, "run", onnx_model, scan, "--out", out) & HEAVY
+    assert (out / "scan.label").stat().st_size == 400
+
+
+def test_heavy_packages_are_seen_where_they_are_loaded() -> None:
+    assert "matplotlib" in loaded_by("import derain.pictures")

@@ -1,0 +1,170 @@
+"""A scan keeps its rows, and says of each whether it can be judged."""
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.hard_cases import hard_cases
+from derain.scan import Scan
+
+HARD_CASES = dict(hard_cases())
+
+# Whatever tells a valid point from one that is not, and its neighbours among the float32.
+SPECIAL = [0.0, -0.0, -1.0, 1e-30, 1e6, 1000000.0625, 1e7, 10000001.0, 3e38, math.nan, math.inf]
+special = st.sampled_from([*SPECIAL, -math.inf])
+rows_of_four = hnp.arrays(
+    np.float32,
+    st.tuples(st.integers(0, 8), st.just(4)),
+    elements=special | st.floats(-100, 100, width=32),
+)
+
+
+def full_scan() -> Scan:
+    """Six points with everything a scan can have."""
+    rng = np.random.default_rng(0)
+    return Scan(
+        xyz=rng.normal(size=(6, 3)).astype(np.float32),
+        intensity=np.arange(6, dtype=np.float32),
+        label=np.arange(6) * 10,
+        radar=np.arange(6) % 2 == 0,
+        fields={"ring": np.arange(6, dtype=np.uint16), "time": rng.normal(size=6)},
+        shape=(2, 3),
+        name="full.pcd",
+        header="of the file",
+    )
+
+
+def can_be_judged(point: list[float], intensity: float | None) -> bool:
+    values = point if intensity is None else [*point, intensity]
+    return (
+        all(math.isfinite(value) for value in values)
+        and all(abs(coordinate) <= 1e6 for coordinate in point)
+        and (intensity is None or abs(intensity) <= 1e7)
+        and any(coordinate != 0 for coordinate in point)
+        and any(value != -1 for value in values)
+    )
+
+
+@given(rows_of_four)
+def test_valid_is_what_a_look_at_each_row_says(points: NDArray[np.float32]) -> None:
+    rows = points.tolist()
+    assert Scan.of(points).valid.tolist() == [can_be_judged(row[:3], row[3]) for row in rows]
+    assert Scan.of(points[:, :3]).valid.tolist() == [can_be_judged(row[:3], None) for row in rows]
+
+
+def test_a_cell_is_empty_only_if_every_column_says_so() -> None:
+    rows = np.array([[-1, -1, -1, -1], [-1, -1, -1, 5], [-1, -1, 2, -1]])
+    assert Scan.of(rows).valid.tolist() == [False, True, True]
+    assert Scan.of(rows[:, :3]).valid.tolist() == [False, False, True]
+
+
+@given(rows_of_four)
+def test_range_is_the_distance_from_the_sensor(points: NDArray[np.float32]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        distance = Scan.of(points).range
+    expected = np.array([math.sqrt(x * x + y * y + z * z) for x, y, z, _ in points.tolist()])
+    with np.errstate(over="ignore"):
+        np.testing.assert_allclose(distance, expected.astype(np.float32), rtol=1e-6)
+
+
+@pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
+def test_a_hard_scan_has_a_finite_range_and_intensity_wherever_it_is_valid(scan: Scan) -> None:
+    assert scan.valid.shape == scan.range.shape == (len(scan),)
+    assert np.isfinite(scan.range[scan.valid]).all()
+    assert scan.intensity is None or np.isfinite(scan.intensity[scan.valid]).all()
+
+
+def test_an_array_becomes_a_scan_of_its_first_four_columns() -> None:
+    points = np.arange(15, dtype=np.int64).reshape(3, 5)
+    scan = Scan.of(points, name="numbers")
+    np.testing.assert_array_equal(scan.xyz, points[:, :3])
+    np.testing.assert_array_equal(scan.intensity, points[:, 3])
+    assert scan.xyz.dtype == np.float32
+    assert (len(scan), scan.name) == (3, "numbers")
+
+
+def test_an_array_of_three_columns_has_no_intensity() -> None:
+    assert Scan.of(np.ones((2, 3))).intensity is None
+
+
+def test_a_scan_passes_through_as_it_is() -> None:
+    scan = full_scan()
+    assert Scan.of(scan) is scan
+
+
+def test_numbers_beyond_float32_are_points_that_cannot_be_judged() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        scan = Scan.of(np.array([[1e300, 0, 0, 0], [1, 2, 3, -1e300], [1, 2, 3, 4]]))
+        assert scan.valid.tolist() == [False, False, True]
+
+
+@pytest.mark.parametrize("shape", [(0,), (4,), (5, 2), (2, 4, 4), ()])
+def test_an_array_that_is_not_rows_of_points_is_refused(shape: tuple[int, ...]) -> None:
+    with pytest.raises(InputError, match=r"mine: points have shape .*\. Give an array"):
+        Scan.of(np.zeros(shape), name="mine")
+
+
+@pytest.mark.parametrize("column", ["intensity", "label", "radar", "fields"])
+def test_a_column_of_another_length_is_refused(column: str) -> None:
+    short = np.zeros(2)
+    columns = {column: {"ring": short} if column == "fields" else short}
+    title = "ring" if column == "fields" else column
+    with pytest.raises(InputError, match=f"cloud.bin: {title} has 2 rows for 3 points"):
+        Scan(np.zeros((3, 3), np.float32), name="cloud.bin", **columns)
+
+
+def test_coordinates_of_another_width_are_refused() -> None:
+    with pytest.raises(InputError, match=r"coordinates have shape \(3, 4\)"):
+        Scan(np.zeros((3, 4), np.float32))
+
+
+@given(st.lists(st.integers(0, 5)))
+def test_taking_rows_takes_them_of_every_column(rows: list[int]) -> None:
+    scan, taken = full_scan(), full_scan().take(np.array(rows, dtype=np.int64))
+    assert len(taken) == len(rows)
+    for name in ("xyz", "intensity", "label", "radar"):
+        np.testing.assert_array_equal(getattr(taken, name), getattr(scan, name)[rows])
+        assert getattr(taken, name).dtype == getattr(scan, name).dtype
+    assert set(taken.fields) == set(scan.fields)
+    for name, column in scan.fields.items():
+        np.testing.assert_array_equal(taken.fields[name], column[rows])
+    assert (taken.name, taken.header) == (scan.name, scan.header)
+
+
+def test_rows_that_are_left_form_no_grid() -> None:
+    assert full_scan().take(np.arange(6)).shape is None
+
+
+def test_taking_by_a_mask_keeps_the_order() -> None:
+    scan = full_scan()
+    mask = np.array([True, False, True, True, False, True])
+    np.testing.assert_array_equal(scan.take(mask).xyz, scan.take(np.flatnonzero(mask)).xyz)
+
+
+def test_taking_from_a_scan_of_coordinates_alone_invents_nothing() -> None:
+    taken = Scan(np.ones((4, 3), np.float32)).take(np.array([2]))
+    assert (taken.intensity, taken.label, taken.radar, taken.fields) == (None, None, None, {})
+
+
+def test_labels_are_added_to_a_copy() -> None:
+    scan = Scan(np.ones((4, 3), np.float32), intensity=np.ones(4, np.float32), name="street.bin")
+    labelled = scan.with_label(np.arange(4))
+    assert scan.label is None
+    assert labelled.label is not None
+    assert labelled.label.tolist() == [0, 1, 2, 3]
+    assert labelled.xyz is scan.xyz
+    assert labelled.name == "street.bin"
+
+
+def test_labels_of_another_length_are_refused() -> None:
+    with pytest.raises(InputError, match="label has 5 rows for 4 points"):
+        Scan(np.ones((4, 3), np.float32)).with_label(np.arange(5))

@@ -1,0 +1,94 @@
+"""A Spec says the same after a trip through a file, or what is wrong with the file."""
+
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from derain.errors import InputError
+from derain.neighbours import NeighbourView
+from derain.spec import SCHEMA, Spec
+
+SPEC = Spec(
+    network="outdet",
+    view={"kind": "neighbours", "neighbours": 7},
+    mean=(1.0, 2.0, 3.0, 4.0),
+    std=(5.0, 6.0, 7.0, 8.0),
+    classes={0: "road", 3: "rain", 110: "snow"},
+    rain=(3, 110),
+    data="somewhere",
+    licence="MIT",
+    units=("m", "m", "m", "0..255"),
+    threshold=0.25,
+)
+
+four_numbers = st.tuples(*[st.floats(-1e6, 1e6)] * 4)
+specs = st.builds(
+    Spec,
+    network=st.text(),
+    view=st.fixed_dictionaries({"kind": st.just("neighbours"), "neighbours": st.integers(1, 64)}),
+    mean=four_numbers,
+    std=four_numbers,
+    classes=st.dictionaries(st.integers(0, 65535), st.text()),
+    rain=st.lists(st.integers(0, 65535)).map(tuple),
+    data=st.text(),
+    licence=st.text(),
+    units=st.tuples(*[st.text()] * 4),
+    threshold=st.floats(0, 1),
+)
+
+
+@given(specs)
+def test_a_spec_survives_json(spec: Spec) -> None:
+    assert Spec.from_dict(json.loads(json.dumps(spec.as_dict())), "model") == spec
+
+
+def test_a_spec_as_a_dict_is_primitives_only() -> None:
+    content = SPEC.as_dict()
+    assert json.loads(json.dumps(content)) == content
+
+
+def test_a_spec_read_back_cannot_be_changed() -> None:
+    spec = Spec.from_dict(SPEC.as_dict(), "model")
+    assert {type(value) for value in (spec.mean, spec.std, spec.rain, spec.units)} == {tuple}
+    with pytest.raises(AttributeError):
+        spec.threshold = 0.9  # type: ignore[misc]
+
+
+def test_what_a_later_derain_adds_within_the_schema_is_passed_over() -> None:
+    assert Spec.from_dict({**SPEC.as_dict(), "sensor": "unheard of"}, "model") == SPEC
+
+
+def test_a_newer_schema_asks_for_an_upgrade() -> None:
+    newer = {"schema": SCHEMA + 1, "everything": "else may differ"}
+    with pytest.raises(InputError, match=r"m\.onnx: its Spec has schema .* Upgrade derain\."):
+        Spec.from_dict(newer, "m.onnx")
+
+
+@pytest.mark.parametrize("name", SPEC.as_dict())
+def test_a_spec_that_lacks_something_is_damaged(name: str) -> None:
+    content = SPEC.as_dict()
+    del content[name]
+    with pytest.raises(InputError, match=rf"m\.onnx: its Spec is damaged \('{name}'\)"):
+        Spec.from_dict(content, "m.onnx")
+
+
+@pytest.mark.parametrize(
+    "classes", [None, [], "rain", {"three": "rain"}], ids=["none", "list", "text", "no number"]
+)
+def test_classes_that_are_not_named_by_numbers_are_damage(classes: Any) -> None:
+    with pytest.raises(InputError, match=r"m\.onnx: its Spec is damaged"):
+        Spec.from_dict({**SPEC.as_dict(), "classes": classes}, "m.onnx")
+
+
+def test_the_view_is_the_one_the_spec_names() -> None:
+    view = SPEC.make_view(threads=2)
+    assert view == NeighbourView(neighbours=7, missing_intensity=4.0, threads=2)
+
+
+def test_an_unknown_view_asks_for_an_upgrade() -> None:
+    content = {**SPEC.as_dict(), "view": {"kind": "voxels"}}
+    with pytest.raises(InputError, match=r"unknown view 'voxels'\. Upgrade derain\."):
+        Spec.from_dict(content, "m.onnx").make_view()
