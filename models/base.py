@@ -152,7 +152,11 @@ class DerainingModule(lightning.LightningModule):
 
     def on_train_start(self) -> None:
         """Enters the run in TensorBoard's table of hyper-parameters, to be ranked by its IoU."""
-        parameters = {name: value for name, value in self.hparams.items() if name != "spec"}
+        parameters = {
+            name: value
+            for name, value in self.hparams.items()
+            if name != "spec" and not name.startswith("_")
+        }
         for logger in self.loggers:
             if isinstance(logger, TensorBoardLogger):
                 logger.log_hyperparams(parameters, {"hp_metric": 0.0})
@@ -182,6 +186,17 @@ class DerainingModule(lightning.LightningModule):
     def on_validation_epoch_end(self) -> None:
         """Logs the scores of the epoch."""
         self._log_scores("val")
+
+    def on_test_start(self) -> None:
+        """Refuses to test on several devices, which share out the scans and count some twice.
+
+        Raises:
+            InputError: More than one device.
+        """
+        if self.trainer.world_size > 1:
+            raise InputError(
+                "--trainer.devices", "several would count some scans twice", "Test on one device."
+            )
 
     def on_test_epoch_start(self) -> None:
         """Forgets the scores of another test."""
