@@ -183,11 +183,13 @@ class FoldedOutDet(nn.Module):
         Returns:
             Logits of "not rain" and "rain", float32 (M, 2).
         """
-        features = points[neighbours].flatten(1) @ self.on_points + self.bias1
+        # An embedding exports as Gather, which runs faster than the GatherND of plain indexing.
+        features = functional.embedding(neighbours, points).flatten(1) @ self.on_points + self.bias1
         features = functional.leaky_relu(features + distances @ self.on_distances, 0.2)
         size = (neighbours.shape[0] + BLOCKS - 1) // BLOCKS
         blocks = [
-            features[neighbours[start * size : (start + 1) * size]].flatten(1) @ self.weight2
+            functional.embedding(neighbours[start * size : (start + 1) * size], features).flatten(1)
+            @ self.weight2
             for start in range(BLOCKS)
         ]
         features = torch.cat(blocks) + self.bias2 + points @ self.shortcut
