@@ -1,7 +1,7 @@
 """From a data set's files to batches of views."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -19,16 +19,16 @@ from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.morton import distinct_positions
-from derain.neighbours import NeighbourView
 from derain.scan import Scan
 from derain.spec import Spec
+from derain.view import View
 
 Part = Literal["train", "validation", "test", "predict"]
 
 
 @dataclass(frozen=True)
 class ScanFile:
-    """Where one scan lies, and where its labels do if it has any."""
+    """Where one scan lies, and where its labels are to be read, if they are."""
 
     scan: Path
     label: Path | None = None
@@ -49,7 +49,7 @@ class ScanDataset(Dataset[Sample | InputError]):
         self,
         files: Sequence[ScanFile],
         read: Callable[[ScanFile], Scan],
-        view: NeighbourView,
+        view: View,
         card: DataCard,
         augmentation: Augmentation | None = None,
     ) -> None:
@@ -118,18 +118,51 @@ class ScanDataModule(lightning.LightningDataModule):
         self.loading = loading
 
     @abstractmethod
-    def files(self, part: Part) -> list[ScanFile]:
-        """The scans of a part of the data, in order.
+    def find(self, part: Part) -> list[ScanFile]:
+        """The scans of a part of the data, in order, and where their labels should lie.
 
         Raises:
-            InputError: Missing folders or files.
+            InputError: Missing folders or scans.
         """
 
+    def files(self, part: Part) -> list[ScanFile]:
+        """The scans of a part of the data, in order, each with the labels that are read there.
+
+        Prediction reads none, nor does the training of a model that does not learn from labels. In
+        such a model's validation they measure and choose nothing: there it reads those it finds.
+
+        Raises:
+            InputError: Missing folders or scans, or labels missing where they are needed.
+        """
+        files = self.find(part)
+        if part == "predict" or (part == "train" and not self._learns_from_labels):
+            return [replace(file, label=None) for file in files]
+        if part == "validation" and not self._learns_from_labels:
+            return [file if _has_labels(file) else replace(file, label=None) for file in files]
+        for file in files:
+            if not _has_labels(file):
+                raise InputError(
+                    file.scan,
+                    f"its labels are not at {file.label}",
+                    "Add them or leave the scan out.",
+                )
+        return files
+
     def setup(self, stage: str) -> None:
-        """Completes the data card from the training scans where it has no statistics."""
+        """Completes the data card from the training scans where it lacks statistics."""
         if stage == "fit" and not self.card.has_statistics:
-            files = self.files("train")
-            self.card = measured(self.card, map(self.read, evenly_spaced(files)))
+            self.card = measured(self.card, self.training_scans(most=200))
+
+    def training_scans(self, most: int) -> Iterator[Scan]:
+        """Reads some of the training scans, spread over all of them, as they are in their files.
+
+        Args:
+            most: How many, where there are so many.
+
+        Raises:
+            InputError: A scan that cannot be read.
+        """
+        return map(self.read, evenly_spaced(self.files("train"), most))
 
     def train_dataloader(self) -> DataLoader[Sample | InputError]:
         """Training scans, shuffled and augmented."""
@@ -194,6 +227,11 @@ class ScanDataModule(lightning.LightningDataModule):
             collate_fn=_packed,
         )
 
+    @property
+    def _learns_from_labels(self) -> bool:
+        model = getattr(self.trainer, "lightning_module", None)
+        return model is None or bool(model.LEARNS_FROM_LABELS)
+
     def _read_distinct(self, file: ScanFile) -> Scan:
         scan = self.read(file)
         judged = np.flatnonzero(scan.valid)
@@ -208,16 +246,5 @@ def _packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:
     return Batch.of([sample for sample in samples if isinstance(sample, Sample)])
 
 
-def labelled(scans: Sequence[Path], label_of: Callable[[Path], Path]) -> list[ScanFile]:
-    """Pairs scans with their label files.
-
-    Raises:
-        InputError: A scan without its label file.
-    """
-    files = [ScanFile(scan, label_of(scan)) for scan in scans]
-    for file in files:
-        if file.label is not None and not file.label.is_file():
-            raise InputError(
-                file.scan, f"its labels are not at {file.label}", "Add them or leave the scan out."
-            )
-    return files
+def _has_labels(file: ScanFile) -> bool:
+    return file.label is not None and file.label.is_file()

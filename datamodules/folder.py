@@ -4,7 +4,7 @@ from glob import glob
 from pathlib import Path
 
 from derain.cards import load_card
-from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile, labelled
+from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile
 from derain.errors import InputError
 from derain.files.labels import label_beside
 
@@ -35,19 +35,17 @@ class Folder(ScanDataModule):
         self.root = Path(root)
         self.patterns = {"train": train, "validation": validation, "test": test, "predict": test}
 
-    def files(self, part: Part) -> list[ScanFile]:
+    def find(self, part: Part) -> list[ScanFile]:
         """The scans that a part's patterns find, each pattern's in sorted order.
 
         Raises:
-            InputError: A pattern that finds nothing, or a scan without labels.
+            InputError: A pattern that finds nothing.
         """
         patterns = self.patterns[part]
         if not patterns:
             raise InputError(self.root, f"no patterns for {part}", f"Give --data.{part}.")
         scans = [scan for pattern in patterns for scan in self._matches(pattern)]
-        if part == "predict":
-            return [ScanFile(scan) for scan in scans]
-        return labelled(scans, label_beside)
+        return [ScanFile(scan, label_beside(scan)) for scan in scans]
 
     def _matches(self, pattern: str) -> list[Path]:
         found = sorted(glob(pattern, root_dir=self.root, recursive=True))

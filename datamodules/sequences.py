@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from derain.cards import DataCard
-from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile, labelled
+from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile
 from derain.errors import InputError
 from derain.files import find_scans
 
@@ -49,18 +49,18 @@ class SequenceDataModule(ScanDataModule):
         self.layout = layout
         self.split = split or card.split
 
-    def files(self, part: Part) -> list[ScanFile]:
+    def find(self, part: Part) -> list[ScanFile]:
         """The scans of a part's sequences, in order; for prediction those of the test part.
 
         Raises:
-            InputError: A missing sequence, scan folder or label file.
+            InputError: A missing sequence or scan folder.
         """
         sequences = self.split.get("test" if part == "predict" else part, ())
         if not sequences:
             raise InputError(self.root, f"no sequences are named for {part}", "Give a split.")
-        return [file for name in sequences for file in self._sequence(name, part)]
+        return [file for name in sequences for file in self._sequence(name)]
 
-    def _sequence(self, name: str, part: Part) -> list[ScanFile]:
+    def _sequence(self, name: str) -> list[ScanFile]:
         folder = self.root / self.layout.sequences / name
         if not (folder / self.layout.scans).is_dir():
             raise InputError(
@@ -68,7 +68,7 @@ class SequenceDataModule(ScanDataModule):
                 f"no such folder, though the split names sequence {name}",
                 "Check --data.root, or give a --data.split of the sequences that are there.",
             )
-        scans = find_scans([folder / self.layout.scans])
-        if part == "predict":
-            return [ScanFile(scan) for scan in scans]
-        return labelled(scans, lambda scan: folder / self.layout.labels / f"{scan.stem}.label")
+        return [
+            ScanFile(scan, folder / self.layout.labels / f"{scan.stem}.label")
+            for scan in find_scans([folder / self.layout.scans])
+        ]

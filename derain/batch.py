@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from derain.neighbours import Neighbourhoods
 from derain.scan import Scan
+from derain.view import ViewedScan
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,11 +17,11 @@ class Sample:
     Attributes:
         scan: The whole scan, with its labels where they are known.
         view: The network's view of it.
-        target: What the network is to say of each of its points, int64 (M,); None without labels.
+        target: What the network is to say of each of its cells, int64 (M,); None without labels.
     """
 
     scan: Scan
-    view: Neighbourhoods
+    view: ViewedScan
     target: Tensor | None
 
 
@@ -31,7 +31,7 @@ class Batch:
 
     Attributes:
         inputs: The network's inputs by name, scans one after the other.
-        target: What the network is to say of each point, int64; None without labels.
+        target: What the network is to say of each cell, int64 (M,); None without labels.
         samples: The scans, in order.
     """
 
@@ -41,7 +41,7 @@ class Batch:
 
     @classmethod
     def of(cls, samples: Sequence[Sample]) -> "Batch":
-        """Packs samples; the scans' points stay neighbours of their own scan only."""
+        """Packs samples of one kind of view, which sees to it that scans do not mix."""
         packed = type(samples[0].view).pack([sample.view for sample in samples])
         targets = [sample.target for sample in samples if sample.target is not None]
         return cls(
@@ -62,5 +62,5 @@ class Batch:
         return Batch(inputs, target, self.samples)
 
     def split(self, scores: Tensor) -> list[Tensor]:
-        """Takes per-point scores, (M, ...), apart into those of each scan."""
-        return list(torch.split(scores, [len(sample.view.first) for sample in self.samples]))
+        """Takes scores of all cells, (M, ...), apart into those of each scan."""
+        return list(torch.split(scores, [sample.view.size for sample in self.samples]))

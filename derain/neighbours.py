@@ -29,11 +29,18 @@ class Neighbourhoods:
         inverse: Point that answers for each row of the scan, int64 (N,); -1 for invalid rows.
     """
 
+    VARYING: ClassVar[str | None] = "points"
+
     points: NDArray[np.float32]
     neighbours: NDArray[np.int64]
     distances: NDArray[np.float32]
     first: NDArray[np.int64]
     inverse: NDArray[np.int64]
+
+    @property
+    def size(self) -> int:
+        """M, the number of points that the network scores."""
+        return len(self.points)
 
     def inputs(self) -> dict[str, NDArray[Any]]:
         """The network's inputs, in its order: points, distances, neighbours."""

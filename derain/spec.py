@@ -2,16 +2,15 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from derain.errors import InputError
 from derain.neighbours import NeighbourView
+from derain.view import View
 
 SCHEMA = 1
-
-CHANNELS = ("x", "y", "z", "intensity")
 
 
 @dataclass(frozen=True)
@@ -23,10 +22,11 @@ class Spec:
         view: Kind and parameters of the view that it sees a scan through.
         channels: Its input channels, in order.
         units: Their units.
-        mean: Mean of each channel that the network's input is centred by.
-        std: Standard deviation of each channel that the input is divided by.
+        mean: Mean of each channel over the training points.
+        std: Standard deviation of each channel over the training points.
         classes: Names of the training data's semantic classes, by id.
         rain: Ids of those that count as rain.
+        rule: Constants of the network's own rule for rain, by name; empty where it has none.
         threshold: A point is rain where its probability is greater.
         data: Name of the training data.
         licence: Licence of the training data.
@@ -41,8 +41,9 @@ class Spec:
     rain: tuple[int, ...]
     data: str
     licence: str
+    channels: tuple[str, ...]
     units: tuple[str, ...]
-    channels: tuple[str, ...] = CHANNELS
+    rule: Mapping[str, float] = field(default_factory=dict)
     threshold: float = 0.5
     schema: int = SCHEMA
 
@@ -69,7 +70,7 @@ class Spec:
                 "Upgrade derain.",
             )
         try:
-            known = {field.name: content[field.name] for field in fields(cls)}
+            known = {part.name: content[part.name] for part in fields(cls)}
             spec = cls(**{name: _immutable(value) for name, value in known.items()})
             return replace(spec, classes={int(id_): n for id_, n in known["classes"].items()})
         except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -77,7 +78,17 @@ class Spec:
                 source, f"its Spec is damaged ({error})", "Export the model again."
             ) from error
 
-    def make_view(self, threads: int = 0) -> NeighbourView:
+    @property
+    def mean_intensity(self) -> float:
+        """Mean intensity of the training points; 0 for a network that sees none."""
+        return dict(zip(self.channels, self.mean, strict=True)).get("intensity", 0.0)
+
+    @property
+    def intensity_unit(self) -> str:
+        """Unit of the training data's intensity."""
+        return dict(zip(self.channels, self.units, strict=True)).get("intensity", "not used")
+
+    def make_view(self, threads: int = 0) -> View:
         """The view that the network sees a scan through.
 
         Args:
@@ -91,7 +102,7 @@ class Spec:
         if kind != NeighbourView.KIND:
             raise InputError(self.network, f"unknown view {kind!r}", "Upgrade derain.")
         # The training data's mean says least about points whose intensity was not measured.
-        return NeighbourView(**parameters, missing_intensity=self.mean[3], threads=threads)
+        return NeighbourView(**parameters, missing_intensity=self.mean_intensity, threads=threads)
 
 
 def _immutable(value: Any) -> Any:

@@ -55,11 +55,11 @@ def export(model: DerainingModule, path: Path) -> Proof:
 
 
 def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
-    """The deployed network as an ONNX graph with any number of points."""
+    """The deployed network as an ONNX graph, for scans of any size where its view varies."""
     # 50 points: neither 0 nor 1, which the exporter would take for constants, nor any other size.
     example = spec.make_view()(Scan.of(scene(50)))
     inputs = {name: torch.from_numpy(array) for name, array in example.inputs().items()}
-    points = torch.export.Dim("points", min=0)
+    varying = example.VARYING and torch.export.Dim(example.VARYING, min=0)
     # The exporter's own parts warn of each other, and of torchvision; what it makes is checked.
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)
     with warnings.catch_warnings():
@@ -72,13 +72,14 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
             opset_version=OPSET,
             dynamo=True,
             external_data=False,
-            dynamic_shapes={name: {0: points} for name in inputs},
+            dynamic_shapes={name: {0: varying} for name in inputs} if varying else None,
             verbose=False,
         )
     assert program is not None  # only None when it was told to write a file itself
     proto: onnx.ModelProto = program.model_proto
-    # The exporter writes the number of answers as a formula over the blocks; it is that of points.
-    proto.graph.output[0].type.tensor_type.shape.dim[0].dim_param = points.__name__
+    if varying:
+        # The exporter writes the number of answers as a formula over 3D-OutDet's blocks.
+        proto.graph.output[0].type.tensor_type.shape.dim[0].dim_param = example.VARYING
     del proto.graph.value_info[:]
     return proto
 

@@ -1,7 +1,7 @@
 """What every derainer shares: its Spec, its metrics, and what it logs."""
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Protocol, Self
 
 import lightning
@@ -14,16 +14,26 @@ from torch import Tensor, nn
 from derain.batch import Batch
 from derain.cards import DataCard
 from derain.errors import InputError
-from derain.losses import class_weights, segmentation_loss
 from derain.metrics import RainMetrics
 from derain.probability import probability_of_rain
+from derain.scan import Scan
 from derain.spec import Spec
 
+# What the checkpoint of a run is chosen by, the more the better: the IoU of the validation scans
+# where a network learns from labels, and minus the loss where it does not.
+MERIT = "val/merit"
 
-class HasCard(Protocol):
+# Training scans that a view is fitted to; more change its grid by nothing.
+EXAMPLES = 20
+
+
+class TrainingData(Protocol):
     """What a derainer asks of the data module it is trained or tested with."""
 
     card: DataCard
+
+    def training_scans(self, most: int) -> Iterator[Scan]:
+        """Some of the training scans."""
 
 
 class DerainingModule(lightning.LightningModule):
@@ -34,25 +44,27 @@ class DerainingModule(lightning.LightningModule):
 
     Attributes:
         NAME: Name of the network in a Spec and on the command line.
+        LEARNS_FROM_LABELS: Whether it does; where not, none is read in its training.
+        channels: Names of its input channels.
         network: The network itself.
         card: Data card of the data it is trained or tested on.
     """
 
     NAME: ClassVar[str]
+    LEARNS_FROM_LABELS: ClassVar[bool] = True
     network: nn.Module
     mean: Tensor
     std: Tensor
-    class_weight: Tensor
     metrics: RainMetrics
     card: DataCard
 
-    def __init__(self) -> None:
+    def __init__(self, channels: Sequence[str]) -> None:
         super().__init__()
+        self.channels = tuple(channels)
         self._spec: Spec | None = None
         # Not in the state_dict: the Spec holds them.
-        self.register_buffer("mean", torch.zeros(4), persistent=False)
-        self.register_buffer("std", torch.ones(4), persistent=False)
-        self.register_buffer("class_weight", torch.ones(2), persistent=False)
+        self.register_buffer("mean", torch.zeros(len(channels)), persistent=False)
+        self.register_buffer("std", torch.ones(len(channels)), persistent=False)
 
     @property
     def spec(self) -> Spec:
@@ -66,8 +78,28 @@ class DerainingModule(lightning.LightningModule):
         return self._spec
 
     @abstractmethod
-    def view_parameters(self) -> dict[str, Any]:
-        """Kind and parameters of the view that the network sees."""
+    def view_parameters(self, scans: Sequence[Scan]) -> dict[str, Any]:
+        """Kind and parameters of the view that the network sees.
+
+        Args:
+            scans: Training scans that it may be fitted to; none for published weights.
+
+        Raises:
+            InputError: A view that needs scans to be fitted to, and none given.
+        """
+
+    def rule(self, scans: Sequence[Scan]) -> dict[str, float]:
+        """Constants of the network's own rule for rain, fitted to training scans."""
+        return {}
+
+    @abstractmethod
+    def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
+        """What the network is to make small, and what it says.
+
+        Returns:
+            ``loss`` and what it is made of, each a scalar, by name; and the logits of "not rain"
+            and "rain" of every cell, float (M, 2).
+        """
 
     @abstractmethod
     def folded(self) -> nn.Module:
@@ -75,15 +107,18 @@ class DerainingModule(lightning.LightningModule):
 
     @classmethod
     @abstractmethod
-    def from_published(cls, state_dict: Mapping[str, Tensor], card: DataCard) -> Self:
+    def from_published(
+        cls, state_dict: Mapping[str, Tensor], card: DataCard, grid: str | None = None
+    ) -> Self:
         """Builds the model from published weights.
 
         Args:
             state_dict: Published tensors.
             card: Data card whose statistics they were trained with.
+            grid: Name of the grid they were trained on, for networks that see range images.
 
         Raises:
-            InputError: Weights of another network.
+            InputError: Weights of another network, or a grid missing or surplus.
         """
 
     def adopt(self, spec: Spec | dict[str, Any] | None) -> None:
@@ -104,39 +139,38 @@ class DerainingModule(lightning.LightningModule):
         self.mean.copy_(torch.tensor(spec.mean))
         self.std.copy_(torch.tensor(spec.std))
 
-    def spec_for(self, card: DataCard) -> Spec:
+    def spec_for(self, card: DataCard, scans: Sequence[Scan] = ()) -> Spec:
         """Spec of this network on a data set.
 
+        Args:
+            card: Its data card.
+            scans: Training scans that view and rule are fitted to, if they are not stated.
+
         Raises:
-            InputError: A data card without statistics.
+            InputError: A data card without statistics, or no scans where they are needed.
         """
-        if card.mean is None or card.std is None:
-            raise InputError(card.name, "the data card has no statistics", "Add mean and std.")
+        statistics = [card.statistics(channel) for channel in self.channels]
         return Spec(
             network=self.NAME,
-            view=self.view_parameters(),
-            mean=card.mean,
-            std=card.std,
+            view=self.view_parameters(scans),
+            channels=self.channels,
+            units=tuple(card.unit(channel) for channel in self.channels),
+            mean=tuple(mean for mean, _ in statistics),
+            std=tuple(std for _, std in statistics),
+            rule=self.rule(scans),
             classes=card.classes,
             rain=card.rain,
             threshold=self.hparams["threshold"],
             data=card.name,
             licence=card.licence,
-            units=("m", "m", "m", card.intensity_unit),
         )
 
-    def normalised(self, points: Tensor) -> Tensor:
-        """Centres and scales raw points, float (M, 4), as the Spec says."""
-        return (points - self.mean) / self.std
-
     def setup(self, stage: str) -> None:
-        """Learns from the data what the Spec, the loss and the metrics need."""
-        data: HasCard = self.trainer.datamodule  # type: ignore[attr-defined]
+        """Learns from the data what the Spec and the metrics need."""
+        data: TrainingData = self.trainer.datamodule  # type: ignore[attr-defined]
         self.card = data.card
         if self._spec is None and stage == "fit":
-            self.adopt(self.spec_for(self.card))
-        if (share := self.card.rain_share) is not None:
-            self.class_weight.copy_(class_weights([1 - share, share]))
+            self.adopt(self.spec_for(self.card, list(data.training_scans(EXAMPLES))))
         self.metrics = RainMetrics(self.card.classes, self.card.rain)
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
@@ -163,12 +197,14 @@ class DerainingModule(lightning.LightningModule):
 
     def training_step(self, batch: Batch) -> Tensor:
         """Loss of one batch."""
-        return self._loss(batch, self(**batch.inputs), "train")
+        losses, _ = self.losses(batch)
+        self._log_losses(batch, losses, "train")
+        return losses["loss"]
 
     def validation_step(self, batch: Batch) -> list[NDArray[np.float32]]:
         """Loss of one batch, its points counted, and the probability of each, as for predict."""
-        logits = self(**batch.inputs)
-        self._loss(batch, logits, "val")
+        losses, logits = self.losses(batch)
+        self._log_losses(batch, losses, "val")
         return self._count(batch, logits)
 
     def test_step(self, batch: Batch) -> None:
@@ -213,23 +249,20 @@ class DerainingModule(lightning.LightningModule):
             for sample, scores in zip(batch.samples, batch.split(logits), strict=True)
         ]
 
-    def _loss(self, batch: Batch, logits: Tensor, part: str) -> Tensor:
-        assert batch.target is not None  # the data modules pair these scans with labels
-        loss = segmentation_loss(logits, batch.target, self.class_weight)
-        parts = {"loss": loss.total, "cross_entropy": loss.cross_entropy, "lovasz": loss.lovasz}
+    def _log_losses(self, batch: Batch, losses: Mapping[str, Tensor], part: str) -> None:
+        values = {f"{part}/{name}": value for name, value in losses.items()}
+        if part == "val" and not self.LEARNS_FROM_LABELS:
+            values[MERIT] = -losses["loss"]
         self.log_dict(
-            {f"{part}/{name}": value for name, value in parts.items()},
-            on_step=False,
-            on_epoch=True,
-            sync_dist=True,
-            batch_size=len(batch.samples),
+            values, on_step=False, on_epoch=True, sync_dist=True, batch_size=len(batch.samples)
         )
-        return loss.total
 
     def _count(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
         probabilities = self.probabilities(batch, logits)
         for sample, probability in zip(batch.samples, probabilities, strict=True):
             scan = sample.scan
+            if scan.label is None:
+                continue
             self.metrics.update(
                 predicted=torch.from_numpy(probability > self.spec.threshold).to(self.device),
                 label=torch.from_numpy(scan.label).to(self.device),
@@ -240,8 +273,12 @@ class DerainingModule(lightning.LightningModule):
         return probabilities
 
     def _log_scores(self, part: str) -> None:
+        if not self.metrics.per_scan():  # scans without labels measure nothing
+            return
         scores = self.metrics.compute()
         self.log_dict({f"{part}/{name}": score for name, score in scores.items()})
         self.log(f"{part}_iou", scores["iou"], prog_bar=True, logger=False)
         if part == "val":
             self.log("hp_metric", scores["iou"])
+            if self.LEARNS_FROM_LABELS:
+                self.log(MERIT, scores["iou"])

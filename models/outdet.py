@@ -5,7 +5,7 @@ Efficient Outlier Detector for 3D LiDAR Point Clouds in Adverse Weather", IEEE I
 sporsho/3D_OutDet (MIT).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import torch
@@ -14,11 +14,13 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from derain.cards import DataCard
-from derain.models.base import DerainingModule
+from derain.errors import InputError
 from derain.models.published import load_tensors, published_tensors
+from derain.models.supervised import SupervisedModule
 from derain.neighbours import NeighbourView
+from derain.scan import Scan
 
-CHANNELS = 4
+CHANNELS = ("x", "y", "z", "intensity")
 WIDTH = 32
 
 # The published network sees every distance one metre longer than it is; without that offset its
@@ -76,12 +78,12 @@ class OutDetNetwork(nn.Module):
     def __init__(self, neighbours: int = 9) -> None:
         super().__init__()
         self.distance_weight = nn.Parameter(torch.ones(neighbours))
-        self.weight1 = nn.Parameter(torch.empty(CHANNELS + 1, WIDTH, neighbours))
+        self.weight1 = nn.Parameter(torch.empty(len(CHANNELS) + 1, WIDTH, neighbours))
         self.bias1 = nn.Parameter(torch.randn(WIDTH))
         self.norm1 = PointBatchNorm(WIDTH)
         self.weight2 = nn.Parameter(torch.empty(WIDTH, WIDTH, neighbours))
         self.norm2 = PointBatchNorm(WIDTH)
-        self.shortcut = nn.Parameter(torch.empty(WIDTH, CHANNELS, 1))
+        self.shortcut = nn.Parameter(torch.empty(WIDTH, len(CHANNELS), 1))
         self.dropout = nn.Dropout(0.5)
         self.head = nn.Linear(WIDTH, 2)
         for weight in (self.weight1, self.weight2, self.shortcut):
@@ -154,8 +156,8 @@ class FoldedOutDet(nn.Module):
         scale2, shift2 = _affine(exact, "norm2", network.norm2.eps)
 
         weight1 = exact["weight1"] * scale1[:, None]
-        on_points = weight1[:CHANNELS] / std[:, None, None]
-        on_distances = weight1[CHANNELS] * exact["distance_weight"]
+        on_points = weight1[:-1] / std[:, None, None]
+        on_distances = weight1[-1] * exact["distance_weight"]
         bias1 = exact["bias1"] * scale1 + shift1
         bias1 = bias1 - (on_points * mean[:, None, None]).sum(dim=(0, 2))
         bias1 = bias1 + DISTANCE_OFFSET * on_distances.sum(dim=1)
@@ -207,7 +209,7 @@ def _constant(tensor: Tensor) -> nn.Parameter:
     return nn.Parameter(tensor.float().contiguous(), requires_grad=False)
 
 
-class OutDet(DerainingModule):
+class OutDet(SupervisedModule):
     """Trains 3D-OutDet; the defaults are the published recipe for WADS.
 
     Args:
@@ -235,27 +237,35 @@ class OutDet(DerainingModule):
         threshold: float = 0.5,
         spec: dict[str, Any] | None = None,
     ) -> None:
-        super().__init__()
+        super().__init__(CHANNELS)
         self.save_hyperparameters()
         self.network = OutDetNetwork(neighbours)
         self.adopt(spec)
 
     @classmethod
-    def from_published(cls, state_dict: Mapping[str, Tensor], card: DataCard) -> Self:
-        """Builds the model from a published state_dict, with or without ``module.`` prefixes."""
+    def from_published(
+        cls, state_dict: Mapping[str, Tensor], card: DataCard, grid: str | None = None
+    ) -> Self:
+        """Builds the model from a published state_dict, with or without ``module.`` prefixes.
+
+        Raises:
+            InputError: A state_dict of another network, or a grid, which it does not see through.
+        """
+        if grid is not None:
+            raise InputError("--grid", f"{cls.NAME} sees neighbours, not a grid", "Leave it out.")
         network = OutDetNetwork.from_published(state_dict)
         model = cls(neighbours=len(network.distance_weight))
         model.network = network
         model.adopt(model.spec_for(card))
         return model
 
-    def view_parameters(self) -> dict[str, Any]:
-        """Kind and parameters of the view that the network sees."""
+    def view_parameters(self, scans: Sequence[Scan]) -> dict[str, Any]:
+        """Kind and parameters of the view that the network sees, whatever the scans."""
         return {"kind": NeighbourView.KIND, "neighbours": self.hparams["neighbours"]}
 
     def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
         """Logits, float (M, 2), of raw points; arguments as for :class:`FoldedOutDet`."""
-        return self.network(self.normalised(points), distances, neighbours)
+        return self.network((points - self.mean) / self.std, distances, neighbours)
 
     def folded(self) -> nn.Module:
         """The network as it is deployed."""

@@ -37,8 +37,10 @@ class ScanPanels(lightning.Callback):
         if not self.left or not isinstance(trainer.logger, TensorBoardLogger):
             return
         for sample, probability in zip(batch.samples, outputs, strict=True):
+            if not self.left or sample.scan.label is None:
+                continue
             rain = model.card.rain_of(sample.scan)
-            if not self.left or not rain.any():
+            if not rain.any():
                 continue
             figure = judgement_figure(
                 sample.scan, probability > model.spec.threshold, rain, sample.scan.name

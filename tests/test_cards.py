@@ -19,6 +19,7 @@ OWN: dict[str, Any] = {
     "rain": [3, 4],
     "mean": [1, 2, 3, 4],
     "std": [5.0, 6.0, 7.0, 8.0],
+    "range": [9, 10],
     "rain_share": 0.25,
     "split": {"train": ["00", "010"], "test": ["008"]},
 }
@@ -73,17 +74,22 @@ def test_a_card_of_ones_own_holds_what_its_file_says(card_file: Path) -> None:
         rain=(3, 4),
         mean=(1.0, 2.0, 3.0, 4.0),
         std=(5.0, 6.0, 7.0, 8.0),
+        range=(9.0, 10.0),
         rain_share=0.25,
         split={"train": ("00", "010"), "test": ("008",)},
     )
 
 
 def test_a_card_without_all_its_statistics_says_so(card_file: Path) -> None:
-    for missing in ("mean", "std", "rain_share"):
+    for missing in ("mean", "std", "range", "rain_share"):
         card_file.write_text(yaml.safe_dump({k: v for k, v in OWN.items() if k != missing}))
         card = load_card(card_file)
         assert not card.has_statistics
-        assert card.with_statistics((0.0,) * 4, (1.0,) * 4, 0.5).has_statistics
+        statistics = {"mean": (0.0,) * 4, "std": (1.0,) * 4, "range": (9.0, 9.0), "rain_share": 0.5}
+        whole = card.completed(**statistics)
+        assert whole.has_statistics
+        # What it knew already stays.
+        assert whole == card.completed(**{missing: statistics[missing]})
 
 
 @pytest.mark.parametrize(

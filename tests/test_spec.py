@@ -20,7 +20,9 @@ SPEC = Spec(
     rain=(3, 110),
     data="somewhere",
     licence="MIT",
+    channels=("x", "y", "z", "intensity"),
     units=("m", "m", "m", "0..255"),
+    rule={"threshold": 0.008},
     threshold=0.25,
 )
 
@@ -35,7 +37,9 @@ specs = st.builds(
     rain=st.lists(st.integers(0, 65535)).map(tuple),
     data=st.text(),
     licence=st.text(),
+    channels=st.just(("x", "y", "z", "intensity")),
     units=st.tuples(*[st.text()] * 4),
+    rule=st.dictionaries(st.text(), st.floats(-1e6, 1e6)),
     threshold=st.floats(0, 1),
 )
 

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.scan import Scan
 
+# What mean and std are of, in their order.
+CHANNELS = ("x", "y", "z", "intensity")
+
 
 @dataclass(frozen=True)
 class DataCard:
@@ -26,6 +29,7 @@ class DataCard:
         intensity_unit: Unit or span of its intensities, such as ``0..255``.
         mean: Mean of x, y, z (metres) and intensity over the training points; None if not known.
         std: Their standard deviations; None if not known.
+        range: Mean and standard deviation of range in metres; None if not known.
         rain_share: Share of rain among the training points; None if not known.
         split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
     """
@@ -37,13 +41,39 @@ class DataCard:
     intensity_unit: str = "not stated"
     mean: tuple[float, ...] | None = None
     std: tuple[float, ...] | None = None
+    range: tuple[float, ...] | None = None
     rain_share: float | None = None
     split: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def has_statistics(self) -> bool:
-        """True where mean, standard deviation and rain share are all known."""
-        return None not in (self.mean, self.std, self.rain_share)
+        """True where the statistics of every channel and the rain share are known."""
+        return None not in (self.mean, self.std, self.range, self.rain_share)
+
+    def statistics(self, channel: str) -> tuple[float, float]:
+        """Mean and standard deviation of a channel over the training points.
+
+        Args:
+            channel: ``x``, ``y``, ``z``, ``intensity`` or ``range``.
+
+        Raises:
+            InputError: They are not known.
+        """
+        if channel == "range" and self.range is not None:
+            mean, std = self.range
+            return mean, std
+        if channel in CHANNELS and self.mean is not None and self.std is not None:
+            number = CHANNELS.index(channel)
+            return self.mean[number], self.std[number]
+        raise InputError(
+            self.name,
+            f"the data card has no statistics of {channel}",
+            "Add mean and std (of x, y, z, intensity), or range (its mean and std).",
+        )
+
+    def unit(self, channel: str) -> str:
+        """Unit of a channel."""
+        return self.intensity_unit if channel == "intensity" else "m"
 
     def rain_of(self, scan: Scan) -> NDArray[np.bool_]:
         """Which points of a labelled scan are rain, bool (N,).
@@ -55,11 +85,12 @@ class DataCard:
             raise InputError(scan.name, "it has no labels", "Give its label file.")
         return np.isin(scan.label, self.rain)
 
-    def with_statistics(
-        self, mean: tuple[float, ...], std: tuple[float, ...], rain_share: float
-    ) -> "DataCard":
-        """The same card with statistics taken from training scans."""
-        return replace(self, mean=mean, std=std, rain_share=rain_share)
+    def completed(self, **statistics: Any) -> "DataCard":
+        """The same card with statistics in place of those that it lacks."""
+        return replace(
+            self,
+            **{name: value for name, value in statistics.items() if getattr(self, name) is None},
+        )
 
 
 def packaged_cards() -> dict[str, Path]:
@@ -99,25 +130,27 @@ def _card(content: dict[str, Any]) -> DataCard:
             "classes": {int(id_): str(name) for id_, name in content.get("classes", {}).items()},
             "rain": tuple(int(id_) for id_ in content.get("rain", ())),
             "split": {part: _names(names) for part, names in content.get("split", {}).items()},
-            "mean": _channels(content.get("mean")),
-            "std": _channels(content.get("std")),
+            "mean": _numbers(content.get("mean"), CHANNELS),
+            "std": _numbers(content.get("std"), CHANNELS),
+            "range": _numbers(content.get("range"), ("mean", "std")),
         }
     )
     if not set(card.rain) <= set(card.classes) or not card.rain:
         raise ValueError(f"rain {list(card.rain)} must name ids of its classes")
-    if card.std is not None and min(card.std) <= 0:
-        raise ValueError(f"std {list(card.std)} must be positive")
+    stds = [*(card.std or ()), *(card.range or ())[1:]]
+    if min(stds, default=1) <= 0:
+        raise ValueError(f"standard deviations {stds} must be positive")
     if card.rain_share is not None and not 0 <= card.rain_share <= 1:
         raise ValueError(f"rain_share {card.rain_share} must be within 0 and 1")
     return card
 
 
-def _channels(values: Any) -> tuple[float, ...] | None:
+def _numbers(values: Any, names: tuple[str, ...]) -> tuple[float, ...] | None:
     if values is None:
         return None
     numbers = tuple(map(float, values))
-    if len(numbers) != 4:
-        raise ValueError(f"{list(numbers)} must be one number each for x, y, z and intensity")
+    if len(numbers) != len(names):
+        raise ValueError(f"{list(numbers)} must be one number each for {', '.join(names)}")
     return numbers
 
 

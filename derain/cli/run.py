@@ -139,15 +139,15 @@ def _intensity_warning(scan: Scan, derainer: Derainer) -> str | None:
     """What is odd about a scan's intensities, given the data that the model was trained on."""
     spec = derainer.spec
     if scan.intensity is None:
-        return f"no intensity: the mean of {spec.data}, {spec.mean[3]:.3g}, stands in"
+        return f"no intensity: the mean of {spec.data}, {spec.mean_intensity:.3g}, stands in"
     valid = scan.valid
     mean = float(scan.intensity[valid].mean(dtype=np.float64)) if valid.any() else 0.0
-    expected = spec.mean[3]
+    expected = spec.mean_intensity
     comparable = mean > 0 and expected > 0
     if comparable and not 1 / INTENSITY_MISMATCH < mean / expected < INTENSITY_MISMATCH:
         return (
             f"mean intensity {mean:.3g}, but {expected:.3g} where the model was trained "
-            f"(unit {spec.units[3]}): see --intensity-scale"
+            f"(unit {spec.intensity_unit}): see --intensity-scale"
         )
     return None
 

@@ -16,7 +16,7 @@ from derain.datamodules.rehearse3d import Rehearse3D
 from derain.datamodules.simulated import Simulated
 from derain.datamodules.wads import Wads
 from derain.errors import InputError
-from derain.models.base import DerainingModule
+from derain.models.base import MERIT, DerainingModule
 from derain.models.checkpoint import load_model
 from derain.models.outdet import OutDet
 from derain.models.panels import ScanPanels
@@ -76,7 +76,7 @@ class DerainCLI(LightningCLI):
         parser.add_lightning_class_args(TestReport, "report")
         parser.set_defaults(
             {
-                "checkpoint.monitor": "val/iou",
+                "checkpoint.monitor": MERIT,
                 "checkpoint.mode": "max",
                 "checkpoint.filename": "best",
                 "checkpoint.enable_version_counter": False,

@@ -31,6 +31,8 @@ def test_they_are_numpys_over_all_points_at_once(scans: list[tuple[int, int]]) -
         return
     np.testing.assert_allclose(card.mean, columns[:, :4].mean(axis=0), rtol=1e-6)
     np.testing.assert_allclose(card.std, columns[:, :4].std(axis=0), rtol=1e-5)
+    distance = np.linalg.norm(columns[:, :3], axis=1)
+    np.testing.assert_allclose(card.range, (distance.mean(), distance.std()), rtol=1e-5)
     assert card.rain_share == pytest.approx((columns[:, 4] > 0).mean())
     assert (card.name, card.classes, card.rain) == (CARD.name, CARD.classes, CARD.rain)
 
@@ -47,13 +49,28 @@ def test_hard_scans_give_statistics_that_can_be_divided_by() -> None:
     for name, scan in hard_cases(largest=1000):
         card = measured(CARD, [scan.with_label(np.full(len(scan), 3))])
         assert card.has_statistics, name
-        assert np.isfinite([*card.mean, *card.std]).all(), name
+        assert np.isfinite([*card.mean, *card.std, *card.range]).all(), name
         assert min(card.std) > 0, name
         assert card.rain_share == (1 if scan.valid.any() else 0), name
 
 
 def test_no_scans_give_statistics_that_change_nothing() -> None:
-    assert measured(CARD, []) == CARD.with_statistics((0.0,) * 4, (1.0,) * 4, 0.0)
+    card = measured(CARD, [])
+    assert (card.mean, card.std, card.range) == ((0.0,) * 4, (1.0,) * 4, (0.0, 1.0))
+
+
+def test_scans_without_labels_give_all_but_the_share_of_rain() -> None:
+    scan = random_scan(1, 50)
+    card, unlabelled = measured(CARD, [scan]), measured(CARD, [Scan(scan.xyz, scan.intensity)])
+    assert unlabelled.rain_share is None
+    assert unlabelled.completed(rain_share=card.rain_share) == card
+
+
+def test_what_a_card_says_is_not_measured_again() -> None:
+    card = CARD.completed(mean=(1.0,) * 4, rain_share=0.5)
+    complete = measured(card, [random_scan(1, 50)])
+    assert (complete.mean, complete.rain_share) == (card.mean, 0.5)
+    assert complete.std == measured(CARD, [random_scan(1, 50)]).std
 
 
 @given(st.integers(0, 60), st.integers(1, 20))

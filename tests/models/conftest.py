@@ -48,13 +48,14 @@ def outdet() -> Callable[..., OutDet]:
         model.adopt(
             Spec(
                 network="outdet",
-                view=model.view_parameters(),
+                view=model.view_parameters([]),
                 mean=tuple(rng.normal(0, 3, 4).tolist()),
                 std=tuple(rng.uniform(0.5, 20, 4).tolist()),
                 classes={0: "other", 1: "rain"},
                 rain=(1,),
                 data="random",
                 licence="none",
+                channels=model.channels,
                 units=("m", "m", "m", "0..255"),
             )
         )

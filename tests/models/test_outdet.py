@@ -110,7 +110,7 @@ def test_it_has_as_many_parameters_as_published() -> None:
 
 def test_the_neighbourhood_is_as_large_as_asked_for(sample: MakeSample) -> None:
     model = OutDet(neighbours=5)
-    assert model.view_parameters() == {"kind": "neighbours", "neighbours": 5}
+    assert model.view_parameters([]) == {"kind": "neighbours", "neighbours": 5}
     assert model(**inputs_of(sample(scene(100), neighbours=5))).shape == (100, 2)
 
 
@@ -130,7 +130,7 @@ def test_published_weights_are_taken_over(
 
 
 def test_weights_need_a_card_with_statistics(outdet: MakeModel) -> None:
-    with pytest.raises(InputError, match="REHEARSE-3D: the data card has no statistics"):
+    with pytest.raises(InputError, match="REHEARSE-3D: the data card has no statistics of x"):
         OutDet.from_published(published(outdet().network), load_card("rehearse3d"))
 
 

@@ -256,7 +256,9 @@ def test_a_scan_that_cannot_be_read_stops_a_run_with_its_name(
 ) -> None:
     trainer = make_trainer(epochs=1)
     data = scenes(workers=1)
-    data.card = data.card.with_statistics((0.0,) * 4, (1.0,) * 4, 0.1)
+    data.card = data.card.completed(
+        mean=(0.0,) * 4, std=(1.0,) * 4, range=(0.0, 1.0), rain_share=0.1
+    )
     (tmp_path / "1.bin").write_bytes(b"damaged")
     with pytest.raises(InputError, match=r"1\.bin: 7 bytes are not whole rows") as refusal:
         trainer.fit(OutDet(), data)

@@ -1,0 +1,54 @@
+"""What derainers that learn from labels share: their loss."""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from derain.batch import Batch
+from derain.losses import SegmentationLoss, class_weights, segmentation_loss
+from derain.models.base import DerainingModule
+from derain.view import IGNORED
+
+
+class SupervisedModule(DerainingModule):
+    """A derainer that learns rain from what is labelled as rain.
+
+    Args:
+        channels: Names of the network's input channels.
+    """
+
+    class_weight: Tensor
+
+    def __init__(self, channels: Sequence[str]) -> None:
+        super().__init__(channels)
+        # Not in the state_dict: the data say it.
+        self.register_buffer("class_weight", torch.ones(2), persistent=False)
+
+    def setup(self, stage: str) -> None:
+        """Weighs the classes by their shares in the data."""
+        super().setup(stage)
+        if (share := self.card.rain_share) is not None:
+            self.class_weight.copy_(class_weights([1 - share, share]))
+
+    def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
+        """Loss with its parts, and logits."""
+        assert batch.target is not None  # the data modules pair these scans with labels
+        logits = self(**batch.inputs)
+        loss = self.segmentation_loss(logits, batch.target)
+        return {
+            "loss": loss.total,
+            "cross_entropy": loss.cross_entropy,
+            "lovasz": loss.lovasz,
+        }, logits
+
+    def segmentation_loss(self, logits: Tensor, target: Tensor) -> SegmentationLoss:
+        """Weighted cross-entropy and Lovász-softmax over the cells that hold something.
+
+        Args:
+            logits: Scores of every cell, float (M, 2).
+            target: 1 for rain, 0 for everything else, ``IGNORED`` where there is nothing to
+                judge, int64 (M,).
+        """
+        judged = target != IGNORED
+        return segmentation_loss(logits[judged], target[judged], self.class_weight)
