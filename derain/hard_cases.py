@@ -59,6 +59,10 @@ def hard_cases(largest: int = 20_000) -> Iterator[tuple[str, Scan]]:
         ),
     )
     yield "azimuth ±π", Scan.of(_behind(ordinary))
+    yield "at the poles", Scan.of(ordinary * np.array([0, 0, 1, 1], np.float32))
+    yield "a grid row without returns", Scan.of(_without_inclinations(ordinary, -3, -1))
+    yield "many grid rows without returns", Scan.of(_without_inclinations(ordinary, -20, 3))
+    yield "constant image", Scan.of(_sphere(range_=10, intensity=50))
     yield "on a line", Scan.of(ordinary * np.array([1, 0, 0, 1], np.float32))
     yield "intensity 0", Scan.of(ordinary * np.array([1, 1, 1, 0], np.float32))
     yield "intensity 65,535", Scan.of(_with_intensity(ordinary, 65_535))
@@ -88,6 +92,27 @@ def _behind(points: NDArray[np.float32]) -> NDArray[np.float32]:
     points[::2, 1] = 0.0
     points[1::2, 1] = -0.0
     return points
+
+
+def _without_inclinations(
+    points: NDArray[np.float32], lowest: float, highest: float
+) -> NDArray[np.float32]:
+    """Leaves out what lies between two inclinations, in degrees."""
+    x, y, z = points[:, :3].T
+    inclination = np.degrees(np.arctan2(z, np.hypot(x, y)))
+    return points[(inclination < lowest) | (inclination > highest)]
+
+
+def _sphere(range_: float, intensity: float) -> NDArray[np.float32]:
+    """Returns at one range and of one intensity, about one in each pixel of 64 × 256."""
+    azimuth, inclination = np.meshgrid(
+        np.radians(np.linspace(-180, 180, 256, endpoint=False)),
+        np.radians(np.linspace(-25, 15, 64)),
+    )
+    x = np.cos(inclination) * np.cos(azimuth)
+    y = np.cos(inclination) * np.sin(azimuth)
+    points = range_ * np.stack([x, y, np.sin(inclination)], axis=-1).reshape(-1, 3)
+    return np.column_stack([points, np.full(len(points), intensity)]).astype(np.float32)
 
 
 def _with_intensity(points: NDArray[np.float32], intensity: float) -> NDArray[np.float32]:

@@ -92,9 +92,9 @@ class Scan:
     @property
     def range(self) -> NDArray[np.float32]:
         """Distance of every point from the sensor, float32 (N,), metres."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            distance = np.linalg.norm(self.xyz.astype(np.float64), axis=1)
-            return to_float32(distance)
+        with np.errstate(invalid="ignore"):
+            x, y, z = np.ascontiguousarray(self.xyz.T, dtype=np.float64)
+            return to_float32(np.sqrt(x * x + y * y + z * z))
 
     @property
     def valid(self) -> NDArray[np.bool_]:

@@ -1,0 +1,114 @@
+"""What the grid and the way back from its pixels allow: rain IoU of a perfect labelling.
+
+    python benchmarks/way_back.py WADS/sample.bin
+    python benchmarks/way_back.py WADS/sequences/36/velodyne/*.bin
+    python benchmarks/way_back.py WADS/sequences/36/velodyne/*.bin --beams
+
+Every pixel is labelled with the truth of the return that it shows; no network can do better.
+"""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.cards import load_card
+from derain.files import read_scan
+from derain.files.labels import label_beside, read_labels, semantic
+from derain.grid_fit import fit_grid
+from derain.range_image import RangeView
+from derain.scan import Scan
+from derain.spherical_grid import SphericalGrid, grid_of
+from derain.stopwatch import Stopwatch
+from derain.way_back import WAYS_BACK
+
+
+@dataclass
+class Tally:
+    """Counts of one grid and one way back, over all scans."""
+
+    points: int = 0
+    hidden: int = 0
+    pixels: int = 0
+    empty: int = 0
+    found: int = 0
+    either: int = 0
+    view: list[float] = field(default_factory=list)
+    back: list[float] = field(default_factory=list)
+
+    def add(self, view: RangeView, scan: Scan, rain: NDArray[np.bool_]) -> None:
+        """Views a scan, labels its pixels perfectly and takes the labels back."""
+        stopwatch = Stopwatch()
+        with stopwatch.stage("view"):
+            image = view(scan)
+        score = (image.target(rain) == 1).astype(np.float32)
+        with stopwatch.stage("back"):
+            called = image.back(score) > 0.5
+        self.points += int(scan.valid.sum())
+        self.hidden += int(image.hidden.sum())
+        self.pixels += image.size
+        self.empty += int((~image.valid).sum())
+        self.found += int((called & rain).sum())
+        self.either += int((called | rain).sum())
+        self.view.append(stopwatch.milliseconds["view"])
+        self.back.append(stopwatch.milliseconds["back"])
+
+    def cells(self) -> list[str]:
+        """What the table says of it."""
+        return [
+            f"{self.hidden / self.points:.1%}",
+            f"{self.empty / self.pixels:.1%}",
+            f"{self.found / self.either:.3f}",
+            f"{np.median(self.view):.1f}",
+            f"{np.median(self.back):.1f}",
+        ]
+
+
+def main() -> None:
+    """Prints the table, or the beams."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("scans", type=Path, nargs="+", help="labelled scans of WADS")
+    parser.add_argument("--repeats", type=int, default=5, help="runs of each, for the times")
+    parser.add_argument("--beams", action="store_true", help="print the sensor's beams instead")
+    arguments = parser.parse_args()
+
+    scans = [_read(path) for path in arguments.scans]
+    fit = fit_grid(scans)
+    if arguments.beams:
+        print(", ".join(f"{beam:.3f}" for beam in fit.beams))
+        return
+    grids = {
+        "even, -25..15°": SphericalGrid.even(64, 2048, (-25, 15)),
+        "beams of WADS": grid_of("wads", "benchmark"),
+        "fitted": fit.grid,
+    }
+    _print_table(grids, scans, arguments.repeats)
+
+
+def _print_table(grids: dict[str, SphericalGrid], scans: Sequence[Scan], repeats: int) -> None:
+    card = load_card("wads")
+    rain = [card.rain_of(scan) for scan in scans]
+    print("| grid | size | way back | points hidden | pixels empty | IoU | view ms | back ms |")
+    print("|---|---|---|---:|---:|---:|---:|---:|")
+    for name, grid in grids.items():
+        for way_back in WAYS_BACK:
+            view, tally = RangeView(grid, way_back=way_back), Tally()
+            for _ in range(repeats):
+                for scan, truth in zip(scans, rain, strict=True):
+                    tally.add(view, scan, truth)
+            size = f"{grid.rows}x{grid.columns}"
+            print("|", " | ".join([name, size, way_back, *tally.cells()]), "|")
+
+
+def _read(path: Path) -> Scan:
+    scan = read_scan(path)
+    return scan.with_label(semantic(read_labels(label_beside(path), len(scan))))
+
+
+if __name__ == "__main__":
+    main()

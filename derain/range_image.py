@@ -1,0 +1,193 @@
+"""The range view: a scan as the image that the sensor saw."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.scan import Scan
+from derain.spherical_grid import SphericalGrid
+from derain.view import IGNORED
+from derain.way_back import WAYS_BACK, ProjectedPoints
+
+CHANNELS = ("range", "x", "y", "z", "intensity")
+
+
+@dataclass(frozen=True, eq=False)
+class RangeImage:
+    """One scan as a network on images sees it.
+
+    Attributes:
+        image: The view's channels, float32 (C, H, W): metres and the file's unit of intensity; 0
+            where nothing returned.
+        valid: True where something returned, bool (H, W).
+        pixel: Pixel of each row of the scan, int64 (N,); -1 for invalid rows and for points
+            outside the grid.
+        winner: Row of the scan that each pixel shows, int64 (H · W,); -1 where nothing returned.
+        range: Range of each row of the scan, float32 (N,), metres.
+        wraps: True where the last column is the neighbour of the first.
+        way_back: How points that are not shown get a score.
+    """
+
+    VARYING: ClassVar[str | None] = None
+
+    image: NDArray[np.float32]
+    valid: NDArray[np.bool_]
+    pixel: NDArray[np.int64]
+    winner: NDArray[np.int64]
+    range: NDArray[np.float32]
+    wraps: bool
+    way_back: str
+
+    @property
+    def size(self) -> int:
+        """H · W, the number of pixels that the network scores."""
+        return self.valid.size
+
+    @property
+    def hidden(self) -> NDArray[np.bool_]:
+        """True for points on the grid whose pixel shows a nearer return, bool (N,)."""
+        judged = self.pixel >= 0
+        return judged & (self.range > self._nearest().take(self.pixel))
+
+    def inputs(self) -> dict[str, NDArray[Any]]:
+        """The network's inputs, a batch of one: image (1, C, H, W) and valid (1, 1, H, W)."""
+        return {"image": self.image[None], "valid": self.valid[None, None]}
+
+    def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """What the network is to say of each pixel.
+
+        Args:
+            rain: Truth for every row of the scan, bool (N,).
+
+        Returns:
+            1 for rain, 0 for everything else, ``IGNORED`` where nothing returned, int64 (H · W,).
+        """
+        result = np.full(self.size, IGNORED)
+        shown = self.winner >= 0
+        result[shown] = rain[self.winner[shown]]
+        return result
+
+    def back(self, score: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Carries the network's scores back to every row of the scan.
+
+        Args:
+            score: One value per pixel, float32 (H · W,).
+
+        Returns:
+            One value per row of the scan in its order, float32 (N,); 0 for invalid rows and for
+            points outside the grid, which nobody judged.
+        """
+        judged = np.flatnonzero(self.pixel >= 0)
+        points = ProjectedPoints(
+            self.pixel[judged],
+            self.range[judged],
+            self._nearest().reshape(self.valid.shape),
+            self.wraps,
+        )
+        result = np.zeros(len(self.pixel), np.float32)
+        result[judged] = WAYS_BACK[self.way_back](points, score)
+        return result
+
+    @staticmethod
+    def pack(views: Sequence["RangeImage"]) -> dict[str, NDArray[Any]]:
+        """Inputs of several scans on one grid as one batch."""
+        return {
+            "image": np.stack([view.image for view in views]),
+            "valid": np.stack([view.valid[None] for view in views]),
+        }
+
+    def _nearest(self) -> NDArray[np.float32]:
+        """Range that each pixel shows, float32 (H · W,); infinite where nothing returned."""
+        nearest = np.full(self.size, np.inf, np.float32)
+        shown = self.winner >= 0
+        nearest[shown] = self.range[self.winner[shown]]
+        return nearest
+
+
+@dataclass(frozen=True)
+class RangeView:
+    """How a scan becomes a range image; the same in training and in deployment.
+
+    The nearest return wins a pixel; of equally near ones that of the lowest row.
+
+    Args:
+        grid: Rows and columns of the image.
+        channels: What a pixel holds, in order, of ``range``, ``x``, ``y``, ``z`` and
+            ``intensity``.
+        way_back: How points that lost their pixel get a score: ``nearest range``, ``copy`` or
+            ``vote``.
+        missing_intensity: Stands in for the intensity of scans that have none.
+
+    Raises:
+        InputError: An unknown channel or way back.
+    """
+
+    KIND: ClassVar[str] = "range"
+
+    grid: SphericalGrid
+    channels: tuple[str, ...] = CHANNELS
+    way_back: str = "nearest range"
+    missing_intensity: float = 0.0
+
+    def __post_init__(self) -> None:
+        if unknown := set(self.channels) - set(CHANNELS):
+            raise InputError(
+                "channels",
+                f"no such channel: {', '.join(sorted(unknown))}",
+                f"Known are {', '.join(CHANNELS)}.",
+            )
+        if self.way_back not in WAYS_BACK:
+            raise InputError(
+                "way_back",
+                f"no such way back: '{self.way_back}'",
+                f"Known are {', '.join(WAYS_BACK)}.",
+            )
+
+    def __call__(self, scan: Scan) -> RangeImage:
+        """Views a scan."""
+        grid, distance = self.grid, scan.range
+        valid = np.flatnonzero(scan.valid)
+        pixel = np.full(len(scan), -1)
+        # take is four times faster than indexing for rows of three numbers.
+        pixel[valid] = grid.pixel(scan.xyz.take(valid, axis=0))
+        winner = _winners(pixel, distance, grid.rows * grid.columns)
+        shown = np.flatnonzero(winner >= 0)
+        image = np.zeros((len(self.channels), len(winner)), np.float32)
+        columns = self._columns(scan, distance, winner[shown])
+        for channel, name in zip(image, self.channels, strict=True):
+            channel[shown] = columns[name]
+        return RangeImage(
+            image.reshape(len(self.channels), grid.rows, grid.columns),
+            (winner >= 0).reshape(grid.rows, grid.columns),
+            pixel,
+            winner,
+            distance,
+            grid.is_full_circle,
+            self.way_back,
+        )
+
+    def _columns(
+        self, scan: Scan, distance: NDArray[np.float32], rows: NDArray[np.int64]
+    ) -> dict[str, NDArray[np.float32] | float]:
+        """What some rows of a scan hold, by channel."""
+        x, y, z = scan.xyz.take(rows, axis=0).T
+        intensity = self.missing_intensity if scan.intensity is None else scan.intensity[rows]
+        return {"range": distance[rows], "x": x, "y": y, "z": z, "intensity": intensity}
+
+
+def _winners(
+    pixel: NDArray[np.int64], distance: NDArray[np.float32], size: int
+) -> NDArray[np.int64]:
+    """Row of the nearest point in each pixel, the lowest of equally near ones, int64 (size,)."""
+    rows = np.flatnonzero(pixel >= 0)
+    nearest = np.full(size, np.inf, np.float32)
+    np.minimum.at(nearest, pixel[rows], distance[rows])
+    rows = rows[distance[rows] == nearest[pixel[rows]]]
+    winner = np.full(size, -1)
+    # Where a pixel is written several times the last stays, which backwards is the lowest row.
+    winner[pixel[rows[::-1]]] = rows[::-1]
+    return winner
