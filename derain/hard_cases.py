@@ -100,7 +100,8 @@ def _without_inclinations(
     """Leaves out what lies between two inclinations, in degrees."""
     x, y, z = points[:, :3].T
     inclination = np.degrees(np.arctan2(z, np.hypot(x, y)))
-    return points[(inclination < lowest) | (inclination > highest)]
+    outside: NDArray[np.bool_] = (inclination < lowest) | (inclination > highest)
+    return points[outside]
 
 
 def _sphere(range_: float, intensity: float) -> NDArray[np.float32]:

@@ -35,7 +35,7 @@ def segmentation_loss(logits: Tensor, target: Tensor, class_weight: Tensor) -> S
         class_weight: Weight of each class, float (C,), at least 0; see :func:`class_weights`.
     """
     cross_entropy = weighted_cross_entropy(logits, target, class_weight)
-    lovasz = lovasz_softmax(_at_least_float32(logits).softmax(dim=1), target)
+    lovasz = lovasz_softmax(at_least_float32(logits).softmax(dim=1), target)
     return SegmentationLoss(cross_entropy + lovasz, cross_entropy, lovasz)
 
 
@@ -50,7 +50,7 @@ def weighted_cross_entropy(logits: Tensor, target: Tensor, class_weight: Tensor)
         target: Class of every point, 0 … C − 1, int64 (N,).
         class_weight: Weight of each class, float (C,), at least 0.
     """
-    logits = _at_least_float32(logits)
+    logits = at_least_float32(logits)
     class_weight = class_weight.to(logits)
     total = functional.cross_entropy(logits, target, class_weight, reduction="sum")
     weight = class_weight[target].sum()
@@ -71,7 +71,7 @@ def lovasz_softmax(probability: Tensor, target: Tensor) -> Tensor:
         probability: Probability of each class, float (N, C).
         target: Class of every point, 0 … C − 1, int64 (N,).
     """
-    probability = _at_least_float32(probability)
+    probability = at_least_float32(probability)
     foreground = functional.one_hot(target, probability.shape[1]).bool()
     error = torch.where(foreground, 1 - probability, probability)
     error, order = error.sort(dim=0, descending=True)
@@ -124,5 +124,6 @@ def class_weights(shares: Sequence[float], floor: float = 1e-3) -> Tensor:
     return torch.tensor([1 / (share + floor) for share in shares])
 
 
-def _at_least_float32(tensor: Tensor) -> Tensor:
+def at_least_float32(tensor: Tensor) -> Tensor:
+    """The same numbers in a type that sums of a scan's points fit into."""
     return tensor.to(torch.promote_types(tensor.dtype, torch.float32))

@@ -8,6 +8,8 @@ from typing import Any
 
 from derain.errors import InputError
 from derain.neighbours import NeighbourView
+from derain.range_image import RangeView
+from derain.spherical_grid import SphericalGrid
 from derain.view import View
 
 SCHEMA = 1
@@ -97,12 +99,16 @@ class Spec:
         Raises:
             InputError: A kind of view that this derain does not know.
         """
-        parameters = dict(self.view)
-        kind = parameters.pop("kind", None)
-        if kind != NeighbourView.KIND:
-            raise InputError(self.network, f"unknown view {kind!r}", "Upgrade derain.")
         # The training data's mean says least about points whose intensity was not measured.
-        return NeighbourView(**parameters, missing_intensity=self.mean_intensity, threads=threads)
+        missing_intensity = self.mean_intensity
+        match dict(self.view):
+            case {"kind": NeighbourView.KIND, "neighbours": neighbours}:
+                return NeighbourView(neighbours, missing_intensity, threads)
+            case {"kind": RangeView.KIND, "grid": grid, "way_back": way_back}:
+                grid = SphericalGrid.from_dict(grid, self.network)
+                return RangeView(grid, self.channels, way_back, missing_intensity)
+        kind = self.view.get("kind")
+        raise InputError(self.network, f"unknown view {kind!r}", "Upgrade derain.")
 
 
 def _immutable(value: Any) -> Any:

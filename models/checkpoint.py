@@ -10,11 +10,15 @@ import lightning
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.models.base import DerainingModule
+from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
 from derain.models.published import read_checkpoint
+from derain.models.salsanext import SalsaNext
 from derain.spec import Spec
 
-MODELS: dict[str, type[DerainingModule]] = {OutDet.NAME: OutDet}
+MODELS: dict[str, type[DerainingModule]] = {
+    model.NAME: model for model in (OutDet, SalsaNext, LiSnowNet)
+}
 
 
 def load_model(path: Path) -> DerainingModule:

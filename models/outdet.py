@@ -15,6 +15,7 @@ from torch.nn import functional
 
 from derain.cards import DataCard
 from derain.errors import InputError
+from derain.models.batch_norm import PointBatchNorm
 from derain.models.published import load_tensors, published_tensors
 from derain.models.supervised import SupervisedModule
 from derain.neighbours import NeighbourView
@@ -51,21 +52,6 @@ PUBLISHED_KEYS = {
     "head.weight": "fc.weight",
     "head.bias": "fc.bias",
 }
-
-
-class PointBatchNorm(nn.BatchNorm1d):
-    """BatchNorm that leaves a batch of fewer than two points to the running statistics.
-
-    One point has no variance; PyTorch's own raises an error there.
-    """
-
-    def forward(self, features: Tensor) -> Tensor:
-        """Normalises float (M, channels)."""
-        if self.training and len(features) < 2:
-            return functional.batch_norm(
-                features, self.running_mean, self.running_var, self.weight, self.bias, eps=self.eps
-            )
-        return super().forward(features)
 
 
 class OutDetNetwork(nn.Module):

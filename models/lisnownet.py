@@ -1,0 +1,206 @@
+"""LiSnowNet-L1: learns without a label what a range image would be without snow or rain.
+
+Rain is where the image changes: a network trained to make images sparse, and to change them as
+little as that takes, takes out what is small and bright against nothing.
+
+Source: M.-Y. Yu, R. Vasudevan, M. Johnson-Roberson, "LiSnowNet: Real-time Snow Removal for LiDAR
+Point Clouds", IROS 2022.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
+
+import torch
+from lightning.pytorch.utilities.types import OptimizerLRScheduler
+from torch import Tensor, nn
+
+from derain.batch import Batch
+from derain.cards import DataCard
+from derain.errors import InputError
+from derain.models.base import DerainingModule
+from derain.models.lisnownet_network import LiSnowNetwork
+from derain.models.range_module import FITTED, per_pixel, range_view
+from derain.scan import Scan
+from derain.selection_rule import SelectionRule
+from derain.sparsity import sparsity_loss
+from derain.spec import Spec
+
+__all__ = ["DeployedLiSnowNet", "LiSnowNet", "LiSnowNetwork"]
+
+CHANNELS = ("range", "z", "intensity")
+
+# How surely a residual of twice the rule's threshold is rain: its logit.
+STEEPNESS = 4.0
+
+# Logit of what the rule decides whatever the residual is.
+CERTAIN = 20.0
+
+
+class DeployedLiSnowNet(nn.Module):
+    """The network with its selection rule: from a raw range image to logits of its pixels.
+
+    Args:
+        network: A trained network.
+        rule: What it calls rain.
+    """
+
+    def __init__(self, network: LiSnowNetwork, rule: SelectionRule) -> None:
+        super().__init__()
+        self.network = network
+        self.rule = rule
+
+    def forward(self, image: Tensor, valid: Tensor) -> Tensor:
+        """Scores every pixel; arguments and result as for :class:`LiSnowNet`."""
+        seen = cube_roots(image, self.rule)
+        return select(image, seen, self.network(seen, valid), self.rule)
+
+
+def cube_roots(image: Tensor, rule: SelectionRule) -> Tensor:
+    """What the network sees: cube roots of range and of intensity, in 0..1, float (B, 2, H, W).
+
+    Args:
+        image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
+        rule: Its full scale of intensity.
+    """
+    share = (image[:, 2:] / rule.full_scale).clamp(0, 1)
+    return torch.cat([image[:, :1], share], dim=1) ** (1 / 3)
+
+
+def select(image: Tensor, seen: Tensor, denoised: Tensor, rule: SelectionRule) -> Tensor:
+    """Logits of "not rain" and "rain" of every pixel, float (B · H · W, 2), row by row.
+
+    The published rule says yes or no. Here its answer is that of a probability of one half, which
+    the residual moves.
+
+    Args:
+        image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
+        seen: What the network saw, float (B, 2, H, W).
+        denoised: What it made of that, float (B, 2, H, W).
+        rule: The rule.
+    """
+    distance, height, intensity = image.split(1, dim=1)
+    of_range, of_intensity = (denoised - seen).split(1, dim=1)
+    excess = of_range * of_intensity**3 / rule.residual - 1
+    margin = (STEEPNESS * excess).clamp(-CERTAIN, CERTAIN)
+    possible = (height > rule.ground) & (intensity < rule.intensity * rule.full_scale)
+    margin = torch.where(possible, margin, -CERTAIN)
+    margin = torch.where(distance < rule.near, CERTAIN, margin)
+    return per_pixel(torch.cat([-margin, margin], dim=1) / 2)
+
+
+class LiSnowNet(DerainingModule):
+    """Trains LiSnowNet-L1 on scans without reading a label; the recipe is the published one.
+
+    Args:
+        grid: The range image's grid: ``fitted`` to the training scans, the name of a published
+            one, or its bounds.
+        way_back: How points that lost their pixel to a nearer one get a score.
+        width: Channels of the features at full size, 8 as published.
+        dropout: Share of feature maps dropped in training.
+        alpha: How much sparsity counts against the residual: it weighs 1 - 2^-alpha.
+        beta: Share of the wavelet part in sparsity.
+        learning_rate: Of Adam.
+        decay: Factor by which the learning rate falls per epoch.
+        rule: Constants of the :class:`SelectionRule` that are stated rather than fitted to the
+            training scans, by name.
+        threshold: A point is rain where its probability is greater.
+        spec: Set by derain when it saves a checkpoint; leave it out otherwise.
+
+    Raises:
+        InputError: Weights of the loss, or constants of the rule, that cannot be meant.
+    """
+
+    NAME: ClassVar[str] = "lisnownet"
+    LEARNS_FROM_LABELS: ClassVar[bool] = False
+    network: LiSnowNetwork
+
+    def __init__(
+        self,
+        grid: str | dict[str, Any] = FITTED,
+        way_back: str = "nearest range",
+        width: int = 8,
+        dropout: float = 0.5,
+        alpha: float = 5.5,
+        beta: float = 0.5,
+        learning_rate: float = 1e-3,
+        decay: float = 0.95,
+        rule: dict[str, float] = {},
+        threshold: float = 0.5,
+        spec: dict[str, Any] | None = None,
+    ) -> None:
+        super().__init__(CHANNELS)
+        if alpha < 0 or not 0 <= beta <= 1:
+            raise InputError(
+                self.NAME,
+                f"alpha {alpha:g} and beta {beta:g} weigh no loss",
+                "Give an alpha of at least 0 and a beta from 0 to 1.",
+            )
+        self.save_hyperparameters()
+        self.network = LiSnowNetwork(width=width, dropout=dropout)
+        self.selection = SelectionRule.fitted(rule, [])
+        self.adopt(spec)
+
+    @classmethod
+    def from_published(
+        cls, state_dict: Mapping[str, Tensor], card: DataCard, grid: str | None = None
+    ) -> Self:
+        """Builds the model from a published state_dict, with or without ``module.`` prefixes.
+
+        Raises:
+            InputError: A state_dict of another network, or no grid.
+        """
+        if grid is None:
+            raise InputError(
+                cls.NAME, "weights do not say what grid they were trained on", "Give --grid."
+            )
+        network = LiSnowNetwork.from_published(state_dict)
+        model = cls(grid=grid, width=network.width)
+        model.network = network
+        model.adopt(model.spec_for(card))
+        return model
+
+    def adopt(self, spec: Spec | dict[str, Any] | None) -> None:
+        """Takes over a Spec, its selection rule included."""
+        super().adopt(spec)
+        if self._spec is not None:
+            self.selection = SelectionRule(**self._spec.rule)
+
+    def view_parameters(self, scans: Sequence[Scan]) -> dict[str, Any]:
+        """Kind and parameters of the view that the network sees."""
+        return range_view(self.hparams["grid"], self.hparams["way_back"], scans)
+
+    def rule(self, scans: Sequence[Scan]) -> dict[str, float]:
+        """Constants of the selection rule, fitted to training scans where they are not stated."""
+        return SelectionRule.fitted(self.hparams["rule"], scans).as_dict()
+
+    def forward(self, image: Tensor, valid: Tensor) -> Tensor:
+        """Logits of every pixel, float (B · H · W, 2).
+
+        Args:
+            image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
+            valid: Pixels with a return, bool (B, 1, H, W).
+        """
+        return self.folded()(image, valid)
+
+    def folded(self) -> nn.Module:
+        """The network as it is deployed."""
+        return DeployedLiSnowNet(self.network, self.selection)
+
+    def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
+        """Loss with its parts, from the images alone, and logits."""
+        image, valid = batch.inputs["image"], batch.inputs["valid"]
+        seen = cube_roots(image, self.selection)
+        denoised = self.network(seen, valid)
+        loss = sparsity_loss(denoised, seen, valid, self.hparams["alpha"], self.hparams["beta"])
+        return {
+            "loss": loss.total,
+            "wavelet": loss.wavelet,
+            "fourier": loss.fourier,
+            "residual": loss.residual,
+        }, select(image, seen, denoised, self.selection)
+
+    def configure_optimizers(self) -> OptimizerLRScheduler:
+        """Adam with a learning rate that falls after every epoch."""
+        optimizer = torch.optim.Adam(self.parameters(), lr=self.hparams["learning_rate"])
+        schedule = torch.optim.lr_scheduler.ExponentialLR(optimizer, self.hparams["decay"])
+        return {"optimizer": optimizer, "lr_scheduler": schedule}

@@ -1,0 +1,45 @@
+"""What derainers on range images share: the grid they see a scan through."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from torch import Tensor
+
+from derain.errors import InputError
+from derain.grid_fit import fit_grid
+from derain.range_image import RangeView
+from derain.scan import Scan
+from derain.spherical_grid import SphericalGrid, grid_of
+
+# In place of a grid's name: the one that fits the training scans.
+FITTED = "fitted"
+
+
+def range_view(
+    grid: str | Mapping[str, Any], way_back: str, scans: Sequence[Scan]
+) -> dict[str, Any]:
+    """Kind and parameters of a view on a grid.
+
+    Args:
+        grid: ``fitted`` for one that fits the scans; or the name of a published grid, or its
+            bounds, as :func:`~derain.spherical_grid.grid_of` takes them.
+        way_back: How points that lost their pixel get a score, as :class:`RangeView` takes it.
+        scans: Training scans.
+
+    Raises:
+        InputError: An unknown grid, or one to fit without scans.
+    """
+    return {"kind": RangeView.KIND, "grid": _chosen(grid, scans).as_dict(), "way_back": way_back}
+
+
+def _chosen(grid: str | Mapping[str, Any], scans: Sequence[Scan]) -> SphericalGrid:
+    if grid != FITTED:
+        return grid_of(grid, "grid")
+    if not scans:
+        raise InputError("grid", "there are no scans to fit it to", "Give a grid by its name.")
+    return fit_grid(scans).grid
+
+
+def per_pixel(image: Tensor) -> Tensor:
+    """One row a pixel: float (B, C, H, W) to (B · H · W, C)."""
+    return image.movedim(1, -1).flatten(0, 2)
