@@ -6,18 +6,13 @@ python benchmarks/wads_sample.py WADS/sample.bin published.onnx trained.onnx
 import argparse
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
+from labelled import read_labelled
 
 from derain.cards import load_card
 from derain.export.comparison import Method, as_table, compare
 from derain.export.latency import versions
 from derain.export.runtime import Derainer
-from derain.files import read_scan
-from derain.files.labels import label_beside, read_labels, semantic
 from derain.one_line_rule import OneLineRule
-from derain.scan import Scan
-from derain.stopwatch import Stopwatch
 
 REPEATS = 30
 
@@ -33,22 +28,10 @@ def main() -> None:
     rule = OneLineRule(intensity=0, range=20)
     methods: dict[str, Method] = {"intensity 0 and range <= 20 m": lambda scan, _: rule(scan)}
     for model in arguments.models:
-        methods[model.stem] = _method(Derainer(model, arguments.threads))
-    rows = compare(methods, [arguments.scan] * REPEATS, _read, load_card("wads"))
+        methods[model.stem] = Derainer(model, arguments.threads)
+    rows = compare(methods, [arguments.scan] * REPEATS, read_labelled, load_card("wads"))
     print(as_table(rows))
     print(f"{arguments.threads} threads, median of {REPEATS}; {versions()}")
-
-
-def _method(derainer: Derainer) -> Method:
-    def judge(scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
-        return derainer.probability(scan, stopwatch) > derainer.spec.threshold
-
-    return judge
-
-
-def _read(path: Path) -> Scan:
-    scan = read_scan(path)
-    return scan.with_label(semantic(read_labels(label_beside(path), len(scan))))
 
 
 if __name__ == "__main__":

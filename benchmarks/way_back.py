@@ -13,11 +13,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from labelled import read_labelled
 from numpy.typing import NDArray
 
 from derain.cards import load_card
-from derain.files import read_scan
-from derain.files.labels import label_beside, read_labels, semantic
 from derain.grid_fit import fit_grid
 from derain.range_image import RangeView
 from derain.scan import Scan
@@ -77,7 +76,7 @@ def main() -> None:
     parser.add_argument("--beams", action="store_true", help="print the sensor's beams instead")
     arguments = parser.parse_args()
 
-    scans = [_read(path) for path in arguments.scans]
+    scans = [read_labelled(path) for path in arguments.scans]
     fit = fit_grid(scans)
     if arguments.beams:
         print(", ".join(f"{beam:.3f}" for beam in fit.beams))
@@ -103,11 +102,6 @@ def _print_table(grids: dict[str, SphericalGrid], scans: Sequence[Scan], repeats
                     tally.add(view, scan, truth)
             size = f"{grid.rows}x{grid.columns}"
             print("|", " | ".join([name, size, way_back, *tally.cells()]), "|")
-
-
-def _read(path: Path) -> Scan:
-    scan = read_scan(path)
-    return scan.with_label(semantic(read_labels(label_beside(path), len(scan))))
 
 
 if __name__ == "__main__":

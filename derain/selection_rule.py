@@ -1,10 +1,11 @@
 """Which returns LiSnowNet calls rain: a threshold on what denoising changed, and three limits."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.scan import Scan
@@ -20,6 +21,11 @@ ROAD_PERCENTILE = 5
 
 # With it, the limit that is fitted to WADS is the published one, -1.8 m.
 ABOVE_ROAD = 0.4
+
+
+# A residual is fitted to this many returns at least, and is at least an eighth of the one published
+# for WADS: less is what the network changes where nothing falls.
+FEWEST, LEAST_RESIDUAL = 100, 0.001
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,23 @@ class SelectionRule:
                 "Both must be above 0.",
             )
 
+    def with_residual_of(self, products: NDArray[np.float32]) -> Self:
+        """The same rule with the residual that parts returns into changed and unchanged.
+
+        It is Otsu's threshold of the logarithms, where the two groups are farthest apart for their
+        spread; not less than LEAST_RESIDUAL, below which what is parted is noise. Fewer than
+        FEWEST products leave it as it is.
+
+        Args:
+            products: Change of cube-rooted range times cubed change of cube-rooted intensity, of
+                returns that height and intensity do not rule out, float32 (N,).
+        """
+        positive = products[products > 0]
+        if len(positive) < FEWEST:
+            return self
+        parting = 10 ** otsu(np.log10(positive))
+        return replace(self, residual=max(parting, LEAST_RESIDUAL))
+
     def as_dict(self) -> dict[str, float]:
         """The rule as JSON-able primitives, for a Spec."""
         return asdict(self)
@@ -80,6 +103,27 @@ class SelectionRule:
         measured = {"full_scale": _full_scale(scans), "ground": _road(scans) + ABOVE_ROAD}
         known = {name: value for name, value in measured.items() if np.isfinite(value)}
         return cls(**{**known, **stated})
+
+
+def otsu(values: NDArray[np.float32], bins: int = 256) -> float:
+    """Threshold that parts values into the two groups of least variance within.
+
+    Args:
+        values: Finite values, float32 (N,), N > 0.
+        bins: Number of values that it is chosen from.
+
+    Source: N. Otsu, "A Threshold Selection Method from Gray-Level Histograms", 1979.
+    """
+    counts, edges = np.histogram(values, bins)
+    centres = (edges[1:] + edges[:-1]) / 2
+    below, total = np.cumsum(counts)[:-1], np.cumsum(counts * centres)[:-1]
+    above = counts.sum() - below
+    rest = (counts * centres).sum() - total
+    # Both groups hold something: the outermost bins do.
+    between = below * above * (total / below - rest / above) ** 2
+    # Where an empty stretch lies between the groups, every threshold in it is as good.
+    best = np.flatnonzero(between == between.max())
+    return float(edges[1:-1][best].mean())
 
 
 def _full_scale(scans: Sequence[Scan]) -> float:

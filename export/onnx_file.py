@@ -4,6 +4,7 @@ import json
 import logging
 import platform
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy
@@ -13,7 +14,8 @@ import torch
 
 import derain
 from derain.errors import InputError
-from derain.export.proof import Proof, prove
+from derain.export.proof import FINITE, INT8, Proof, prove
+from derain.export.quantisation import quantised
 from derain.export.runtime import METADATA_KEY
 from derain.files.atomic import replacing
 from derain.hard_cases import hard_cases, scene
@@ -26,12 +28,14 @@ from derain.spec import Spec
 OPSET = 18
 
 
-def export(model: DerainingModule, path: Path) -> Proof:
+def export(model: DerainingModule, path: Path, calibration: Sequence[Scan] = ()) -> Proof:
     """Exports a model, proves it, and only then puts the file in its place.
 
     Args:
         model: A trained model.
         path: The ONNX file to write.
+        calibration: Scans like those that the model will see, to export it in eight bits; none
+            exports it in float32.
 
     Returns:
         The proof, which the file's metadata holds as well.
@@ -43,15 +47,24 @@ def export(model: DerainingModule, path: Path) -> Proof:
     model = model.eval().cpu()
     with replacing(path) as temporary:
         proto = _traced(model, model.spec)
+        if calibration:
+            proto = quantised(proto, model.spec.make_view(), calibration)
         _describe(proto, model.spec, {})
         onnx.save(proto, temporary)
-        proof = prove(model, temporary, hard_cases())
+        proof = _proof(model, temporary, calibration)
         if not proof.holds:
             raise InputError(path, f"the exported model differs:\n{proof}", "No file was left.")
         _describe(proto, model.spec, proof.as_dict())
         onnx.checker.check_model(proto, full_check=True)
         onnx.save(proto, temporary)
     return proof
+
+
+def _proof(model: DerainingModule, path: Path, calibration: Sequence[Scan]) -> Proof:
+    if not calibration:
+        return prove(model, path, hard_cases())
+    seen = prove(model, path, [(scan.name, scan) for scan in calibration], INT8)
+    return Proof(seen.cases + prove(model, path, hard_cases(), FINITE).cases)
 
 
 def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:

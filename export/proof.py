@@ -15,15 +15,32 @@ from derain.probability import probability_of_rain
 from derain.scan import Scan
 from derain.spec import Spec
 
-# Largest difference of a logit, as a share of the scan's largest logit where that is above 1:
-# float32 keeps seven digits, and a sum of 288 products may lose three of them.
-TOLERANCE = 1e-4
-
-# Share of a scan's points that may change sides, points within rounding of the threshold. One
-# always may: it is no share of a small scan.
-FLIPPED = 1e-4
-
 THREADS = (1, 2)
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What an exported model may differ by from PyTorch on a scan.
+
+    Attributes:
+        difference: Largest difference of a logit, as a share of the scan's largest logit where
+            that is above 1; None where any may be.
+        flipped: Share of the cells that may change sides. One always may: it is no share of a
+            small scan.
+    """
+
+    difference: float | None
+    flipped: float
+
+
+# float32 keeps seven digits, and a sum of a thousand products may lose three of them.
+FLOAT32 = Bounds(difference=1e-4, flipped=1e-4)
+
+# Eight bits keep two digits of every activation: what counts is how many labels change.
+INT8 = Bounds(difference=None, flipped=0.05)
+
+# On scans unlike any that the eight bits were scaled for, the answer has to be one.
+FINITE = Bounds(difference=None, flipped=1.0)
 
 
 @dataclass(frozen=True)
@@ -32,12 +49,13 @@ class Case:
 
     Attributes:
         name: What is hard about the scan.
-        points: Points that the network judged.
+        points: Cells that the network judged: points, or pixels.
         threads: Threads of onnxruntime.
         difference: Largest difference of a logit from PyTorch's, as a share of the scan's largest
             logit where that is above 1.
-        flipped: Points on the other side of the threshold.
+        flipped: Cells on the other side of the threshold.
         finite: Whether every probability is finite.
+        bounds: What it may differ by.
     """
 
     name: str
@@ -46,12 +64,13 @@ class Case:
     difference: float
     flipped: int
     finite: bool
+    bounds: Bounds = FLOAT32
 
     @property
     def holds(self) -> bool:
         """Whether the exported model may be trusted on this scan."""
-        flipped = max(1, FLIPPED * self.points)
-        return self.finite and self.difference <= TOLERANCE and self.flipped <= flipped
+        near = self.bounds.difference is None or self.difference <= self.bounds.difference
+        return self.finite and near and self.flipped <= max(1, self.bounds.flipped * self.points)
 
 
 @dataclass(frozen=True)
@@ -71,7 +90,6 @@ class Proof:
             "largest_difference": max(case.difference for case in self.cases),
             "flipped": sum(case.flipped for case in self.cases),
             "points": sum(case.points for case in self.cases),
-            "tolerance": TOLERANCE,
             "cases": [asdict(case) for case in self.cases],
         }
 
@@ -87,19 +105,25 @@ class Proof:
         points = sum(case.points for case in self.cases)
         flipped = sum(case.flipped for case in self.cases)
         lines.append(
-            f"{len(self.cases)} cases, {points:,} points: largest logit difference "
-            f"{worst.difference:.1e} (may be {TOLERANCE:.0e}), {flipped} labels flipped"
+            f"{len(self.cases)} cases, {points:,} points or pixels: largest logit difference "
+            f"{worst.difference:.1e}, {flipped} labels flipped"
         )
         return "\n".join(lines)
 
 
-def prove(forward: Callable[..., Tensor], model: Path, scans: Iterable[tuple[str, Scan]]) -> Proof:
+def prove(
+    forward: Callable[..., Tensor],
+    model: Path,
+    scans: Iterable[tuple[str, Scan]],
+    bounds: Bounds = FLOAT32,
+) -> Proof:
     """Runs an exported model and its network on the same scans.
 
     Args:
         forward: The network in evaluation mode, from raw inputs to logits.
         model: The exported file.
         scans: Names and scans.
+        bounds: What the two may differ by.
     """
     derainers = [Derainer(model, threads) for threads in THREADS]
     cases = []
@@ -108,11 +132,13 @@ def prove(forward: Callable[..., Tensor], model: Path, scans: Iterable[tuple[str
         tensors = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
         with torch.inference_mode():
             expected = forward(**tensors).numpy()
-        cases += [_compare(expected, derainer, name, scan) for derainer in derainers]
+        cases += [_compare(expected, derainer, name, scan, bounds) for derainer in derainers]
     return Proof(tuple(cases))
 
 
-def _compare(expected: NDArray[np.float32], derainer: Derainer, name: str, scan: Scan) -> Case:
+def _compare(
+    expected: NDArray[np.float32], derainer: Derainer, name: str, scan: Scan, bounds: Bounds
+) -> Case:
     view = derainer.view(scan)
     logits = derainer.session.run(None, view.inputs())[0]
     magnitude = max(1.0, float(np.abs(expected).max(initial=0)))
@@ -125,6 +151,7 @@ def _compare(expected: NDArray[np.float32], derainer: Derainer, name: str, scan:
         difference=float(difference.max(initial=0)),
         flipped=int((_is_rain(logits, derainer.spec) != _is_rain(expected, derainer.spec)).sum()),
         finite=bool(np.isfinite(derainer.probability(scan)).all()),
+        bounds=bounds,
     )
 
 

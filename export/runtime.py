@@ -49,17 +49,20 @@ class Derainer:
         self.spec = Spec.from_dict(self.metadata["spec"], path)
         self.view = self.spec.make_view(self.threads)
 
-    def __call__(self, points: Scan | NDArray[Any]) -> NDArray[np.bool_]:
+    def __call__(
+        self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> NDArray[np.bool_]:
         """Says which points are rain.
 
         Args:
             points: A Scan, or (N, ≥ 4) numbers: x, y, z in metres and intensity in the unit of
                 the training data (``spec.units``).
+            stopwatch: Takes the times of the stages view, network and back.
 
         Returns:
             True for rain, bool (N,), in input order; False for rows that cannot be judged.
         """
-        return self.probability(points) > self.spec.threshold
+        return self.probability(points, stopwatch) > self.spec.threshold
 
     def probability(
         self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None

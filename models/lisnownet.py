@@ -8,6 +8,7 @@ Point Clouds", IROS 2022.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar, Self
 
 import torch
@@ -19,7 +20,7 @@ from derain.cards import DataCard
 from derain.errors import InputError
 from derain.models.base import DerainingModule
 from derain.models.lisnownet_network import LiSnowNetwork
-from derain.models.range_module import FITTED, per_pixel, range_view
+from derain.models.range_module import FITTED, per_pixel, range_view, stated
 from derain.scan import Scan
 from derain.selection_rule import SelectionRule
 from derain.sparsity import sparsity_loss
@@ -78,14 +79,23 @@ def select(image: Tensor, seen: Tensor, denoised: Tensor, rule: SelectionRule) -
         denoised: What it made of that, float (B, 2, H, W).
         rule: The rule.
     """
-    distance, height, intensity = image.split(1, dim=1)
-    of_range, of_intensity = (denoised - seen).split(1, dim=1)
-    excess = of_range * of_intensity**3 / rule.residual - 1
+    excess = change(seen, denoised) / rule.residual - 1
     margin = (STEEPNESS * excess).clamp(-CERTAIN, CERTAIN)
-    possible = (height > rule.ground) & (intensity < rule.intensity * rule.full_scale)
-    margin = torch.where(possible, margin, -CERTAIN)
-    margin = torch.where(distance < rule.near, CERTAIN, margin)
+    margin = torch.where(possible(image, rule), margin, -CERTAIN)
+    margin = torch.where(image[:, :1] < rule.near, CERTAIN, margin)
     return per_pixel(torch.cat([-margin, margin], dim=1) / 2)
+
+
+def change(seen: Tensor, denoised: Tensor) -> Tensor:
+    """What denoising changed: of range, times that of intensity cubed, float (B, 1, H, W)."""
+    of_range, of_intensity = (denoised - seen).split(1, dim=1)
+    return of_range * of_intensity**3
+
+
+def possible(image: Tensor, rule: SelectionRule) -> Tensor:
+    """Which pixels may be rain by their height and intensity, bool (B, 1, H, W)."""
+    _, height, intensity = image.split(1, dim=1)
+    return (height > rule.ground) & (intensity < rule.intensity * rule.full_scale)
 
 
 class LiSnowNet(DerainingModule):
@@ -101,8 +111,9 @@ class LiSnowNet(DerainingModule):
         beta: Share of the wavelet part in sparsity.
         learning_rate: Of Adam.
         decay: Factor by which the learning rate falls per epoch.
-        rule: Constants of the :class:`SelectionRule` that are stated rather than fitted to the
-            training scans, by name.
+        rule: Constants of the :class:`SelectionRule` that are stated, by name. Of the others,
+            ground and full scale are fitted to the training scans, and the residual to what the
+            network changes in the validation scans.
         threshold: A point is rain where its probability is greater.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 
@@ -138,6 +149,7 @@ class LiSnowNet(DerainingModule):
         self.save_hyperparameters()
         self.network = LiSnowNetwork(width=width, dropout=dropout)
         self.selection = SelectionRule.fitted(rule, [])
+        self._changes: list[Tensor] = []  # of the validation scans of an epoch
         self.adopt(spec)
 
     @classmethod
@@ -149,12 +161,14 @@ class LiSnowNet(DerainingModule):
         Raises:
             InputError: A state_dict of another network, or no grid.
         """
-        if grid is None:
-            raise InputError(
-                cls.NAME, "weights do not say what grid they were trained on", "Give --grid."
-            )
         network = LiSnowNetwork.from_published(state_dict)
-        model = cls(grid=grid, width=network.width)
+        if network.channels != 2:
+            raise InputError(
+                cls.NAME,
+                f"the weights see {network.channels} channels",
+                "Give weights that see range and intensity.",
+            )
+        model = cls(grid=stated(grid, cls.NAME), width=network.width)
         model.network = network
         model.adopt(model.spec_for(card))
         return model
@@ -191,6 +205,9 @@ class LiSnowNet(DerainingModule):
         image, valid = batch.inputs["image"], batch.inputs["valid"]
         seen = cube_roots(image, self.selection)
         denoised = self.network(seen, valid)
+        if not self.training:
+            judged = valid & possible(image, self.selection)
+            self._changes.append(change(seen, denoised)[judged])
         loss = sparsity_loss(denoised, seen, valid, self.hparams["alpha"], self.hparams["beta"])
         return {
             "loss": loss.total,
@@ -198,6 +215,20 @@ class LiSnowNet(DerainingModule):
             "fourier": loss.fourier,
             "residual": loss.residual,
         }, select(image, seen, denoised, self.selection)
+
+    def on_validation_epoch_end(self) -> None:
+        """Logs the scores, and fits the rule's residual to what changed where not stated."""
+        super().on_validation_epoch_end()
+        changes = torch.cat([part.float() for part in self._changes])
+        self._changes.clear()
+        if "residual" in self.hparams["rule"] or self.trainer.state.fn != "fit":
+            return
+        rule = self.selection.with_residual_of(changes.cpu().numpy())
+        # Every process has seen other scans; they go on with one rule.
+        residual = float(torch.as_tensor(self.all_gather(torch.tensor(rule.residual))).mean())
+        self.log("val/rule_residual", residual)
+        rule = replace(rule, residual=residual)
+        self.adopt(replace(self.spec, rule=rule.as_dict()))
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
         """Adam with a learning rate that falls after every epoch."""

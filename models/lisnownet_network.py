@@ -115,7 +115,7 @@ class LiSnowNetwork(nn.Module):
             raise InputError(
                 "network", f"{channels} channels of width {width}", "Give numbers of at least 1."
             )
-        self.width = width
+        self.channels, self.width = channels, width
         block = partial(ResidualBlock, dropout=dropout)
         widths = [width * 2**level for level in range(HALVINGS + 1)]
         # Stage by stage from full size to the smallest, in the encoder and in the decoder alike.

@@ -40,6 +40,21 @@ def _chosen(grid: str | Mapping[str, Any], scans: Sequence[Scan]) -> SphericalGr
     return fit_grid(scans).grid
 
 
+def stated(grid: str | None, name: str) -> str:
+    """The grid of published weights, which has to be stated.
+
+    Args:
+        grid: Name of the grid, if there is one.
+        name: Name of the network, for messages.
+
+    Raises:
+        InputError: There is none.
+    """
+    if grid is None:
+        raise InputError(name, "weights do not say what grid they were trained on", "Give --grid.")
+    return grid
+
+
 def per_pixel(image: Tensor) -> Tensor:
     """One row a pixel: float (B, C, H, W) to (B · H · W, C)."""
     return image.movedim(1, -1).flatten(0, 2)

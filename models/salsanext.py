@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from derain.cards import DataCard
 from derain.errors import InputError
 from derain.losses import SegmentationLoss, lovasz_softmax, weighted_cross_entropy
-from derain.models.range_module import FITTED, per_pixel, range_view
+from derain.models.range_module import FITTED, per_pixel, range_view, stated
 from derain.models.salsanext_network import SalsaNextNetwork
 from derain.models.supervised import SupervisedModule
 from derain.scan import Scan
@@ -121,10 +121,6 @@ class SalsaNext(SupervisedModule):
         Raises:
             InputError: A state_dict of another network or of more than two classes, or no grid.
         """
-        if grid is None:
-            raise InputError(
-                cls.NAME, "weights do not say what grid they were trained on", "Give --grid."
-            )
         network = SalsaNextNetwork.from_published(state_dict)
         if (network.channels, network.classes) != (len(CHANNELS), 2):
             raise InputError(
@@ -132,7 +128,7 @@ class SalsaNext(SupervisedModule):
                 f"the weights tell {network.classes} classes from {network.channels} channels",
                 f"Give weights that tell rain from the rest, from {', '.join(CHANNELS)}.",
             )
-        model = cls(grid=grid, width=network.width)
+        model = cls(grid=stated(grid, cls.NAME), width=network.width)
         model.network = network
         model.adopt(model.spec_for(card))
         return model
@@ -175,7 +171,7 @@ class SalsaNext(SupervisedModule):
 
         def factor(step: int) -> float:
             if step < warm_up:
-                return (step + 1) / (warm_up + 1)
+                return (step + 1) / warm_up
             return float(self.hparams["decay"] ** ((step - warm_up) / steps))
 
         schedule = torch.optim.lr_scheduler.LambdaLR(optimizer, factor)

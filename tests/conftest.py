@@ -5,11 +5,12 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 # Threads that spin while they wait make a busy machine many times slower; read when torch loads.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
+import numpy as np
 import pytest
 
 from derain.cli.main import main
@@ -18,7 +19,12 @@ from derain.hard_cases import scene
 from derain.scan import Scan
 
 if TYPE_CHECKING:
+    from torch import nn
+
+    from derain.models.base import DerainingModule
+    from derain.models.lisnownet import LiSnowNet
     from derain.models.outdet import OutDet
+    from derain.models.salsanext import SalsaNext
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
@@ -103,10 +109,87 @@ def onnx_model(random_outdet: "OutDet", tmp_path_factory: pytest.TempPathFactory
     return path
 
 
+@pytest.fixture(scope="session")
+def small_grid() -> dict[str, Any]:
+    """A grid of few pixels, its sides no multiples of 16: most points of a scene lose theirs."""
+    return {"rows": 18, "columns": 60, "inclination": [-30.0, 20.0]}
+
+
+@pytest.fixture(scope="session")
+def random_salsanext(small_grid: dict[str, Any]) -> "SalsaNext":
+    """A narrow SalsaNext of random weights; it calls half of a scene rain."""
+    import torch
+
+    from derain.cards import load_card
+    from derain.models.salsanext import SalsaNext
+
+    with torch.random.fork_rng(), torch.no_grad():
+        torch.manual_seed(0)
+        model = SalsaNext(grid=small_grid, width=4).eval()
+        model.adopt(model.spec_for(load_card("wads")))
+        _randomise(model.network, gain=1.4)
+        view = model.spec.make_view()(Scan.of(scene()))
+        logits = model(**{name: torch.from_numpy(a) for name, a in view.inputs().items()})
+        margin = view.back((logits[:, 1] - logits[:, 0]).numpy())
+        middle = np.median(margin)
+        # Between two pixels, so that none lies on the threshold.
+        model.network.head.bias[0] += float(middle + margin[margin > middle].min()) / 2
+    return model
+
+
+@pytest.fixture(scope="session")
+def random_lisnownet(small_grid: dict[str, Any]) -> "LiSnowNet":
+    """A narrow LiSnowNet of random weights, whose rule knows no limits; it finds rain."""
+    import torch
+
+    from derain.cards import load_card
+    from derain.models.lisnownet import LiSnowNet
+
+    unlimited = {"residual": 0.008, "ground": -10.0, "intensity": 1.0}
+    with torch.random.fork_rng(), torch.no_grad():
+        torch.manual_seed(0)
+        model = LiSnowNet(grid=small_grid, width=4, rule=unlimited).eval()
+        model.adopt(model.spec_for(load_card("wads")))
+        _randomise(model.network, gain=0.6)
+    return model
+
+
+def _randomise(network: "nn.Module", gain: float) -> None:
+    """Draws weights and BatchNorm statistics as a training might leave them."""
+    for name, tensor in network.state_dict().items():
+        if tensor.ndim > 1:
+            tensor.normal_(0, gain * tensor[0].numel() ** -0.5)
+        elif tensor.is_floating_point():
+            centre = 1.0 if ".norm." in name and name.endswith(("running_var", "weight")) else 0.0
+            tensor.uniform_(centre - 0.2, centre + 0.2)
+
+
+@pytest.fixture(scope="session", params=["salsanext", "lisnownet"])
+def image_model(request: pytest.FixtureRequest) -> "DerainingModule":
+    """Each of the two networks on range images."""
+    return request.getfixturevalue(f"random_{request.param}")
+
+
+@pytest.fixture(scope="session")
+def image_onnx(image_model: "DerainingModule", tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same network, exported."""
+    from derain.export.onnx_file import export
+
+    path = tmp_path_factory.mktemp("onnx") / f"{image_model.NAME}.onnx"
+    export(image_model, path)
+    return path
+
+
 @pytest.fixture
 def one_block(monkeypatch: pytest.MonkeyPatch) -> None:
     """Exports 3D-OutDet in one block: the same network, traced several times as quickly."""
     monkeypatch.setattr("derain.models.outdet.BLOCKS", 1)
+
+
+@pytest.fixture
+def two_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Halves images once in LiSnowNet: a network of two stages, traced in a third of the time."""
+    monkeypatch.setattr("derain.models.lisnownet_network.HALVINGS", 1)
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 import argparse
 import shlex
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,14 +13,16 @@ if TYPE_CHECKING:
 SUMMARY = "the whole story on simulated rain, in a few minutes"
 
 DESCRIPTION = """\
-Simulates rain on a test track, trains 3D-OutDet on it, tests it, exports it, proves and times the
-export, and cleans scans with it. Every step is a command of derain, printed before it runs.
+Simulates rain on a test track; trains 3D-OutDet, SalsaNext and LiSnowNet-L1 on it, the last without
+labels; tests them, exports them, proves and times the exports, compares them, and cleans scans with
+the first. Every step is a command of derain, printed before it runs.
 
   derain demo
   derain demo --out somewhere
 """
 
-CONFIG = "outdet_simulated.yaml"
+# What the networks are called, and the beginning of their configurations' names.
+NETWORKS = {"3D-OutDet": "outdet", "SalsaNext": "salsanext", "LiSnowNet-L1": "lisnownet"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,36 +34,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     out: Path = arguments.out
-    checkpoint, model = out / "outdet.ckpt", out / "outdet.onnx"
-    data = ["--config", CONFIG, "--data.root", str(out / "simulated")]
-    quiet = [] if sys.stderr.isatty() else ["--trainer.enable_progress_bar", "false"]
-    log = ["--trainer.logger.save_dir", str(out / "runs")]
-    saving = ["--checkpoint.dirpath", str(out), "--checkpoint.filename", checkpoint.stem]
-    epochs = ["--trainer.max_epochs", str(arguments.epochs)] if arguments.epochs else []
-
-    checkpoint.unlink(missing_ok=True)
-    _derain("fit", *data, *log, *saving, *epochs, *quiet)
-    _derain("test", *data, *log, "--ckpt_path", str(checkpoint), *quiet)
-    _derain("export", str(checkpoint), "--out", str(model))
+    models = {title: _model(name, out, arguments.epochs) for title, name in NETWORKS.items()}
 
     from derain.datamodules.simulated import Simulated
 
     simulated = Simulated(str(out / "simulated"))
     rainiest = simulated.files("test")[-1].scan
+    model = next(iter(models.values()))
     _derain("run", str(model), str(rainiest.parent), "--out", str(out / "cleaned"))
 
-    print(f"\n{_table(model, simulated)}\n")
+    print(f"\n{_table(models, simulated)}\n")
     picture = out / "before_after.png"
     _draw(model, rainiest, picture)
     for path, meaning in {
-        checkpoint: "the trained network",
-        model: "the same, for a CPU without torch",
+        out / "*.ckpt": "the trained networks",
+        out / "*.onnx": "the same, for a CPU without torch",
         out / "cleaned": "scans without their rain, and labels",
         picture: "one of them, before and after",
         out / "runs": f"for TensorBoard: tensorboard --logdir {out / 'runs'}",
     }.items():
         print(f"{path!s:24} {meaning}")
     return 0
+
+
+def _model(name: str, out: Path, epochs: int | None) -> Path:
+    """Trains a network, tests it and exports it."""
+    checkpoint, model = out / f"{name}.ckpt", out / f"{name}.onnx"
+    data = ["--config", f"{name}_simulated.yaml", "--data.root", str(out / "simulated")]
+    quiet = [] if sys.stderr.isatty() else ["--trainer.enable_progress_bar", "false"]
+    log = ["--trainer.logger.save_dir", str(out / "runs")]
+    saving = ["--checkpoint.dirpath", str(out), "--checkpoint.filename", name]
+    length = ["--trainer.max_epochs", str(epochs)] if epochs else []
+
+    checkpoint.unlink(missing_ok=True)
+    _derain("fit", *data, *log, *saving, *length, *quiet)
+    _derain("test", *data, *log, "--ckpt_path", str(checkpoint), *quiet)
+    _derain("export", str(checkpoint), "--out", str(model))
+    return model
 
 
 def _derain(*arguments: str) -> None:
@@ -72,22 +82,20 @@ def _derain(*arguments: str) -> None:
         raise SystemExit(code)
 
 
-def _table(model: Path, simulated: "Simulated") -> str:
-    """Error and time of the exported model, and of the rule that it has to beat."""
+def _table(models: Mapping[str, Path], simulated: "Simulated") -> str:
+    """Error and time of the exported models, and of the rule that they have to beat."""
     from derain.datamodules.base import ScanFile
     from derain.export.comparison import Method, as_table, compare
     from derain.export.runtime import Derainer
+    from derain.neighbours import usable_cores
     from derain.one_line_rule import OneLineRule
     from derain.scan import Scan
 
     labels = {file.scan: file for file in simulated.files("test")}
     training = [simulated.read(file) for file in simulated.files("train")]
     rule = OneLineRule.best((scan, simulated.card.rain_of(scan)) for scan in training)
-    derainer = Derainer(model)
     methods: dict[str, Method] = {
-        "3D-OutDet, ONNX": lambda scan, stopwatch: (
-            derainer.probability(scan, stopwatch) > derainer.spec.threshold
-        ),
+        **{title: Derainer(model) for title, model in models.items()},
         f"intensity <= {rule.intensity:.2g} and range <= {rule.range:.2g} m": (
             lambda scan, stopwatch: rule(scan)
         ),
@@ -98,7 +106,7 @@ def _table(model: Path, simulated: "Simulated") -> str:
 
     rows = compare(methods, list(labels), read, simulated.card)
     return (
-        f"Simulated rain, {len(labels)} test scans of tracks not trained on, {derainer.threads} "
+        f"Simulated rain, {len(labels)} test scans of tracks not trained on, {usable_cores()} "
         f"threads. Simulated rain is easy: this says nothing of real rain.\n\n{as_table(rows)}"
     )
 

@@ -1,9 +1,14 @@
 """``derain export``: an ONNX file from a checkpoint, proved and timed."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from derain.cli.arguments import count, threads
+
+if TYPE_CHECKING:
+    from derain.scan import Scan
 
 SUMMARY = "make an ONNX file that runs on a CPU without torch"
 
@@ -12,8 +17,10 @@ Exports a checkpoint as one ONNX file, proves it against PyTorch, and times it.
 
   derain export outdet.ckpt --out outdet.onnx
   derain export outdet.ckpt --out outdet.onnx --scan scans/000000.bin --threads 2
+  derain export salsanext.ckpt --out salsanext.onnx --int8 --calibration scans/
 
-Where the proof fails, no file is left.
+Where the proof fails, no file is left. With --int8, convolutions compute in eight bits, scaled by
+what they see in scans of the calibration folder, on which the proof is made, too.
 """
 
 
@@ -22,9 +29,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("checkpoint", type=Path, help="checkpoint of derain")
     parser.add_argument("--out", type=Path, required=True, help="the ONNX file to write")
     parser.add_argument(
+        "--int8", action="store_true", help="compute in eight bits (SalsaNext and LiSnowNet)"
+    )
+    parser.add_argument(
+        "--calibration", type=Path, nargs="+", help="scans, or folders of scans, for --int8"
+    )
+    parser.add_argument(
         "--scan", type=Path, help="time the model on this scan; by default on a made-up one"
     )
-    parser.add_argument("--columns", default="x,y,z,intensity", help="columns of a .bin --scan")
+    parser.add_argument("--columns", default="x,y,z,intensity", help="columns of .bin scans")
     parser.add_argument(
         "--threads", type=threads, default=0, help="threads to time with (default all)"
     )
@@ -38,18 +51,37 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.export.onnx_file import export
     from derain.models.checkpoint import load_model
 
+    columns = arguments.columns.split(",")
     if arguments.scan is not None and not arguments.scan.is_file():
         raise InputError(arguments.scan, "there is no such file", "Check --scan.")
-    proof = export(load_model(arguments.checkpoint), arguments.out)
+    model = load_model(arguments.checkpoint)
+    proof = export(
+        model, arguments.out, _calibration(arguments.calibration, arguments.int8, columns)
+    )
     print(proof)
     print(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
     print(
         measure_latency(
             arguments.out,
             arguments.scan,
-            arguments.columns.split(","),
+            columns,
             arguments.threads,
             arguments.repeats,
         )
     )
     return 0
+
+
+def _calibration(paths: Sequence[Path] | None, int8: bool, columns: Sequence[str]) -> list["Scan"]:
+    """Scans that an eight-bit model is scaled by; none for one in float32."""
+    from derain.datamodules.statistics import evenly_spaced
+    from derain.errors import InputError
+    from derain.export.quantisation import CALIBRATION_SCANS
+    from derain.files import find_scans, read_scan
+
+    if int8 != bool(paths):
+        raise InputError(
+            "--int8", "needs --calibration, and that needs it", "Give both or neither."
+        )
+    found = evenly_spaced(find_scans(paths or []), CALIBRATION_SCANS)
+    return [read_scan(path, columns) for path in found]

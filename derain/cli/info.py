@@ -6,29 +6,35 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
+from derain.directions import directions
 from derain.errors import InputError
 from derain.files import read_scan
 from derain.files.labels import read_labels, semantic
+from derain.grid_fit import fit_grid
 from derain.morton import distinct_positions
 from derain.scan import Scan
 
 SUMMARY = "say what is in a scan, a label file or a model"
 
 DESCRIPTION = """\
-Says what is in a scan, a label file, an exported model or a checkpoint.
+Says what is in a scan, a label file, an exported model or a checkpoint, and what range image fits
+a scan. With --grid, fits one grid to all the scans, to be written into a configuration.
 
   derain info scan.bin
   derain info scan.bin --columns x,y,z,intensity,ring --json
   derain info labels/000000.label
   derain info model.onnx
+  derain info --grid scans/*.bin
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument("files", nargs="+", type=Path, help="scans, labels, models, checkpoints")
+    parser.add_argument("--grid", action="store_true", help="fit one grid to all the scans")
     parser.add_argument("--json", action="store_true", help="print one JSON object a file")
     parser.add_argument(
         "--columns",
@@ -39,8 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
+    columns = arguments.columns.split(",")
+    if arguments.grid:
+        fit = fit_grid([read_scan(path, columns) for path in arguments.files]).as_dict()
+        print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
+        return 0
     for path in arguments.files:
-        facts = _facts(path, arguments.columns.split(","))
+        facts = _facts(path, columns)
         if arguments.json:
             print(json.dumps({"file": str(path), **facts}))
         else:
@@ -69,9 +80,8 @@ def _facts(path: Path, columns: list[str]) -> dict[str, Any]:
 
 def _of_scan(scan: Scan) -> dict[str, Any]:
     valid = scan.valid
-    points = scan.xyz[valid].astype(np.float64)
-    azimuth = np.degrees(np.arctan2(points[:, 1], points[:, 0]))
-    inclination = np.degrees(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1])))
+    points = scan.xyz[valid]
+    azimuth, inclination = directions(points)
     return {
         "points": len(scan),
         "valid": int(valid.sum()),
@@ -85,7 +95,14 @@ def _of_scan(scan: Scan) -> dict[str, Any]:
         "azimuth / deg": _span(azimuth),
         "inclination / deg": _span(inclination),
         "intensity": "none" if scan.intensity is None else _span(scan.intensity[valid]),
+        "fitted grid": _fitted(scan) if valid.any() else "none",
     }
+
+
+def _fitted(scan: Scan) -> dict[str, Any]:
+    fit = fit_grid([scan]).as_dict()
+    del fit["grid"]  # one number a row: of use in a configuration, for which there is --grid
+    return fit
 
 
 def _of_labels(path: Path) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from derain.errors import InputError
 from derain.export.runtime import Derainer
 from derain.files import find_scans, read_scan, write_scan
 from derain.files.labels import label_beside, write_labels
+from derain.range_image import RangeView
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
 
@@ -35,6 +36,9 @@ A scan that cannot be read is reported and passed over; the exit code is then 2.
 
 # Intensities this many times off the training data's are of another unit.
 INTENSITY_MISMATCH = 30.0
+
+# A larger share of points outside a model's grid are another sensor's, not a few strays.
+MOST_OUTSIDE = 0.02
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,8 @@ def _clean(
     with stopwatch.stage("read"):
         scan = read_scan(path, arguments.columns.split(","))
     seen = _in_unit_of_model(scan, arguments.intensity_scale)
-    _warn_once(warned, _intensity_warning(seen, derainer))
+    _warn_once(warned, "intensity", _intensity_warning(seen, derainer))
+    _warn_once(warned, "grid", _grid_warning(seen, derainer))
     rain = derainer.probability(seen, stopwatch) > derainer.spec.threshold
     with stopwatch.stage("write"):
         _write(arguments.out / path.name, scan, rain)
@@ -152,8 +157,19 @@ def _intensity_warning(scan: Scan, derainer: Derainer) -> str | None:
     return None
 
 
-def _warn_once(warned: set[str], warning: str | None) -> None:
+def _grid_warning(scan: Scan, derainer: Derainer) -> str | None:
+    """What of a scan the model's range image does not show."""
+    xyz = scan.xyz[scan.valid]
+    if not isinstance(derainer.view, RangeView) or not len(xyz):
+        return None
+    outside = float((derainer.view.grid.pixel(xyz) < 0).mean())
+    if outside <= MOST_OUTSIDE:
+        return None
+    return f"{outside:.0%} of the points lie outside the grid of {derainer.spec.data}, and stay"
+
+
+def _warn_once(warned: set[str], subject: str, warning: str | None) -> None:
     # A folder's scans have the same fault, with other numbers: the first one speaks for all.
-    if warning is not None and not warned:
-        warned.add(warning)
+    if warning is not None and subject not in warned:
+        warned.add(subject)
         tqdm.write(f"derain: warning: {warning}", sys.stderr)

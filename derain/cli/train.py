@@ -18,10 +18,12 @@ from derain.datamodules.wads import Wads
 from derain.errors import InputError
 from derain.models.base import MERIT, DerainingModule
 from derain.models.checkpoint import load_model
+from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
 from derain.models.panels import ScanPanels
 from derain.models.prediction import PredictionWriter
 from derain.models.report import TestReport
+from derain.models.salsanext import SalsaNext
 
 EXAMPLES = {
     "fit": """\
@@ -60,7 +62,16 @@ class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatt
     """Leaves the line breaks of the examples alone."""
 
 
-__all__ = ["Folder", "OutDet", "Rehearse3D", "Simulated", "Wads", "train"]
+__all__ = [
+    "Folder",
+    "LiSnowNet",
+    "OutDet",
+    "Rehearse3D",
+    "SalsaNext",
+    "Simulated",
+    "Wads",
+    "train",
+]
 
 
 class DerainCLI(LightningCLI):

@@ -21,7 +21,7 @@ def test_a_checkpoint_becomes_a_model_with_its_proof_and_times(
         *("--scan", scan, "--threads", "1", "--repeats", "3"),
     )
     assert outcome.code == 0
-    assert "40 cases" in outcome.out
+    assert "48 cases" in outcome.out
     assert "0 labels flipped" in outcome.out
     assert f"Wrote {out} ({out.stat().st_size:,} bytes)" in outcome.out
     assert "500 points, 1 threads, 3 runs, milliseconds" in outcome.out
@@ -64,7 +64,7 @@ def broken(checkpoint: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("cut.ckpt", "damaged"),
         ("no_spec.ckpt", "not a checkpoint of derain"),
         ("weights_alone.ckpt", "Published weights become one through `derain import-weights`."),
-        ("other_network.ckpt", "a checkpoint of 'resnet'. Known are outdet."),
+        ("other_network.ckpt", "a checkpoint of 'resnet'. Known are outdet"),
         ("other_parameters.ckpt", "depth"),
         ("other_weights.ckpt", "its weights do not fit outdet"),
         ("other_size.ckpt", "its weights do not fit outdet"),

@@ -5,13 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from derain.export.runtime import Derainer
-from derain.files import write_scan
+from derain.files import read_scan, write_scan
 from derain.files.labels import write_labels
-from derain.hard_cases import hard_cases
+from derain.grid_fit import fit_grid
+from derain.hard_cases import hard_cases, scene
 from derain.models.outdet import OutDet
 from derain.scan import Scan
+from derain.spherical_grid import grid_of
 
 
 @pytest.fixture
@@ -33,6 +36,16 @@ def scan(tmp_path: Path) -> Path:
     return path
 
 
+def test_one_grid_is_fitted_to_all_scans_and_can_be_configured(run_derain, tmp_path: Path) -> None:
+    paths = [tmp_path / f"{seed}.bin" for seed in range(2)]
+    for seed, path in enumerate(paths):
+        scene(2000, seed).tofile(path)
+    fit = fit_grid([read_scan(path) for path in paths])
+    printed = yaml.safe_load(run_derain("info", "--grid", *paths).out)
+    assert grid_of(printed["grid"], "info") == fit.grid
+    assert strict_json(run_derain("info", "--grid", "--json", *paths).out) == printed
+
+
 def strict_json(text: str) -> dict[str, object]:
     """JSON as the standard has it: without NaN and infinity, which Python lets pass."""
 
@@ -45,7 +58,10 @@ def strict_json(text: str) -> dict[str, object]:
 def test_a_scan_is_described_by_its_valid_points(run_derain, scan: Path) -> None:
     outcome = run_derain("info", scan, "--json")
     assert (outcome.code, outcome.err) == (0, "")
-    assert strict_json(outcome.out) == {
+    facts = strict_json(outcome.out)
+    fit = fit_grid([read_scan(scan)]).as_dict()
+    assert facts.pop("fitted grid") == {name: fit[name] for name in fit if name != "grid"}
+    assert facts == {
         "file": str(scan),
         "points": 6,
         "valid": 4,

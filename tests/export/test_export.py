@@ -15,7 +15,7 @@ from derain.cards import load_card
 from derain.errors import InputError
 from derain.export import onnx_file
 from derain.export.onnx_file import export
-from derain.export.proof import FLIPPED, THREADS, TOLERANCE, Case, prove
+from derain.export.proof import FLOAT32, INT8, THREADS, Case, prove
 from derain.export.runtime import Derainer
 from derain.hard_cases import hard_cases, scene
 from derain.models.outdet import OutDet
@@ -156,8 +156,8 @@ def test_swapped_logits_flip_every_point(onnx_model: Path, random_outdet: OutDet
     ("change", "holds"),
     [
         ({}, True),
-        ({"difference": TOLERANCE}, True),
-        ({"difference": 1.01 * TOLERANCE}, False),
+        ({"difference": FLOAT32.difference}, True),
+        ({"difference": 1.01 * FLOAT32.difference}, False),
         ({"difference": float("nan")}, False),
         ({"flipped": 2}, True),
         ({"flipped": 3}, False),
@@ -165,10 +165,16 @@ def test_swapped_logits_flip_every_point(onnx_model: Path, random_outdet: OutDet
         ({"flipped": 2, "points": 9_999}, False),
         ({"finite": False}, False),
         ({"points": 0}, True),
+        ({"difference": 1e9, "bounds": INT8}, True),
+        ({"flipped": 1000, "bounds": INT8}, True),
+        ({"flipped": 1001, "bounds": INT8}, False),
+        ({"finite": False, "bounds": INT8}, False),
     ],
 )
 def test_a_case_holds_within_its_bounds_only(change: dict[str, float], holds: bool) -> None:
-    case = Case("case", points=round(2 / FLIPPED), threads=1, difference=0, flipped=0, finite=True)
+    case = Case(
+        "case", points=round(2 / FLOAT32.flipped), threads=1, difference=0, flipped=0, finite=True
+    )
     assert replace(case, **change).holds == holds
 
 

@@ -10,6 +10,8 @@ import torch
 from torch import nn
 
 from derain.batch import Sample
+from derain.cards import load_card
+from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
 from derain.neighbours import NeighbourView
 from derain.scan import Scan
@@ -78,6 +80,33 @@ def sample() -> Callable[..., Sample]:
     return view
 
 
+@pytest.fixture
+def image_network(small_grid: dict[str, Any]) -> Callable[..., Any]:
+    """Makes a small SalsaNext or LiSnowNet in evaluation mode, of random weights, as for WADS."""
+
+    def make(model_class: type[DerainingModule], **arguments: Any) -> DerainingModule:
+        model = model_class(**{"grid": small_grid, "width": 4, **arguments})
+        randomise(model.network, seed=0)
+        model.adopt(model.spec_for(load_card("wads")))
+        return model.eval()
+
+    return make
+
+
+@pytest.fixture
+def image_sample() -> Callable[..., Sample]:
+    """Views a scan as a model does, with a random truth or one class for all."""
+
+    def view(model: DerainingModule, points: Scan | np.ndarray, rain: float = 0.3) -> Sample:
+        scan = Scan.of(points)
+        truth = np.random.default_rng(len(scan)).random(len(scan)) < rain
+        image = model.spec.make_view()(scan)
+        labelled = scan.with_label(np.where(truth, 110, 0))
+        return Sample(labelled, image, torch.from_numpy(image.target(truth)))
+
+    return view
+
+
 @pytest.fixture(scope="module")
 def make_trainer() -> Iterator[Callable[..., lightning.Trainer]]:
     """Makes a trainer that writes nothing, and adds its sums in the same order every time."""
@@ -88,10 +117,9 @@ def make_trainer() -> Iterator[Callable[..., lightning.Trainer]]:
             deterministic=True,
             max_epochs=epochs,
             logger=False,
-            enable_checkpointing=False,
             enable_progress_bar=False,
             enable_model_summary=False,
-            **arguments,
+            **{"enable_checkpointing": False, **arguments},
         )
 
     yield make

@@ -1,0 +1,183 @@
+"""Networks on range images, exported: one image size, no torch, an answer for every row."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from derain import models
+from derain.export.proof import THREADS
+from derain.export.runtime import METADATA_KEY, Derainer
+from derain.hard_cases import hard_cases, scene
+from derain.models.base import DerainingModule
+from derain.probability import probability_of_rain
+from derain.range_image import RangeView
+from derain.scan import Scan
+
+HARD_CASES = dict(hard_cases(largest=5000))
+PIXELS = 18 * 60
+
+
+@pytest.fixture(scope="module")
+def derainer(image_onnx: Path) -> Derainer:
+    return Derainer(image_onnx, threads=1)
+
+
+def shapes(path: Path) -> dict[str, list[int | str]]:
+    graph = onnx.load(path).graph
+    return {
+        value.name: [size.dim_param or size.dim_value for size in value.type.tensor_type.shape.dim]
+        for value in (*graph.input, *graph.output)
+    }
+
+
+def logits_of(model: DerainingModule, scan: Scan) -> NDArray[np.float32]:
+    view = model.spec.make_view()(scan)
+    with torch.inference_mode():
+        return model(**{name: torch.from_numpy(a) for name, a in view.inputs().items()}).numpy()
+
+
+def test_the_size_of_the_image_is_that_of_the_grid(
+    image_onnx: Path, image_model: DerainingModule
+) -> None:
+    assert shapes(image_onnx) == {
+        "image": [1, len(image_model.channels), 18, 60],
+        "valid": [1, 1, 18, 60],
+        "logits": [PIXELS, 2],
+    }
+
+
+def test_the_file_passes_the_checker_at_the_pinned_opset(image_onnx: Path) -> None:
+    proto = onnx.load(image_onnx)
+    onnx.checker.check_model(proto, full_check=True)
+    assert [(opset.domain, opset.version) for opset in proto.opset_import] == [("", 18)]
+
+
+def test_nothing_in_the_graph_depends_on_how_many_pixels_are_empty(image_onnx: Path) -> None:
+    operators = {node.op_type for node in onnx.load(image_onnx).graph.node}
+    assert {"Conv", "Where"} <= operators
+    assert not operators & {"NonZero", "ScatterND", "ScatterElements", "Dropout"}
+
+
+def test_the_file_says_nothing_of_the_machine_it_was_made_on(image_onnx: Path) -> None:
+    proto = onnx.load(image_onnx)
+    assert not any(len(node.metadata_props) for node in proto.graph.node)
+    assert str(Path(models.__file__).parent).encode() not in image_onnx.read_bytes()
+
+
+def test_the_file_says_how_the_network_is_used(
+    image_model: DerainingModule, derainer: Derainer
+) -> None:
+    assert derainer.spec == image_model.spec
+    assert derainer.metadata["spec"] == image_model.spec.as_dict()
+    assert derainer.view == image_model.spec.make_view()
+
+
+def test_the_proof_in_the_file_is_that_of_every_hard_case(derainer: Derainer) -> None:
+    written = derainer.metadata["proof"]
+    assert [(case["name"], case["threads"]) for case in written["cases"]] == [
+        (name, threads) for name, _ in hard_cases() for threads in THREADS
+    ]
+    assert {case["points"] for case in written["cases"]} == {PIXELS}
+    assert 0 < written["largest_difference"] < 1e-4
+    assert all(case["finite"] for case in written["cases"])
+
+
+def test_a_fair_part_of_a_scene_is_called_rain(derainer: Derainer) -> None:
+    # What the other tests compare is worth comparing.
+    assert 0.2 < derainer(scene()).mean() < 0.8
+
+
+@pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
+def test_every_row_of_a_hard_scan_gets_the_answer_of_pytorch(
+    image_model: DerainingModule, derainer: Derainer, scan: Scan
+) -> None:
+    probability = derainer.probability(scan)
+    assert probability.shape == (len(scan),)
+    assert probability.dtype == np.float32
+    assert ((probability >= 0) & (probability <= 1)).all()
+    assert not probability[~scan.valid].any()
+    expected = probability_of_rain(logits_of(image_model, scan))
+    back = image_model.spec.make_view()(scan).back(expected)
+    np.testing.assert_allclose(probability, back, rtol=0, atol=1e-3)
+
+
+def test_a_model_runs_where_there_is_no_torch(image_onnx: Path, derainer: Derainer) -> None:
+    script = """
+import sys
+for name in ("torch", "lightning", "open3d", "onnx", "matplotlib", "scipy", "sklearn"):
+    sys.modules[name] = None  # importing it is an error
+from derain.export.runtime import Derainer
+from derain.hard_cases import scene
+print(Derainer(sys.argv[1], threads=1)(scene()).nonzero()[0].tolist())
+"""
+    printed = subprocess.run(
+        [sys.executable, "-c", script, image_onnx], check=True, capture_output=True, text=True
+    ).stdout
+    assert json.loads(printed) == derainer(scene()).nonzero()[0].tolist()
+
+
+def with_way_back(derainer: Derainer, model: Path, way_back: str, path: Path) -> Derainer:
+    """The same file, but for the way back in its Spec."""
+    spec = replace(derainer.spec, view={**derainer.spec.view, "way_back": way_back})
+    proto = onnx.load(model)
+    onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps({"spec": spec.as_dict()})})
+    onnx.save(proto, path)
+    return Derainer(path, threads=1)
+
+
+def test_the_way_back_is_the_specs_and_decides_for_what_lost_its_pixel_alone(
+    image_model: DerainingModule, image_onnx: Path, derainer: Derainer, tmp_path: Path
+) -> None:
+    scan = Scan.of(scene())
+    score = probability_of_rain(logits_of(image_model, scan))
+    answers: dict[str, Any] = {}
+    for way_back in ("nearest range", "copy", "vote"):
+        changed = with_way_back(derainer, image_onnx, way_back, tmp_path / "changed.onnx")
+        view = changed.view
+        assert isinstance(view, RangeView)
+        assert view.way_back == way_back
+        answers[way_back] = changed.probability(scan)
+        np.testing.assert_allclose(answers[way_back], view(scan).back(score), rtol=0, atol=1e-3)
+    seen = view(scan)
+    shown = (seen.pixel >= 0) & ~seen.hidden
+    np.testing.assert_array_equal(answers["copy"][shown], answers["nearest range"][shown])
+    np.testing.assert_array_equal(derainer.probability(scan), answers["nearest range"])
+    for one, other in (("copy", "nearest range"), ("nearest range", "vote"), ("vote", "copy")):
+        assert (answers[one][seen.hidden] != answers[other][seen.hidden]).any()
+
+
+def test_points_outside_the_grid_are_no_rain_and_change_no_other(derainer: Derainer) -> None:
+    points = scene(500)
+    overhead = np.array([[0.1, 0, 50, 3], [0, 0.1, -50, 3]], np.float32)
+    probability = derainer.probability(np.concatenate([overhead, points]))
+    np.testing.assert_array_equal(probability[:2], 0)
+    np.testing.assert_array_equal(probability[2:], derainer.probability(points))
+
+
+@pytest.mark.parametrize(
+    "row", [[np.nan, 1, 1, 1], [1, 1, 1, np.inf], [0, 0, 0, 50], [-1, -1, -1, -1]], ids=str
+)
+def test_a_row_that_cannot_be_judged_is_not_rain_and_changes_no_other(
+    derainer: Derainer, row: list[float]
+) -> None:
+    points = scene(500)
+    places = [0, 250, 502]
+    mixed = np.insert(points, [0, 249, 500], np.array(row, np.float32), axis=0)
+    probability = derainer.probability(mixed)
+    np.testing.assert_array_equal(probability[places], 0)
+    np.testing.assert_array_equal(np.delete(probability, places), derainer.probability(points))
+
+
+def test_points_without_intensity_get_the_mean_of_the_training_data(derainer: Derainer) -> None:
+    points = scene()
+    points[:, 3] = derainer.spec.mean_intensity
+    np.testing.assert_array_equal(derainer.probability(points[:, :3]), derainer.probability(points))

@@ -1,0 +1,142 @@
+"""Eight-bit models: smaller, proved on the scans that set their scales, finite on all others."""
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+
+from derain.errors import InputError
+from derain.export import onnx_file
+from derain.export.onnx_file import export
+from derain.export.proof import FINITE, INT8, THREADS, Proof
+from derain.export.quantisation import ScanReader
+from derain.export.runtime import Derainer
+from derain.hard_cases import hard_cases, scene
+from derain.models.base import DerainingModule
+from derain.models.outdet import OutDet
+from derain.scan import Scan
+
+HARD_CASES = dict(hard_cases(largest=5000))
+CALIBRATION = [Scan.of(scene(3000, seed), f"scene {seed}") for seed in range(3)]
+
+
+@pytest.fixture(scope="module")
+def int8(
+    image_model: DerainingModule, image_onnx: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Proof]:
+    """The network in eight bits, of the graph in float32, and the proof that the export gave."""
+    path = tmp_path_factory.mktemp("int8") / f"{image_model.NAME}.onnx"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(onnx_file, "_traced", lambda *_: onnx.load(image_onnx))
+        return path, export(image_model, path, CALIBRATION)
+
+
+def test_convolutions_compute_in_eight_bits(int8: tuple[Path, Proof]) -> None:
+    graph = onnx.load(int8[0]).graph
+    made_by = {name: node.op_type for node in graph.node for name in node.output}
+    convolutions = [node for node in graph.node if node.op_type == "Conv"]
+    assert len(convolutions) > 20
+    for node in convolutions:
+        assert {made_by.get(name) for name in node.input} == {"DequantizeLinear"}
+    weights = {tensor.name: tensor for tensor in graph.initializer}
+    types = Counter(
+        weights[node.input[0]].data_type
+        for node in graph.node
+        if node.op_type == "DequantizeLinear" and node.input[0] in weights
+    )
+    assert types[onnx.TensorProto.INT8] >= len(convolutions)
+
+
+def test_the_file_is_smaller_and_passes_the_checker(
+    int8: tuple[Path, Proof], image_onnx: Path
+) -> None:
+    proto = onnx.load(int8[0])
+    onnx.checker.check_model(proto, full_check=True)
+    assert [(opset.domain, opset.version) for opset in proto.opset_import] == [("", 18)]
+    stored, before = (
+        sum(tensor.ByteSize() for tensor in onnx.load(path).graph.initializer)
+        for path in (int8[0], image_onnx)
+    )
+    assert stored < 0.5 * before
+    assert int8[0].stat().st_size < image_onnx.stat().st_size
+
+
+def test_the_proof_is_made_on_the_calibration_scans_and_on_every_hard_case(
+    int8: tuple[Path, Proof],
+) -> None:
+    path, proof = int8
+    assert proof.holds
+    names = [scan.name for scan in CALIBRATION] + [name for name, _ in hard_cases()]
+    assert [(case.name, case.threads) for case in proof.cases] == [
+        (name, threads) for name in names for threads in THREADS
+    ]
+    seen, others = np.split(np.array(proof.cases), [len(CALIBRATION) * len(THREADS)])
+    assert {case.bounds for case in seen} == {INT8}
+    assert {case.bounds for case in others} == {FINITE}
+    assert all(case.finite for case in proof.cases)
+    assert Derainer(path).metadata["proof"] == proof.as_dict()
+    assert proof.as_dict()["cases"][0]["bounds"] == {"difference": None, "flipped": 0.05}
+
+
+def test_few_labels_of_a_scene_flip(int8: tuple[Path, Proof], image_onnx: Path) -> None:
+    reduced, exact = Derainer(int8[0]), Derainer(image_onnx)
+    assert reduced.spec == exact.spec
+    for seed in range(10, 14):  # not those that set the scales
+        rain = exact(scene(3000, seed))
+        assert 0.05 < rain.mean() < 0.95
+        assert np.mean(reduced(scene(3000, seed)) != rain) < 0.1
+    assert (reduced.probability(scene()) != exact.probability(scene())).any()
+
+
+@pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
+def test_every_row_of_a_hard_scan_gets_an_answer(int8: tuple[Path, Proof], scan: Scan) -> None:
+    probability = Derainer(int8[0], threads=1).probability(scan)
+    assert probability.shape == (len(scan),)
+    assert ((probability >= 0) & (probability <= 1)).all()
+    assert not probability[~scan.valid].any()
+
+
+def test_a_reader_gives_the_inputs_of_every_scan_once(image_model: DerainingModule) -> None:
+    view = image_model.spec.make_view()
+    reader = ScanReader(view, CALIBRATION)
+    for scan in CALIBRATION:
+        inputs = reader.get_next()
+        assert inputs is not None
+        for name, array in view(scan).inputs().items():
+            np.testing.assert_array_equal(inputs[name], array)
+    assert reader.get_next() is None
+
+
+def test_too_many_flipped_labels_leave_no_file(
+    image_model: DerainingModule,
+    image_onnx: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def ruined(proto: onnx.ModelProto, *_: object) -> onnx.ModelProto:
+        """Swaps the two logits."""
+        (logits,) = proto.graph.output
+        for node in proto.graph.node:
+            node.output[:] = ["straight" if name == logits.name else name for name in node.output]
+        one = onnx.numpy_helper.from_array(np.array([1, 0]), "swap")
+        proto.graph.initializer.append(one)
+        swap = onnx.helper.make_node("Gather", ["straight", "swap"], [logits.name], axis=1)
+        proto.graph.node.append(swap)
+        return proto
+
+    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(image_onnx))
+    monkeypatch.setattr(onnx_file, "quantised", ruined)
+    with pytest.raises(InputError, match="the exported model differs: FAILED scene 0"):
+        export(image_model, tmp_path / "model.onnx", CALIBRATION)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_network_without_convolutions_is_refused(
+    random_outdet: OutDet, onnx_model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(onnx_model))
+    with pytest.raises(InputError, match="no convolution to quantise"):
+        export(random_outdet, tmp_path / "model.onnx", CALIBRATION)
+    assert list(tmp_path.iterdir()) == []
