@@ -5,6 +5,7 @@ import logging
 import platform
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy
@@ -14,7 +15,7 @@ import torch
 
 import derain
 from derain.errors import InputError
-from derain.export.proof import FINITE, INT8, Proof, prove
+from derain.export.proof import FINITE, FLOAT32, INT8, Proof, prove
 from derain.export.quantisation import quantised
 from derain.export.runtime import METADATA_KEY
 from derain.files.atomic import replacing
@@ -62,7 +63,9 @@ def export(model: DerainingModule, path: Path, calibration: Sequence[Scan] = ())
 
 def _proof(model: DerainingModule, path: Path, calibration: Sequence[Scan]) -> Proof:
     if not calibration:
-        return prove(model, path, hard_cases())
+        assert FLOAT32.difference is not None
+        bounds = replace(FLOAT32, difference=FLOAT32.difference * model.AMPLIFIES)
+        return prove(model, path, hard_cases(), bounds)
     seen = prove(model, path, [(scan.name, scan) for scan in calibration], INT8)
     return Proof(seen.cases + prove(model, path, hard_cases(), FINITE).cases)
 

@@ -44,6 +44,7 @@ class DerainingModule(lightning.LightningModule):
 
     Attributes:
         NAME: Name of the network in a Spec and on the command line.
+        AMPLIFIES: How many times more than other networks' its logits amplify rounding.
         LEARNS_FROM_LABELS: Whether it does; where not, none is read in its training.
         channels: Names of its input channels.
         network: The network itself.
@@ -51,6 +52,7 @@ class DerainingModule(lightning.LightningModule):
     """
 
     NAME: ClassVar[str]
+    AMPLIFIES: ClassVar[float] = 1.0
     LEARNS_FROM_LABELS: ClassVar[bool] = True
     network: nn.Module
     mean: Tensor

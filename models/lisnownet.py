@@ -122,6 +122,8 @@ class LiSnowNet(DerainingModule):
     """
 
     NAME: ClassVar[str] = "lisnownet"
+    # What denoising changed is divided by the rule's residual, some thousandths.
+    AMPLIFIES: ClassVar[float] = 100.0
     LEARNS_FROM_LABELS: ClassVar[bool] = False
     network: LiSnowNetwork
 

@@ -4,12 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from derain.cli.main import main
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
 from derain.hard_cases import hard_cases, scene
+from derain.range_image import RangeView
 from derain.scan import Scan
+from derain.spherical_grid import SphericalGrid
 
 # A .bin file of x, y, z and intensity cannot lack the intensity.
 SUFFIXES = {"no intensity": (".pcd", ".npz", ".ply")}
@@ -81,3 +84,28 @@ def test_no_hard_case_is_hard_in_name_only() -> None:
     assert set(scans["intensity 0"].intensity) == {0}
     assert set(scans["intensity 65,535"].intensity) == {65_535}
     assert len(scans["50 points"]) == 50
+
+
+def filled_rows(scan: Scan) -> NDArray[np.bool_]:
+    """Which rows of the usual grid, 64 from 15 to -25 degrees, show a return."""
+    return RangeView(SphericalGrid.even(64, 256, (-25, 15)), ())(scan).valid.any(axis=1)
+
+
+def test_no_case_of_range_images_is_hard_in_name_only() -> None:
+    scans = dict(hard_cases(largest=50))
+    poles = scans["at the poles"]
+    assert not poles.xyz[:, :2].any()
+    assert {-90, 90} == set(np.degrees(np.arctan2(poles.xyz[:, 2], 0)))
+    for name, empty in (
+        ("a grid row without returns", slice(26, 28)),
+        ("many grid rows without returns", slice(20, 56)),
+    ):
+        rows = filled_rows(scans[name])
+        assert rows[: empty.start].any(), name
+        assert not rows[empty].any(), name
+        assert rows[empty.stop :].any(), name
+        assert filled_rows(Scan.of(scene()))[empty].any(), name
+    same = scans["constant image"]
+    np.testing.assert_allclose(same.range, 10, rtol=1e-6)
+    assert set(same.intensity) == {50}
+    assert RangeView(SphericalGrid.even(32, 128, (-25.3, 15.3)), ())(same).valid.all()

@@ -68,5 +68,18 @@ def test_run_loads_nothing_heavy(scan: Path, onnx_model: Path, tmp_path: Path) -
     assert (out / "scan.label").stat().st_size == 400
 
 
+def test_fitting_a_grid_loads_nothing_heavy(scan: Path) -> None:
+    assert not loaded_by(COMMAND, "info", "--grid", scan) & HEAVY
+
+
+def test_networks_on_range_images_load_nothing_heavy(
+    scan: Path, image_onnx: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    assert not loaded_by(COMMAND, "info", image_onnx) & HEAVY
+    assert not loaded_by(COMMAND, "run", image_onnx, scan, "--out", out) & HEAVY
+    assert (out / "scan.label").stat().st_size == 400
+
+
 def test_heavy_packages_are_seen_where_they_are_loaded() -> None:
     assert "matplotlib" in loaded_by("import derain.pictures")

@@ -1,6 +1,7 @@
 """A Spec says the same after a trip through a file, or what is wrong with the file."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -9,7 +10,10 @@ from hypothesis import strategies as st
 
 from derain.errors import InputError
 from derain.neighbours import NeighbourView
+from derain.range_image import RangeView
 from derain.spec import SCHEMA, Spec
+from derain.spherical_grid import SphericalGrid
+from derain.way_back import WAYS_BACK
 
 SPEC = Spec(
     network="outdet",
@@ -90,6 +94,42 @@ def test_classes_that_are_not_named_by_numbers_are_damage(classes: Any) -> None:
 def test_the_view_is_the_one_the_spec_names() -> None:
     view = SPEC.make_view(threads=2)
     assert view == NeighbourView(neighbours=7, missing_intensity=4.0, threads=2)
+
+
+GRID = SphericalGrid.of_beams([3.0, 1.5, -0.1, -24.9], columns=100, azimuth=(-60.0, 70.0))
+
+
+def of_range_view(**changes: Any) -> Spec:
+    view = {"kind": "range", "grid": GRID.as_dict(), "way_back": "vote", **changes}
+    return replace(SPEC, network="salsanext", view=view, channels=("z", "x", "range", "intensity"))
+
+
+@pytest.mark.parametrize("way_back", WAYS_BACK)
+def test_a_range_view_survives_json_with_its_grid_and_way_back(way_back: str) -> None:
+    spec = of_range_view(way_back=way_back)
+    read = Spec.from_dict(json.loads(json.dumps(spec.as_dict())), "model")
+    assert read == spec
+    channels = ("z", "x", "range", "intensity")
+    assert read.make_view() == RangeView(GRID, channels, way_back, missing_intensity=4.0)
+
+
+def test_a_network_that_sees_no_intensity_has_no_unit_of_it() -> None:
+    spec = replace(SPEC, channels=("x", "y", "z", "range"))
+    assert (spec.mean_intensity, spec.intensity_unit) == (0.0, "not used")
+    assert (SPEC.mean_intensity, SPEC.intensity_unit) == (4.0, "0..255")
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"way_back": "guess"}, "no such way back: 'guess'"),
+        ({"grid": {"columns": 8}}, "salsanext: not a grid"),
+        ({"grid": None}, "salsanext: not a grid"),
+    ],
+)
+def test_a_range_view_that_cannot_be_is_refused(change: dict[str, Any], reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        of_range_view(**change).make_view()
 
 
 def test_an_unknown_view_asks_for_an_upgrade() -> None:

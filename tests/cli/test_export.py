@@ -3,11 +3,16 @@
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
 import torch
 
+from derain.export import onnx_file
 from derain.export.runtime import Derainer
 from derain.hard_cases import scene
+from derain.models.base import DerainingModule
+from derain.models.checkpoint import save_model
+from derain.scan import Scan
 
 
 @pytest.mark.usefixtures("one_block")
@@ -33,6 +38,83 @@ def test_a_checkpoint_becomes_a_model_with_its_proof_and_times(
     np.testing.assert_allclose(
         first.probability(scene()), second.probability(scene()), rtol=0, atol=1e-6
     )
+
+
+@pytest.fixture
+def scans(tmp_path: Path) -> Path:
+    """A folder of twenty scenes, more than eight bits are scaled by."""
+    (tmp_path / "scans").mkdir()
+    for seed in range(20):
+        scene(500, seed).tofile(tmp_path / "scans" / f"{seed:02d}.bin")
+    return tmp_path / "scans"
+
+
+def test_a_model_in_eight_bits_is_scaled_by_scans_like_those_it_will_see(
+    run_derain,
+    image_model: DerainingModule,
+    image_onnx: Path,
+    scans: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(image_onnx))
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
+    save_model(image_model, tmp_path / "model.ckpt")
+    outcome = run_derain(
+        *("export", tmp_path / "model.ckpt", "--out", tmp_path / "int8.onnx"),
+        *("--int8", "--calibration", scans, "--scan", scans / "00.bin", "--repeats", "1"),
+    )
+    assert outcome.code == 0
+    # Sixteen of the scans and the scene, each with one thread and with two.
+    assert "34 cases" in outcome.out
+    int8 = Derainer(tmp_path / "int8.onnx")
+    names = {case["name"] for case in int8.metadata["proof"]["cases"]}
+    assert names - {"scene"} < {str(path) for path in scans.iterdir()}
+    assert len(names) == 17
+    operators = {node.op_type for node in onnx.load(tmp_path / "int8.onnx").graph.node}
+    assert {"QuantizeLinear", "DequantizeLinear"} <= operators
+
+
+@pytest.mark.parametrize("options", [["--int8"], ["--calibration", "scans"]], ids=str)
+def test_eight_bits_and_calibration_scans_come_together(
+    run_derain,
+    checkpoint: Path,
+    scans: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    options: list[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = run_derain("export", checkpoint, "--out", "model.onnx", *options)
+    assert (outcome.code, outcome.out) == (2, "")
+    (line,) = outcome.err.splitlines()
+    assert line == "derain: --int8: needs --calibration, and that needs it. Give both or neither."
+    assert list(tmp_path.iterdir()) == [scans]
+
+
+@pytest.mark.parametrize(
+    ("calibration", "reason"),
+    [("none", "none"), ("empty", "empty"), ("scans", "no convolution to quantise")],
+)
+def test_what_cannot_be_computed_in_eight_bits_is_one_line_and_exit_code_2(
+    run_derain,
+    checkpoint: Path,
+    onnx_model: Path,
+    scans: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    calibration: str,
+    reason: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(onnx_model))
+    (tmp_path / "empty").mkdir()
+    options = ["--int8", "--calibration", calibration]
+    outcome = run_derain("export", checkpoint, "--out", "model.onnx", *options)
+    assert (outcome.code, outcome.out) == (2, "")
+    (line,) = outcome.err.splitlines()
+    assert reason in line
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "scans"]
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,13 @@ import torch
 from torch import Tensor
 
 from derain.cards import load_card
+from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
+from derain.models.lisnownet_network import published_key
 from derain.models.outdet import PUBLISHED_KEYS, OutDet
+from derain.models.salsanext import SalsaNext
+from derain.models.salsanext_network import PUBLISHED_KEYS as SALSANEXT_KEYS
+from derain.spherical_grid import grid_of
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +54,114 @@ def test_a_training_checkpoint_that_holds_the_weights_will_do(
     outcome = run_derain("import-weights", "outdet", weights, "--stats", "wads", "--out", out)
     assert outcome.code == 0
     assert load_model(out).spec.data == "WADS"
+
+
+def of_image_network(model: DerainingModule, prefix: str = "") -> dict[str, Tensor]:
+    """The weights of a SalsaNext or LiSnowNet under the published names."""
+    key = SALSANEXT_KEYS.get if isinstance(model, SalsaNext) else published_key
+    return {f"{prefix}{key(name)}": tensor for name, tensor in model.network.state_dict().items()}
+
+
+@pytest.mark.parametrize(("prefix", "grid"), [("", "wads"), ("module.", "semantickitti")])
+def test_weights_of_networks_on_range_images_come_with_their_grid(
+    run_derain, image_model: DerainingModule, tmp_path: Path, prefix: str, grid: str
+) -> None:
+    weights, out = tmp_path / "published", tmp_path / "model.ckpt"
+    torch.save(of_image_network(image_model, prefix), weights)
+    outcome = run_derain(
+        *("import-weights", image_model.NAME, weights),
+        *("--stats", "kitti", "--grid", grid, "--out", out),
+    )
+    assert (outcome.code, outcome.err) == (0, "")
+    model = load_model(out)
+    card = load_card("kitti")
+    assert (model.NAME, model.spec.data) == (image_model.NAME, card.name)
+    assert model.spec.view["grid"] == grid_of(grid, "").as_dict()
+    assert (model.spec.mean[0], model.spec.mean[-1]) == (card.range[0], card.mean[3])
+    imported = model.network.state_dict()
+    for name, tensor in image_model.network.state_dict().items():
+        assert torch.equal(imported[name], tensor), name
+
+
+def training_checkpoint(model: DerainingModule) -> dict[str, object]:
+    """What SalsaNext's trainer saves, with the state of its optimiser and of its warm-up.
+
+    Source: TiagoCortinhal/SalsaNext, trainer.py and warmupLR.py, whose state holds a whole CyclicLR.
+    """
+    optimizer = torch.optim.SGD(model.parameters(), lr=0.01, momentum=0.9)
+    warm_up = torch.optim.lr_scheduler.CyclicLR(optimizer, 0, 0.01, 10, cycle_momentum=False)
+    return {
+        "epoch": 33,
+        "state_dict": of_image_network(model, "module."),
+        "optimizer": optimizer.state_dict(),
+        "info": {"train_loss": 0.017, "best_val_iou": 0.94},
+        "scheduler": {"initial_scheduler": warm_up, "last_epoch": 7, "finished": True},
+    }
+
+
+def test_a_whole_training_checkpoint_of_an_image_network_will_do(
+    run_derain, image_model: DerainingModule, tmp_path: Path
+) -> None:
+    content = {**training_checkpoint(image_model), "scheduler": {"last_epoch": 7}}
+    assert_imported(run_derain, image_model, content, tmp_path)
+
+
+def test_a_checkpoint_as_salsanext_saves_it_will_do(
+    run_derain, random_salsanext: SalsaNext, tmp_path: Path
+) -> None:
+    assert_imported(run_derain, random_salsanext, training_checkpoint(random_salsanext), tmp_path)
+
+
+def assert_imported(
+    run_derain, model: DerainingModule, content: dict[str, object], folder: Path
+) -> None:
+    """Imports a checkpoint and compares its weights with those of the model."""
+    weights, out = folder / "valid_best", folder / "model.ckpt"
+    torch.save(content, weights)
+    options = ["--stats", "kitti", "--grid", "rehearse3d", "--out", out]
+    outcome = run_derain("import-weights", model.NAME, weights, *options)
+    assert (outcome.code, outcome.err) == (0, "")
+    imported = load_model(out).network.state_dict()
+    for name, tensor in model.network.state_dict().items():
+        assert torch.equal(imported[name], tensor), name
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ((), "weights do not say what grid they were trained on. Give --grid."),
+        (("--grid", "mars"), "there is no grid named 'mars'. Known are semantickitti, rehearse3d"),
+        (("--grid", "fitted"), "there are no scans to fit it to. Give a grid by its name."),
+    ],
+)
+def test_a_grid_that_is_missing_or_unknown_is_one_line_and_exit_code_2(
+    run_derain,
+    image_model: DerainingModule,
+    tmp_path: Path,
+    options: tuple[str, ...],
+    reason: str,
+) -> None:
+    weights, out = tmp_path / "published", tmp_path / "model.ckpt"
+    torch.save(of_image_network(image_model), weights)
+    outcome = run_derain(
+        "import-weights", image_model.NAME, weights, "--stats", "kitti", "--out", out, *options
+    )
+    assert (outcome.code, outcome.out) == (2, "")
+    (line,) = outcome.err.splitlines()
+    assert reason in line
+    assert not out.exists()
+
+
+def test_a_network_that_sees_no_grid_is_given_none(
+    run_derain, published: dict[str, Tensor], tmp_path: Path
+) -> None:
+    weights, out = tmp_path / "published.pt", tmp_path / "outdet.ckpt"
+    torch.save(published, weights)
+    options = ["--stats", "wads", "--grid", "wads", "--out", out]
+    outcome = run_derain("import-weights", "outdet", weights, *options)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert outcome.err == "derain: --grid: outdet sees neighbours, not a grid. Leave it out.\n"
+    assert not out.exists()
 
 
 class Trojan:

@@ -12,6 +12,8 @@ from derain.files import read_scan, write_scan
 from derain.files.labels import write_labels
 from derain.grid_fit import fit_grid
 from derain.hard_cases import hard_cases, scene
+from derain.models.base import DerainingModule
+from derain.models.checkpoint import save_model
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.spherical_grid import grid_of
@@ -145,6 +147,29 @@ def test_several_files_give_one_object_each(
     outcome = run_derain("info", scan, onnx_model, "--json")
     objects = [strict_json(line) for line in outcome.out.splitlines()]
     assert [item["file"] for item in objects] == [str(scan), str(onnx_model)]
+
+
+def test_a_model_on_range_images_says_its_grid_and_rule(
+    run_derain, image_model: DerainingModule, image_onnx: Path, tmp_path: Path
+) -> None:
+    save_model(image_model, tmp_path / "model.ckpt")
+    for path in (image_onnx, tmp_path / "model.ckpt"):
+        facts = strict_json(run_derain("info", path, "--json").out)
+        assert facts["spec"] == image_model.spec.as_dict()
+        text = run_derain("info", path).out
+        assert f"network: {image_model.NAME}" in text
+        assert "kind: range" in text
+        assert "way_back: nearest range" in text
+
+
+def test_a_scan_without_a_valid_point_has_no_grid(run_derain, tmp_path: Path) -> None:
+    np.full((10, 4), np.nan, np.float32).tofile(tmp_path / "nothing.bin")
+    facts = strict_json(run_derain("info", tmp_path / "nothing.bin", "--json").out)
+    assert facts["fitted grid"] == "none"
+    outcome = run_derain("info", "--grid", tmp_path / "nothing.bin")
+    assert (outcome.code, outcome.out) == (2, "")
+    (line,) = outcome.err.splitlines()
+    assert line.startswith("derain: grid: there is no valid point to fit it to.")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Augmentation turns and jitters a scan, and changes nothing else about it."""
+"""Augmentation turns, jitters, mirrors and thins a scan, and changes nothing else about it."""
 
 import warnings
 
@@ -14,6 +14,8 @@ from derain.scan import Scan
 HARD_CASES = dict(hard_cases(largest=5000))
 TURN = Augmentation(rotation_probability=1, jitter_probability=0)
 JITTER = Augmentation(rotation_probability=0, jitter_probability=1)
+MIRROR = Augmentation(0, 0, mirror_probability=1)
+DROP = Augmentation(0, 0, dropping_probability=1)
 BOTH = Augmentation(rotation_probability=1, jitter_probability=1)
 NEITHER = Augmentation(rotation_probability=0, jitter_probability=0)
 
@@ -51,9 +53,53 @@ def test_jitter_is_in_metres_and_the_same_in_every_direction() -> None:
 def test_each_happens_to_its_share_of_scans(share: float) -> None:
     scan = Scan.of(scene(10))
     rng = np.random.default_rng(0)
-    for augmentation in (Augmentation(share, 0), Augmentation(0, share)):
+    mirror = Augmentation(0, 0, mirror_probability=share)
+    for augmentation in (Augmentation(share, 0), Augmentation(0, share), mirror):
         changed = [bool((augmentation(scan, rng).xyz != scan.xyz).any()) for _ in range(400)]
         assert np.mean(changed) == pytest.approx(share, abs=0.1 if share == 0.5 else 0)
+
+
+def test_a_mirror_changes_left_and_right_and_nothing_else() -> None:
+    scan = street()
+    mirrored = MIRROR(scan, np.random.default_rng(0))
+    np.testing.assert_array_equal(mirrored.xyz, scan.xyz * [1, -1, 1])
+    assert mirrored.intensity is scan.intensity
+    assert mirrored.label is scan.label
+
+
+@given(st.integers(0, 2**32))
+def test_points_that_are_left_keep_their_order_and_what_belongs_to_them(seed: int) -> None:
+    scan = street()
+    left = DROP(scan, np.random.default_rng(seed))
+    assert left.label is not None
+    assert (np.diff(left.label) > 0).all()  # a point's label is its row
+    np.testing.assert_array_equal(left.xyz, scan.xyz[left.label])
+    np.testing.assert_array_equal(left.intensity, scan.intensity[left.label])
+
+
+@pytest.mark.parametrize("dropping", [0.1, 0.5])
+def test_a_scan_loses_any_share_of_its_points_up_to_the_largest(dropping: float) -> None:
+    scan, rng = Scan.of(scene(5000)), np.random.default_rng(0)
+    drop = Augmentation(0, 0, dropping_probability=1, dropping=dropping)
+    lost = np.array([1 - len(drop(scan, rng)) / len(scan) for _ in range(300)])
+    assert lost.max() <= dropping + 0.03
+    assert lost.mean() == pytest.approx(dropping / 2, abs=0.02)
+    assert lost.std() == pytest.approx(dropping / 12**0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_points_are_dropped_from_their_share_of_scans(share: float) -> None:
+    scan, rng = Scan.of(scene(1000)), np.random.default_rng(0)
+    drop = Augmentation(0, 0, dropping_probability=share)
+    lost = [len(drop(scan, rng)) < len(scan) for _ in range(400)]
+    assert np.mean(lost) == pytest.approx(share, abs=0.1 if share == 0.5 else 0.01)
+
+
+@pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
+def test_every_hard_scan_can_be_mirrored_and_thinned(scan: Scan) -> None:
+    rng = np.random.default_rng(0)
+    assert MIRROR(scan, rng).valid.tolist() == scan.valid.tolist()
+    assert DROP(scan, rng).valid.sum() <= scan.valid.sum()
 
 
 def test_everything_else_stays() -> None:

@@ -3,6 +3,7 @@
 import pickle
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,14 @@ import pytest
 import torch
 
 from derain.batch import Batch
+from derain.cards import load_card
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading, ScanDataModule, ScanFile
 from derain.datamodules.folder import Folder
 from derain.errors import InputError
 from derain.files.labels import write_labels
 from derain.hard_cases import scene
+from derain.models.lisnownet import LiSnowNet
 from derain.neighbours import NeighbourView
 from derain.scan import Scan
 
@@ -198,6 +201,73 @@ def test_statistics_are_taken_from_the_training_scans_where_the_card_has_none(
     np.testing.assert_allclose(data.card.mean, points.mean(axis=0))
     np.testing.assert_allclose(data.card.std, points.std(axis=0))
     assert data.card.rain_share == 0.25
+
+
+@pytest.fixture
+def unsupervised(small_grid: dict[str, Any]) -> Connect:
+    """Gives a data module a model that does not learn from labels."""
+
+    def connect(data: ScanDataModule) -> ScanDataModule:
+        model = LiSnowNet(small_grid, width=2)
+        data.trainer = SimpleNamespace(lightning_module=model)
+        data.setup("fit")
+        model.adopt(model.spec_for(data.card))
+        return data
+
+    return connect
+
+
+def test_a_model_that_learns_from_no_labels_gets_none_to_train_on(
+    folder: Callable[..., Folder], unsupervised: Connect
+) -> None:
+    data = unsupervised(folder())
+    assert {file.label for file in data.files("train")} == {None}
+    assert {batch.target for batch in batches(data, "train")} == {None}
+    assert {scan.label for scan in data.training_scans(SCANS)} == {None}
+
+
+def test_such_a_model_is_validated_on_the_labels_that_there_are(
+    folder: Callable[..., Folder], unsupervised: Connect, tmp_path: Path
+) -> None:
+    data = unsupervised(folder(batch_size=SCANS))
+    (tmp_path / "2.label").unlink()
+    (batch,) = batches(data, "val")
+    labelled = [sample.scan.label is not None for sample in batch.samples]
+    assert labelled == [True, True, False, True, True, True]
+    assert batch.target is None  # there is none for all of them
+    with pytest.raises(InputError, match=r"2\.bin: its labels are not at"):
+        data.files("test")
+
+
+@pytest.mark.parametrize("part", ["train", "validation", "test"])
+def test_a_model_that_learns_from_labels_needs_them_all(
+    folder: Callable[..., Folder], connect: Connect, tmp_path: Path, part: Any
+) -> None:
+    data = connect(folder())
+    (tmp_path / "2.label").unlink()
+    with pytest.raises(InputError, match=r"2\.bin: its labels are not at .* Add them or leave"):
+        data.files(part)
+    assert len(data.files("predict")) == SCANS
+
+
+@pytest.mark.parametrize("card", ["simulated", "rehearse3d"])
+def test_statistics_but_not_the_share_of_rain_are_measured_without_labels(
+    tmp_path: Path, write: Write, unsupervised: Connect, card: str
+) -> None:
+    write(tmp_path / "0.bin", points=scene(40))
+    data = unsupervised(Folder(str(tmp_path), card, train=["0.bin"]))
+    np.testing.assert_allclose(data.card.mean, scene(40).astype(np.float64).mean(axis=0))
+    assert data.card.rain_share == load_card(card).rain_share
+
+
+def test_range_images_of_a_batch_have_one_size(
+    folder: Callable[..., Folder], unsupervised: Connect
+) -> None:
+    (batch,) = batches(unsupervised(folder(batch_size=SCANS)), "val")
+    assert batch.inputs["image"].shape == (SCANS, 3, 18, 60)
+    assert batch.inputs["valid"].shape == (SCANS, 1, 18, 60)
+    for number, sample in enumerate(batch.samples):
+        assert torch.equal(batch.inputs["image"][number], torch.from_numpy(sample.view.image))
 
 
 def test_the_statistics_of_a_card_are_left_alone(folder: Callable[..., Folder]) -> None:
