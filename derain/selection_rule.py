@@ -109,12 +109,15 @@ def otsu(values: NDArray[np.float32], bins: int = 256) -> float:
     """Threshold that parts values into the two groups of least variance within.
 
     Args:
-        values: Finite values, float32 (N,), N > 0.
+        values: Finite values, float32 (N,), N > 0; all the same, they are their own threshold.
         bins: Number of values that it is chosen from.
 
     Source: N. Otsu, "A Threshold Selection Method from Gray-Level Histograms", 1979.
     """
-    counts, edges = np.histogram(values, bins)
+    lowest, highest = float(values.min()), float(values.max())
+    if lowest == highest:
+        return lowest
+    counts, edges = np.histogram(values.astype(np.float64), bins, (lowest, highest))
     centres = (edges[1:] + edges[:-1]) / 2
     below, total = np.cumsum(counts)[:-1], np.cumsum(counts * centres)[:-1]
     above = counts.sum() - below

@@ -97,6 +97,9 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
         # The exporter writes the number of answers as a formula over 3D-OutDet's blocks.
         proto.graph.output[0].type.tensor_type.shape.dim[0].dim_param = example.VARYING
     del proto.graph.value_info[:]
+    for node in proto.graph.node:
+        # Where in which file each operator was called: longer than the graph, and of no one's use.
+        del node.metadata_props[:]
     return proto
 
 

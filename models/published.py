@@ -1,13 +1,34 @@
 """Reading the weights that others published."""
 
+from collections import defaultdict
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import torch
 from torch import Tensor, nn
+from torch.serialization import safe_globals
 
 from derain.errors import InputError
+
+
+class Inert:
+    """Stands for what a checkpoint holds besides values: it is given anything and does nothing."""
+
+    def __new__(cls, *_: object) -> Self:
+        """An object that holds nothing."""
+        return super().__new__(cls)
+
+    def __init__(self, *_: object) -> None:
+        """Forgets what it is given."""
+
+    def __setstate__(self, _: object) -> None:
+        """Forgets what it is given."""
+
+
+# SalsaNext's training checkpoints hold a scheduler, which holds its optimiser and a bound method.
+# Source: TiagoCortinhal/SalsaNext, trainer.py and warmupLR.py
+TRAINER_STATE = ("torch.optim.lr_scheduler.CyclicLR", "torch.optim.sgd.SGD", "builtins.getattr")
 
 
 def read_state_dict(path: Path) -> dict[str, Tensor]:
@@ -28,7 +49,7 @@ def read_state_dict(path: Path) -> dict[str, Tensor]:
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """Unpickles tensors and plain containers, and nothing else, onto the CPU.
+    """Unpickles tensors and plain containers onto the CPU, with nothing where trainers stood.
 
     Raises:
         InputError: A missing file, or one that holds anything else.
@@ -36,7 +57,8 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(path, "no such file", "Check the path.")
     try:
-        content = torch.load(path, map_location="cpu", weights_only=True)
+        with safe_globals([dict, defaultdict, *((Inert, name) for name in TRAINER_STATE)]):
+            content = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:  # torch.load raises what its parts raise, from EOFError to zip's own
         # Not in torch's words, which advise to load it all the same.
         raise InputError(

@@ -13,7 +13,7 @@ from derain.errors import InputError
 from derain.files import read_scan
 from derain.hard_cases import hard_cases, scene
 from derain.scan import Scan
-from derain.selection_rule import LEAST_RESIDUAL, SelectionRule, otsu
+from derain.selection_rule import SelectionRule, otsu
 
 HARD_CASES = dict(hard_cases(largest=5000))
 
@@ -129,7 +129,7 @@ def two_groups(low: float, high: float, share: float = 0.1) -> NDArray[np.float3
     return np.concatenate([positive, -positive]).astype(np.float32)
 
 
-@pytest.mark.parametrize(("low", "high"), [(1e-4, 1.0), (1e-7, 1.0), (3e-2, 30.0)])
+@pytest.mark.parametrize(("low", "high"), [(1e-4, 1.0), (1e-7, 1.0), (3e-2, 300.0)])
 @pytest.mark.parametrize("share", [0.02, 0.5])
 def test_the_residual_parts_what_changed_from_what_did_not(
     low: float, high: float, share: float
@@ -200,24 +200,6 @@ def test_the_rule_that_is_fitted_to_wads_is_the_published_one(shared: Path) -> N
     rule = SelectionRule.fitted({"residual": 0.008}, [read_scan(path) for path in paths])
     assert rule.full_scale == 255
     assert rule.ground == pytest.approx(-1.8, abs=0.1)
-
-
-def test_the_residual_parts_what_changed_from_what_did_not() -> None:
-    rng = np.random.default_rng(0)
-    unchanged, changed = 10 ** rng.normal(-4, 0.3, 5000), 10 ** rng.normal(-1.5, 0.3, 1000)
-    products = np.concatenate([unchanged, changed, -changed]).astype(np.float32)
-    residual = SelectionRule().with_residual_of(products).residual
-    assert 10**-3.1 < residual < 10**-2.2
-    assert (changed > residual).mean() > 0.98
-    assert (unchanged < residual).mean() > 0.99
-
-
-def test_too_few_changes_or_too_small_ones_fit_no_residual() -> None:
-    rule = SelectionRule(residual=0.5)
-    assert rule.with_residual_of(np.full(99, 0.1, np.float32)) == rule
-    assert rule.with_residual_of(np.full(1000, -0.1, np.float32)) == rule
-    noise = np.geomspace(1e-9, 1e-5, 1000).astype(np.float32)
-    assert rule.with_residual_of(noise).residual == LEAST_RESIDUAL
 
 
 @given(st.integers(0, 2**32))

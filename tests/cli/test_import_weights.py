@@ -86,7 +86,7 @@ def test_weights_of_networks_on_range_images_come_with_their_grid(
 def training_checkpoint(model: DerainingModule) -> dict[str, object]:
     """What SalsaNext's trainer saves, with the state of its optimiser and of its warm-up.
 
-    Source: TiagoCortinhal/SalsaNext, trainer.py and warmupLR.py, whose state holds a whole CyclicLR.
+    Source: TiagoCortinhal/SalsaNext, trainer.py and warmupLR.py, whose state holds a CyclicLR.
     """
     optimizer = torch.optim.SGD(model.parameters(), lr=0.01, momentum=0.9)
     warm_up = torch.optim.lr_scheduler.CyclicLR(optimizer, 0, 0.01, 10, cycle_momentum=False)

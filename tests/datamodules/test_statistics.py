@@ -27,7 +27,8 @@ def test_they_are_numpys_over_all_points_at_once(scans: list[tuple[int, int]]) -
     drawn = [random_scan(seed, points) for seed, points in scans]
     columns = np.concatenate([np.c_[s.xyz, s.intensity, s.label][s.valid] for s in drawn])
     card = measured(CARD, iter(drawn))
-    if len(columns) < 2:
+    # One row, however often: a channel that never changes is the next test's.
+    if len(np.unique(columns, axis=0)) < 2:
         return
     np.testing.assert_allclose(card.mean, columns[:, :4].mean(axis=0), rtol=1e-6)
     np.testing.assert_allclose(card.std, columns[:, :4].std(axis=0), rtol=1e-5)
