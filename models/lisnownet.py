@@ -53,7 +53,7 @@ class DeployedLiSnowNet(nn.Module):
     def forward(self, image: Tensor, valid: Tensor) -> Tensor:
         """Scores every pixel; arguments and result as for :class:`LiSnowNet`."""
         seen = cube_roots(image, self.rule)
-        return select(image, seen, self.network(seen, valid), self.rule)
+        return select(image, valid, seen, self.network(seen, valid), self.rule)
 
 
 def cube_roots(image: Tensor, rule: SelectionRule) -> Tensor:
@@ -67,14 +67,17 @@ def cube_roots(image: Tensor, rule: SelectionRule) -> Tensor:
     return torch.cat([image[:, :1], share], dim=1) ** (1 / 3)
 
 
-def select(image: Tensor, seen: Tensor, denoised: Tensor, rule: SelectionRule) -> Tensor:
+def select(
+    image: Tensor, valid: Tensor, seen: Tensor, denoised: Tensor, rule: SelectionRule
+) -> Tensor:
     """Logits of "not rain" and "rain" of every pixel, float (B · H · W, 2), row by row.
 
     The published rule says yes or no. Here its answer is that of a probability of one half, which
-    the residual moves.
+    the residual moves. A pixel without a return is not rain.
 
     Args:
         image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
+        valid: Pixels with a return, bool (B, 1, H, W).
         seen: What the network saw, float (B, 2, H, W).
         denoised: What it made of that, float (B, 2, H, W).
         rule: The rule.
@@ -83,6 +86,7 @@ def select(image: Tensor, seen: Tensor, denoised: Tensor, rule: SelectionRule) -
     margin = (STEEPNESS * excess).clamp(-CERTAIN, CERTAIN)
     margin = torch.where(possible(image, rule), margin, -CERTAIN)
     margin = torch.where(image[:, :1] < rule.near, CERTAIN, margin)
+    margin = torch.where(valid, margin, -CERTAIN)
     return per_pixel(torch.cat([-margin, margin], dim=1) / 2)
 
 
@@ -216,7 +220,7 @@ class LiSnowNet(DerainingModule):
             "wavelet": loss.wavelet,
             "fourier": loss.fourier,
             "residual": loss.residual,
-        }, select(image, seen, denoised, self.selection)
+        }, select(image, valid, seen, denoised, self.selection)
 
     def on_validation_epoch_end(self) -> None:
         """Logs the scores, and fits the rule's residual to what changed where not stated."""

@@ -126,10 +126,12 @@ def test_a_probability_above_one_half_is_what_the_published_rule_says(rule: Sele
     image = image.astype(np.float32)
     seen = cube_roots(torch.from_numpy(image)[None], rule)
     denoised = seen + torch.from_numpy(rng.normal(0.2, 0.5, (1, 2, *size)).astype(np.float32))
-    logits = select(torch.from_numpy(image)[None], seen, denoised, rule)
+    returned = torch.from_numpy(rng.random((1, 1, *size)) < 0.9)
+    logits = select(torch.from_numpy(image)[None], returned, seen, denoised, rule)
     probability = probability_of_rain(logits.numpy()).reshape(size)
     change = (denoised - seen)[0].numpy()
     snow = says_snow(image.astype(np.float64), change.astype(np.float64), rule)
+    snow &= returned.numpy()[0, 0]
     assert 0.05 < snow.mean() < 0.95
     np.testing.assert_array_equal(probability > 0.5, snow)
 
@@ -155,7 +157,8 @@ def test_the_limits_of_the_rule_are_where_they_were_published(
     rule = SelectionRule(residual=0.125, near=2.5)
     image = torch.tensor(pixel)[None, :, None, None]
     seen = torch.zeros(1, 2, 1, 1)
-    logits = select(image, seen, torch.tensor(change)[None, :, None, None], rule)
+    returned = torch.ones(1, 1, 1, 1, dtype=torch.bool)
+    logits = select(image, returned, seen, torch.tensor(change)[None, :, None, None], rule)
     assert (probability_of_rain(logits.numpy())[0] > 0.5) == rain
 
 
@@ -163,7 +166,8 @@ def test_the_probability_rises_with_the_residual() -> None:
     changes = torch.linspace(-2, 2, 101)
     denoised = torch.stack([changes, torch.full_like(changes, 0.5)])[None, :, None]
     image = torch.tensor([10.0, 0.0, 0.0])[None, :, None, None].expand(1, 3, 1, 101)
-    logits = select(image, torch.zeros(1, 2, 1, 101), denoised, SelectionRule(residual=0.125))
+    seen, rule = torch.zeros(1, 2, 1, 101), SelectionRule(residual=0.125)
+    logits = select(image, image[:, :1] > 0, seen, denoised, rule)
     margin = logits[:, 1] - logits[:, 0]
     # At twice the limit the margin is 4: a probability of .98.
     assert margin[100].item() == pytest.approx(4.0)
