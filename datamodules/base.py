@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import lightning
 import numpy as np
@@ -13,6 +13,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from derain.batch import Batch, Sample
 from derain.cards import DataCard
+from derain.channels import extra_channels, with_columns
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.statistics import evenly_spaced, measured
 from derain.errors import InputError
@@ -76,10 +77,7 @@ class ScanDataset(Dataset[Sample | InputError]):
             # torch's generator differs by run seed, epoch and worker; NumPy's global one does not.
             seed = int(torch.randint(2**62, ()).item())
             scan = self.augmentation(scan, np.random.default_rng(seed))
-        view = self.view(scan)
-        if scan.label is None:
-            return Sample(scan, view, None)
-        return Sample(scan, view, torch.from_numpy(view.target(self.card.rain_of(scan))))
+        return Sample.of(scan, self.view(scan), self.card)
 
 
 @dataclass(frozen=True)
@@ -150,8 +148,9 @@ class ScanDataModule(lightning.LightningDataModule):
 
     def setup(self, stage: str) -> None:
         """Completes the data card from the training scans where it lacks statistics."""
-        if stage == "fit" and not self.card.has_statistics:
-            self.card = measured(self.card, self.training_scans(most=200))
+        extra = [name for name in self._extra_channels if name not in self.card.extra]
+        if stage == "fit" and (extra or not self.card.has_statistics):
+            self.card = measured(self.card, self.training_scans(most=200), extra)
 
     def training_scans(self, most: int) -> Iterator[Scan]:
         """Reads some of the training scans, spread over all of them, as they are in their files.
@@ -186,7 +185,9 @@ class ScanDataModule(lightning.LightningDataModule):
         Raises:
             InputError: A file that cannot be read, or labels that are not in the data card.
         """
-        scan = replace(read_scan(file.scan, self.loading.columns), fields={})
+        scan = read_scan(file.scan, self.loading.columns)
+        if self._model is not None:  # to a model, the file's other columns would only cost memory
+            scan = with_columns(scan, self._extra_channels)
         if file.label is None:
             return scan
         label = semantic(read_labels(file.label, len(scan)))
@@ -228,9 +229,16 @@ class ScanDataModule(lightning.LightningDataModule):
         )
 
     @property
+    def _model(self) -> Any:
+        return getattr(self.trainer, "lightning_module", None)
+
+    @property
     def _learns_from_labels(self) -> bool:
-        model = getattr(self.trainer, "lightning_module", None)
-        return model is None or bool(model.LEARNS_FROM_LABELS)
+        return self._model is None or bool(self._model.LEARNS_FROM_LABELS)
+
+    @property
+    def _extra_channels(self) -> tuple[str, ...]:
+        return () if self._model is None else extra_channels(self._model.channels)
 
     def _read_distinct(self, file: ScanFile) -> Scan:
         scan = self.read(file)

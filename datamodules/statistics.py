@@ -4,11 +4,17 @@ from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from derain.cards import DataCard
+from derain.cards import CHANNELS, DataCard
+from derain.channels import USUAL_CHANNELS, channel_values
+from derain.errors import InputError
 from derain.scan import Scan
 
 Item = TypeVar("Item")
+
+# A variance below this share of the squared mean is what rounding leaves of a constant.
+ROUNDING = 1e-12
 
 
 def evenly_spaced(items: Sequence[Item], most: int) -> list[Item]:
@@ -17,35 +23,55 @@ def evenly_spaced(items: Sequence[Item], most: int) -> list[Item]:
     return [items[number] for number in numbers]
 
 
-def measured(card: DataCard, scans: Iterable[Scan]) -> DataCard:
+def measured(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -> DataCard:
     """Completes a data card with the statistics that it lacks.
 
-    Mean and standard deviation of x, y, z and range in metres and of intensity, and the share of
-    rain, over the valid points of all scans. Scans without intensity, or without points, count as
-    0. The share of rain is not measured where a scan has no labels.
+    Mean and standard deviation of x, y, z and range in metres, of intensity and of extra channels,
+    over what the valid points of all scans hold of them; 0 and 1 where they hold nothing. The share
+    of rain is that of the points whose class says whether they are; it is not measured where a scan
+    has no labels.
 
     Args:
         card: A data card.
         scans: Training scans.
+        extra: Names of further channels.
+
+    Raises:
+        InputError: An extra channel of which no scan holds anything.
     """
-    count, rain, labelled = 0, 0, True
-    total, squares = np.zeros(5), np.zeros(5)
+    channels = (*USUAL_CHANNELS, *extra)
+    count, total, squares = np.zeros((3, len(channels)))
+    rain, judged, labelled = 0, 0, True
     for scan in scans:
-        valid = scan.valid
-        intensity = np.zeros(len(scan)) if scan.intensity is None else scan.intensity
-        points = np.column_stack([scan.xyz, intensity, scan.range])[valid].astype(np.float64)
-        count += len(points)
-        total += points.sum(axis=0)
-        squares += (points**2).sum(axis=0)
+        rows = np.flatnonzero(scan.valid)
+        values = channel_values(scan, rows, channels).astype(np.float64)
+        count += (~np.isnan(values)).sum(axis=1)
+        total += np.nansum(values, axis=1)
+        squares += np.nansum(values**2, axis=1)
         labelled = labelled and scan.label is not None
-        rain += int(card.rain_of(scan)[valid].sum()) if labelled else 0
-    mean = total / max(count, 1)
-    variance = np.maximum(squares / max(count, 1) - mean**2, 0)
+        if labelled:
+            rain += int(card.rain_of(scan)[rows].sum())
+            judged += int((~card.unknown_of(scan)[rows]).sum())
+    _refuse_unheard_of(extra, count[len(USUAL_CHANNELS) :])
+    mean = total / np.maximum(count, 1)
+    variance = squares / np.maximum(count, 1) - mean**2
     # A channel that never changes says nothing, and is not to be divided by 0.
-    std = np.where(variance > 0, np.sqrt(variance), 1.0)
+    std = np.sqrt(np.where(variance > ROUNDING * mean**2, variance, 1.0))
+    statistics = dict(zip(channels, zip(mean.tolist(), std.tolist(), strict=True), strict=True))
     return card.completed(
-        mean=tuple(mean[:4].tolist()),
-        std=tuple(std[:4].tolist()),
-        range=(float(mean[4]), float(std[4])),
-        rain_share=rain / max(count, 1) if labelled else None,
+        mean=tuple(statistics[name][0] for name in CHANNELS),
+        std=tuple(statistics[name][1] for name in CHANNELS),
+        range=statistics["range"],
+        extra={name: statistics[name] for name in extra},
+        rain_share=rain / max(judged, 1) if labelled else None,
     )
+
+
+def _refuse_unheard_of(channels: Sequence[str], count: NDArray[np.float64]) -> None:
+    for name, known in zip(channels, count, strict=True):
+        if not known:
+            raise InputError(
+                f"channel '{name}'",
+                "no training scan holds a number of that name",
+                "Name columns of the scans; data.loading.columns names those of .bin and .npy.",
+            )

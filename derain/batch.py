@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from derain.cards import DataCard
 from derain.scan import Scan
-from derain.view import ViewedScan
+from derain.view import IGNORED, ViewedScan
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +24,18 @@ class Sample:
     scan: Scan
     view: ViewedScan
     target: Tensor | None
+
+    @classmethod
+    def of(cls, scan: Scan, view: ViewedScan, card: DataCard) -> "Sample":
+        """Gives a view its target, by the labels of its scan if there are any.
+
+        Cells of points of which it is not known whether they are rain are not judged.
+        """
+        if scan.label is None:
+            return cls(scan, view, None)
+        target = view.target(card.rain_of(scan))
+        target[view.target(card.unknown_of(scan)) == 1] = IGNORED
+        return cls(scan, view, torch.from_numpy(target))
 
 
 @dataclass(frozen=True, eq=False)

@@ -91,9 +91,10 @@ class RainMetrics(Metric):
         classes: Name of every semantic class, by id.
         rain: Ids of the classes that count as rain.
         range_edges: Where the range bands start, metres, rising from 0; the last band is open.
+        unknown: Ids of the classes that are not counted, for nobody knows whether they are rain.
 
     Raises:
-        InputError: Two classes of one name, rain that is no class, or edges that do not rise
+        InputError: Two classes of one name, rain that is no known class, or edges that do not rise
             from 0.
     """
 
@@ -103,6 +104,7 @@ class RainMetrics(Metric):
 
     ids: Tensor
     is_rain: Tensor
+    unknown: Tensor
     cells: Tensor
     scan_counts: list[Tensor]
 
@@ -111,14 +113,17 @@ class RainMetrics(Metric):
         classes: Mapping[int, str],
         rain: Collection[int],
         range_edges: Sequence[float] = (0, 10, 20, 40, 80),
+        unknown: Collection[int] = (),
     ) -> None:
         super().__init__()
+        classes = {id_: name for id_, name in classes.items() if id_ not in unknown}
         _check(classes, rain, range_edges)
         ids = sorted(classes)
         self.names = [classes[id_] for id_ in ids]
         self.range_edges = tuple(range_edges)
         self.register_buffer("ids", torch.tensor(ids), persistent=False)
         self.register_buffer("is_rain", torch.tensor([i in rain for i in ids]), persistent=False)
+        self.register_buffer("unknown", torch.tensor([*unknown], dtype=torch.int64), False)
 
         # Points by class, range band and whether they were called rain.
         cells = torch.zeros(len(ids), len(range_edges), 2, dtype=torch.int64)
@@ -147,8 +152,11 @@ class RainMetrics(Metric):
 
         Raises:
             InputError: A label that is no class.
-            RuntimeError: A scan number out of its bounds, or tensors of different lengths.
+            RuntimeError: A scan number out of its bounds.
+            IndexError: Tensors of different lengths.
         """
+        known = ~torch.isin(label, self.unknown)
+        predicted, label, range, scan = predicted[known], label[known], range[known], scan[known]
         row = self._class_rows(label)
         cell = (row * len(self.range_edges) + self._bands(range)) * 2 + predicted
         cells = torch.bincount(cell, minlength=self.cells.numel()).reshape(self.cells.shape)

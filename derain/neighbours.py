@@ -1,14 +1,15 @@
 """The neighbour view: every point of a scan with its nearest neighbours."""
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 import small_gicp
 from numpy.typing import NDArray
 
+from derain.channels import filled_values
 from derain.morton import distinct_positions
 from derain.scan import Scan
 
@@ -21,7 +22,7 @@ class Neighbourhoods:
     one position the first row speaks for all.
 
     Attributes:
-        points: x, y, z in metres and intensity in the file's unit, float32 (M, 4).
+        points: The view's channels, each in its own unit, float32 (M, C).
         neighbours: The point itself, then its nearest neighbours in ascending distance, as rows
             of ``points``, int64 (M, k).
         distances: Their distances in metres, float32 (M, k).
@@ -94,14 +95,16 @@ class NeighbourView:
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
-        missing_intensity: Stands in for the intensity of scans that have none.
+        channels: What the network sees of a point, in order, as :meth:`Scan.channel` names it.
+        stand_in: What stands in for a value that a scan lacks, by channel; 0 if not named.
         threads: Threads of the search; 0 takes every core this process may use.
     """
 
     KIND: ClassVar[str] = "neighbours"
 
     neighbours: int = 9
-    missing_intensity: float = 0.0
+    channels: tuple[str, ...] = ("x", "y", "z", "intensity")
+    stand_in: Mapping[str, float] = field(default_factory=dict)
     threads: int = 0
 
     def __call__(self, scan: Scan) -> Neighbourhoods:
@@ -116,9 +119,8 @@ class NeighbourView:
         neighbours, distances = nearest_neighbours(
             xyz, self.neighbours, rank=first, threads=self.threads
         )
-        points = np.empty((len(first), 4), np.float32)
-        points[:, :3] = xyz
-        points[:, 3] = self.missing_intensity if scan.intensity is None else scan.intensity[first]
+        values = filled_values(scan, first, self.channels, self.stand_in)
+        points = np.ascontiguousarray(values.T)
         return Neighbourhoods(points, neighbours, distances, first, inverse)
 
 

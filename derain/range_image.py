@@ -1,12 +1,13 @@
 """The range view: a scan as the image that the sensor saw."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.channels import filled_values
 from derain.errors import InputError
 from derain.scan import Scan
 from derain.spherical_grid import SphericalGrid
@@ -21,8 +22,8 @@ class RangeImage:
     """One scan as a network on images sees it.
 
     Attributes:
-        image: The view's channels, float32 (C, H, W): metres and the file's unit of intensity; 0
-            where nothing returned.
+        image: The view's channels, each in its own unit, float32 (C, H, W); 0 where nothing
+            returned.
         valid: True where something returned, bool (H, W).
         pixel: Pixel of each row of the scan, int64 (N,); -1 for invalid rows and for points
             outside the grid.
@@ -116,14 +117,13 @@ class RangeView:
 
     Args:
         grid: Rows and columns of the image.
-        channels: What a pixel holds, in order, of ``range``, ``x``, ``y``, ``z`` and
-            ``intensity``.
+        channels: What a pixel holds, in order, as :meth:`Scan.channel` names it.
         way_back: How points that lost their pixel get a score: ``nearest range``, ``copy`` or
             ``vote``.
-        missing_intensity: Stands in for the intensity of scans that have none.
+        stand_in: What stands in for a value that a scan lacks, by channel; 0 if not named.
 
     Raises:
-        InputError: An unknown channel or way back.
+        InputError: An unknown way back.
     """
 
     KIND: ClassVar[str] = "range"
@@ -131,15 +131,9 @@ class RangeView:
     grid: SphericalGrid
     channels: tuple[str, ...] = CHANNELS
     way_back: str = "nearest range"
-    missing_intensity: float = 0.0
+    stand_in: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if unknown := set(self.channels) - set(CHANNELS):
-            raise InputError(
-                "channels",
-                f"no such channel: {', '.join(sorted(unknown))}",
-                f"Known are {', '.join(CHANNELS)}.",
-            )
         if self.way_back not in WAYS_BACK:
             raise InputError(
                 "way_back",
@@ -157,9 +151,7 @@ class RangeView:
         winner = _winners(pixel, distance, grid.rows * grid.columns)
         shown = np.flatnonzero(winner >= 0)
         image = np.zeros((len(self.channels), len(winner)), np.float32)
-        columns = self._columns(scan, distance, winner[shown])
-        for channel, name in zip(image, self.channels, strict=True):
-            channel[shown] = columns[name]
+        image[:, shown] = filled_values(scan, winner[shown], self.channels, self.stand_in)
         return RangeImage(
             image.reshape(len(self.channels), grid.rows, grid.columns),
             (winner >= 0).reshape(grid.rows, grid.columns),
@@ -169,14 +161,6 @@ class RangeView:
             grid.is_full_circle,
             self.way_back,
         )
-
-    def _columns(
-        self, scan: Scan, distance: NDArray[np.float32], rows: NDArray[np.int64]
-    ) -> dict[str, NDArray[np.float32] | float]:
-        """What some rows of a scan hold, by channel."""
-        x, y, z = scan.xyz.take(rows, axis=0).T
-        intensity = self.missing_intensity if scan.intensity is None else scan.intensity[rows]
-        return {"range": distance[rows], "x": x, "y": y, "z": z, "intensity": intensity}
 
 
 def _winners(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,10 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 
-# No sensor measures beyond 1,000 km, and no intensity reaches 10 million: what does is a damaged
-# row. The bound also keeps every float32 computation downstream finite.
+# No sensor measures beyond 1,000 km, and no intensity or other column reaches 10 million: what does
+# is damaged. The bounds also keep every float32 computation downstream finite.
 LARGEST_COORDINATE = 1e6
-LARGEST_INTENSITY = 1e7
+LARGEST_VALUE = 1e7
 
 # SemanticKITTI-style range images mark a cell without a return by -1 in every column.
 SENTINEL = -1.0
@@ -89,7 +90,7 @@ class Scan:
     def __len__(self) -> int:
         return len(self.xyz)
 
-    @property
+    @cached_property  # the range view, its channel and the metrics ask for it in turn
     def range(self) -> NDArray[np.float32]:
         """Distance of every point from the sensor, float32 (N,), metres."""
         with np.errstate(invalid="ignore"):
@@ -113,9 +114,37 @@ class Scan:
             at_origin &= column == 0
             sentinel &= column == SENTINEL
         if self.intensity is not None:
-            valid &= np.abs(self.intensity) <= LARGEST_INTENSITY
+            valid &= np.abs(self.intensity) <= LARGEST_VALUE
             sentinel &= self.intensity == SENTINEL
         return valid & ~at_origin & ~sentinel
+
+    def channel(self, name: str) -> NDArray[np.float32] | None:
+        """One value per point, by name.
+
+        Args:
+            name: ``x``, ``y``, ``z`` or ``range`` (metres); ``intensity``; ``radar`` (1 for points
+                of the radar, 0 for others); or a column of numbers in ``fields``, in upper or lower
+                case.
+
+        Returns:
+            float32 (N,), in the column's own unit; NaN where a column of ``fields`` holds nothing
+            finite or what no sensor measures. None where the scan has no such channel.
+        """
+        match name:
+            case "x" | "y" | "z":
+                return self.xyz[:, "xyz".index(name)]
+            case "range":
+                return self.range
+            case "intensity":
+                return self.intensity
+            case "radar" if self.radar is not None:
+                return to_float32(self.radar)
+        columns = {title.lower(): column for title, column in self.fields.items()}
+        column = columns.get(name.lower())
+        if column is None or column.ndim > 1 or column.dtype.kind not in "biuf":
+            return None
+        values = to_float32(column)
+        return np.where(np.abs(values) <= LARGEST_VALUE, values, np.float32(np.nan))
 
     def with_label(self, label: NDArray[np.int64]) -> "Scan":
         """The same scan with semantic class ids, int64 (N,)."""

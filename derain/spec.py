@@ -9,6 +9,7 @@ from typing import Any
 from derain.errors import InputError
 from derain.neighbours import NeighbourView
 from derain.range_image import RangeView
+from derain.scan import Scan
 from derain.spherical_grid import SphericalGrid
 from derain.view import View
 
@@ -24,7 +25,8 @@ class Spec:
         view: Kind and parameters of the view that it sees a scan through.
         channels: Its input channels, in order.
         units: Their units.
-        mean: Mean of each channel over the training points.
+        mean: Mean of each channel over the training points; it stands in for values that a scan
+            lacks, about which it says least.
         std: Standard deviation of each channel over the training points.
         classes: Names of the training data's semantic classes, by id.
         rain: Ids of those that count as rain.
@@ -83,12 +85,16 @@ class Spec:
     @property
     def mean_intensity(self) -> float:
         """Mean intensity of the training points; 0 for a network that sees none."""
-        return dict(zip(self.channels, self.mean, strict=True)).get("intensity", 0.0)
+        return self._means.get("intensity", 0.0)
 
     @property
     def intensity_unit(self) -> str:
         """Unit of the training data's intensity."""
         return dict(zip(self.channels, self.units, strict=True)).get("intensity", "not used")
+
+    def missing_channels(self, scan: Scan) -> dict[str, float]:
+        """Channels that a scan has not got, and the means that stand in for them, by name."""
+        return {name: mean for name, mean in self._means.items() if scan.channel(name) is None}
 
     def make_view(self, threads: int = 0) -> View:
         """The view that the network sees a scan through.
@@ -99,16 +105,18 @@ class Spec:
         Raises:
             InputError: A kind of view that this derain does not know.
         """
-        # The training data's mean says least about points whose intensity was not measured.
-        missing_intensity = self.mean_intensity
         match dict(self.view):
             case {"kind": NeighbourView.KIND, "neighbours": neighbours}:
-                return NeighbourView(neighbours, missing_intensity, threads)
+                return NeighbourView(neighbours, self.channels, self._means, threads)
             case {"kind": RangeView.KIND, "grid": grid, "way_back": way_back}:
                 grid = SphericalGrid.from_dict(grid, self.network)
-                return RangeView(grid, self.channels, way_back, missing_intensity)
+                return RangeView(grid, self.channels, way_back, self._means)
         kind = self.view.get("kind")
         raise InputError(self.network, f"unknown view {kind!r}", "Upgrade derain.")
+
+    @property
+    def _means(self) -> dict[str, float]:
+        return dict(zip(self.channels, self.mean, strict=True))
 
 
 def _immutable(value: Any) -> Any:

@@ -4,16 +4,17 @@ import json
 import logging
 import platform
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy
+import numpy as np
 import onnx
 import onnxruntime
 import torch
 
 import derain
+from derain.channels import extra_channels
 from derain.errors import InputError
 from derain.export.proof import FINITE, FLOAT32, INT8, Proof, prove
 from derain.export.quantisation import quantised
@@ -65,9 +66,21 @@ def _proof(model: DerainingModule, path: Path, calibration: Sequence[Scan]) -> P
     if not calibration:
         assert FLOAT32.difference is not None
         bounds = replace(FLOAT32, difference=FLOAT32.difference * model.AMPLIFIES)
-        return prove(model, path, hard_cases(), bounds)
+        return prove(model, path, _hard_cases(model.spec), bounds)
     seen = prove(model, path, [(scan.name, scan) for scan in calibration], INT8)
-    return Proof(seen.cases + prove(model, path, hard_cases(), FINITE).cases)
+    return Proof(seen.cases + prove(model, path, _hard_cases(model.spec), FINITE).cases)
+
+
+def _hard_cases(spec: Spec) -> Iterator[tuple[str, Scan]]:
+    """Hard scans that have the network's extra channels, with gaps, as fused scans have them."""
+    rng = np.random.default_rng(0)
+    statistics = dict(zip(spec.channels, zip(spec.mean, spec.std, strict=True), strict=True))
+    for name, scan in hard_cases():
+        columns = {}
+        for channel in extra_channels(spec.channels):
+            column = rng.normal(*statistics[channel], len(scan))
+            columns[channel] = np.where(rng.random(len(scan)) < 0.1, np.nan, column)
+        yield name, replace(scan, fields=columns)
 
 
 def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
@@ -110,7 +123,7 @@ def _describe(proto: onnx.ModelProto, spec: Spec, proof: dict[str, object]) -> N
         "torch": torch.__version__,
         "onnx": onnx.__version__,
         "onnxruntime": onnxruntime.__version__,
-        "numpy": numpy.__version__,
+        "numpy": np.__version__,
         "python": platform.python_version(),
     }
     description = f"{spec.network} trained on {spec.data}: probability of rain for LiDAR points"

@@ -56,7 +56,8 @@ class Derainer:
 
         Args:
             points: A Scan, or (N, ≥ 4) numbers: x, y, z in metres and intensity in the unit of
-                the training data (``spec.units``).
+                the training data (``spec.units``). What else a model sees (``spec.channels``) are
+                columns of a Scan; the training data's mean stands in where it has none.
             stopwatch: Takes the times of the stages view, network and back.
 
         Returns:

@@ -46,9 +46,12 @@ class DerainingModule(lightning.LightningModule):
         NAME: Name of the network in a Spec and on the command line.
         AMPLIFIES: How many times more than other networks' its logits amplify rounding.
         LEARNS_FROM_LABELS: Whether it does; where not, none is read in its training.
-        channels: Names of its input channels.
+        channels: Names of its input channels, as :meth:`Scan.channel` takes them.
         network: The network itself.
         card: Data card of the data it is trained or tested on.
+
+    Raises:
+        InputError: No channels, or one twice.
     """
 
     NAME: ClassVar[str]
@@ -62,6 +65,10 @@ class DerainingModule(lightning.LightningModule):
 
     def __init__(self, channels: Sequence[str]) -> None:
         super().__init__()
+        if not channels or len(set(channels)) < len(channels):
+            raise InputError(
+                "channels", f"{list(channels)} is no choice", "Name each channel once."
+            )
         self.channels = tuple(channels)
         self._spec: Spec | None = None
         # Not in the state_dict: the Spec holds them.
@@ -127,14 +134,16 @@ class DerainingModule(lightning.LightningModule):
         """Takes over a Spec, its normalisation included.
 
         Raises:
-            InputError: A Spec that this derain cannot read, or of another network.
+            InputError: A Spec that this derain cannot read, or of another network or channels.
         """
         if spec is None:
             return
         spec = spec if isinstance(spec, Spec) else Spec.from_dict(spec, "checkpoint")
-        if spec.network != self.NAME:
+        if (spec.network, spec.channels) != (self.NAME, self.channels):
             raise InputError(
-                "checkpoint", f"a model of {spec.network}", f"Give one of {self.NAME}."
+                "checkpoint",
+                f"a model of {spec.network} on {', '.join(spec.channels)}",
+                f"Give one of {self.NAME} on {', '.join(self.channels)}.",
             )
         self._spec = spec
         self.hparams["spec"] = spec.as_dict()
@@ -173,7 +182,7 @@ class DerainingModule(lightning.LightningModule):
         self.card = data.card
         if self._spec is None and stage == "fit":
             self.adopt(self.spec_for(self.card, list(data.training_scans(EXAMPLES))))
-        self.metrics = RainMetrics(self.card.classes, self.card.rain)
+        self.metrics = RainMetrics(self.card.classes, self.card.rain, unknown=self.card.unknown)
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """Takes the Spec from the checkpoint that a run starts from.

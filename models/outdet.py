@@ -59,17 +59,18 @@ class OutDetNetwork(nn.Module):
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
+        channels: Number of input channels, 4 as published.
     """
 
-    def __init__(self, neighbours: int = 9) -> None:
+    def __init__(self, neighbours: int = 9, channels: int = len(CHANNELS)) -> None:
         super().__init__()
         self.distance_weight = nn.Parameter(torch.ones(neighbours))
-        self.weight1 = nn.Parameter(torch.empty(len(CHANNELS) + 1, WIDTH, neighbours))
+        self.weight1 = nn.Parameter(torch.empty(channels + 1, WIDTH, neighbours))
         self.bias1 = nn.Parameter(torch.randn(WIDTH))
         self.norm1 = PointBatchNorm(WIDTH)
         self.weight2 = nn.Parameter(torch.empty(WIDTH, WIDTH, neighbours))
         self.norm2 = PointBatchNorm(WIDTH)
-        self.shortcut = nn.Parameter(torch.empty(WIDTH, len(CHANNELS), 1))
+        self.shortcut = nn.Parameter(torch.empty(WIDTH, channels, 1))
         self.dropout = nn.Dropout(0.5)
         self.head = nn.Linear(WIDTH, 2)
         for weight in (self.weight1, self.weight2, self.shortcut):
@@ -91,7 +92,7 @@ class OutDetNetwork(nn.Module):
         """Scores every point.
 
         Args:
-            points: Normalised x, y, z, intensity, float (M, 4).
+            points: Normalised channels, float (M, C).
             distances: Distances to the neighbours in metres, float (M, k).
             neighbours: The point itself, then its neighbours, as rows of ``points``, int64 (M, k).
 
@@ -129,8 +130,8 @@ class FoldedOutDet(nn.Module):
 
     Args:
         network: A trained network.
-        mean: Mean of each input channel, float (4,).
-        std: Standard deviation of each input channel, float (4,).
+        mean: Mean of each input channel, float (C,).
+        std: Standard deviation of each input channel, float (C,).
     """
 
     def __init__(self, network: OutDetNetwork, mean: Tensor, std: Tensor) -> None:
@@ -164,7 +165,7 @@ class FoldedOutDet(nn.Module):
         """Scores every point.
 
         Args:
-            points: Raw x, y, z in metres and intensity in the data's unit, float32 (M, 4).
+            points: Raw channels in the units of the Spec, float32 (M, C).
             distances: Distances to the neighbours in metres, float32 (M, k).
             neighbours: The point itself, then its neighbours, as rows of ``points``, int64 (M, k).
 
@@ -200,6 +201,8 @@ class OutDet(SupervisedModule):
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
+        channels: What it sees of a point besides distances: ``x``, ``y``, ``z``, ``range``,
+            ``intensity``, ``radar``, or other columns of the scans, such as ``doppler``.
         learning_rate: Of Adam.
         weight_decay: Of Adam.
         milestones: Epochs after which the learning rate falls.
@@ -216,6 +219,7 @@ class OutDet(SupervisedModule):
     def __init__(
         self,
         neighbours: int = 9,
+        channels: tuple[str, ...] = CHANNELS,
         learning_rate: float = 1e-3,
         weight_decay: float = 1e-4,
         milestones: tuple[int, ...] = (30, 40, 45),
@@ -223,9 +227,9 @@ class OutDet(SupervisedModule):
         threshold: float = 0.5,
         spec: dict[str, Any] | None = None,
     ) -> None:
-        super().__init__(CHANNELS)
+        super().__init__(channels)
         self.save_hyperparameters()
-        self.network = OutDetNetwork(neighbours)
+        self.network = OutDetNetwork(neighbours, len(channels))
         self.adopt(spec)
 
     @classmethod

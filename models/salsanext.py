@@ -57,8 +57,7 @@ def score_pixels(
         network: From normalised images, 0 where nothing returned, to logits (B, 2, H, W).
         mean: Mean of each channel, float (C,).
         std: Standard deviation of each channel, float (C,).
-        image: Range (m), x, y, z (m) and intensity (the data's unit) of each pixel, or those of
-            them that the Spec names, float (B, C, H, W).
+        image: Raw channels in the units of the Spec, float (B, C, H, W).
         valid: Pixels with a return, bool (B, 1, H, W).
     """
     normalised = (image - mean[:, None, None]) / std[:, None, None]
@@ -72,7 +71,8 @@ class SalsaNext(SupervisedModule):
         grid: The range image's grid: ``fitted`` to the training scans, the name of a published
             one, or its bounds.
         way_back: How points that lost their pixel to a nearer one get a score.
-        channels: Input channels, of ``range``, ``x``, ``y``, ``z`` and ``intensity``.
+        channels: What it sees of a point: ``range``, ``x``, ``y``, ``z``, ``intensity``, ``radar``,
+            or other columns of the scans, such as ``doppler``.
         width: Channels of the first layers, 32 as published; all others are multiples of it.
         dropout: Share of feature maps dropped in training.
         learning_rate: Of stochastic gradient descent, after the warm-up.

@@ -5,8 +5,13 @@ import pytest
 import torch
 
 from derain.batch import Batch, Sample
-from derain.neighbours import NeighbourView
+from derain.cards import DataCard
+from derain.hard_cases import scene
+from derain.neighbours import Neighbourhoods, NeighbourView
+from derain.range_image import RangeView
 from derain.scan import Scan
+from derain.spherical_grid import SphericalGrid
+from derain.view import IGNORED, View
 
 SIZES = (12, 0, 1, 30)
 
@@ -56,6 +61,31 @@ def test_a_batch_of_an_empty_scan_is_an_empty_batch() -> None:
 def test_a_batch_has_targets_only_if_every_scan_has(unlabelled: int) -> None:
     samples = [sample(9, labelled=False)] * unlabelled + [sample(5)] * (2 - unlabelled)
     assert Batch.of(samples).target is None
+
+
+@pytest.mark.parametrize(
+    "view",
+    [NeighbourView(5), RangeView(SphericalGrid.even(8, 30, (-30, 30)))],
+    ids=["neighbours", "range"],
+)
+def test_cells_of_unknown_points_are_not_to_be_judged(view: View) -> None:
+    card = DataCard("ours", {0: "ground", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))
+    rng = np.random.default_rng(0)
+    scan = Scan.of(scene(200)).with_label(rng.choice([0, 3, 9], 200))
+    viewed = view(scan)
+    target = Sample.of(scan, viewed, card).target
+    assert target is not None
+    # Rows as cells see them: the first of those at one position, the nearest in a pixel.
+    row = viewed.first if isinstance(viewed, Neighbourhoods) else viewed.winner
+    expected = np.array([0, 0, 0, 1, 0, 0, 0, 0, 0, IGNORED])[scan.label[row]]
+    np.testing.assert_array_equal(target, np.where(row >= 0, expected, IGNORED))
+    assert set(expected.tolist()) == {0, 1, IGNORED}
+
+
+def test_a_scan_without_labels_has_no_target() -> None:
+    scan = Scan.of(scene(20))
+    card = DataCard("ours", {3: "rain"}, rain=(3,))
+    assert Sample.of(scan, NeighbourView(5)(scan), card).target is None
 
 
 def test_tensors_follow_to_another_device_and_scans_stay() -> None:

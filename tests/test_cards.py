@@ -1,6 +1,7 @@
 """Data cards: the packaged ones say what was published, and a user's own are read with care."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ OWN: dict[str, Any] = {
     "mean": [1, 2, 3, 4],
     "std": [5.0, 6.0, 7.0, 8.0],
     "range": [9, 10],
+    "extra": {"doppler": [-0.5, 2], "ring": [31.5, 18.4]},
     "rain_share": 0.25,
     "split": {"train": ["00", "010"], "test": ["008"]},
 }
@@ -75,6 +77,7 @@ def test_a_card_of_ones_own_holds_what_its_file_says(card_file: Path) -> None:
         mean=(1.0, 2.0, 3.0, 4.0),
         std=(5.0, 6.0, 7.0, 8.0),
         range=(9.0, 10.0),
+        extra={"doppler": (-0.5, 2.0), "ring": (31.5, 18.4)},
         rain_share=0.25,
         split={"train": ("00", "010"), "test": ("008",)},
     )
@@ -92,6 +95,31 @@ def test_a_card_without_all_its_statistics_says_so(card_file: Path) -> None:
         assert whole == card.completed(**{missing: statistics[missing]})
 
 
+def test_every_channel_has_its_statistics_and_its_unit(card_file: Path) -> None:
+    card_file.write_text(yaml.safe_dump(OWN))
+    card = load_card(card_file)
+    assert card.statistics("intensity") == (4, 8)
+    assert card.statistics("range") == (9, 10)
+    assert card.statistics("doppler") == (-0.5, 2)
+    units = {name: card.unit(name) for name in ("z", "range", "doppler", "rcs", "radar", "ring")}
+    assert units == {
+        "z": "m",
+        "range": "m",
+        "doppler": "m/s",
+        "rcs": "dBsm",
+        "radar": "0 or 1",
+        "ring": "not stated",
+    }
+    with pytest.raises(InputError, match="our yard: the data card has no statistics of rcs"):
+        card.statistics("rcs")
+
+
+def test_extra_statistics_join_those_that_a_card_has(card_file: Path) -> None:
+    card_file.write_text(yaml.safe_dump(OWN))
+    card = load_card(card_file).completed(extra={"rcs": (1.0, 2.0), "ring": (0.0, 1.0)})
+    assert card.extra == {"doppler": (-0.5, 2), "ring": (31.5, 18.4), "rcs": (1, 2)}
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -101,10 +129,17 @@ def test_a_card_without_all_its_statistics_says_so(card_file: Path) -> None:
         {"rain": []},
         {"rain": 3},
         {"rain": [5]},
+        {"unknown": [5]},
+        {"unknown": [0, 3]},
+        {"unknown": 4},
         {"mean": [1, 2, 3]},
         {"mean": 1},
         {"std": [1, 1, 1, 0]},
         {"std": ["a", "b", "c", "d"]},
+        {"extra": ["doppler"]},
+        {"extra": {"doppler": [1]}},
+        {"extra": {"doppler": None}},
+        {"extra": {"doppler": [1, 0]}},
         {"rain_share": 1.5},
         {"rain_share": "much"},
         {"split": {"train": "00"}},
@@ -147,6 +182,15 @@ def test_rain_is_every_class_that_the_card_says(card_file: Path) -> None:
     assert rain.tolist() == [False, True, True, True]
     with pytest.raises(InputError, match=r"a\.bin: it has no labels"):
         load_card(card_file).rain_of(scan)
+
+
+def test_an_unknown_class_is_neither_rain_nor_not(card_file: Path) -> None:
+    card_file.write_text(yaml.safe_dump({**OWN, "rain": [3], "unknown": [4]}))
+    card = load_card(card_file)
+    scan = Scan.of(np.ones((3, 4)), name="a.bin").with_label(np.array([0, 3, 4]))
+    assert card.rain_of(scan).tolist() == [False, True, False]
+    assert card.unknown_of(scan).tolist() == [False, False, True]
+    assert not replace(card, unknown=()).unknown_of(scan).any()
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones() -> None:

@@ -312,6 +312,17 @@ def test_an_unknown_label_is_named_and_nothing_is_counted() -> None:
     assert metrics.pooled() == Counts(0, 0, 0, 0)
 
 
+def test_points_of_unknown_class_are_not_counted() -> None:
+    predicted, label, distance, scan, scans = random_batch(seed=15)
+    known = (label != 7) & (label != 110)
+    metrics = RainMetrics(CLASSES, [3], unknown=[110, 7])
+    metrics.update(predicted, label, distance, scan, scans)
+    expected = RainMetrics({0: "ground", 3: "rain"}, [3])
+    expected.update(predicted[known], label[known], distance[known], scan[known], scans)
+    assert 0 < known.sum() < len(known)
+    assert report(metrics) == report(expected)
+
+
 @pytest.mark.parametrize("scan_number", [-1, 4])
 def test_a_scan_number_out_of_bounds_is_refused_and_nothing_is_counted(scan_number: int) -> None:
     metrics = counted()

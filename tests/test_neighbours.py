@@ -119,9 +119,27 @@ def test_fewer_points_than_neighbours_repeat_the_farthest(count: int) -> None:
         assert (view.distances[:, count - 1 :] == view.distances[:, -1:]).all()
 
 
-def test_a_scan_without_intensity_takes_the_stand_in() -> None:
-    view = NeighbourView(missing_intensity=9.5)(Scan.of(np.ones((1, 3), np.float32)))
-    assert view.points[0, 3] == 9.5
+def test_points_hold_the_channels_asked_for_in_their_order_and_a_stand_in_for_gaps() -> None:
+    rng = np.random.default_rng(5)
+    xyz = rng.normal(size=(50, 3)).astype(np.float32)
+    rcs = np.where(np.arange(50) < 20, np.nan, rng.normal(size=50))
+    scan = Scan(xyz, fields={"rcs": rcs})
+    channels = ("rcs", "range", "z", "intensity")
+    view = NeighbourView(channels=channels, stand_in={"rcs": 7.5, "intensity": 9.5})(scan)
+    rows = view.first
+    np.testing.assert_array_equal(
+        view.points[:, 0], np.float32(np.where(rows < 20, 7.5, rcs[rows]))
+    )
+    np.testing.assert_array_equal(view.points[:, 1], scan.range[rows])
+    np.testing.assert_array_equal(view.points[:, 2], xyz[rows, 2])
+    np.testing.assert_array_equal(view.points[:, 3], 9.5)
+
+
+def test_channels_do_not_change_who_is_near() -> None:
+    scan = Scan.of(np.random.default_rng(6).normal(size=(500, 4)))
+    usual, other = NeighbourView()(scan), NeighbourView(channels=("intensity",))(scan)
+    np.testing.assert_array_equal(usual.neighbours, other.neighbours)
+    np.testing.assert_array_equal(usual.distances, other.distances)
 
 
 def test_packing_keeps_every_scan_to_itself() -> None:

@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -168,3 +169,49 @@ def test_labels_are_added_to_a_copy() -> None:
 def test_labels_of_another_length_are_refused() -> None:
     with pytest.raises(InputError, match="label has 5 rows for 4 points"):
         Scan(np.ones((4, 3), np.float32)).with_label(np.arange(5))
+
+
+def test_the_usual_channels_are_the_scans_own() -> None:
+    scan = full_scan()
+    for place, axis in enumerate("xyz"):
+        np.testing.assert_array_equal(scan.channel(axis), scan.xyz[:, place])
+    np.testing.assert_array_equal(scan.channel("range"), scan.range)
+    np.testing.assert_array_equal(scan.channel("intensity"), scan.intensity)
+    assert scan.channel("radar").tolist() == [1, 0, 1, 0, 1, 0]
+
+
+def test_a_column_of_the_file_is_a_channel_in_upper_and_lower_case() -> None:
+    scan = full_scan()
+    for name in ("ring", "Ring", "RING"):
+        channel = scan.channel(name)
+        assert channel.dtype == np.float32
+        np.testing.assert_array_equal(channel, np.arange(6))
+    assert scan.channel("doppler") is None
+
+
+def test_a_column_says_whose_a_point_is_where_the_scan_does_not() -> None:
+    column = {"radar": np.array([False, True])}
+    assert Scan(np.ones((2, 3), np.float32), fields=column).channel("radar").tolist() == [0, 1]
+    known = Scan(np.ones((2, 3), np.float32), radar=np.array([True, False]), fields=column)
+    assert known.channel("radar").tolist() == [1, 0]
+
+
+def test_what_no_sensor_measures_is_missing_from_a_column() -> None:
+    values = np.array([1e7, -1e7, 1.1e7, 1e300, -np.inf, np.nan])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        channel = Scan(np.ones((6, 3), np.float32), fields={"rcs": values}).channel("rcs")
+    assert np.isnan(channel).tolist() == [False, False, True, True, True, True]
+    assert channel[:2].tolist() == [1e7, -1e7]
+
+
+@pytest.mark.parametrize(
+    "column", [np.zeros((6, 3)), np.array(list("abcdef")), np.zeros(6, complex)], ids=str
+)
+def test_a_column_that_is_not_one_number_a_point_is_no_channel(column: NDArray[Any]) -> None:
+    assert Scan(np.ones((6, 3), np.float32), fields={"other": column}).channel("other") is None
+
+
+def test_a_scan_without_intensity_or_source_has_no_such_channels() -> None:
+    scan = Scan(np.ones((2, 3), np.float32))
+    assert (scan.channel("intensity"), scan.channel("radar")) == (None, None)

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from derain.errors import InputError
 from derain.neighbours import NeighbourView
 from derain.range_image import RangeView
+from derain.scan import Scan
 from derain.spec import SCHEMA, Spec
 from derain.spherical_grid import SphericalGrid
 from derain.way_back import WAYS_BACK
@@ -29,6 +31,8 @@ SPEC = Spec(
     rule={"threshold": 0.008},
     threshold=0.25,
 )
+
+MEANS = {"x": 1.0, "y": 2.0, "z": 3.0, "intensity": 4.0}
 
 four_numbers = st.tuples(*[st.floats(-1e6, 1e6)] * 4)
 specs = st.builds(
@@ -93,7 +97,7 @@ def test_classes_that_are_not_named_by_numbers_are_damage(classes: Any) -> None:
 
 def test_the_view_is_the_one_the_spec_names() -> None:
     view = SPEC.make_view(threads=2)
-    assert view == NeighbourView(neighbours=7, missing_intensity=4.0, threads=2)
+    assert view == NeighbourView(7, SPEC.channels, MEANS, threads=2)
 
 
 GRID = SphericalGrid.of_beams([3.0, 1.5, -0.1, -24.9], columns=100, azimuth=(-60.0, 70.0))
@@ -110,7 +114,18 @@ def test_a_range_view_survives_json_with_its_grid_and_way_back(way_back: str) ->
     read = Spec.from_dict(json.loads(json.dumps(spec.as_dict())), "model")
     assert read == spec
     channels = ("z", "x", "range", "intensity")
-    assert read.make_view() == RangeView(GRID, channels, way_back, missing_intensity=4.0)
+    means = dict(zip(channels, SPEC.mean, strict=True))
+    assert read.make_view() == RangeView(GRID, channels, way_back, means)
+
+
+def test_what_a_scan_lacks_is_what_its_means_stand_in_for() -> None:
+    spec = replace(SPEC, channels=("x", "intensity", "radar", "doppler"))
+    xyz = np.ones((2, 3), np.float32)
+    assert spec.missing_channels(Scan(xyz)) == {"intensity": 2.0, "radar": 3.0, "doppler": 4.0}
+    gaps = Scan(xyz, np.ones(2, np.float32), fields={"Doppler": np.full(2, np.nan)})
+    assert spec.missing_channels(gaps) == {"radar": 3.0}
+    fused = replace(gaps, radar=np.array([False, True]))
+    assert spec.missing_channels(fused) == {}
 
 
 def test_a_network_that_sees_no_intensity_has_no_unit_of_it() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from derain.channels import UNITS
 from derain.errors import InputError
 from derain.scan import Scan
 
@@ -25,11 +26,14 @@ class DataCard:
         name: Name of the data set, for tables and models.
         classes: Names of its semantic classes, by id.
         rain: Ids of the classes that are to be removed.
+        unknown: Ids of the classes of which it is not known whether they are rain: neither trained
+            on nor measured by.
         licence: Licence of the data.
         intensity_unit: Unit or span of its intensities, such as ``0..255``.
         mean: Mean of x, y, z (metres) and intensity over the training points; None if not known.
         std: Their standard deviations; None if not known.
         range: Mean and standard deviation of range in metres; None if not known.
+        extra: Mean and standard deviation of further channels, by name, such as ``doppler``.
         rain_share: Share of rain among the training points; None if not known.
         split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
     """
@@ -37,11 +41,13 @@ class DataCard:
     name: str
     classes: Mapping[int, str]
     rain: tuple[int, ...]
+    unknown: tuple[int, ...] = ()
     licence: str = "not stated"
     intensity_unit: str = "not stated"
     mean: tuple[float, ...] | None = None
     std: tuple[float, ...] | None = None
     range: tuple[float, ...] | None = None
+    extra: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rain_share: float | None = None
     split: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
@@ -54,7 +60,7 @@ class DataCard:
         """Mean and standard deviation of a channel over the training points.
 
         Args:
-            channel: ``x``, ``y``, ``z``, ``intensity`` or ``range``.
+            channel: ``x``, ``y``, ``z``, ``intensity``, ``range``, or one of the extra ones.
 
         Raises:
             InputError: They are not known.
@@ -65,15 +71,17 @@ class DataCard:
         if channel in CHANNELS and self.mean is not None and self.std is not None:
             number = CHANNELS.index(channel)
             return self.mean[number], self.std[number]
+        if channel in self.extra:
+            return self.extra[channel]
         raise InputError(
             self.name,
             f"the data card has no statistics of {channel}",
-            "Add mean and std (of x, y, z, intensity), or range (its mean and std).",
+            "Add mean and std (of x, y, z, intensity), range, or extra (by name, mean and std).",
         )
 
     def unit(self, channel: str) -> str:
         """Unit of a channel."""
-        return self.intensity_unit if channel == "intensity" else "m"
+        return self.intensity_unit if channel == "intensity" else UNITS.get(channel, "not stated")
 
     def rain_of(self, scan: Scan) -> NDArray[np.bool_]:
         """Which points of a labelled scan are rain, bool (N,).
@@ -81,16 +89,30 @@ class DataCard:
         Raises:
             InputError: A scan without labels.
         """
-        if scan.label is None:
-            raise InputError(scan.name, "it has no labels", "Give its label file.")
-        return np.isin(scan.label, self.rain)
+        return self._of_classes(scan, self.rain)
 
-    def completed(self, **statistics: Any) -> "DataCard":
+    def unknown_of(self, scan: Scan) -> NDArray[np.bool_]:
+        """Of which points of a labelled scan it is not known whether they are rain, bool (N,).
+
+        Raises:
+            InputError: A scan without labels.
+        """
+        return self._of_classes(scan, self.unknown)
+
+    def completed(
+        self, extra: Mapping[str, tuple[float, float]] = {}, **statistics: Any
+    ) -> "DataCard":
         """The same card with statistics in place of those that it lacks."""
         return replace(
             self,
+            extra={**extra, **self.extra},
             **{name: value for name, value in statistics.items() if getattr(self, name) is None},
         )
+
+    def _of_classes(self, scan: Scan, ids: tuple[int, ...]) -> NDArray[np.bool_]:
+        if scan.label is None:
+            raise InputError(scan.name, "it has no labels", "Give its label file.")
+        return np.isin(scan.label, ids)
 
 
 def packaged_cards() -> dict[str, Path]:
@@ -129,15 +151,22 @@ def _card(content: dict[str, Any]) -> DataCard:
             **content,
             "classes": {int(id_): str(name) for id_, name in content.get("classes", {}).items()},
             "rain": tuple(int(id_) for id_ in content.get("rain", ())),
+            "unknown": tuple(int(id_) for id_ in content.get("unknown", ())),
             "split": {part: _names(names) for part, names in content.get("split", {}).items()},
             "mean": _numbers(content.get("mean"), CHANNELS),
             "std": _numbers(content.get("std"), CHANNELS),
             "range": _numbers(content.get("range"), ("mean", "std")),
+            "extra": {
+                str(name): _numbers(numbers, ("mean", "std"))
+                for name, numbers in content.get("extra", {}).items()
+            },
         }
     )
     if not set(card.rain) <= set(card.classes) or not card.rain:
         raise ValueError(f"rain {list(card.rain)} must name ids of its classes")
-    stds = [*(card.std or ()), *(card.range or ())[1:]]
+    if not set(card.unknown) <= set(card.classes) - set(card.rain):
+        raise ValueError(f"unknown {list(card.unknown)} must name ids of its classes without rain")
+    stds = [*(card.std or ()), *(card.range or ())[1:], *(std for _, std in card.extra.values())]
     if min(stds, default=1) <= 0:
         raise ValueError(f"standard deviations {stds} must be positive")
     if card.rain_share is not None and not 0 <= card.rain_share <= 1:

@@ -57,8 +57,9 @@ def scan_of(
     Args:
         path: The file.
         fields: Name → column, each of N rows: either `x`, `y` and `z` (N,) or `xyz` (N, 3), metres
-            in the sensor frame; `intensity` (or another of INTENSITY_NAMES) if there is one; and
-            whatever else the file holds. Upper and lower case are the same.
+            in the sensor frame; `intensity` (or another of INTENSITY_NAMES) and `radar` (not 0 for
+            points of the radar) if there are; and whatever else the file holds. Upper and
+            lower case are the same.
         shape: (height, width) of an organised cloud.
         header: What the file says besides its columns, for the writer of its format.
 
@@ -84,6 +85,7 @@ def scan_of(
         # Copies, for what is done to a scan's numbers must not reach the columns of its file.
         xyz.copy(),
         None if intensity is None else intensity.copy(),
+        radar=flat["radar"] != 0 if "radar" in flat else None,
         fields=dict(fields),
         shape=shape,
         name=str(path),

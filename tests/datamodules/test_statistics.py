@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from derain.cards import DataCard
 from derain.datamodules.statistics import evenly_spaced, measured
+from derain.errors import InputError
 from derain.hard_cases import hard_cases
 from derain.scan import Scan
 
@@ -44,6 +45,53 @@ def test_a_channel_that_never_changes_is_divided_by_one() -> None:
     assert card.mean == (4, 2, 3, 7)
     assert card.std == (pytest.approx(math.sqrt(6)), 1, 1, 1)
     assert card.rain_share == 0
+
+
+def test_what_rounding_leaves_of_a_constant_is_no_variance() -> None:
+    points = np.random.default_rng(0).normal(size=(9999, 4)).astype(np.float32)
+    points[:, 3] = 0.1
+    assert measured(CARD, [Scan.of(points)]).std[3] == 1
+
+
+def test_extra_channels_are_measured_over_the_numbers_of_valid_points() -> None:
+    rng = np.random.default_rng(0)
+    scans, doppler, flags = [], [], []
+    for size in (40, 0, 70):
+        scan = random_scan(size, size)
+        column = np.where(rng.random(size) < 0.7, np.nan, rng.normal(3, 2, size))
+        column[:1] = np.inf
+        radar = rng.random(size) < 0.3
+        scans.append(Scan(scan.xyz, scan.intensity, radar=radar, fields={"doppler": column}))
+        doppler.append(column[scan.valid & np.isfinite(column)])
+        flags.append(radar[scan.valid])
+    scans.append(random_scan(1, 30))  # has neither, and counts for neither
+    card = measured(CARD, iter(scans), ["doppler", "radar"])
+    for name, values in (("doppler", doppler), ("radar", flags)):
+        expected = np.concatenate(values)
+        np.testing.assert_allclose(card.extra[name], (expected.mean(), expected.std()), rtol=1e-5)
+    usual = measured(CARD, iter(scans))
+    assert (card.mean, card.std, card.range) == (usual.mean, usual.std, usual.range)
+    assert usual.extra == {}
+
+
+def test_scans_without_intensity_do_not_count_for_it() -> None:
+    scan = random_scan(1, 50)
+    bare = Scan(random_scan(2, 50).xyz)
+    assert measured(CARD, [scan, bare]).mean[3] == measured(CARD, [scan]).mean[3]
+    assert (measured(CARD, [bare]).mean[3], measured(CARD, [bare]).std[3]) == (0, 1)
+
+
+def test_a_channel_of_which_no_scan_holds_a_number_is_refused() -> None:
+    nothing = Scan(np.ones((3, 3), np.float32), fields={"doppler": np.full(3, np.nan)})
+    for name in ("doppler", "dopler"):
+        with pytest.raises(InputError, match=f"channel '{name}': no training scan holds a number"):
+            measured(CARD, [nothing], [name])
+
+
+def test_points_of_unknown_class_do_not_count_for_the_share_of_rain() -> None:
+    scan = Scan.of(np.ones((4, 4))).with_label(np.array([0, 3, 9, 9]))
+    card = DataCard("ours", {0: "ground", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))
+    assert measured(card, [scan]).rain_share == 0.5
 
 
 def test_hard_scans_give_statistics_that_can_be_divided_by() -> None:

@@ -43,22 +43,26 @@ def one_thread() -> Iterator[None]:
 def outdet() -> Callable[..., OutDet]:
     """Makes a 3D-OutDet in evaluation mode, of random weights, statistics and normalisation."""
 
-    def make(seed: int = 0, neighbours: int = 9) -> OutDet:
+    def make(
+        seed: int = 0,
+        neighbours: int = 9,
+        channels: tuple[str, ...] = ("x", "y", "z", "intensity"),
+    ) -> OutDet:
         rng = np.random.default_rng(seed)
-        model = OutDet(neighbours=neighbours)
+        model = OutDet(neighbours=neighbours, channels=channels)
         randomise(model.network, seed)
         model.adopt(
             Spec(
                 network="outdet",
                 view=model.view_parameters([]),
-                mean=tuple(rng.normal(0, 3, 4).tolist()),
-                std=tuple(rng.uniform(0.5, 20, 4).tolist()),
+                mean=tuple(rng.normal(0, 3, len(channels)).tolist()),
+                std=tuple(rng.uniform(0.5, 20, len(channels)).tolist()),
                 classes={0: "other", 1: "rain"},
                 rain=(1,),
                 data="random",
                 licence="none",
                 channels=model.channels,
-                units=("m", "m", "m", "0..255"),
+                units=("not stated",) * len(channels),
             )
         )
         return model.eval()

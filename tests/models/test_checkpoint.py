@@ -71,9 +71,9 @@ def test_a_copy_of_a_copy_is_the_same(outdet: MakeModel, path: Path) -> None:
 
 def test_hyper_parameters_are_primitives_only(content: dict[str, Any]) -> None:
     parameters = dict(content["hyper_parameters"])
-    milestones = parameters.pop("milestones")
+    tuples = {name: parameters.pop(name) for name in ("channels", "milestones")}
     assert json.loads(json.dumps(parameters)) == parameters
-    assert milestones == (30, 40, 45)
+    assert tuples == {"channels": ("x", "y", "z", "intensity"), "milestones": (30, 40, 45)}
     assert parameters["spec"]["view"] == {"kind": "neighbours", "neighbours": 5}
 
 

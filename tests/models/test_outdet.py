@@ -108,6 +108,36 @@ def test_it_has_as_many_parameters_as_published() -> None:
     assert sum(parameter.numel() for parameter in OutDet().parameters()) == 11_019
 
 
+def test_further_channels_widen_what_sees_points_and_nothing_else() -> None:
+    usual = OutDetNetwork().state_dict()
+    wider = OutDetNetwork(channels=6).state_dict()
+    changed = {name for name in usual if usual[name].shape != wider[name].shape}
+    assert changed == {"weight1", "shortcut"}
+    assert wider["weight1"].shape == (7, 32, 9)
+
+
+@pytest.mark.parametrize("channels", [(), ("x", "y", "x")], ids=str)
+def test_channels_are_named_once_each(channels: tuple[str, ...]) -> None:
+    with pytest.raises(InputError, match="Name each channel once"):
+        OutDet(channels=channels)
+
+
+def test_a_spec_of_other_channels_is_refused(outdet: MakeModel) -> None:
+    with pytest.raises(InputError, match="Give one of outdet on x, y, z, rcs"):
+        OutDet(channels=("x", "y", "z", "rcs"), spec=outdet().spec.as_dict())
+
+
+@torch.no_grad()
+def test_a_folded_network_computes_the_same_from_further_channels(
+    outdet: MakeModel, sample: MakeSample
+) -> None:
+    model = outdet(channels=("rcs", "x", "y", "z", "radar", "intensity"))
+    inputs = inputs_of(sample(scene()))
+    six = torch.randn(len(inputs["points"]), 6, generator=torch.Generator().manual_seed(0))
+    inputs["points"] = six * model.std + model.mean
+    torch.testing.assert_close(model.folded()(**inputs), model(**inputs), atol=2e-4, rtol=2e-4)
+
+
 def test_the_neighbourhood_is_as_large_as_asked_for(sample: MakeSample) -> None:
     model = OutDet(neighbours=5)
     assert model.view_parameters([]) == {"kind": "neighbours", "neighbours": 5}

@@ -1,0 +1,80 @@
+"""Input channels: the values of a point that a network sees, by name.
+
+A channel is ``x``, ``y``, ``z``, ``range``, ``intensity``, ``radar``, or any other column of the
+scan's file, such as ``doppler`` or ``rcs``.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.scan import Scan
+
+# What networks see unless they are told otherwise. All other channels are extra: a scan need not
+# have them, and a data card has their statistics only where a network has asked for them.
+USUAL_CHANNELS = ("x", "y", "z", "intensity", "range")
+
+UNITS = {
+    **dict.fromkeys(("x", "y", "z", "range"), "m"),
+    "doppler": "m/s",
+    "rcs": "dBsm",
+    "radar": "0 or 1",
+}
+
+
+def extra_channels(channels: Sequence[str]) -> tuple[str, ...]:
+    """Those of some channels that are not usual, in their order."""
+    return tuple(name for name in channels if name not in USUAL_CHANNELS)
+
+
+def with_columns(scan: Scan, channels: Sequence[str]) -> Scan:
+    """The same scan with nothing in `fields` but some channels, float32, where it has them."""
+    columns = {name: scan.channel(name) for name in channels}
+    present = {name: column for name, column in columns.items() if column is not None}
+    return replace(scan, fields=present)
+
+
+def channel_values(
+    scan: Scan, rows: NDArray[np.int64], channels: Sequence[str]
+) -> NDArray[np.float32]:
+    """What some points of a scan measure.
+
+    Args:
+        scan: The scan.
+        rows: Row numbers of points that are valid, int64 (M,).
+        channels: Names of C channels.
+
+    Returns:
+        float32 (C, M), each channel in its own unit; NaN for values that the scan lacks.
+    """
+    values = np.full((len(channels), len(rows)), np.nan, np.float32)
+    for of_channel, name in zip(values, channels, strict=True):
+        column = scan.channel(name)
+        if column is not None:
+            of_channel[:] = column[rows]
+    return values
+
+
+def filled_values(
+    scan: Scan,
+    rows: NDArray[np.int64],
+    channels: Sequence[str],
+    stand_in: Mapping[str, float],
+) -> NDArray[np.float32]:
+    """What some points of a scan measure, and a stand-in for what they lack.
+
+    Args:
+        scan: The scan.
+        rows: Row numbers of points that are valid, int64 (M,).
+        channels: Names of C channels.
+        stand_in: What stands in for a value that is missing, by channel; 0 if not named.
+
+    Returns:
+        float32 (C, M), finite.
+    """
+    values = channel_values(scan, rows, channels)
+    for of_channel, name in zip(values, channels, strict=True):
+        of_channel[np.isnan(of_channel)] = stand_in.get(name, 0.0)
+    return values

@@ -1,0 +1,130 @@
+"""Columns of fused scans reach the models that name them, and no other."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from derain.datamodules.augmentation import Augmentation
+from derain.datamodules.base import Loading
+from derain.datamodules.folder import Folder
+from derain.errors import InputError
+from derain.files import write_scan
+from derain.files.labels import write_labels
+from derain.hard_cases import scene
+from derain.models.outdet import OutDet
+from derain.scan import Scan
+
+COLUMNS = ("x", "y", "z", "intensity", "radar", "doppler", "rcs")
+CARD = "name: fused\nclasses: {0: other, 3: rain}\nrain: [3]\n"
+
+MakeFolder = Callable[..., Folder]
+
+
+def fused(seed: int, points: int = 60) -> Scan:
+    """A scan whose last ten points are a radar's."""
+    rng = np.random.default_rng(seed)
+    columns = dict(zip("xyz", scene(points, seed).T[:3], strict=True))
+    columns["intensity"] = scene(points, seed)[:, 3]
+    is_radar = np.arange(points) >= points - 10
+    columns["radar"] = np.float32(is_radar)
+    for name in ("doppler", "rcs"):
+        columns[name] = np.where(is_radar, rng.normal(3, 2, points), np.nan).astype(np.float32)
+    return Scan(scene(points, seed)[:, :3], columns["intensity"], fields=columns)
+
+
+@pytest.fixture(params=["bin", "npz", "pcd", "ply", "npy"])
+def folder(request: pytest.FixtureRequest, tmp_path: Path) -> MakeFolder:
+    """Makes a data module of three fused scans in a format."""
+    for number in range(3):
+        path = tmp_path / f"{number}.{request.param}"
+        write_scan(path, fused(number))
+        write_labels(path.with_suffix(".label"), np.arange(60) % 2 * 3)
+    (tmp_path / "card.yaml").write_text(CARD)
+
+    def make(model: OutDet | None, **loading: Any) -> Folder:
+        parts = {part: [f"*.{request.param}"] for part in ("train", "validation", "test")}
+        loading = {"columns": COLUMNS, **loading}
+        data = Folder(
+            str(tmp_path), str(tmp_path / "card.yaml"), **parts, loading=Loading(**loading)
+        )
+        data.trainer = SimpleNamespace(lightning_module=model)
+        return data
+
+    return make
+
+
+def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(
+    folder: MakeFolder,
+) -> None:
+    model = OutDet(channels=("x", "y", "z", "intensity", "rcs", "radar", "doppler"))
+    data = folder(model)
+    data.setup("fit")
+    scans = [fused(number) for number in range(3)]
+    for name in ("radar", "doppler", "rcs"):
+        values = np.concatenate([scan.fields[name] for scan in scans])
+        expected = (np.nanmean(values), np.nanstd(values))
+        np.testing.assert_allclose(data.card.extra[name], expected, rtol=1e-5)
+    model.adopt(model.spec_for(data.card))
+    assert model.spec.units[4:] == ("dBsm", "0 or 1", "m/s")
+    for number, batch in enumerate(data.test_dataloader()):
+        (sample,) = batch.samples
+        assert set(sample.scan.fields) == {"radar", "doppler", "rcs"}
+        points = batch.inputs["points"].numpy()
+        rows = sample.view.first
+        for place, name in enumerate(model.channels):
+            column = scans[number].channel(name)[rows]
+            known = ~np.isnan(column)
+            np.testing.assert_array_equal(points[known, place], column[known])
+            np.testing.assert_array_equal(points[~known, place], np.float32(model.spec.mean[place]))
+
+
+def test_a_model_that_names_none_is_given_none(folder: MakeFolder) -> None:
+    model = OutDet()
+    data = folder(model)
+    data.setup("fit")
+    assert data.card.extra == {}
+    assert data.read(data.files("train")[0]).fields == {}
+
+
+def test_without_a_model_every_column_is_read(folder: MakeFolder) -> None:
+    data = folder(None)
+    assert set(data.read(data.files("train")[0]).fields) == set(COLUMNS)
+
+
+def test_columns_stay_with_their_points_where_training_drops_and_turns_points(
+    folder: MakeFolder,
+) -> None:
+    model = OutDet(channels=("x", "y", "z", "intensity", "rcs"))
+    data = folder(model, augmentation=Augmentation(dropping_probability=1, dropping=0.5))
+    data.setup("fit")
+    model.adopt(model.spec_for(data.card))
+    lost = 0
+    for batch in data.train_dataloader():
+        scan = batch.samples[0].scan
+        lost += 60 - len(scan)
+        by_intensity = {
+            original.intensity[row]: original.fields["rcs"][row]
+            for original in map(fused, range(3))
+            for row in range(60)
+        }
+        expected = [by_intensity[intensity] for intensity in scan.intensity]
+        np.testing.assert_array_equal(scan.channel("rcs"), expected)
+    assert lost > 0
+
+
+def test_a_channel_that_the_scans_have_not_is_one_error_before_training(folder: MakeFolder) -> None:
+    data = folder(OutDet(channels=("x", "y", "z", "dopler")))
+    with pytest.raises(InputError, match="channel 'dopler': no training scan holds a number"):
+        data.setup("fit")
+
+
+def test_what_the_card_says_of_a_channel_is_not_measured(folder: MakeFolder) -> None:
+    data = folder(OutDet(channels=("x", "y", "z", "rcs", "doppler")))
+    data.card = data.card.completed(extra={"rcs": (1.0, 2.0)})
+    data.setup("fit")
+    assert set(data.card.extra) == {"rcs", "doppler"}
+    assert data.card.extra["rcs"] == (1, 2)
