@@ -100,7 +100,7 @@ class SelectionRule:
         names = [field.name for field in fields(cls)]
         if unknown := sorted(set(stated) - set(names)):
             raise InputError("rule", f"{unknown} are no constants of it", f"Known are {names}.")
-        measured = {"full_scale": _full_scale(scans), "ground": _road(scans) + ABOVE_ROAD}
+        measured = {"full_scale": full_scale(scans), "ground": _road(scans) + ABOVE_ROAD}
         known = {name: value for name, value in measured.items() if np.isfinite(value)}
         return cls(**{**known, **stated})
 
@@ -129,8 +129,14 @@ def otsu(values: NDArray[np.float32], bins: int = 256) -> float:
     return float(edges[1:-1][best].mean())
 
 
-def _full_scale(scans: Sequence[Scan]) -> float:
-    """Full scale of the scans' intensities; not a number where none has any."""
+def full_scale(scans: Sequence[Scan]) -> float:
+    """Full scale of the scans' intensities, in their unit; not a number where none has any.
+
+    It is the smallest of FULL_SCALES that no intensity exceeds.
+
+    Args:
+        scans: Scans of one sensor.
+    """
     intensities = [scan.intensity[scan.valid] for scan in scans if scan.intensity is not None]
     if not any(len(intensity) for intensity in intensities):
         return np.nan

@@ -1,31 +1,30 @@
-"""Rain on beams against closed forms, numerical integrals and a loop over beams."""
+"""What rain does to the returns of beams, against numerical integrals and a loop over beams."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from derain.errors import InputError
 from derain.simulation import rain as rain_module
 from derain.simulation.classes import TrackClass
-from derain.simulation.rain import (
-    DROP_REFLECTIVITY,
+from derain.simulation.drops import DROP_REFLECTIVITY, Drops, draw_drops, drop_reflectivity
+from derain.simulation.marshall_palmer import (
     INTERCEPT,
     LARGEST_DROP,
     SMALLEST_DROP,
-    Drops,
-    Rain,
-    draw_drops,
-    drop_reflectivity,
-    farthest_visible_drop,
-    rain_on_beams,
+    draw_diameters,
+    extinction,
+    slope,
 )
+from derain.simulation.rain import rain_on_beams
+from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
 from derain.simulation.sensor import Returns, Sensor
 
 SENSOR = Sensor()
+DUAL, LAST = replace(SENSOR, returns="dual"), replace(SENSOR, returns="last")
 RATES = (10.0, 25.0, 50.0)
 
 
@@ -33,7 +32,10 @@ def surfaces(
     distance: float, reflectivity: float, count: int, label: TrackClass = TrackClass.CAR
 ) -> Returns:
     return Returns(
-        np.full(count, distance), np.full(count, reflectivity), np.full(count, int(label))
+        np.full(count, distance),
+        np.full(count, reflectivity),
+        np.full(count, int(label)),
+        np.arange(count),
     )
 
 
@@ -48,121 +50,14 @@ def random_surfaces(count: int, generator: np.random.Generator) -> Returns:
         np.where(nothing, SENSOR.maximum_range, generator.uniform(1, 100, count)),
         np.where(nothing, 0, 10 ** generator.uniform(-5, 0, count)),
         np.where(nothing, 0, generator.choice([0, 1, 2, 4, 5, 6, 7], count)),
+        np.arange(count),
     )
 
 
-def largest_deviation(sample: NDArray[np.float64], cumulative: NDArray[np.float64]) -> float:
-    """Kolmogorov and Smirnov's statistic times √n: above 1.95 in one of a thousand samples."""
-    steps = np.arange(len(sample) + 1) / len(sample)
-    ahead, behind = np.abs(cumulative - steps[:-1]).max(), np.abs(cumulative - steps[1:]).max()
-    return math.sqrt(len(sample)) * float(max(ahead, behind))
-
-
-@pytest.mark.parametrize(
-    ("rate", "slope", "mean_diameter", "density", "extinction"),
-    [
-        (10, 2.5280, 0.396, 894.0, 1.556e-3),
-        (25, 2.0855, 0.479, 1352.1, 2.771e-3),
-        (50, 1.8030, 0.555, 1801.1, 4.288e-3),
-    ],
-)
-def test_rain_has_the_figures_of_marshall_and_palmer(
-    rate: float, slope: float, mean_diameter: float, density: float, extinction: float
-) -> None:
-    rain = Rain(rate)
-    assert rain.slope == pytest.approx(slope, abs=5e-5)
-    assert 1 / rain.slope == pytest.approx(mean_diameter, abs=5e-4)
-    assert rain.drops_per_cubic_metre == pytest.approx(density, abs=0.05)
-    assert rain.extinction == pytest.approx(extinction, abs=5e-7)
-
-
-@pytest.mark.parametrize("rate", RATES)
-def test_extinction_is_the_integral_over_the_cross_sections_of_all_drops(rate: float) -> None:
-    rain = Rain(rate)
-    diameter = np.linspace(0, 40, 400_001)
-    cross_section = 1e-6 * np.pi / 4 * diameter**2  # m²
-    density = INTERCEPT * np.exp(-rain.slope * diameter)
-    integral = np.trapezoid(2 * cross_section * density, diameter)
-    assert rain.extinction == pytest.approx(integral, rel=1e-6)
-
-
-def test_no_rain_has_no_drops_and_takes_no_light() -> None:
-    clear = Rain(0)
-    assert clear.drops_per_cubic_metre == 0
-    assert clear.extinction == 0
-    assert clear.transmission(np.array([1.0, 100.0])).tolist() == [1, 1]
-
-
-@pytest.mark.parametrize("rate", [-1.0, math.inf, math.nan])
-def test_a_rate_that_is_no_rain_rate_is_refused(rate: float) -> None:
-    with pytest.raises(InputError, match="rain rate"):
-        Rain(rate)
-
-
-@pytest.mark.parametrize("rate", RATES)
-def test_diameters_follow_the_exponential_cut_at_both_ends(rate: float) -> None:
-    rain = Rain(rate)
-    sample = np.sort(rain.draw_diameters(100_000, np.random.default_rng(1)))
-    assert sample[0] >= SMALLEST_DROP
-    assert sample[-1] <= LARGEST_DROP
-
-    tail = np.exp(-rain.slope * np.array([SMALLEST_DROP, LARGEST_DROP]))
-    cumulative = (tail[0] - np.exp(-rain.slope * sample)) / (tail[0] - tail[1])
-    assert largest_deviation(sample, cumulative) < 1.95
-
-    diameter = np.linspace(SMALLEST_DROP, LARGEST_DROP, 100_001)
-    density = np.exp(-rain.slope * diameter)
-    for power in (1, 2, 3):
-        moment = np.trapezoid(diameter**power * density, diameter) / np.trapezoid(density, diameter)
-        error = (sample**power).std() / math.sqrt(len(sample))
-        assert (sample**power).mean() == pytest.approx(moment, abs=4 * error)
-
-
-@pytest.mark.parametrize("rate", RATES)
-def test_drops_per_beam_are_poisson_with_the_volume_of_the_cone(rate: float) -> None:
-    beams, far = 20_000, 12.0
-    drops = draw_drops(Rain(rate), np.full(beams, far), SENSOR, np.random.default_rng(2))
-    counts = np.bincount(drops.beam, minlength=beams)
-
-    half_angle = SENSOR.beam_divergence / 2
-    cone = math.pi / 3 * (far * math.tan(half_angle)) ** 2 * far
-    blind = math.pi / 3 * math.tan(half_angle) ** 2 * SENSOR.minimum_range**3
-    expected = Rain(rate).drops_per_cubic_metre * (cone - blind)
-    assert counts.mean() == pytest.approx(expected, abs=4 * math.sqrt(expected / beams))
-    spread = math.sqrt((expected + 2 * expected**2) / beams)  # of a Poisson sample's variance
-    assert counts.var() == pytest.approx(expected, abs=4 * spread)
-
-
-def test_distances_follow_the_cross_section_of_the_cone() -> None:
-    near, far = SENSOR.minimum_range, 15.0
-    drops = draw_drops(Rain(25), np.full(50_000, far), SENSOR, np.random.default_rng(3))
-    distance = np.sort(drops.range)
-    assert len(distance) > 10_000
-    cumulative = (distance**3 - near**3) / (far**3 - near**3)
-    assert largest_deviation(distance, cumulative) < 1.95
-
-
-def test_a_beam_that_ends_within_the_minimum_range_holds_no_drop() -> None:
-    reach = np.full(10_000, SENSOR.minimum_range / 2)
-    assert len(draw_drops(Rain(50), reach, SENSOR, np.random.default_rng(0)).beam) == 0
-
-
-def test_a_drop_returns_with_the_fourth_power_of_distance_until_it_fills_the_beam() -> None:
-    def power(distance: float) -> float:
-        drops = Drops(np.zeros(1, np.int64), np.array([distance]), np.array([3.0]))
-        return float(drop_reflectivity(drops, SENSOR)[0]) / distance**2
-
-    filled = 3e-3 / SENSOR.beam_spread  # a drop of 3 mm is as wide as the beam at 2 m
-    assert power(2 * filled) / power(4 * filled) == pytest.approx(2**4)
-    assert power(filled / 4) / power(filled / 2) == pytest.approx(2**2)
-    assert power(filled) == pytest.approx(DROP_REFLECTIVITY / filled**2)
-
-
-def test_the_largest_drop_is_at_the_threshold_where_visibility_ends() -> None:
-    horizon = farthest_visible_drop(SENSOR)
-    drop = Drops(np.zeros(1, np.int64), np.array([horizon]), np.array([LARGEST_DROP]))
-    power = drop_reflectivity(drop, SENSOR)[0] / horizon**2
-    assert power == pytest.approx(SENSOR.detection_threshold)
+def rained(clear: Returns, rain: RainField, seed: int, sensor: Sensor = SENSOR) -> Returns:
+    """The returns of beams that point straight ahead."""
+    beams = np.tile([1.0, 0.0, 0.0], (len(clear.range), 1))
+    return rain_on_beams(clear, beams, rain, sensor, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("rate", RATES)
@@ -172,101 +67,127 @@ def test_open_beams_see_as_much_rain_as_the_integral_over_visible_drops(rate: fl
     The visible drops of a beam are a Poisson process, so the share of beams with none is
     exp(−their expected number), here a plain integral over distance.
     """
-    rain, beams = Rain(rate), 40_000
+    beams, steepness = 40_000, float(slope(rate))
     distance = np.linspace(SENSOR.minimum_range, SENSOR.maximum_range, 400_001)
-    needed = SENSOR.detection_threshold * distance**2 * np.exp(2 * rain.extinction * distance)
+    needed = SENSOR.detection_threshold * distance**2 * np.exp(2 * extinction(rate) * distance)
     width = 1e3 * SENSOR.beam_spread * distance * np.sqrt(needed / DROP_REFLECTIVITY)
     width = np.clip(width, SMALLEST_DROP, LARGEST_DROP)
-    density = np.exp(-rain.slope * width) - math.exp(-rain.slope * LARGEST_DROP)
+    density = np.exp(-steepness * width) - math.exp(-steepness * LARGEST_DROP)
     cross_section = math.pi / 4 * (SENSOR.beam_spread * distance) ** 2
-    visible = np.trapezoid(INTERCEPT / rain.slope * density * cross_section, distance)
+    visible = np.trapezoid(INTERCEPT / steepness * density * cross_section, distance)
     share = 1 - math.exp(-visible)
 
-    detected = rain_on_beams(open_air(beams), rain, SENSOR, np.random.default_rng(4))
+    detected = rained(open_air(beams), UniformRain(rate), seed=4)
     error = math.sqrt(share * (1 - share) / beams)
     assert detected.returned.mean() == pytest.approx(share, abs=4 * error)
     assert set(detected.label[detected.returned]) == {TrackClass.RAIN}
 
 
 def test_surfaces_fade_with_the_way_there_and_back() -> None:
-    rain, distance = Rain(50), 30.0
-    clear = surfaces(distance, 0.8, 1000)
-    detected = rain_on_beams(clear, rain, SENSOR, np.random.default_rng(5))
+    distance = 30.0
+    detected = rained(surfaces(distance, 0.8, 1000), UniformRain(50), seed=5)
     kept = detected.label == TrackClass.CAR
     assert kept.sum() > 900
-    assert np.allclose(detected.reflectivity[kept], 0.8 * math.exp(-2 * rain.extinction * distance))
+    assert np.allclose(detected.reflectivity[kept], 0.8 * np.exp(-2 * extinction(50) * distance))
     assert (detected.range[kept] == distance).all()
 
 
-def test_the_strongest_return_of_each_beam_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    generator, rain = np.random.default_rng(6), Rain(25)
-    clear = random_surfaces(300, generator)
-    drops = draw_drops(rain, np.minimum(clear.range, 15), SENSOR, generator)
-    # Ten times the drops, so that many beams hold several visible ones.
-    drops = Drops(
-        np.tile(drops.beam, 10),
-        np.tile(drops.range, 10),
-        rain.draw_diameters(10 * len(drops.beam), generator),
-    )
+def crowded(
+    clear: Returns, generator: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> Drops:
+    """Lets ten times the drops fall, so that many beams hold several visible ones."""
+    some = draw_drops(25, np.minimum(clear.range, 15), SENSOR, generator)
+    diameter = draw_diameters(25, 10 * len(some.beam), generator)
+    drops = Drops(np.tile(some.beam, 10), np.tile(some.range, 10), diameter)
+    # The same place twice is the same range twice: told apart, the last return is one of them.
+    drops = Drops(drops.beam, drops.range * generator.uniform(0.9, 1, len(diameter)), diameter)
     monkeypatch.setattr(rain_module, "draw_drops", lambda *_: drops)
-    detected = rain_on_beams(clear, rain, SENSOR, generator)
+    return drops
 
+
+def test_the_strongest_and_the_last_of_all_that_a_beam_meets_are_reported(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    generator, rain = np.random.default_rng(6), UniformRain(25)
+    clear = random_surfaces(300, generator)
+    drops = crowded(clear, generator, monkeypatch)
     water = drop_reflectivity(drops, SENSOR)
+    strongest, last, dual = (rained(clear, rain, 0, sensor) for sensor in (SENSOR, LAST, DUAL))
+
+    seen_several = 0
     for beam in range(300):
-        candidates = [
-            (float(clear.reflectivity[beam]), float(clear.range[beam]), clear.label[beam])
-        ]
-        candidates += [
-            (float(water[drop]), float(drops.range[drop]), np.int64(TrackClass.RAIN))
+        met = [(clear.reflectivity[beam], clear.range[beam], clear.label[beam])]
+        met += [
+            (water[drop], drops.range[drop], TrackClass.RAIN)
             for drop in np.flatnonzero(drops.beam == beam)
         ]
         received = [
-            (
-                reflectivity * math.exp(-2 * rain.extinction * distance) / distance**2,
-                distance,
-                label,
-            )
-            for reflectivity, distance, label in candidates
+            (reflectivity * np.exp(-2 * extinction(25) * distance) / distance**2, distance, label)
+            for reflectivity, distance, label in met
         ]
-        power, distance, label = max(received, key=lambda candidate: candidate[0])
-        if power < SENSOR.detection_threshold:
-            assert not detected.returned[beam]
-        else:
-            assert detected.power[beam] == pytest.approx(power)
-            assert detected.range[beam] == pytest.approx(distance)
-            assert detected.label[beam] == label
-    assert {"kept", "lost", "rain"} == {
-        "lost" if not seen else "rain" if label == TrackClass.RAIN else "kept"
-        for seen, label in zip(detected.returned, detected.label, strict=True)
-    }
+        detectable = [one for one in received if one[0] >= SENSOR.detection_threshold]
+        by_power = max(detectable, key=lambda one: one[0], default=None)
+        by_range = max(detectable, key=lambda one: one[1], default=None)
+        both = [by_power] if by_power == by_range else [by_power, by_range]
+        seen_several += len(both) == 2
+        for returns, expected in ((strongest, [by_power]), (last, [by_range]), (dual, both)):
+            rows = np.flatnonzero(returns.beam == beam)
+            assert len(rows) == len(expected)
+            for row, one in zip(rows, expected, strict=True):
+                if one is None:
+                    assert not returns.returned[row]
+                else:
+                    assert returns.power[row] == pytest.approx(one[0])
+                    assert returns.range[row] == pytest.approx(one[1])
+                    assert returns.label[row] == one[2]
+    assert seen_several > 20
+    kinds = np.where(strongest.returned, strongest.label == TrackClass.RAIN, -1)
+    assert set(kinds) == {-1, 0, 1}  # lost, kept, rain
 
 
 @settings(max_examples=25, deadline=None)
-@given(rate=st.floats(0, 200), seed=st.integers(0, 2**32))
-def test_a_beam_is_kept_weaker_or_ends_at_a_drop_in_front_or_is_lost(
-    rate: float, seed: int
+@given(
+    rate=st.floats(0, 200),
+    seed=st.integers(0, 2**32),
+    sensor=st.sampled_from([SENSOR, LAST, DUAL, replace(SENSOR, aperture=0.01)]),
+)
+def test_energy_never_grows_and_a_beam_is_kept_weaker_or_ends_at_a_drop_or_is_lost(
+    rate: float, seed: int, sensor: Sensor
 ) -> None:
-    generator = np.random.default_rng(seed)
-    clear = random_surfaces(2000, generator)
-    detected = rain_on_beams(clear, Rain(rate), SENSOR, generator)
+    clear = random_surfaces(2000, np.random.default_rng(seed))
+    detected = rained(clear, UniformRain(rate), seed, sensor)
     returned = detected.returned
     wet = returned & (detected.label == TrackClass.RAIN)
     kept = returned & ~wet
+    beam = detected.beam
 
-    assert (detected.power[returned] >= SENSOR.detection_threshold).all()
-    assert (detected.range[kept] == clear.range[kept]).all()
-    assert (detected.label[kept] == clear.label[kept]).all()
-    assert (detected.reflectivity[kept] <= clear.reflectivity[kept]).all()
-    assert (detected.range[wet] <= clear.range[wet]).all()
-    assert (detected.range[wet] >= SENSOR.minimum_range).all()
+    assert set(beam) == set(range(2000))
+    assert (np.diff(beam) >= 0).all()
+    assert (detected.power[returned] >= sensor.detection_threshold * (1 - 1e-12)).all()
+    assert (detected.range[kept] == clear.range[beam[kept]]).all()
+    assert (detected.label[kept] == clear.label[beam[kept]]).all()
+    assert (detected.reflectivity[kept] <= clear.reflectivity[beam[kept]]).all()
+    assert (detected.range[wet] <= clear.range[beam[wet]]).all()
+    assert (detected.range[wet] >= sensor.minimum_range * (1 - 1e-12)).all()
     assert (detected.reflectivity[wet] <= DROP_REFLECTIVITY).all()
     assert (detected.label[~returned] == TrackClass.BACKGROUND).all()
-    assert (detected.range[~returned] == SENSOR.maximum_range).all()
+    assert (detected.range[~returned] == sensor.maximum_range).all()
+
+
+def test_the_last_return_reports_less_rain_than_the_strongest() -> None:
+    clear = surfaces(60.0, 0.05, 20_000)
+    strongest, last, dual = (
+        rained(clear, UniformRain(50), 1, sensor) for sensor in (SENSOR, LAST, DUAL)
+    )
+    rain = [(returns.label == TrackClass.RAIN).sum() for returns in (strongest, last, dual)]
+    assert rain[1] == 0  # a surface that is seen is behind every drop
+    assert rain[0] == rain[2] > 1000
+    assert len(dual.range) == 20_000 + rain[0]
 
 
 def test_clear_air_leaves_what_the_threshold_lets_through() -> None:
     clear = random_surfaces(5000, np.random.default_rng(7))
-    detected = rain_on_beams(clear, Rain(0), SENSOR, np.random.default_rng(8))
+    detected = rained(clear, UniformRain(0), seed=8)
     visible = clear.power >= SENSOR.detection_threshold
     assert 0 < visible.sum() < 5000
     assert (detected.returned == visible).all()
@@ -274,26 +195,38 @@ def test_clear_air_leaves_what_the_threshold_lets_through() -> None:
     assert (detected.label[visible] == clear.label[visible]).all()
 
 
-def test_more_rain_loses_more_surfaces() -> None:
+def test_more_rain_loses_more_of_the_surfaces_that_clear_air_shows() -> None:
     clear = random_surfaces(50_000, np.random.default_rng(9))
-    kept = []
+    visible = clear.power >= SENSOR.detection_threshold
+    kept, lost = [], []
     for rate in (0, *RATES, 100):
-        detected = rain_on_beams(clear, Rain(rate), SENSOR, np.random.default_rng(10))
+        detected = rained(clear, UniformRain(rate), seed=10)
         kept.append(np.count_nonzero(detected.returned & (detected.label != TrackClass.RAIN)))
-    # Each step loses far more than the few hundred that chance could give back.
+        lost.append(np.count_nonzero(visible & ~detected.returned))
+    # Each step changes more than the two hundred that chance could give back.
     assert (np.diff(kept) < -400).all(), kept
+    assert (np.diff(lost) > 200).all(), lost
+
+
+def test_it_rains_where_the_field_says_so() -> None:
+    beams = Sensor(azimuth=(-180, 180), inclination=(-1, 1), rows=20, columns=2000).beams()
+    clear = open_air(len(beams))
+    detected = rain_on_beams(clear, beams, SprinkledRain(50), SENSOR, np.random.default_rng(12))
+    x, y, _ = (beams * detected.range[:, None])[detected.returned].T
+    assert len(x) > 1000
+    assert (np.abs(y) < 14).all()  # where the sprinklers throw no more
+    assert (x > -16).all()
+    assert np.count_nonzero(x > 8) > 50
 
 
 def test_a_seed_gives_the_same_rain_again() -> None:
     clear = random_surfaces(2000, np.random.default_rng(11))
-    first, again, other = (
-        rain_on_beams(clear, Rain(25), SENSOR, np.random.default_rng(seed)) for seed in (1, 1, 2)
-    )
+    first, again, other = (rained(clear, UniformRain(25), seed) for seed in (1, 1, 2))
     assert (first.range == again.range).all()
     assert (first.reflectivity == again.reflectivity).all()
     assert (first.range != other.range).any()
 
 
 def test_a_scan_without_beams_stays_empty() -> None:
-    detected = rain_on_beams(open_air(0), Rain(25), SENSOR, np.random.default_rng(0))
-    assert len(detected.range) == 0
+    for sensor in (SENSOR, LAST, DUAL):
+        assert len(rained(open_air(0), UniformRain(25), 0, sensor).range) == 0

@@ -1,11 +1,15 @@
 """The sensor's beams and its measurement."""
 
+import json
 import math
+from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from derain.simulation.sensor import Returns, Sensor
+from derain.errors import InputError
+from derain.simulation.sensor import Returns, Sensor, load_sensor, packaged_sensors
 
 SENSOR = Sensor(rows=20, columns=50)
 BEAMS = SENSOR.rows * SENSOR.columns
@@ -17,6 +21,7 @@ def returns(generator: np.random.Generator) -> Returns:
         np.where(seen, generator.uniform(2, 100, BEAMS), SENSOR.maximum_range),
         np.where(seen, generator.uniform(0.01, 1, BEAMS), 0),
         np.where(seen, generator.integers(0, 8, BEAMS), 0),
+        np.arange(BEAMS),
     )
 
 
@@ -34,7 +39,20 @@ def test_the_volume_of_a_beam_is_the_integral_over_its_cross_section() -> None:
     distance = np.linspace(2, 50, 100_001)
     radius = distance * math.tan(SENSOR.beam_divergence / 2)
     integral = np.trapezoid(np.pi * radius**2, distance)
-    assert SENSOR.beam_volume(2, np.array([50.0])) == pytest.approx(integral)
+    assert SENSOR.beam_volume(np.array([2.0]), np.array([50.0])) == pytest.approx(integral)
+
+
+def test_a_full_circle_holds_no_direction_twice() -> None:
+    sensor = replace(SENSOR, azimuth=(-180, 180), rows=1, columns=8)
+    x, y, _ = sensor.beams().T
+    azimuth = np.sort(np.degrees(np.arctan2(y, x)) % 360)
+    assert np.allclose(np.diff(azimuth), 45)
+
+
+def test_rows_lie_where_they_are_stated() -> None:
+    sensor = replace(SENSOR, rows=3, row_inclinations=(5.0, 0.0, -12.0))
+    inclination = np.degrees(np.arcsin(sensor.beams()[:, 2])).reshape(3, -1)
+    assert np.allclose(inclination, np.array([[5.0], [0.0], [-12.0]]))
 
 
 def test_a_scan_holds_the_beams_that_returned_in_their_order() -> None:
@@ -45,6 +63,15 @@ def test_a_scan_holds_the_beams_that_returned_in_their_order() -> None:
     assert (scan.label == given.label[given.returned]).all()
     direction = scan.xyz / np.linalg.norm(scan.xyz, axis=1, keepdims=True)
     assert np.allclose(direction, SENSOR.beams()[given.returned], atol=1e-6)
+
+
+def test_two_returns_of_a_beam_lie_along_it() -> None:
+    beam = np.array([3, 3, 7])
+    given = Returns(np.array([5.0, 60, 10]), np.full(3, 0.5), np.array([3, 1, 7]), beam)
+    scan = SENSOR.measure(given, np.random.default_rng(0))
+    assert np.allclose(scan.xyz / scan.range[:, None], SENSOR.beams()[beam], atol=1e-6)
+    assert scan.label is not None
+    assert scan.label.tolist() == [3, 1, 7]
 
 
 def test_measured_distance_and_intensity_scatter_as_stated() -> None:
@@ -66,9 +93,73 @@ def test_measured_distance_and_intensity_scatter_as_stated() -> None:
 
 
 def test_intensity_stays_within_its_scale() -> None:
-    extreme = Returns(np.full(BEAMS, 5.0), np.tile([1e-4, 1.0], BEAMS // 2), np.zeros(BEAMS, int))
+    reflectivity = np.tile([1e-4, 1.0], BEAMS // 2)
+    label, beam = np.zeros(BEAMS, int), np.arange(BEAMS)
+    extreme = Returns(np.full(BEAMS, 5.0), reflectivity, label, beam)
     scan = SENSOR.measure(extreme, np.random.default_rng(4))
     assert scan.intensity is not None
     assert scan.intensity.min() == 0
     assert scan.intensity.max() == 255
     assert scan.intensity.dtype == scan.xyz.dtype == np.float32
+
+
+def test_packaged_sensors_have_the_beams_of_their_names() -> None:
+    beams = {name: len(load_sensor(name).beams()) for name in packaged_sensors()}
+    assert beams == {
+        "mems_256": 256 * 1150,
+        "mems_64": 64 * 400,
+        "spinning_128": 128 * 2048,
+        "spinning_64": 64 * 2048,
+    }
+    assert load_sensor("mems_64") == Sensor()
+
+
+def test_every_packaged_sensor_is_written_out_in_full_and_survives_json() -> None:
+    for name in packaged_sensors():
+        stated = set(packaged_sensors()[name].read_text().replace(":", " ").split())
+        assert set(asdict(Sensor())) - {"row_inclinations"} <= stated
+        content = json.loads(json.dumps(asdict(load_sensor(name))))
+        again = {
+            key: tuple(value) if isinstance(value, list) else value
+            for key, value in content.items()
+        }
+        assert Sensor(**again) == load_sensor(name)
+
+
+def test_a_sensor_file_states_what_differs_from_the_defaults(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text("rows: 32\nreturns: dual\nazimuth: [-180, 180]\n")
+    assert load_sensor(path) == Sensor(rows=32, returns="dual", azimuth=(-180, 180))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "rows: 0",
+        "rows: 64.5",
+        "columns: -1",
+        "colour: red",
+        "azimuth: [10, -10]",
+        "azimuth: [-200, 200]",
+        "inclination: [5]",
+        "rows: 3\nrow_inclinations: [1, 2]",
+        "detection_threshold: 4e-6",  # a text, to YAML
+        "maximum_range: .inf",
+        "minimum_range: .nan",
+        "returns: first",
+        "frame_rate: 0",
+        "rows: [",
+        "just text",
+        "",
+    ],
+)
+def test_a_file_that_describes_no_sensor_is_refused(content: str, tmp_path: Path) -> None:
+    path = tmp_path / "broken.yaml"
+    path.write_text(content)
+    with pytest.raises(InputError, match="does not describe a sensor"):
+        load_sensor(path)
+
+
+def test_a_sensor_that_is_nowhere_is_refused() -> None:
+    with pytest.raises(InputError, match="mems_256"):
+        load_sensor("mems_257")

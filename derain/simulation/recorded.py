@@ -1,0 +1,149 @@
+"""Rain on scans that were recorded in clear air."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.scan import Scan
+from derain.selection_rule import full_scale
+from derain.simulation.classes import TrackClass
+from derain.simulation.rain import rain_on_beams
+from derain.simulation.rain_field import RainField
+from derain.simulation.recorded_beams import RecordedBeams, find_beams
+from derain.simulation.rewriting import with_intensity, with_points
+from derain.simulation.sensor import FULL_SCALE_INTENSITY, Returns, Sensor
+
+# What everything is taken to reflect in a scan without intensities: a tenth, which the ranges of
+# LiDARs are stated for.
+USUAL_REFLECTIVITY = 0.1
+
+
+def rain_on_scan(
+    scan: Scan, rain: RainField, sensor: Sensor, generator: np.random.Generator
+) -> Scan:
+    """Lets it rain on a scan that was recorded in clear air.
+
+    A return stays where it is and gets darker, or a drop in front of it takes its place, or it is
+    lost. A beam that returned nothing may hit a drop; see :func:`find_beams` for how such beams are
+    found. Returns nearer than the sensor's minimum range are the vehicle's own and stay as they
+    are, and so do points of a radar. Of two returns of one beam, in two rows, each is treated as a
+    beam's only one, so that such beams meet twice the drops; columns of a second return in the
+    same row stay.
+
+    Reflectivity is the intensity as a share of its full scale (1, 255 or 65,535), or a tenth where
+    the scan has none. What should have been too dark for ``sensor`` was seen nevertheless. How far
+    above the threshold it was nobody knows: it is taken to be above twice the threshold with
+    probability 1/2, above ten times with 1/10, and so on, so that it is lost with the share of the
+    light that the rain takes.
+
+    Args:
+        scan: The scan. Its file's columns of coordinates, intensity, and range or distance follow
+            what happens; all others are kept.
+        rain: The rain.
+        sensor: Tells how wide the beams are, and what is seen of drops. Where its beams point does
+            not matter. It reports the last return, or else the strongest.
+        generator: Source of chance.
+
+    Returns:
+        The scan in the rain, with labels: TrackClass.RAIN, and what the scan had or 0 elsewhere.
+        Rows come in the order of ``scan``. A lost one looks like the empty cells of an organised
+        scan (without any, it is NaN) and is left out of any other scan. A drop on a beam that had
+        returned nothing fills its cell; without a cell it becomes a row at the end, whose other
+        columns are those of the return before it in its row of the sensor's grid.
+    """
+    beams = find_beams(scan, generator)
+    exposed = _exposed(scan, beams, sensor)
+    row, direction = beams.row[exposed], beams.direction[exposed]
+    clear = _clear_air(scan, row, beams.returned[exposed], sensor, generator)
+    one_return = replace(sensor, returns="last" if sensor.returns == "last" else "strongest")
+    detected = rain_on_beams(clear, direction, rain, one_return, generator)
+
+    rained = _with_drops(scan.take(beams.row), exposed, direction, detected, sensor, generator)
+    if scan.intensity is not None:
+        intensity = _intensity(scan, row, clear, detected, sensor, generator)
+        rained = with_intensity(rained, exposed[detected.returned], intensity[detected.returned])
+    if scan.shape is None:
+        return rained.take(np.delete(np.arange(len(rained)), exposed[~detected.returned]))
+    lost = exposed[clear.returned & ~detected.returned]
+    return replace(_emptied(rained, lost, scan), shape=scan.shape)
+
+
+def _exposed(scan: Scan, beams: RecordedBeams, sensor: Sensor) -> NDArray[np.int64]:
+    """Numbers of the beams that it rains on, int64 (E,)."""
+    too_near = beams.returned & (scan.range[beams.row] < sensor.minimum_range)
+    return np.flatnonzero(np.isfinite(beams.direction[:, 0]) & ~too_near)
+
+
+def _clear_air(
+    scan: Scan,
+    row: NDArray[np.int64],
+    returned: NDArray[np.bool_],
+    sensor: Sensor,
+    generator: np.random.Generator,
+) -> Returns:
+    """What beams returned through clear air, strong enough to have been seen."""
+    range_ = np.where(returned, scan.range[row].astype(np.float64), sensor.maximum_range)
+    if scan.intensity is None:
+        reflectivity = np.full(len(row), USUAL_REFLECTIVITY)
+    else:
+        reflectivity = np.clip(scan.intensity[row] / full_scale([scan]), 0, 1).astype(np.float64)
+    needed = sensor.detection_threshold * range_**2
+    # A draw is within [0, 1), and 1 minus it above 0.
+    excess = 1 / (1 - generator.random(len(row)))
+    reflectivity = np.where(reflectivity < needed, needed * excess, reflectivity)
+    return Returns(
+        range_,
+        np.where(returned, reflectivity, 0),
+        np.full(len(row), TrackClass.BACKGROUND, np.int64),
+        np.arange(len(row)),
+    )
+
+
+def _with_drops(
+    scan: Scan,
+    exposed: NDArray[np.int64],
+    direction: NDArray[np.float64],
+    detected: Returns,
+    sensor: Sensor,
+    generator: np.random.Generator,
+) -> Scan:
+    """Puts the drops that were detected in the rows of their beams, and labels every row."""
+    wet = detected.label == TrackClass.RAIN
+    distance = sensor.measured_range(detected.range[wet], generator)
+    label = np.zeros(len(scan), np.int64) if scan.label is None else scan.label.copy()
+    kept = detected.returned & ~wet
+    label[exposed] = np.where(kept, label[exposed], detected.label)
+    moved = with_points(scan, exposed[wet], direction[wet] * distance[:, None])
+    return moved.with_label(label)
+
+
+def _intensity(
+    scan: Scan,
+    row: NDArray[np.int64],
+    clear: Returns,
+    detected: Returns,
+    sensor: Sensor,
+    generator: np.random.Generator,
+) -> NDArray[np.float64]:
+    """Intensity of every detected return in the scan's unit, float64 (E,)."""
+    assert scan.intensity is not None
+    wet = detected.label == TrackClass.RAIN
+    kept = detected.returned & ~wet
+    intensity = scan.intensity[row].astype(np.float64)
+    # Not of its reflectivity anew, which may be a guess: the recorded value, dimmed as much.
+    intensity[kept] *= detected.reflectivity[kept] / clear.reflectivity[kept]
+    share = sensor.measured_intensity(detected.reflectivity[wet], generator) / FULL_SCALE_INTENSITY
+    intensity[wet] = full_scale([scan]) * share
+    return intensity
+
+
+def _emptied(rained: Scan, rows: NDArray[np.int64], scan: Scan) -> Scan:
+    """Makes rows of an organised scan look like the empty cells that it had in clear air."""
+    pattern = np.flatnonzero(~scan.valid)[:1]
+    xyz = scan.xyz[pattern].astype(np.float64) if len(pattern) else np.full((1, 3), np.nan)
+    rained = with_points(rained, rows, np.repeat(xyz, len(rows), axis=0))
+    if scan.intensity is None:
+        return rained
+    intensity = scan.intensity[pattern].astype(np.float64) if len(pattern) else np.zeros(1)
+    return with_intensity(rained, rows, np.repeat(intensity, len(rows)))

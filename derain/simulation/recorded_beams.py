@@ -1,0 +1,131 @@
+"""Finds the beams behind a recorded scan, those that returned nothing included."""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.directions import directions
+from derain.grid_fit import GridFit, fit_grid
+from derain.scan import Scan
+
+# Rounds of the median polish: as many as sensors take whose lasers point to a few distinct sides.
+ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedBeams:
+    """The beams of a recorded scan: first one for each of its N rows, then those without a row.
+
+    Attributes:
+        row: Row of the scan that stands for each beam, int64 (B,): its own; of beams without one,
+            that of the return before them in the same row of the sensor's grid.
+        direction: Unit vectors, float64 (B, 3), sensor frame; not a number where it is not known.
+        returned: True for the beams that returned, bool (B,).
+    """
+
+    row: NDArray[np.int64]
+    direction: NDArray[np.float64]
+    returned: NDArray[np.bool_]
+
+
+def find_beams(scan: Scan, generator: np.random.Generator) -> RecordedBeams:
+    """Finds the beams of a scan.
+
+    Every return is a beam of its own, along its own direction: none is lost to another in the same
+    cell of a grid. What returned nothing is told from where nothing is:
+
+    - An organised scan has a cell for each beam. The direction of an empty one is the sum of what
+      is usual of its row and of its column; cells in rows or columns without any return have none.
+    - For any other scan a grid is fitted, see :func:`derain.grid_fit.fit_grid`. Its empty pixels
+      are beams, except for as many as there are returns that share a pixel with another: those left
+      their own pixels empty, chance says which. The grid is in ascending order by construction, and
+      its azimuths wrap around.
+
+    Args:
+        scan: The scan. Rows that are not valid, or of a radar, are empty cells or no beams.
+        generator: Source of chance.
+
+    Source: what REHEARSE-3D's Algorithm 1 is for, by other means.
+    """
+    valid = scan.valid if scan.radar is None else scan.valid & ~scan.radar
+    own = np.full((len(scan), 3), np.nan)
+    xyz = scan.xyz[valid].astype(np.float64)
+    own[valid] = xyz / np.linalg.norm(xyz, axis=1, keepdims=True)
+    rows = np.arange(len(scan))
+    if scan.shape is not None:
+        direction = np.where(valid[:, None], own, _cell_directions(scan, valid))
+        return RecordedBeams(rows, direction, valid)
+    if not valid.any():
+        return RecordedBeams(rows, own, valid)
+    before, direction = _unreturned(scan, valid, generator)
+    return RecordedBeams(
+        np.concatenate([rows, before]),
+        np.concatenate([own, direction]),
+        np.concatenate([valid, np.zeros(len(before), bool)]),
+    )
+
+
+def _cell_directions(scan: Scan, valid: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Usual direction of every cell of an organised scan, float64 (N, 3)."""
+    assert scan.shape is not None
+    angles = np.full((2, len(scan)), np.nan)
+    angles[:, valid] = directions(scan.xyz[valid])
+    azimuth, inclination = angles.reshape(2, *scan.shape)
+    # Cells of a column look much the same way: nearer than half a turn to the first that returned.
+    first = np.argmax(np.isfinite(azimuth), axis=0)
+    reference = azimuth[first, np.arange(azimuth.shape[1])]
+    azimuth = reference + (azimuth - reference + 180) % 360 - 180
+    return _unit_vectors(_polished(azimuth).ravel(), _polished(inclination.T).T.ravel())
+
+
+def _polished(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sum of a column's and a row's effect in every cell, of (H, W) angles or NaN.
+
+    Columns come first, and should differ most: what is missing of one must not pass for an effect.
+
+    Source: Tukey 1977, "Exploratory Data Analysis", the median polish.
+    """
+    of_row = np.zeros((angle.shape[0], 1))
+    of_column = np.zeros((1, angle.shape[1]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of an empty row or column: NaN is meant
+        for _ in range(ROUNDS):
+            of_column = np.nanmedian(angle - of_row, axis=0, keepdims=True)
+            of_row = np.nanmedian(angle - of_column, axis=1, keepdims=True)
+    return of_row + of_column
+
+
+def _unreturned(
+    scan: Scan, valid: NDArray[np.bool_], generator: np.random.Generator
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Row of the return before, int64 (E,), and direction, float64 (E, 3), of unreturned beams."""
+    seen = np.flatnonzero(valid)
+    fit = fit_grid([scan.take(seen)])
+    pixels = fit.grid.rows * fit.grid.columns
+    pixel = fit.grid.pixel(scan.xyz[seen])
+    empty = np.setdiff1d(np.arange(pixels), pixel)
+    count = np.clip(pixels - len(seen), 0, len(empty))
+    chosen = np.sort(generator.choice(empty, count, replace=False))
+    by_pixel = np.argsort(pixel, kind="stable")
+    before = np.searchsorted(pixel[by_pixel], chosen) - 1
+    return seen[by_pixel[np.maximum(before, 0)]], _pixel_directions(fit, chosen)
+
+
+def _pixel_directions(fit: GridFit, pixel: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Direction of the beam of each pixel, or of the pixel's middle, float64 (P, 3)."""
+    row, column = np.divmod(pixel, fit.grid.columns)
+    edges = np.array(fit.grid.edges)
+    inclination = np.array(fit.beams) if fit.beams else (edges[:-1] + edges[1:]) / 2
+    right, left = fit.grid.azimuth
+    azimuth = left - (column + 0.5) * (left - right) / fit.grid.columns
+    return _unit_vectors(azimuth, inclination[row])
+
+
+def _unit_vectors(
+    azimuth: NDArray[np.float64], inclination: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    azimuth, inclination = np.radians(azimuth), np.radians(inclination)
+    level = np.cos(inclination)
+    return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(inclination)], axis=1)

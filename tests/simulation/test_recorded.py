@@ -1,0 +1,248 @@
+"""Rain on recorded scans: what it does to their rows, on made and on real scans."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from derain.files import read_scan, write_scan
+from derain.hard_cases import hard_cases, scene
+from derain.scan import Scan
+from derain.simulation.classes import TrackClass
+from derain.simulation.drops import DROP_REFLECTIVITY, farthest_visible_drop
+from derain.simulation.rain_field import SprinkledRain, UniformRain
+from derain.simulation.recorded import rain_on_scan
+from derain.simulation.sensor import Sensor
+
+SENSOR = Sensor()
+FILES = (
+    "hesai_at128_front.pcd",
+    "kitti_front.bin",
+    "kitti_hdl64.bin",
+    "ouster_os0_32_dual.npz",
+    "ouster_os1_128.npz",
+    "pandaset_pandar64.pcd",
+    "velodyne_vlp16_dual.pcd",
+)
+# Beyond this a measured distance is off in one of a million drops.
+NOISE = 6 * SENSOR.range_noise
+
+
+def rained(scan: Scan, rate: float, seed: int = 0) -> Scan:
+    return rain_on_scan(scan, UniformRain(rate), SENSOR, np.random.default_rng(seed))
+
+
+def is_rain(scan: Scan) -> NDArray[np.bool_]:
+    assert scan.label is not None
+    return scan.label == TrackClass.RAIN
+
+
+def numbered(scan: Scan) -> Scan:
+    """The scan with the number of every row in a column, which follows the row."""
+    return replace(scan, fields={**scan.fields, "number": np.arange(len(scan))})
+
+
+def in_place(wet: Scan) -> NDArray[np.bool_]:
+    """True for rows in the order that they had, as far as it goes: appended ones follow."""
+    return np.append(True, np.diff(wet.fields["number"]) > 0).cumprod().astype(bool)
+
+
+def equal(first: NDArray[Any], second: NDArray[Any]) -> bool:
+    """Whether two columns are the same, bit for bit."""
+    floating = first.dtype.kind == "f"
+    return first.dtype == second.dtype and np.array_equal(first, second, equal_nan=floating)
+
+
+@pytest.fixture(scope="module", params=FILES)
+def clear(request: pytest.FixtureRequest, shared: Path) -> Scan:
+    """Each of the clean scans."""
+    return read_scan(shared / "data" / "clean" / request.param)
+
+
+@pytest.fixture(scope="module")
+def wet(clear: Scan) -> Scan:
+    """The same scan in heavy rain, with the number that every row had."""
+    return rained(numbered(clear), 50)
+
+
+def test_clear_air_changes_nothing_of_a_real_scan(clear: Scan) -> None:
+    same = rained(clear, 0)
+    assert same.shape == clear.shape
+    assert not is_rain(same).any()
+    assert equal(same.xyz, clear.xyz)
+    for name, column in clear.fields.items():
+        assert equal(same.fields[name], column), name
+
+
+def test_drops_on_a_real_scan_lie_on_its_beams_in_front_of_what_was_there(
+    clear: Scan, wet: Scan
+) -> None:
+    drops = is_rain(wet)
+    assert drops.sum() > 0.02 * len(drops)
+    assert wet.valid[drops].all()
+    assert (wet.range[drops] < farthest_visible_drop(SENSOR) + NOISE).all()
+
+    number = wet.fields["number"]
+    replaced = drops & in_place(wet) & clear.valid[number]
+    assert 0 < replaced.sum() < drops.sum()  # some are on beams that had returned nothing
+    before, after = clear.take(number[replaced]), wet.take(replaced)
+    assert (after.range < before.range + NOISE).all()
+    cosine = (after.xyz * before.xyz).sum(axis=1) / (after.range * before.range)
+    assert cosine == pytest.approx(1, abs=1e-5)
+
+
+def test_what_rain_leaves_of_a_real_scan_stays_to_the_bit_and_in_order(
+    clear: Scan, wet: Scan
+) -> None:
+    kept = wet.take(wet.valid & ~is_rain(wet))
+    number = kept.fields["number"]
+    assert (np.diff(number) > 0).all()
+    assert len(number) > 0.5 * clear.valid.sum()
+
+    before = clear.take(number)
+    assert equal(kept.xyz, before.xyz)
+    for name, column in before.fields.items():
+        if name not in ("intensity", "reflectivity"):
+            assert equal(kept.fields[name], column), name
+    if before.intensity is not None and kept.intensity is not None:
+        assert (kept.intensity <= before.intensity).all()
+        assert (kept.intensity < before.intensity).any()
+
+
+def test_every_row_of_a_real_scan_is_kept_or_gives_way_to_a_drop_or_is_lost(
+    clear: Scan, wet: Scan
+) -> None:
+    number = wet.fields["number"]
+    if clear.shape is not None:
+        assert wet.shape == clear.shape
+        assert (number == np.arange(len(clear))).all()
+        assert (clear.valid | is_rain(wet) | ~wet.valid).all()
+        return
+    appended = ~in_place(wet)
+    assert is_rain(wet)[appended].all()
+    assert appended.sum() > 100
+
+
+def test_more_rain_leaves_less_of_a_real_scan(clear: Scan) -> None:
+    rates = (0, 10, 25, 50)
+    kept = [
+        np.count_nonzero(~is_rain(wet) & wet.valid) for wet in (rained(clear, r) for r in rates)
+    ]
+    gone = clear.valid.sum() - np.array(kept)
+    assert gone[0] == 0
+    assert gone[-1] > 0
+    assert (np.diff(gone) >= -4 * np.sqrt(gone[:-1])).all(), gone
+
+
+def test_a_rained_real_scan_can_be_written_in_its_own_format(clear: Scan, tmp_path: Path) -> None:
+    wet = rained(clear, 25)
+    path = tmp_path / Path(clear.name).name
+    write_scan(path, wet)
+    again = read_scan(path)
+    assert equal(again.xyz, wet.xyz)
+    assert again.shape == wet.shape
+    for name, column in wet.fields.items():
+        assert equal(again.fields[name], column), name
+
+
+@pytest.mark.parametrize(("name", "scan"), list(hard_cases(5000)))
+def test_hard_scans_stay_finite_where_they_were(name: str, scan: Scan) -> None:
+    for rain in (UniformRain(0), UniformRain(50), SprinkledRain(50)):
+        wet = rain_on_scan(scan, rain, SENSOR, np.random.default_rng(0))
+        assert wet.valid[is_rain(wet)].all(), name
+        # Invalid rows stay, and no others come.
+        assert equal(wet.xyz[~wet.valid], scan.xyz[~scan.valid]), name
+        assert (wet.intensity is None) == (scan.intensity is None)
+
+
+def wall(distance: float, intensity: float, shape: tuple[int, int] | None = (40, 200)) -> Scan:
+    sensor = Sensor(rows=40, columns=200, azimuth=(-40, 40), inclination=(-10, 10))
+    xyz = (sensor.beams() * distance).astype(np.float32)
+    return Scan(xyz, np.full(len(xyz), intensity, np.float32), shape=shape)
+
+
+def test_a_dark_return_is_lost_with_the_share_of_light_that_rain_takes() -> None:
+    clear = wall(60.0, 0.0, shape=None)
+    assert clear.intensity is not None
+    clear.intensity[0] = 255  # the full scale
+    sensor = Sensor(minimum_range=59.0, maximum_range=61.0)  # too far off to see a drop
+    wet = rain_on_scan(clear, UniformRain(10), sensor, np.random.default_rng(1))
+    share = np.exp(-2 * 1.556e-3 * 60)
+    error = np.sqrt(share * (1 - share) / len(clear))
+    assert len(wet) / len(clear) == pytest.approx(share, abs=4 * error)
+
+
+def test_a_bright_return_is_kept_and_dimmed_by_the_light_that_rain_takes() -> None:
+    clear = wall(40.0, 200.0)
+    wet = rained(clear, 25)
+    kept = ~is_rain(wet)
+    assert wet.valid.all()
+    assert kept.sum() > 0.8 * len(kept)
+    assert wet.intensity is not None
+    assert wet.intensity[kept] == pytest.approx(200 * np.exp(-2 * 2.771e-3 * 40), rel=1e-3)
+
+
+@pytest.mark.parametrize("full_scale", [1.0, 255.0, 65_535.0])
+def test_drops_are_as_bright_as_water_on_the_scale_of_the_scan(full_scale: float) -> None:
+    clear = wall(40.0, full_scale)
+    wet = rained(clear, 50)
+    drops = is_rain(wet)
+    assert wet.intensity is not None
+    share = wet.intensity[drops] / full_scale
+    assert 0.1 * DROP_REFLECTIVITY < share.mean() < DROP_REFLECTIVITY
+
+
+@pytest.mark.parametrize(("gaps", "nothing"), [(0, np.nan), (1, np.nan), (1, 0.0)])
+def test_a_lost_return_looks_like_an_empty_cell_or_is_not_a_number(
+    gaps: int, nothing: float
+) -> None:
+    clear = wall(110.0, 0.0)
+    clear.xyz[:gaps] = nothing
+    wet = rained(clear, 50)
+    lost = wet.xyz[~wet.valid]
+    assert len(lost) > 1000
+    assert equal(lost, np.full_like(lost, nothing))
+
+
+def test_labels_are_kept_where_nothing_happens() -> None:
+    clear = wall(110.0, 0.0)
+    wet = rained(clear.with_label(np.full(len(clear), 5)), 50)
+    assert wet.label is not None
+    assert set(wet.label[wet.valid]) == {5, TrackClass.RAIN}
+    assert set(wet.label[~wet.valid]) == {TrackClass.BACKGROUND}
+
+
+def test_points_of_a_radar_stay_and_no_drop_is_one() -> None:
+    clear = wall(110.0, 0.0, shape=None)
+    radar = np.arange(len(clear)) % 2 == 0
+    wet = rained(replace(clear, radar=radar), 50)
+    assert wet.radar is not None
+    assert len(wet) < len(clear)
+    assert equal(wet.xyz[wet.radar], clear.xyz[radar])
+    assert not wet.radar[is_rain(wet)].any()
+
+
+def test_what_is_nearer_than_the_sensor_sees_stays() -> None:
+    near = wall(0.5, 0.0, shape=None)
+    assert equal(rained(near, 200).xyz[: len(near)], near.xyz)
+
+
+def test_a_seed_gives_the_same_rain_again() -> None:
+    clear = Scan.of(scene())
+    first, again, other = (rained(clear, 50, seed) for seed in (1, 1, 2))
+    assert np.array_equal(first.xyz, again.xyz)
+    assert np.array_equal(first.intensity, again.intensity)
+    assert not np.array_equal(first.xyz, other.xyz)
+
+
+def test_rain_falls_only_where_the_field_has_any() -> None:
+    clear = wall(100.0, 255.0)
+    here, elsewhere = (
+        rain_on_scan(clear, SprinkledRain(50, (0.0, drift)), SENSOR, np.random.default_rng(0))
+        for drift in (0.0, 1000.0)
+    )
+    assert is_rain(here).sum() > 100
+    assert not is_rain(elsewhere).any()

@@ -1,0 +1,127 @@
+"""The beams behind recorded scans, against sensors whose beams are known."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from derain.files import read_scan
+from derain.hard_cases import hard_cases
+from derain.scan import Scan
+from derain.simulation.recorded_beams import RecordedBeams, find_beams
+from derain.simulation.sensor import Sensor
+
+# Half a step off, so that beams lie in the middle of the columns of a grid from -180 to 180.
+HALF_STEP = 180 / 512
+SENSOR = Sensor(
+    azimuth=(-180 - HALF_STEP, 180 - HALF_STEP), inclination=(-20, 10), rows=32, columns=512
+)
+ORGANISED = ("ouster_os1_128.npz", "ouster_os0_32_dual.npz", "pandaset_pandar64.pcd")
+
+
+def degrees_between(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.degrees(2 * np.arcsin(np.linalg.norm(first - second, axis=1) / 2))
+
+
+def beams_of(scan: Scan) -> RecordedBeams:
+    return find_beams(scan, np.random.default_rng(0))
+
+
+def recording(returned: NDArray[np.bool_], nothing: float) -> Scan:
+    """A scan of a sensor whose rows lag behind by steps of half a degree, as lasers are mounted."""
+    distance = np.random.default_rng(1).uniform(3, 60, len(returned))
+    xyz = np.where(returned[:, None], lagging() * distance[:, None], nothing)
+    return Scan(xyz.astype(np.float32), shape=(SENSOR.rows, SENSOR.columns))
+
+
+def lagging() -> NDArray[np.float64]:
+    beams = SENSOR.beams().reshape(SENSOR.rows, SENSOR.columns, 3)
+    lag = np.radians(0.5 * (np.arange(SENSOR.rows) % 4))[:, None]
+    x = beams[..., 0] * np.cos(lag) - beams[..., 1] * np.sin(lag)
+    y = beams[..., 0] * np.sin(lag) + beams[..., 1] * np.cos(lag)
+    return np.stack([x, y, beams[..., 2]], axis=-1).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("nothing", [np.nan, 0.0])
+def test_empty_cells_of_an_organised_scan_look_where_their_row_and_column_look(
+    nothing: float,
+) -> None:
+    returned = np.random.default_rng(2).random(SENSOR.rows * SENSOR.columns) < 0.6
+    scan = recording(returned, nothing)
+    beams = beams_of(scan)
+    assert (beams.row == np.arange(len(scan))).all()
+    assert (beams.returned == returned).all()
+    assert degrees_between(beams.direction, lagging()).max() < 0.01
+
+
+def test_cells_of_an_empty_row_or_column_have_no_direction() -> None:
+    returned = np.ones((SENSOR.rows, SENSOR.columns), bool)
+    returned[5], returned[:, 7] = False, False
+    known = np.isfinite(beams_of(recording(returned.ravel(), np.nan)).direction).all(axis=1)
+    assert (known == returned.ravel()).all()
+
+
+def test_every_return_of_an_unorganised_scan_is_a_beam_of_its_own() -> None:
+    returned = np.random.default_rng(3).random(SENSOR.rows * SENSOR.columns) < 0.8
+    organised = recording(returned, np.nan)
+    # Two returns in one direction, and returns in any order.
+    rows = np.random.default_rng(4).permutation(np.append(np.flatnonzero(returned), [0] * 3))
+    scan = Scan(np.nan_to_num(organised.xyz[rows], nan=1.0))
+    beams = beams_of(scan)
+    assert (beams.row[: len(scan)] == np.arange(len(scan))).all()
+    assert beams.returned[: len(scan)].all()
+    own = beams.direction[: len(scan)] * np.linalg.norm(scan.xyz, axis=1, keepdims=True)
+    assert np.allclose(own, scan.xyz, atol=1e-5)
+
+
+def test_unreturned_beams_are_as_many_as_are_missing_and_look_where_nothing_returned() -> None:
+    returned = np.random.default_rng(5).random(SENSOR.rows * SENSOR.columns) < 0.8
+    xyz = (SENSOR.beams() * 20)[returned].astype(np.float32)
+    beams = beams_of(Scan(xyz))
+    unreturned = ~beams.returned
+    missing = np.count_nonzero(~returned)
+    assert unreturned.sum() == pytest.approx(missing, rel=0.05)
+
+    cosine = beams.direction[unreturned] @ SENSOR.beams()[~returned].T
+    assert np.degrees(np.arccos(np.clip(cosine.max(axis=1), -1, 1))).max() < HALF_STEP
+
+
+def test_an_unreturned_beam_takes_after_a_return_of_its_own_row() -> None:
+    returned = np.random.default_rng(6).random(SENSOR.rows * SENSOR.columns) < 0.9
+    xyz = (SENSOR.beams() * 20)[returned].astype(np.float32)
+    beams = beams_of(Scan(xyz))
+    unreturned = ~beams.returned
+    inclination = np.arcsin(beams.direction[:, 2])
+    same_row = np.isclose(inclination[unreturned], inclination[beams.row[unreturned]], atol=2e-3)
+    assert same_row.mean() > 0.98  # the first of a row has no return before it
+    assert (
+        degrees_between(beams.direction[unreturned], beams.direction[beams.row[unreturned]])[
+            same_row
+        ].mean()
+        < 2
+    )
+
+
+@pytest.mark.parametrize(("name", "scan"), list(hard_cases(5000)))
+def test_hard_scans_have_the_beams_of_their_valid_rows(name: str, scan: Scan) -> None:
+    beams = beams_of(scan)
+    assert (beams.returned[: len(scan)] == scan.valid).all(), name
+    assert not beams.returned[len(scan) :].any()
+    length = np.linalg.norm(beams.direction, axis=1)
+    assert np.allclose(length[beams.returned], 1)
+    assert np.allclose(length[len(scan) :], 1)
+    assert scan.valid[beams.row[len(scan) :]].all()
+
+
+@pytest.mark.parametrize("name", ORGANISED)
+def test_directions_of_real_returns_are_found_when_they_are_hidden(name: str, shared: Path) -> None:
+    scan = read_scan(shared / "data" / "clean" / name)
+    hidden = scan.valid & (np.random.default_rng(7).random(len(scan)) < 0.3)
+    xyz = scan.xyz.copy()
+    xyz[hidden] = np.nan
+    found = beams_of(Scan(xyz, shape=scan.shape)).direction[hidden]
+    truth = scan.xyz[hidden] / np.linalg.norm(scan.xyz[hidden], axis=1, keepdims=True)
+    error = degrees_between(found, truth)
+    assert np.median(error) < 0.1
+    assert np.percentile(error, 95) < 0.4
