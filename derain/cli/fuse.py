@@ -1,0 +1,156 @@
+"""``derain fuse``: merges the frames of a LiDAR and of a 4D radar."""
+
+import argparse
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from derain.cli.arguments import factor
+from derain.errors import InputError
+from derain.extrinsics import Extrinsics, read_extrinsics
+from derain.files import find_scans, read_scan, write_scan
+from derain.files.atomic import replacing
+from derain.files.frame_times import FRAME_COLUMNS, METADATA, read_frame_times
+from derain.files.labels import instance, read_labels, semantic, write_labels
+from derain.fusion import NO_DETECTIONS, fuse, nearest_in_time
+from derain.label_transfer import LABEL_WITHIN, UNKNOWN
+
+SUMMARY = "merge the frames of a LiDAR and of a 4D radar"
+
+DESCRIPTION = f"""\
+Merges LiDAR scans with the radar frames nearest in time, in the layout of REHEARSE-3D: writes
+lidar_radar_pcd, in each file the points of the LiDAR, then those of the radar in the LiDAR's frame,
+and with --labels lidar_radar_labels.
+
+  derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused
+  derain fuse --lidar innoviz --radar radar --extrinsics radar_to_lidar.yaml --out fused \\
+    --radar-columns x,y,z,doppler,rcs --extra doppler,rcs
+  derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused \\
+    --labels innoviz_labels --label-within 0.5
+
+The extrinsics say where the radar is in the LiDAR's frame (x forward, y left, z up):
+
+  {{x: 0.5, y: 0.0, z: -0.7, roll: 0, pitch: 0, yaw: 1.5}}     metres and degrees
+
+or as a 4 x 4 matrix. When each scan was taken is in the {METADATA} of its folder, a line for each:
+frame (its name), timestamp (in seconds). The label of a radar point is that of the nearest LiDAR
+point, {UNKNOWN} (unknown) if none is near. A LiDAR scan without a radar frame stays alone.
+"""
+
+SCANS = "lidar_radar_pcd"
+LABELS = "lidar_radar_labels"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's arguments."""
+    parser.add_argument("--lidar", type=Path, required=True, help="folder of LiDAR scans")
+    parser.add_argument("--radar", type=Path, required=True, help="folder of radar frames")
+    parser.add_argument(
+        "--extrinsics", type=Path, required=True, help="YAML file: the radar in the LiDAR's frame"
+    )
+    parser.add_argument("--out", type=Path, required=True, help="folder to write to")
+    parser.add_argument(
+        "--within",
+        type=factor,
+        default=0.05,
+        metavar="SECONDS",
+        help="farthest in time that a radar frame may be from its scan (default: %(default)s)",
+    )
+    parser.add_argument("--labels", type=Path, help="folder of the LiDAR scans' labels")
+    parser.add_argument(
+        "--label-within",
+        type=factor,
+        default=LABEL_WITHIN,
+        metavar="METRES",
+        help="how far a LiDAR point's label reaches (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--extra",
+        default="",
+        metavar="COLUMNS",
+        help="radar columns to keep, such as doppler,rcs: writes .npz, whose column radar tells "
+        "the sensors apart",
+    )
+    for sensor in ("lidar", "radar"):
+        parser.add_argument(
+            f"--{sensor}-columns",
+            default="x,y,z,intensity",
+            help=f"names of the columns of the {sensor}'s .bin and .npy (default: %(default)s)",
+        )
+    parser.add_argument(
+        "--metadata-columns",
+        type=_two_names,
+        default=",".join(FRAME_COLUMNS),
+        help=f"columns of {METADATA} with a scan's name and its time (default: %(default)s)",
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Runs the command."""
+    _refuse_overwriting(arguments)
+    extrinsics = read_extrinsics(arguments.extrinsics)
+    scans, frames = find_scans([arguments.lidar]), find_scans([arguments.radar])
+    times = read_frame_times(scans, arguments.metadata_columns)
+    frame_times = read_frame_times(frames, arguments.metadata_columns)
+    nearest = nearest_in_time(times, frame_times, arguments.within)
+    if (nearest < 0).all():
+        raise InputError(
+            arguments.radar,
+            f"no frame is within {arguments.within:g} s of a LiDAR scan",
+            "Check that the timestamps are seconds of one clock, or widen --within.",
+        )
+    partners = [frames[number] if number >= 0 else None for number in nearest]
+    for scan, frame in tqdm(zip(scans, partners, strict=True), total=len(scans), disable=None):
+        _fuse(scan, frame, extrinsics, arguments)
+    _write_metadata(arguments.out / SCANS / METADATA, scans, times, partners)
+    alone = partners.count(None)
+    print(f"{len(scans)} scans in {arguments.out / SCANS}, {alone} of them without a radar frame")
+    return 0
+
+
+def _fuse(
+    scan: Path, frame: Path | None, extrinsics: Extrinsics, arguments: argparse.Namespace
+) -> None:
+    lidar = read_scan(scan, arguments.lidar_columns.split(","))
+    raw = None
+    if arguments.labels is not None:
+        raw = read_labels(arguments.labels / f"{scan.stem}.label", len(lidar))
+        lidar = lidar.with_label(semantic(raw))
+    radar = NO_DETECTIONS
+    if frame is not None:
+        radar = read_scan(frame, arguments.radar_columns.split(","))
+    extra = list(filter(None, arguments.extra.split(",")))
+    fused = fuse(lidar, radar, extrinsics, arguments.label_within, extra)
+    write_scan(arguments.out / SCANS / f"{scan.stem}{'.npz' if extra else '.bin'}", fused)
+    if fused.label is not None and raw is not None:
+        instances = np.pad(instance(raw), (0, len(radar)))  # the radar's points are of none
+        write_labels(arguments.out / LABELS / f"{scan.stem}.label", fused.label, instances)
+
+
+def _refuse_overwriting(arguments: argparse.Namespace) -> None:
+    written = {(arguments.out / name).resolve() for name in (SCANS, LABELS)}
+    for folder in (arguments.lidar, arguments.radar, arguments.labels):
+        if folder is not None and folder.resolve() in written:
+            raise InputError(arguments.out, f"would overwrite {folder}", "Give another --out.")
+
+
+def _write_metadata(
+    path: Path, scans: Sequence[Path], times: NDArray[np.float64], partners: Sequence[Path | None]
+) -> None:
+    """Writes when each scan was taken, and which radar frame is in it."""
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*FRAME_COLUMNS, "radar_frame"])
+        for scan, time, frame in zip(scans, times.tolist(), partners, strict=True):
+            writer.writerow([scan.stem, time, frame.stem if frame else ""])
+
+
+def _two_names(text: str) -> list[str]:
+    names = text.split(",")
+    if len(names) != 2:
+        raise argparse.ArgumentTypeError(f"{text} is not two names with a comma between")
+    return names

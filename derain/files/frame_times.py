@@ -1,0 +1,77 @@
+"""When the scans of a folder were taken: its ``metadata.csv``, which REHEARSE-3D has as well."""
+
+import csv
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.reading import reading
+
+METADATA = "metadata.csv"
+
+# Names of the columns that hold a scan's name and its time; those of REHEARSE-3D are not published.
+FRAME_COLUMNS = ("frame", "timestamp")
+
+
+def read_frame_times(
+    scans: Sequence[Path], columns: Sequence[str] = FRAME_COLUMNS
+) -> NDArray[np.float64]:
+    """Reads when scans of one folder were taken.
+
+    Args:
+        scans: The scans, at least one. A line of the ``metadata.csv`` beside them belongs to the
+            scan of that name, whatever its suffix and the zeros before it: 000012.bin, 000012 and
+            12 are one.
+        columns: Names of two columns: the scan's name, and its time.
+
+    Returns:
+        The time of each scan, float64 (N,), in the file's own unit, which should be seconds.
+
+    Raises:
+        InputError: A file that is missing or damaged, or lacks a column or a scan.
+    """
+    path = scans[0].parent / METADATA
+    if not path.exists():
+        raise InputError(
+            path,
+            "there is no such file",
+            f"Write one: a line {','.join(columns)}, then one for each scan, such as 000000,12.3.",
+        )
+    times = _times(path, *columns)
+    for scan in scans:
+        if _key(scan.name) not in times:
+            raise InputError(path, f"has no line for {scan.name}", "Add it, or move the scan away.")
+    return np.array([times[_key(scan.name)] for scan in scans])
+
+
+def _times(path: Path, frame: str, timestamp: str) -> dict[str, float]:
+    damage = UnicodeDecodeError, csv.Error
+    with reading(path, *damage), path.open(newline="", encoding="utf-8-sig") as file:
+        lines = csv.DictReader(file, skipinitialspace=True)
+        present = lines.fieldnames or ()
+        rows = list(lines)
+    if not {frame, timestamp} <= set(present):
+        raise InputError(
+            path,
+            f"has no columns {frame} and {timestamp} ({', '.join(present)})",
+            "Name those of the scan's name and its time with --metadata-columns.",
+        )
+    return {_key(row[frame]): _finite(path, row[timestamp]) for row in rows}
+
+
+def _key(name: str) -> str:
+    return Path(name).stem.lstrip("0")
+
+
+def _finite(path: Path, text: str | None) -> float:
+    try:
+        time = float(text or "")
+    except ValueError:
+        time = math.nan
+    if not math.isfinite(time):
+        raise InputError(path, f"'{text}' is not a time", "Write seconds, as in 12.345.")
+    return time

@@ -1,0 +1,62 @@
+"""When scans were taken: lines of metadata.csv, found by name."""
+
+from pathlib import Path
+
+import pytest
+
+from derain.errors import InputError
+from derain.files.frame_times import read_frame_times
+
+
+def written(folder: Path, text: str, *names: str) -> list[Path]:
+    (folder / "metadata.csv").write_text(text)
+    return [folder / name for name in names]
+
+
+def test_a_scan_has_the_time_of_the_line_with_its_name(tmp_path: Path) -> None:
+    text = "frame,timestamp\n000002,0.3\n000000,0.1\n000001,1700000000.25\n"
+    scans = written(tmp_path, text, "000000.bin", "000001.bin", "000002.bin")
+    assert read_frame_times(scans).tolist() == [0.1, 1700000000.25, 0.3]
+
+
+@pytest.mark.parametrize("frame", ["000012.bin", "000012", "12", "000012.pcd", " 12"])
+def test_suffix_and_zeros_before_a_name_make_no_difference(tmp_path: Path, frame: str) -> None:
+    scans = written(tmp_path, f"timestamp,frame\n5,{frame}\n6,0\n", "000012.bin", "000000.bin")
+    assert read_frame_times(scans).tolist() == [5, 6]
+
+
+def test_columns_of_other_names_can_be_stated(tmp_path: Path) -> None:
+    scans = written(tmp_path, "\ufeffstem,camera,seconds\na,1,2.5\n", "a.bin")
+    assert read_frame_times(scans, ["stem", "seconds"]).tolist() == [2.5]
+
+
+def test_lines_of_scans_that_are_not_asked_for_do_no_harm(tmp_path: Path) -> None:
+    scans = written(tmp_path, "frame,timestamp\n0,1\n1,2\n", "1.bin")
+    assert read_frame_times(scans).tolist() == [2]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", r"has no columns frame and timestamp \(\)"),
+        ("frame,time\n0,1\n", r"has no columns frame and timestamp \(frame, time\)"),
+        ("frame,timestamp\n1,1\n", r"has no line for 000000\.bin"),
+        ("frame,timestamp\n0,soon\n", "'soon' is not a time"),
+        ("frame,timestamp\n0,nan\n", "'nan' is not a time"),
+        ("frame,timestamp\n0,\n", "'' is not a time"),
+        ("frame,timestamp\n0\n", "'None' is not a time"),
+    ],
+)
+def test_what_does_not_say_when_is_refused(tmp_path: Path, text: str, reason: str) -> None:
+    scans = written(tmp_path, text, "000000.bin")
+    with pytest.raises(InputError, match=rf"metadata\.csv: {reason}"):
+        read_frame_times(scans)
+
+
+def test_a_missing_or_damaged_file_is_named(tmp_path: Path) -> None:
+    scans = [tmp_path / "0.bin"]
+    with pytest.raises(InputError, match=r"metadata\.csv: there is no such file\. Write one"):
+        read_frame_times(scans)
+    (tmp_path / "metadata.csv").write_bytes(b"frame,timestamp\n\xff,1\n")
+    with pytest.raises(InputError, match=r"metadata\.csv: cannot be read as \.csv"):
+        read_frame_times(scans)

@@ -1,0 +1,240 @@
+"""The radar against closed forms: echoes, false alarms, detections, and rain hardly seen."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.special import spherical_jn, spherical_yn
+
+from derain.scan import Scan
+from derain.simulation import objects, shapes
+from derain.simulation.classes import TrackClass
+from derain.simulation.layout import lay_out_track
+from derain.simulation.objects import Surface
+from derain.simulation.radar import (
+    ECHO_PER_AREA,
+    FALL_SPEED,
+    REFERENCE_CELLS,
+    Radar,
+    detect,
+    rain_echoes,
+    surface_echoes,
+    volume_reflectivity,
+)
+from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
+from derain.simulation.track import Track
+
+pytestmark = pytest.mark.usefixtures("open3d")
+
+DRY = UniformRain(0)
+HEAVY = UniformRain(50)
+# Few cells, so that many frames are made in a second.
+NARROW = Radar(azimuth=(-6, 6), inclination=(-4, 4), columns=8, rows=4)
+
+
+def plate(x: float, width: float, y: float = 0.0, height: float = 0.6) -> Surface:
+    """A square target facing the sensor at a distance in metres, its centre at a height."""
+    box = shapes.box(0.01, width, height - width / 2, height + width / 2)
+    return Surface(box, TrackClass.TARGET, 0.5).placed(x, y)
+
+
+# Nothing in sight: what is there is behind the radar.
+OPEN = Track.of([plate(-50, 1)])
+
+
+def frames(track: Track, radar: Radar, count: int, rain: RainField = DRY) -> list[Scan]:
+    generator = np.random.default_rng(0)
+    return [detect(track, rain, radar, generator) for _ in range(count)]
+
+
+def labels(scans: list[Scan]) -> NDArray[np.int64]:
+    return np.concatenate([scan.label for scan in scans if scan.label is not None])
+
+
+def column(scans: list[Scan], name: str) -> NDArray[np.float32]:
+    return np.concatenate([scan.fields[name] for scan in scans])
+
+
+def backscatter_efficiency(size: float, index: complex) -> float:
+    """Of a sphere by Mie's theory; size is its circumference over the wavelength.
+
+    Source: Bohren and Huffman 1983, "Absorption and Scattering of Light by Small Particles", 4.8.
+    """
+    order = np.arange(1, int(size + 4 * size ** (1 / 3) + 10) + 1)
+    inside, derivative = index * size, np.zeros(order[-1] + 16, complex)
+    for n in range(len(derivative) - 1, 0, -1):
+        derivative[n - 1] = n / inside - 1 / (derivative[n] + n / inside)
+    derivative = derivative[1 : order[-1] + 1]
+    psi, before_psi = size * spherical_jn(order, size), size * spherical_jn(order - 1, size)
+    xi = psi + 1j * size * spherical_yn(order, size)
+    before_xi = before_psi + 1j * size * spherical_yn(order - 1, size)
+
+    def coefficient(factor: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        return (factor * psi - before_psi) / (factor * xi - before_xi)
+
+    electric = coefficient(derivative / index + order / size)
+    magnetic = coefficient(derivative * index + order / size)
+    total = np.sum((2 * order + 1) * (-1.0) ** order * (electric - magnetic))
+    return float(abs(total) ** 2 / size**2)
+
+
+@pytest.mark.parametrize("rate", [10, 25, 50])
+def test_rain_scatters_back_what_mies_theory_says(rate: float) -> None:
+    wavelength, water = 299.79 / 77, 3.67 + 2.16j  # mm; at 20 degrees, Liebe et al. 1991
+    diameter = np.linspace(0.02, 8, 400)
+    number = 8000 * np.exp(-4.1 * rate**-0.21 * diameter)  # Marshall and Palmer 1948
+    efficiency = [backscatter_efficiency(math.pi * d / wavelength, water) for d in diameter]
+    expected = (
+        np.trapezoid(np.array(efficiency) * math.pi / 4 * diameter**2 * number, diameter) * 1e-6
+    )
+    assert volume_reflectivity(np.array(rate)) == pytest.approx(expected, rel=0.02)
+
+
+def test_the_echo_of_a_plate_is_in_proportion_to_its_area_at_any_distance() -> None:
+    per_area = 10 ** (ECHO_PER_AREA[TrackClass.TARGET] / 10)
+    for x, width in ((15, 1), (15, 2), (40, 2), (80, 4)):
+        echo, _ = surface_echoes(Track.of([plate(x, width)]), Radar())
+        assert echo.sum() == pytest.approx(per_area * width**2, rel=0.15)
+        assert echo[TrackClass.TARGET].sum() == echo.sum()
+
+
+def test_a_car_returns_more_than_a_bike_and_a_bike_more_than_a_pedestrian() -> None:
+    def mean_dbsm(make: Callable[[np.random.Generator], Surface]) -> float:
+        echoes = [
+            surface_echoes(Track.of([make(np.random.default_rng(seed)).placed(20, 0)]), Radar())[0]
+            for seed in range(3)
+        ]
+        return float(10 * np.log10(np.mean([echo.sum() for echo in echoes])))
+
+    car, bike = mean_dbsm(objects.car), mean_dbsm(objects.bike)
+    assert 5 < car < 15
+    assert -9 < bike < 1
+    assert -12 < mean_dbsm(objects.pedestrian) < bike
+
+
+def test_an_echo_lies_in_the_cell_that_its_surface_lies_in() -> None:
+    radar = Radar()
+    inclination, azimuth, distance = radar.centres()
+    # Towards the middle of the cell in row 3, column 20 at a depth of 80.
+    level = distance[80] * np.cos(inclination[3])
+    x, y = level * np.cos(azimuth[20]), level * np.sin(azimuth[20])
+    height = radar.mounting_height + distance[80] * np.sin(inclination[3])
+    echo, farthest = surface_echoes(Track.of([plate(x, 0.3, y, height)]), radar)
+    assert np.argwhere(echo).tolist() == [[TrackClass.TARGET, 3, 20, 80]]
+    assert (farthest == radar.maximum_range).all()  # the plate does not fill its cell
+
+
+def test_the_rain_fills_every_cell_up_to_what_blocks_the_view() -> None:
+    radar = replace(NARROW, maximum_range=61)
+    farthest = np.full((4, 8), radar.maximum_range)
+    rate = volume_reflectivity(np.array(50.0))
+    width, height = math.radians(12), 2 * math.sin(math.radians(4))
+    volume = width * height * (61**3 - 1) / 3
+    assert rain_echoes(HEAVY, farthest, radar).sum() == pytest.approx(rate * volume, rel=1e-3)
+    blocked = rain_echoes(HEAVY, farthest / 2, radar)
+    assert blocked.sum() == pytest.approx(rate * volume / 8, rel=0.03)
+    assert not rain_echoes(DRY, farthest, radar).any()
+
+
+@pytest.mark.parametrize("rain", [DRY, HEAVY], ids=["dry", "heavy rain"])
+def test_false_alarms_are_as_rare_as_said_whether_or_not_it_rains(rain: RainField) -> None:
+    radar = replace(NARROW, false_alarm_rate=2e-3)
+    scans = frames(OPEN, radar, 60, rain)
+    cells = math.prod(radar.shape)
+    expected = 60 * cells * radar.false_alarm_rate
+    found = labels(scans)
+    assert len(found) == pytest.approx(expected, abs=4 * math.sqrt(expected) + 0.05 * expected)
+    if rain is DRY:
+        assert (found == TrackClass.BACKGROUND).all()
+    else:
+        assert set(found) == {TrackClass.BACKGROUND, TrackClass.RAIN}
+
+
+@pytest.mark.parametrize("reach", [90, 120, 200])
+def test_a_target_is_detected_as_often_as_the_closed_form_says(reach: float) -> None:
+    # An isolated Swerling 1 target of a signal S times the noise, by cell-averaging CFAR over N
+    # cells: (1 + T / (1 + S))^-N where T = P^(-1/N) - 1 for a false alarm rate of P.
+    # Source: Finn and Johnson 1968.
+    radar = replace(NARROW, reach=reach, leakage=-100.0)
+    inclination, azimuth, distance = radar.centres()
+    x, y = distance[80] * np.cos(azimuth[4]), distance[80] * np.sin(azimuth[4])
+    track = Track.of([plate(x, 0.4, y, radar.mounting_height + x * math.tan(inclination[2]))])
+    echo, _ = surface_echoes(track, radar)
+    assert np.argwhere(echo)[:, 3].tolist() == [80]
+    signal = echo.sum() / (distance[80] / reach) ** 4
+    cells = 2 * REFERENCE_CELLS
+    threshold = radar.false_alarm_rate ** (-1 / cells) - 1
+    expected = (1 + threshold / (1 + signal)) ** -cells
+    rate = (labels(frames(track, radar, 300)) == TrackClass.TARGET).sum() / 300
+    assert 0.03 < expected < 0.97
+    assert rate == pytest.approx(expected, abs=4 * math.sqrt(expected * (1 - expected) / 300))
+
+
+def test_positions_are_off_by_a_share_of_the_cell() -> None:
+    radar = replace(NARROW, accuracy=0.1)
+    inclination, azimuth, distance = radar.centres()
+    height = radar.mounting_height + distance[60] * math.sin(inclination[1])
+    away = distance[60] * math.cos(inclination[1])
+    x, y = away * math.cos(azimuth[2]), away * math.sin(azimuth[2])
+    scans = frames(Track.of([plate(x, 0.3, y, height)]), radar, 300)
+    points = np.concatenate([scan.xyz[scan.label == TrackClass.TARGET] for scan in scans])
+    measured = np.stack(
+        [
+            np.arcsin(points[:, 2] / np.linalg.norm(points, axis=1)),
+            np.arctan2(points[:, 1], points[:, 0]),
+            np.linalg.norm(points, axis=1),
+        ]
+    )
+    centre = np.array([inclination[1], azimuth[2], distance[60]])
+    error = (measured - centre[:, None]) / np.array(radar.cell)[:, None]
+    assert len(points) > 200
+    np.testing.assert_allclose(error.mean(axis=1), 0, atol=0.03)
+    np.testing.assert_allclose(error.std(axis=1), 0.1, rtol=0.2)
+
+
+def test_the_scene_stands_and_the_rain_falls() -> None:
+    scans = frames(lay_out_track(np.random.default_rng(0)), Radar(), 3)
+    scans += frames(OPEN, replace(Radar(), false_alarm_rate=3e-3), 5, HEAVY)
+    doppler, label = column(scans, "doppler"), labels(scans)
+    still = doppler[label != TrackClass.RAIN]
+    assert abs(still.mean()) < 0.02
+    assert still.std() == pytest.approx(Radar().doppler_noise, rel=0.1)
+    drops = np.concatenate([scan.xyz for scan in scans])[label == TrackClass.RAIN]
+    sine = drops[:, 2] / np.linalg.norm(drops, axis=1)
+    slope, offset = np.polyfit(sine, doppler[label == TrackClass.RAIN], 1)
+    assert len(drops) > 50
+    assert pytest.approx(6.5, abs=0.1) == FALL_SPEED
+    assert slope == pytest.approx(-FALL_SPEED, abs=1)
+    assert offset == pytest.approx(0, abs=0.1)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_frame_of_a_street_has_hundreds_of_detections_and_hardly_any_rain(seed: int) -> None:
+    track = lay_out_track(np.random.default_rng(seed))
+    scans = frames(track, Radar(), 20, SprinkledRain(50))
+    dry = frames(track, Radar(), 20)
+    for scan in [*scans, *dry]:
+        assert 100 < len(scan) < 500
+    assert 0 < (labels(scans) == TrackClass.RAIN).mean() < 0.01
+    assert len(labels(scans)) > 0.9 * len(labels(dry))
+    assert not (labels(dry) == TrackClass.RAIN).any()
+    assert {TrackClass.BACKGROUND, TrackClass.CAR} < set(labels(scans))
+
+
+def test_a_frame_has_named_columns_and_follows_from_its_seed() -> None:
+    track = lay_out_track(np.random.default_rng(0))
+    one, same = (detect(track, HEAVY, Radar(), np.random.default_rng(7)) for _ in range(2))
+    other = detect(track, HEAVY, Radar(), np.random.default_rng(8))
+    assert {name: values.dtype for name, values in one.fields.items()} == dict.fromkeys(
+        ["x", "y", "z", "doppler", "rcs"], np.dtype(np.float32)
+    )
+    np.testing.assert_array_equal(np.stack([one.fields[axis] for axis in "xyz"], axis=1), one.xyz)
+    assert one.label is not None
+    assert (one.label.dtype, one.valid.all()) == (np.int64, True)
+    for name in one.fields:
+        np.testing.assert_array_equal(one.fields[name], same.fields[name])
+    assert len(one) != len(other) or not np.array_equal(one.xyz, other.xyz)
+    assert np.isfinite(one.fields["rcs"]).all()
