@@ -1,31 +1,44 @@
 """Simulated rain on a test track, made on the user's machine."""
 
+from pathlib import Path
+
 from derain.cards import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.sequences import Layout, SequenceDataModule
-from derain.simulation.dataset import Campaign, ensure_track
+from derain.errors import InputError
+from derain.simulation.campaign import Campaign
+from derain.simulation.dataset import ensure_track
+from derain.simulation.manifest import read_manifest
 
 
 class Simulated(SequenceDataModule):
-    """A small simulated data set in the layout of REHEARSE-3D; made at first use.
+    """A simulated data set in the layout of REHEARSE-3D: by default a small one, made at first use.
 
     Simulated rain is easy: a score on it says nothing about real rain.
 
     Args:
-        root: Folder of the data set, made if it does not hold this campaign already.
-        campaign: What is simulated.
+        root: Folder of the data set.
+        campaign: What is simulated where the folder does not hold it already.
+        make: Whether it is simulated there; else what ``derain simulate`` wrote to the folder is
+            taken, whatever the campaign.
         loading: How the scans are read and batched.
+
+    Raises:
+        InputError: Nothing is to be made, and there is no simulated data set in the folder.
     """
 
     def __init__(
         self,
         root: str = "runs/simulated",
         campaign: Campaign = Campaign(),
+        make: bool = True,
         loading: Loading = Loading(),
     ) -> None:
         layout = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels")
-        super().__init__(root, load_card("simulated"), layout, campaign.split, loading)
+        split = campaign.split if make else _split_of(Path(root))
+        super().__init__(root, load_card("simulated"), layout, split, loading)
         self.campaign = campaign
+        self.make = make
 
     def prepare_data(self) -> None:
         """Simulates the data set where it is missing.
@@ -33,4 +46,17 @@ class Simulated(SequenceDataModule):
         Raises:
             InputError: A folder that holds something else or cannot be written.
         """
-        ensure_track(self.root, self.campaign)
+        if self.make:
+            ensure_track(self.root, self.campaign)
+
+
+def _split_of(root: Path) -> dict[str, list[str]]:
+    manifest = read_manifest(root)
+    if "files" not in manifest:
+        raise InputError(
+            root,
+            "holds no complete simulated data set",
+            "Make it with `derain simulate --out`.",
+        )
+    split: dict[str, list[str]] = manifest["split"]
+    return split

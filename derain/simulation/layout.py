@@ -1,10 +1,11 @@
 """Lays out a test track at random: every seed gives another place of the same kind."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from derain.simulation import objects, shapes
 from derain.simulation.objects import Surface
@@ -21,7 +22,7 @@ def lay_out_track(generator: np.random.Generator) -> Track:
     """
     half_width = generator.uniform(3, 6)
     surfaces = [
-        *_ground(half_width, generator),
+        *road_and_ground(half_width, generator),
         *_traffic(half_width, generator),
         *_sprinklers(half_width, generator),
         *_verges(half_width, generator),
@@ -29,14 +30,29 @@ def lay_out_track(generator: np.random.Generator) -> Track:
         *_buildings(half_width, generator),
     ]
     aside, heading = generator.uniform(-2, 2), np.radians(generator.uniform(-6, 6))
-    ahead, left = generator.uniform(-0.04, 0.04, 2)
+    return on_slope(surfaces, aside, heading, generator.uniform(-0.04, 0.04, 2))
+
+
+def on_slope(
+    surfaces: Iterable[Surface], aside: float, heading: float, slope: NDArray[np.float64]
+) -> Track:
+    """Puts surfaces, laid out along x, on sloping ground under a sensor that looks another way.
+
+    Args:
+        surfaces: All that is on the track, at least one surface.
+        aside: How far the surfaces are moved to the left, metres.
+        heading: Angle that they are turned by before, radians.
+        slope: Rise per metre ahead and per metre to the left, (2,).
+    """
+    ahead, left = slope
     return Track.of(
         replace(surface, triangles=shapes.sloped(surface.triangles, ahead, left))
         for surface in (surface.placed(0, aside, heading) for surface in surfaces)
     )
 
 
-def _ground(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+def road_and_ground(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """A road along x in patches, each dry or wet, and the ground on either side of it."""
     yield objects.ground((-10, 130), (-150, 150), generator)
     for x in pairwise([*np.arange(-10, 50, 1.5), 130]):
         yield objects.asphalt(x, (-half_width, 0), generator)

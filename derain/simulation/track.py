@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,17 +61,9 @@ class Track:
         Raises:
             InputError: Open3D cannot be imported.
         """
-        open3d = import_open3d()
-        tensor = open3d.core.Tensor
-        scene = open3d.t.geometry.RaycastingScene()
-        corners = np.arange(3 * len(self.triangles), dtype=np.uint32).reshape(-1, 3)
-        scene.add_triangles(tensor(self.triangles.reshape(-1, 3)), tensor(corners))
-
         beams = sensor.beams()
         origin = np.broadcast_to((0, 0, sensor.mounting_height), beams.shape)
-        rays = np.concatenate([origin, beams], axis=1).astype(np.float32)
-        hits = {name: hit.numpy() for name, hit in scene.cast_rays(tensor(rays)).items()}
-
+        hits = self._hits(np.concatenate([origin, beams], axis=1).astype(np.float32))
         hit = hits["t_hit"] <= sensor.maximum_range
         triangle = hits["primitive_ids"][hit]
         cosine = np.abs((hits["primitive_normals"][hit] * beams[hit]).sum(axis=1))
@@ -79,4 +73,19 @@ class Track:
         distance[hit] = hits["t_hit"][hit]
         reflectivity[hit] = self.reflectivity[triangle] * cosine
         label[hit] = self.label[triangle]
-        return Returns(distance, reflectivity, label)
+        return Returns(distance, reflectivity, label, np.arange(len(beams)))
+
+    def _hits(self, rays: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+        """What Open3D says of the first triangle on each ray, float32 (N, 6): origin, direction."""
+        tensor = import_open3d().core.Tensor
+        return {name: hit.numpy() for name, hit in self._scene.cast_rays(tensor(rays)).items()}
+
+    @cached_property
+    def _scene(self) -> Any:
+        """Open3D's ray-casting scene, made once: a LiDAR and a radar look at the same track."""
+        open3d = import_open3d()
+        tensor = open3d.core.Tensor
+        scene = open3d.t.geometry.RaycastingScene()
+        corners = np.arange(3 * len(self.triangles), dtype=np.uint32).reshape(-1, 3)
+        scene.add_triangles(tensor(self.triangles.reshape(-1, 3)), tensor(corners))
+        return scene

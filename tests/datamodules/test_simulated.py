@@ -1,5 +1,6 @@
 """Simulated rain is made where it is missing, and read like any other data set."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,7 +8,8 @@ import pytest
 from derain.datamodules.simulated import Simulated
 from derain.errors import InputError
 from derain.open3d_import import import_open3d
-from derain.simulation.dataset import Campaign
+from derain.simulation.campaign import Campaign
+from derain.simulation.dataset import simulate_track
 from derain.simulation.sensor import Sensor
 
 TINY = Campaign(
@@ -57,6 +59,28 @@ def test_the_card_gets_its_statistics_from_the_training_scans(root: Path) -> Non
     data.setup("fit")
     assert data.card.has_statistics
     assert 0 < data.card.rain_share < 0.5
+
+
+def test_a_data_set_that_is_there_is_taken_as_it_is(root: Path) -> None:
+    data = Simulated(str(root), make=False)
+    before = {file: file.stat().st_mtime_ns for file in root.rglob("*")}
+    data.prepare_data()
+    assert {file: file.stat().st_mtime_ns for file in root.rglob("*")} == before
+    assert data.split == TINY.split
+    assert len(data.files("train")) == 4
+
+
+def test_what_is_not_to_be_made_must_be_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds no complete simulated data set"):
+        Simulated(str(tmp_path), make=False)
+
+
+def test_what_a_person_simulated_is_not_replaced(root: Path, tmp_path: Path) -> None:
+    simulate_track(tmp_path / "mine", TINY)
+    before = (tmp_path / "mine/manifest.json").read_bytes()
+    with pytest.raises(InputError, match="Name another folder"):
+        Simulated(str(tmp_path / "mine"), replace(TINY, seed=1)).prepare_data()
+    assert (tmp_path / "mine/manifest.json").read_bytes() == before
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:

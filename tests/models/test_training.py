@@ -24,7 +24,7 @@ from derain.models.outdet import OutDet
 from derain.one_line_rule import OneLineRule
 from derain.open3d_import import import_open3d
 from derain.scan import Scan
-from derain.simulation.dataset import Campaign
+from derain.simulation.campaign import Campaign
 from derain.simulation.sensor import Sensor
 
 MakeTrainer = Callable[..., lightning.Trainer]

@@ -1,13 +1,13 @@
-"""The data set that the simulation writes."""
+"""The data set that the simulation writes: whole, resumable, the same from any workers."""
 
 import hashlib
 import json
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +16,11 @@ from derain.errors import InputError
 from derain.files.binary import read_binary
 from derain.files.labels import read_labels
 from derain.scan import Scan
-from derain.simulation import dataset
+from derain.simulation import dataset, sequence
+from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
-from derain.simulation.dataset import Campaign, ensure_track, read_manifest, simulate_track
+from derain.simulation.dataset import ensure_track, simulate_track
+from derain.simulation.manifest import read_manifest
 from derain.simulation.sensor import Sensor
 
 TINY = Campaign(
@@ -33,14 +35,18 @@ TINY = Campaign(
 
 def checksums(root: Path) -> dict[str, str]:
     return {
-        str(file.relative_to(root)): hashlib.sha256(file.read_bytes()).hexdigest()
+        file.relative_to(root).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
         for file in sorted(root.rglob("*"))
         if file.is_file()
     }
 
 
-def scans(root: Path, sequence: str) -> list[Scan]:
-    folder = root / "sequences" / sequence
+def times(root: Path) -> dict[Path, int]:
+    return {file: file.stat().st_mtime_ns for file in root.rglob("*")}
+
+
+def scans(root: Path, name: str) -> list[Scan]:
+    folder = root / "sequences" / name
     found = []
     for file in sorted((folder / "lidar_radar_pcd").glob("*.bin")):
         scan = read_binary(file)
@@ -56,23 +62,9 @@ def track(open3d: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
-def test_the_folders_and_files_are_those_of_rehearse_3d(track: Path) -> None:
-    expected = {
-        f"sequences/{sequence}/{folder}/{scan}.{suffix}"
-        for sequence in ("000", "001", "002", "003")
-        for folder, suffix in (
-            ("lidar_radar_pcd", "bin"),
-            ("lidar_radar_labels", "label"),
-            ("weather", "csv"),
-        )
-        for scan in ("000000", "000001")
-    }
-    assert set(checksums(track)) == expected | {"manifest.json"}
-
-
 def test_scans_hold_labelled_returns_of_the_sensor(track: Path) -> None:
-    for sequence in ("000", "001", "002", "003"):
-        for scan in scans(track, sequence):
+    for name in ("000", "001", "002", "003"):
+        for scan in scans(track, name):
             assert 500 < len(scan) < 16 * 100
             assert scan.valid.all()
             assert scan.intensity is not None
@@ -80,28 +72,15 @@ def test_scans_hold_labelled_returns_of_the_sensor(track: Path) -> None:
             assert (scan.intensity >= 0).all()
             assert (scan.intensity <= 255).all()
             assert set(scan.label) <= set(TrackClass)
-            assert scan.range.max() < TINY.sensor.maximum_range + 1
+            assert scan.range.max() < TINY.lidar.maximum_range + 1
 
 
 def test_it_rains_where_the_manifest_says_so(track: Path) -> None:
-    manifest = read_manifest(track)
-    assert manifest["rain_rate_mm_h"] == {"000": 0.0, "001": 50.0, "002": 0.0, "003": 0.0}
-    for sequence, rate in manifest["rain_rate_mm_h"].items():
-        weather = (track / "sequences" / sequence / "weather" / "000001.csv").read_text()
-        assert weather == f"rain_rate_mm_h\n{rate}\n"
-        for scan in scans(track, sequence):
+    rates = read_manifest(track)["rain_rate_mm_h"]
+    assert rates == {"000": 0.0, "001": 50.0, "002": 0.0, "003": 50.0}
+    for name, rate in rates.items():
+        for scan in scans(track, name):
             assert np.any(scan.label == TrackClass.RAIN) == (rate > 0)
-
-
-def test_the_split_covers_every_sequence_once() -> None:
-    split = Campaign().split
-    names = [name for part in split.values() for name in part]
-    assert list(split) == ["train", "validation", "test"]
-    assert [len(part) for part in split.values()] == [16, 4, 8]
-    assert names == sorted(set(names))
-    assert set(Campaign().rain_rate) == set(names)
-    for part in split.values():
-        assert {Campaign().rain_rate[name] for name in part} == set(Campaign().rain_rates)
 
 
 def test_sequences_show_different_places_and_scans_of_one_the_same(track: Path) -> None:
@@ -116,8 +95,23 @@ def test_sequences_show_different_places_and_scans_of_one_the_same(track: Path) 
     assert not np.array_equal(first.label, other.label)
 
 
-def test_a_seed_gives_the_same_bytes_again(track: Path, tmp_path: Path) -> None:
-    simulate_track(tmp_path / "again", TINY)
+def test_the_manifest_has_the_checksum_of_every_other_file(track: Path) -> None:
+    there = checksums(track)
+    del there["manifest.json"]
+    assert read_manifest(track)["files"] == there
+
+
+def test_the_manifest_says_how_the_data_set_was_made_and_names_no_place_and_no_date(
+    track: Path,
+) -> None:
+    manifest = read_manifest(track)
+    assert set(manifest) == set(TINY.description) | {"keep", "files"}
+    assert manifest.items() >= TINY.description.items()
+    assert str(track.parent) not in json.dumps(manifest)
+
+
+def test_two_workers_write_what_one_writes(track: Path, tmp_path: Path) -> None:
+    simulate_track(tmp_path / "again", TINY, workers=2)
     assert checksums(tmp_path / "again") == checksums(track)
 
 
@@ -128,27 +122,75 @@ def test_another_seed_gives_other_scans(track: Path, tmp_path: Path) -> None:
     assert first[scan] != other[scan]
 
 
-def test_the_manifest_names_no_place_and_no_date(track: Path) -> None:
-    text = (track / "manifest.json").read_text()
-    assert str(track.parent) not in text
-    assert json.loads(text) == TINY.manifest
-    assert set(TINY.manifest) == {"made_by", "version", "campaign", "split", "rain_rate_mm_h"}
-
-
 def test_a_data_set_that_is_there_is_not_made_twice(track: Path) -> None:
-    before = {file: file.stat().st_mtime_ns for file in track.rglob("*")}
+    before = times(track)
+    simulate_track(track, TINY)
     ensure_track(track, TINY)
-    assert {file: file.stat().st_mtime_ns for file in track.rglob("*")} == before
+    assert times(track) == before
 
 
-def test_a_data_set_of_another_campaign_is_replaced(open3d: ModuleType, tmp_path: Path) -> None:
+def test_only_what_is_missing_is_made(track: Path, tmp_path: Path) -> None:
     root = tmp_path / "track"
+    shutil.copytree(track, root)
+    shutil.rmtree(root / "sequences/001")
+    kept = times(root / "sequences/002")
     simulate_track(root, TINY)
-    smaller = replace(TINY, train=1, scans=1)
+    assert times(root / "sequences/002") == kept
+    assert checksums(root) == checksums(track)
+
+
+def test_an_interrupted_run_is_taken_up_again(
+    track: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root, write = tmp_path / "track", sequence.write_sequence
+
+    def interrupted(folder: Path, campaign: Campaign, name: str) -> None:
+        write(folder, campaign, name)
+        if name == "001":
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(dataset, "write_sequence", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            simulate_track(root, TINY)
+    assert [folder.name for folder in (root / "sequences").iterdir()] == ["000"]
+    assert "files" not in read_manifest(root)
+    (root / "sequences/.001/innoviz").mkdir(parents=True)  # as a kill leaves it
+    kept = times(root / "sequences/000")
+    simulate_track(root, TINY)
+    assert times(root / "sequences/000") == kept
+    assert checksums(root) == checksums(track)
+
+
+def test_nothing_half_written_stays(
+    open3d: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full_disk(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(sequence, "write_labels", full_disk)
+    with pytest.raises(InputError, match="No space left on device"):
+        simulate_track(tmp_path / "track", TINY)
+    assert list((tmp_path / "track/sequences").iterdir()) == []
+    assert "files" not in read_manifest(tmp_path / "track")
+
+
+def test_a_data_set_made_for_a_program_is_replaced_by_that_of_another_campaign(
+    open3d: ModuleType, tmp_path: Path
+) -> None:
+    root, smaller = tmp_path / "track", replace(TINY, train=1, scans=1)
+    ensure_track(root, TINY)
     ensure_track(root, smaller)
-    assert read_manifest(root) == smaller.manifest
-    assert len(list(root.rglob("*.bin"))) == 3
-    assert [file.name for file in tmp_path.iterdir()] == ["track"]
+    assert read_manifest(root).items() >= smaller.description.items()
+    assert len(list(root.rglob("lidar_radar_pcd/*.bin"))) == 3
+
+
+def test_a_data_set_made_for_a_person_is_never_replaced(track: Path) -> None:
+    before = times(track)
+    for make in (simulate_track, ensure_track):
+        with pytest.raises(InputError, match="of other parameters or of another version"):
+            make(track, replace(TINY, seed=1))
+    assert times(track) == before
 
 
 def test_a_folder_with_other_things_is_left_alone(tmp_path: Path) -> None:
@@ -160,29 +202,11 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path: Path) -> None:
     assert checksums(tmp_path) == before
 
 
-def test_nothing_half_written_stays(
-    open3d: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("layout", ["street", "facility"])
+def test_neither_intensity_nor_range_alone_tells_rain(
+    open3d: ModuleType, tmp_path: Path, layout: str
 ) -> None:
-    def full_disk(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(dataset, "write_labels", full_disk)
-    with pytest.raises(InputError, match="No space left on device"):
-        simulate_track(tmp_path / "track", TINY)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [{"train": 0}, {"scans": 0}, {"seed": -1}, {"rain_rates": ()}, {"rain_rates": (-5.0,)}],
-)
-def test_an_impossible_campaign_is_refused(wrong: dict[str, Any]) -> None:
-    with pytest.raises(InputError):
-        replace(TINY, **wrong)
-
-
-def test_neither_intensity_nor_range_alone_tells_rain(open3d: ModuleType, tmp_path: Path) -> None:
-    campaign = replace(TINY, train=6, scans=1, rain_rates=(25.0, 50.0))
+    campaign = replace(TINY, train=6, scans=1, rain_rates=(25.0, 50.0), layout=layout)
     simulate_track(tmp_path / "track", campaign)
     found = [scan for name in campaign.split["train"] for scan in scans(tmp_path / "track", name)]
     rain = np.concatenate([scan.label == TrackClass.RAIN for scan in found])

@@ -1,16 +1,21 @@
 """The ray-cast track against closed forms and a test of every ray with every triangle."""
 
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from derain.simulation import objects, shapes
 from derain.simulation.classes import TrackClass
+from derain.simulation.facility import lay_out_facility
 from derain.simulation.layout import lay_out_track
 from derain.simulation.objects import Surface
 from derain.simulation.sensor import Sensor
 from derain.simulation.track import Track
+
+LayOut = Callable[[np.random.Generator], Track]
 
 SENSOR = Sensor(rows=16, columns=40)
 ON_THE_TRACK = set(TrackClass) - {TrackClass.RAIN}
@@ -59,9 +64,10 @@ def test_casting_finds_the_nearest_of_all_triangles(open3d: ModuleType) -> None:
     assert np.allclose(clear.reflectivity[hit], (reflectivity[nearest] * cosine)[hit], atol=1e-4)
 
 
-def test_every_class_but_rain_stands_on_every_track() -> None:
+@pytest.mark.parametrize("lay_out", [lay_out_track, lay_out_facility])
+def test_every_class_but_rain_stands_on_every_track(lay_out: LayOut) -> None:
     for seed in range(5):
-        track = lay_out_track(np.random.default_rng(seed))
+        track = lay_out(np.random.default_rng(seed))
         assert {TrackClass(label) for label in track.label} == ON_THE_TRACK
         assert len(track.label) == len(track.triangles) == len(track.reflectivity)
         assert track.reflectivity.min() > 0
@@ -69,10 +75,38 @@ def test_every_class_but_rain_stands_on_every_track() -> None:
         assert np.isfinite(track.triangles).all()
 
 
-def test_a_seed_gives_the_same_track_again_and_another_seed_another_one() -> None:
-    first, again, other = (lay_out_track(np.random.default_rng(seed)) for seed in (1, 1, 2))
+@pytest.mark.parametrize("lay_out", [lay_out_track, lay_out_facility])
+def test_a_seed_gives_the_same_track_again_and_another_seed_another_one(lay_out: LayOut) -> None:
+    first, again, other = (lay_out(np.random.default_rng(seed)) for seed in (1, 1, 2))
     assert np.array_equal(first.triangles, again.triangles)
     assert not np.array_equal(first.triangles[:1000], other.triangles[:1000])
+
+
+def centres(track: Track, *kinds: TrackClass) -> NDArray[np.float64]:
+    """Ground positions of the triangles of some classes, float64 (T, 2)."""
+    return track.triangles[np.isin(track.label, kinds)].mean(axis=1)[:, :2].astype(np.float64)
+
+
+def test_the_things_of_the_facility_stand_on_its_road_within_the_stated_distances() -> None:
+    for seed in range(10):
+        track = lay_out_facility(np.random.default_rng(seed))
+        things = centres(
+            track, TrackClass.CAR, TrackClass.PEDESTRIAN, TrackClass.BIKE, TrackClass.TARGET
+        )
+        assert 17 < things[:, 0].min() < things[:, 0].max() < 115
+        # The road is turned by 2 degrees at most, and the masts stand on either side of it.
+        assert np.abs(things[:, 1]).max() < 3.8 + 112 * np.sin(np.radians(2))
+        masts = centres(track, TrackClass.SPRINKLER)
+        assert masts[:, 1].min() < things[:, 1].min() < things[:, 1].max() < masts[:, 1].max()
+
+
+def test_a_second_sensor_sees_the_same_track(open3d: ModuleType) -> None:
+    track = lay_out_facility(np.random.default_rng(0))
+    first = track.cast(SENSOR)
+    track.cast(Sensor(rows=4, columns=10))
+    again = track.cast(SENSOR)
+    assert np.array_equal(first.range, again.range)
+    assert np.array_equal(first.beam, np.arange(16 * 40))
 
 
 @pytest.mark.parametrize(

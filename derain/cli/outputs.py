@@ -1,0 +1,30 @@
+"""Where a command may write what it makes of scans."""
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from derain.errors import InputError
+from derain.files.labels import label_beside
+
+
+def refuse_clashes(scans: Sequence[Path], out: Path) -> None:
+    """Refuses to overwrite a scan by what is made of it, or labels by others.
+
+    Args:
+        scans: What is read.
+        out: Folder where a file of each scan's name, and labels of that name, are to be written.
+
+    Raises:
+        InputError: It holds a scan or its labels, or two scans have one name.
+    """
+    stems = Counter(scan.stem for scan in scans)
+    for scan in scans:
+        if (out / scan.name).resolve() == scan.resolve():
+            raise InputError(out, f"would overwrite {scan}", "Give --out another folder.")
+        if out.resolve() == label_beside(scan).parent.resolve():
+            raise InputError(out, f"holds the labels of {scan}", "Give --out another folder.")
+        if stems[scan.stem] > 1:
+            raise InputError(
+                scan, "another scan has the same name", "Take them in two runs, each to its --out."
+            )

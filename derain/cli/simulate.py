@@ -1,0 +1,129 @@
+"""``derain simulate``: a data set of simulated rain, or rain on scans of one's own."""
+
+import argparse
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+from derain.cli.arguments import count
+from derain.errors import InputError
+from derain.neighbours import usable_cores
+
+SUMMARY = "make a data set of simulated rain, or let it rain on clean scans"
+
+DESCRIPTION = """\
+Simulates a rain facility in the layout of REHEARSE-3D: LiDAR, radar, both merged, labels, weather.
+Every sequence is another track; 60 % of them are to train on, 20 % each to validate and to test.
+
+  derain simulate --out facility
+  derain simulate --out heavy --rain 50 --sequences 5 --scans 20 --seed 1
+  derain simulate --out quick --sensor mems_64 --no-radar --workers 1
+
+The sequences take the rain rates in turn, 0 being clean. An interrupted run is taken up where it
+ended. To train on the data set:
+
+  derain fit --config outdet_simulated.yaml --data.root facility --data.make false
+
+With --on, lets it rain on clean scans instead, in the file's own format with every column kept, and
+writes <stem>.label (1 = rain).
+
+  derain simulate --on clean/ --rain 25 --out rainy
+  derain simulate --on scan.pcd --rain 50 --out rainy --sensor spinning_128 --picture
+
+Simulated rain is easy: a score on it says nothing about real rain.
+"""
+
+# What only one of the two uses knows, and what it takes where nothing is said.
+OF_DATA_SETS = {"sequences": 10, "scans": 10, "radar": True, "workers": usable_cores()}
+OF_SCANS = {"columns": "x,y,z,intensity", "picture": False, "json": False}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's arguments."""
+    parser.add_argument("--out", type=Path, required=True, help="folder to write to")
+    parser.add_argument(
+        "--rain",
+        nargs="+",
+        type=float,
+        metavar="MM_H",
+        help="rain rates in mm/h (default: 10 0 25 0 50, about as often clean as REHEARSE-3D)",
+    )
+    parser.add_argument(
+        "--sensor",
+        help="name of a packaged sensor, or YAML file (default: mems_256, with --on spinning_64)",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed (default: %(default)s)")
+    _add_those_of_data_sets(parser.add_argument_group("a data set"))
+    _add_those_of_scans(parser.add_argument_group("rain on scans"))
+
+
+def _add_those_of_data_sets(group: "argparse._ArgumentGroup") -> None:
+    default = {name: f"(default: {value})" for name, value in OF_DATA_SETS.items()}
+    group.add_argument("--sequences", type=count, help=f"sequences {default['sequences']}")
+    group.add_argument("--scans", type=count, help=f"scans per sequence {default['scans']}")
+    group.add_argument(
+        "--radar", action=argparse.BooleanOptionalAction, help="with a 4D radar (default: yes)"
+    )
+    group.add_argument("--workers", type=count, help="processes (default: one per core)")
+
+
+def _add_those_of_scans(group: "argparse._ArgumentGroup") -> None:
+    group.add_argument("--on", nargs="+", type=Path, metavar="SCAN_OR_DIR", help="clean scans")
+    group.add_argument(
+        "--columns",
+        help=f"names of the columns of .bin and .npy files (default: {OF_SCANS['columns']})",
+    )
+    group.add_argument(
+        "--picture", action="store_true", default=None, help="draw <stem>.png of each scan"
+    )
+    group.add_argument(
+        "--json", action="store_true", default=None, help="print one JSON object a scan"
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Runs the command."""
+    if arguments.seed < 0:
+        raise InputError("--seed", f"{arguments.seed} is negative", "Give 0 or more.")
+    if arguments.on is None:
+        _settle(arguments, OF_DATA_SETS, foreign=OF_SCANS, other="with")
+        return _simulate(arguments)
+    from derain.cli.rain_on_scans import rain_on_scans
+
+    _settle(arguments, OF_SCANS, foreign=OF_DATA_SETS, other="without")
+    return rain_on_scans(arguments)
+
+
+def _settle(
+    arguments: argparse.Namespace, own: Mapping[str, Any], foreign: Collection[str], other: str
+) -> None:
+    """Refuses the options of the other use, and fills in what was not said."""
+    for name in foreign:
+        if getattr(arguments, name) is not None:
+            raise InputError(f"--{name}", f"has a meaning only {other} --on", "Leave it out.")
+    for name, default in own.items():
+        if getattr(arguments, name) is None:
+            setattr(arguments, name, default)
+
+
+def _simulate(arguments: argparse.Namespace) -> int:
+    from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, partition
+    from derain.simulation.dataset import simulate_track
+    from derain.simulation.radar import Radar
+
+    campaign = Campaign(
+        *partition(arguments.sequences),
+        scans=arguments.scans,
+        rain_rates=tuple(arguments.rain or FACILITY_RAIN_RATES),
+        seed=arguments.seed,
+        sensor=arguments.sensor or "mems_256",
+        layout="facility",
+        radar=Radar() if arguments.radar else None,
+    )
+    simulate_track(arguments.out, campaign, arguments.workers)
+    scans = len(campaign.names) * campaign.scans
+    print(
+        f"{arguments.out}: {len(campaign.names)} sequences, {scans:,} scans. "
+        f"What is in them: derain info {arguments.out}"
+    )
+    return 0

@@ -1,0 +1,119 @@
+"""What a simulated data set is made from."""
+
+import json
+from dataclasses import asdict, dataclass, field, replace
+from itertools import cycle
+from typing import Any, Literal
+
+from derain import __version__
+from derain.errors import InputError
+from derain.simulation.manifest import MAKER
+from derain.simulation.radar import Radar
+from derain.simulation.rain_field import UniformRain
+from derain.simulation.sensor import Sensor, load_sensor
+
+# Two sequences of five are clean: of REHEARSE-3D's, 39 % are. How often each of its rain rates
+# comes is not published. The first is rainy, for it may be all that there is to train on.
+# Source: REHEARSE-3D, sections III.A and III.C.
+FACILITY_RAIN_RATES = (10.0, 0.0, 25.0, 0.0, 50.0)
+
+# Shares of the sequences to validate and to test on: 28 and 29 of 143.
+# Source: data_cfg.yaml of the SalsaNext model published with REHEARSE-3D.
+HELD_OUT = 0.2
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What is simulated: every sequence is another track, and its scans differ in rain and noise.
+
+    Attributes:
+        train: Sequences to train on.
+        validation: Sequences to choose a model with.
+        test: Sequences to judge it on.
+        scans: Scans per sequence.
+        rain_rates: Rain rates in mm/h that the sequences take in turn; 0 is clean.
+        seed: Seed of everything drawn.
+        sensor: The LiDAR, or the name of a packaged sensor file, or of one of the user's.
+        layout: ``street``, a random street in even rain, or ``facility``, a test track under
+            sprinklers.
+        radar: The radar; None leaves it out, and with it the folders of its scans.
+
+    Raises:
+        InputError: A number of sequences or scans below 1, a negative seed, no rain rate or an
+            impossible one.
+    """
+
+    train: int = 16
+    validation: int = 4
+    test: int = 8
+    scans: int = 3
+    rain_rates: tuple[float, ...] = (0.0, 10.0, 25.0, 50.0)
+    seed: int = 0
+    sensor: Sensor | str = field(default_factory=Sensor)
+    layout: Literal["street", "facility"] = "street"
+    radar: Radar | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("train", "validation", "test", "scans"):
+            if getattr(self, name) < 1:
+                raise InputError(name, f"{getattr(self, name)} is too few", "Give 1 or more.")
+        if self.seed < 0:
+            raise InputError("seed", f"{self.seed} is negative", "Give 0 or more.")
+        if not self.rain_rates:
+            raise InputError("rain rate", "none is given", "Give one or more, in mm/h.")
+        for rate in self.rain_rates:
+            UniformRain(rate)
+
+    @property
+    def lidar(self) -> Sensor:
+        """The LiDAR.
+
+        Raises:
+            InputError: A sensor file that is missing or damaged.
+        """
+        return load_sensor(self.sensor) if isinstance(self.sensor, str) else self.sensor
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the sequences, in ascending order."""
+        return [f"{number:03d}" for number in range(self.train + self.validation + self.test)]
+
+    @property
+    def split(self) -> dict[str, list[str]]:
+        """Names of the sequences of each part."""
+        return {
+            "train": self.names[: self.train],
+            "validation": self.names[self.train : -self.test],
+            "test": self.names[-self.test :],
+        }
+
+    @property
+    def rain_rate(self) -> dict[str, float]:
+        """Nominal rain rate of each sequence, in mm/h, by name in ascending order."""
+        return dict(zip(self.names, cycle(map(float, self.rain_rates)), strict=False))
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """All that the files depend on, as JSON gives it back."""
+        content = {
+            "made_by": MAKER,
+            "version": __version__,
+            "campaign": asdict(replace(self, sensor=self.lidar)),
+            "split": self.split,
+            "rain_rate_mm_h": self.rain_rate,
+        }
+        return dict(json.loads(json.dumps(content)))
+
+
+def partition(sequences: int) -> tuple[int, int, int]:
+    """How many of some sequences to train on, to validate and to test on.
+
+    Raises:
+        InputError: Fewer than three sequences.
+    """
+    if sequences < 3:
+        raise InputError(
+            "sequences", f"{sequences} are too few to train, validate and test", "Give 3 or more."
+        )
+    held_out = max(1, round(HELD_OUT * sequences))
+    return sequences - 2 * held_out, held_out, held_out

@@ -1,0 +1,84 @@
+"""Lays out a rain facility at random, like the test track of REHEARSE."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from derain.simulation import objects
+from derain.simulation.layout import on_slope, road_and_ground
+from derain.simulation.objects import Surface
+from derain.simulation.track import Track
+
+# What stands on the road, and between which distances in metres. All lie within REHEARSE's 10 to
+# 112 m; the rest is chosen so that the classes come near its shares of the points.
+# Source: REHEARSE-3D, section III.A.
+ROAD_USERS: tuple[tuple[Callable[[np.random.Generator], Surface], tuple[float, float]], ...] = (
+    (objects.car, (30, 80)),
+    (objects.pedestrian, (35, 85)),
+    (objects.pedestrian, (35, 85)),
+    (objects.bike, (20, 55)),
+    (objects.target, (20, 112)),
+)
+
+# Length of road that each of them has to itself, metres.
+CLEARANCE = 6.0
+
+# Where the masts stand, metres along the road: each carries three of the sprinklers that
+# derain.simulation.rain_field has every 3 m.
+MASTS = np.arange(16.0, 85, 9)
+
+
+def lay_out_facility(generator: np.random.Generator) -> Track:
+    """Lays out a facility.
+
+    A road 6.8 to 7.6 m wide leads straight away from the sensor, turned by up to 2 degrees and
+    sloping by up to 1 %. A car, two pedestrians, a bike and a target stand on it, with a row of
+    sprinklers on each side. Bushes and the posts of a fence line it; trees and buildings close the
+    view. Puddles darken the road and the bushes are near: rain is not alone in being dark or near.
+    """
+    half_width = generator.uniform(3.4, 3.8)
+    surfaces = [
+        *road_and_ground(half_width, generator),
+        *_road_users(half_width, generator),
+        *_sprinklers(half_width, generator),
+        *_verges(half_width, generator),
+        *_horizon(half_width, generator),
+    ]
+    heading = np.radians(generator.uniform(-2, 2))
+    return on_slope(surfaces, 0, heading, generator.uniform(-0.01, 0.01, 2))
+
+
+def _road_users(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+    taken = np.array([])
+    for make, distances in ROAD_USERS:
+        x = generator.uniform(*distances)
+        while (np.abs(taken - x) < CLEARANCE).any():
+            x = generator.uniform(*distances)
+        taken = np.append(taken, x)
+        yield make(generator).placed(x, generator.uniform(1.2 - half_width, half_width - 1.2))
+
+
+def _sprinklers(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+    for x in MASTS:
+        yield objects.sprinkler(generator).placed(x, half_width + 0.7)
+        yield objects.sprinkler(generator).placed(x, -half_width - 0.7, np.pi)
+
+
+def _verges(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+    for side in (-1, 1):
+        for _ in range(generator.integers(10, 20)):
+            radii = generator.uniform(0.3, 1.2, 3)
+            x, y = generator.uniform(5, 40), side * (half_width + generator.uniform(2, 12))
+            yield objects.foliage(tuple(radii), 0.7 * radii[2], generator).placed(x, y)
+        for x in np.arange(5.0, 100, 5):
+            yield objects.pole(generator).placed(x, side * (half_width + 14))
+
+
+def _horizon(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+    for side in (-1, 1):
+        for x in np.arange(30.0, 110, 10):
+            y, crown = side * (half_width + generator.uniform(15, 40)), generator.uniform(1.5, 3)
+            yield objects.trunk(generator).placed(x, y)
+            yield objects.foliage((crown, crown, crown), 2 + crown, generator).placed(x, y)
+    for y in (-25, 25):
+        yield objects.building(generator).placed(generator.uniform(85, 110), y)

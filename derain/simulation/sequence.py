@@ -1,0 +1,164 @@
+"""Writes one simulated sequence: the folders of REHEARSE-3D that carry points, labels or weather.
+
+innoviz/000000.bin               a scan of the LiDAR: float32 x, y, z (m), intensity (0..255)
+radar_pcd/000000.bin             a frame of the radar: float32 x, y, z (m), intensity (SNR in dB)
+ext_radar/000000.csv             the same, with all that the radar measured
+lidar_radar_pcd/000000.bin       each scan, joined by the radar frame nearest in time
+lidar_radar_labels/000000.label  uint32 TrackClass per point of it
+weather/000000.csv               the weather during each scan (derain.simulation.weather)
+extrinsics.yaml                  takes points of radar_pcd and ext_radar to the LiDAR's frame
+
+Each folder also holds metadata.csv: frame, timestamp (seconds from the start). Without a radar its
+files are missing, and lidar_radar_pcd holds the LiDAR's scans alone.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import yaml
+from numpy.typing import ArrayLike, NDArray
+
+from derain.extrinsics import POSE, Extrinsics
+from derain.files.atomic import replacing
+from derain.files.binary import write_binary
+from derain.files.frame_times import FRAME_COLUMNS, METADATA
+from derain.files.labels import write_labels
+from derain.fusion import NO_DETECTIONS, fuse, nearest_in_time
+from derain.scan import Scan, to_float32
+from derain.simulation.campaign import Campaign
+from derain.simulation.facility import lay_out_facility
+from derain.simulation.layout import lay_out_track
+from derain.simulation.radar import Radar, detect
+from derain.simulation.rain import rain_on_beams
+from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
+from derain.simulation.sensor import Sensor
+from derain.simulation.track import Track
+from derain.simulation.weather import Weather, draw_wind
+
+LAYOUTS = {"street": lay_out_track, "facility": lay_out_facility}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What stays the same for a sequence: the track, the rain that falls on it, the weather."""
+
+    track: Track
+    rain: RainField
+    weather: Weather
+
+    @classmethod
+    def of(cls, campaign: Campaign, name: str, generator: np.random.Generator) -> Self:
+        """Draws the scene of a sequence."""
+        nominal, wind = campaign.rain_rate[name], draw_wind(generator)
+        sprinkled = campaign.layout == "facility" and nominal > 0
+        rain = SprinkledRain(nominal, wind) if sprinkled else UniformRain(nominal)
+        at_sensor = float(rain.rate(np.zeros(1), np.zeros(1))[0])
+        track = LAYOUTS[campaign.layout](generator)
+        return cls(track, rain, Weather.of(nominal, at_sensor, wind))
+
+
+def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
+    """Simulates a sequence.
+
+    Args:
+        folder: Folder to write.
+        campaign: What the sequence belongs to.
+        name: Name of the sequence.
+
+    Raises:
+        InputError: A file cannot be written, or Open3D cannot be imported.
+    """
+    # The radar has its own source of chance: the LiDAR sees the same with it and without.
+    chance = np.random.SeedSequence(campaign.seed, spawn_key=(int(name),)).spawn(3)
+    of_scene, of_lidar, of_radar = map(np.random.default_rng, chance)
+    scene, sensor = Scene.of(campaign, name, of_scene), campaign.lidar
+    times = np.arange(campaign.scans) / sensor.frame_rate
+    beside = [NO_DETECTIONS] * len(times)
+    mounting = Extrinsics(np.eye(4))
+    if campaign.radar is not None:
+        mounting = _write_mounting(folder, campaign.radar, sensor)
+        beside = _record_radar(folder, scene, campaign.radar, times, of_radar)
+    beams, clear = sensor.beams(), scene.track.cast(sensor)
+    for stem, frame in zip(_stems(len(times)), beside, strict=True):
+        detected = rain_on_beams(clear, beams, scene.rain, sensor, of_lidar)
+        scan = sensor.measure(detected, of_lidar)
+        joined = fuse(scan, frame, mounting)
+        assert joined.label is not None  # as both of its parts are labelled
+        write_binary(folder / "innoviz" / f"{stem}.bin", scan)
+        write_binary(folder / "lidar_radar_pcd" / f"{stem}.bin", joined)
+        write_labels(folder / "lidar_radar_labels" / f"{stem}.label", joined.label)
+        _write_table(folder / "weather" / f"{stem}.csv", asdict(scene.weather))
+    for kind in ("innoviz", "lidar_radar_pcd", "lidar_radar_labels", "weather"):
+        _write_times(folder / kind, times)
+
+
+def _write_mounting(folder: Path, radar: Radar, sensor: Sensor) -> Extrinsics:
+    """Writes where the radar is, as seen from the LiDAR: right above or below it."""
+    pose = dict.fromkeys(POSE, 0.0) | {"z": radar.mounting_height - sensor.mounting_height}
+    with replacing(folder / "extrinsics.yaml") as temporary:
+        temporary.write_text(yaml.safe_dump(pose, sort_keys=False), "utf-8")
+    return Extrinsics.of_pose(**pose)
+
+
+def _record_radar(
+    folder: Path,
+    scene: Scene,
+    radar: Radar,
+    scan_times: NDArray[np.float64],
+    generator: np.random.Generator,
+) -> list[Scan]:
+    """Writes what the radar detects while scans are taken; returns the frame nearest to each."""
+    period = 1 / radar.frame_rate
+    # The two sensors run freely: the radar's first frame comes at any time of its period.
+    times = np.arange(generator.uniform(0, period), scan_times[-1] + period, period)
+    frames = [
+        _with_intensity(detect(scene.track, scene.rain, radar, generator), radar) for _ in times
+    ]
+    for stem, frame in zip(_stems(len(times)), frames, strict=True):
+        write_binary(folder / "radar_pcd" / f"{stem}.bin", replace(frame, fields={}))
+        _write_table(folder / "ext_radar" / f"{stem}.csv", _extended(frame))
+    for kind in ("radar_pcd", "ext_radar"):
+        _write_times(folder / kind, times)
+    return [frames[row] for row in nearest_in_time(scan_times, times, within=period)]
+
+
+def _with_intensity(frame: Scan, radar: Radar) -> Scan:
+    """A radar frame with the strength of its echoes over the noise, dB, as their intensity."""
+    weakening = 40 * np.log10(frame.range / radar.reach)
+    return replace(frame, intensity=to_float32(frame.fields["rcs"] - weakening))
+
+
+def _extended(frame: Scan) -> dict[str, NDArray[np.float64]]:
+    """The columns of REHEARSE-3D's extended radar, whose names and units are not published.
+
+    Confidence is the probability that noise alone would have been weaker than the echo.
+    """
+    assert frame.intensity is not None
+    intensity = frame.intensity.astype(np.float64)
+    return {
+        **dict(zip("xyz", frame.xyz.T, strict=True)),
+        "intensity": intensity,
+        "cross_section": frame.fields["rcs"],
+        "velocity": frame.fields["doppler"],
+        "confidence": -np.expm1(-(10 ** (intensity / 10))),
+    }
+
+
+def _stems(count: int) -> list[str]:
+    return [f"{number:06d}" for number in range(count)]
+
+
+def _write_times(folder: Path, times: NDArray[np.float64]) -> None:
+    rows = [f"{stem},{time:.6f}" for stem, time in zip(_stems(len(times)), times, strict=True)]
+    with replacing(folder / METADATA) as temporary:
+        temporary.write_text("\n".join([",".join(FRAME_COLUMNS), *rows]) + "\n", "utf-8")
+
+
+def _write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
+    """Writes columns of one or more numbers each as CSV with their names at the top."""
+    table = np.column_stack(list(columns.values()))
+    with replacing(path) as temporary:
+        np.savetxt(temporary, table, "%.6g", ",", header=",".join(columns), comments="")

@@ -1,0 +1,201 @@
+"""``derain simulate``: data sets of simulated rain, and rain on clean scans."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files import find_scans, read_scan
+from derain.files.labels import read_labels
+from derain.hard_cases import scene
+from derain.open3d_import import import_open3d
+
+QUICK = ["--sensor", "mems_64", "--workers", "1", "--sequences", "3", "--scans", "1"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _open3d() -> None:
+    try:
+        import_open3d()
+    except InputError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def clean(tmp_path: Path) -> Path:
+    """A folder of two clean scans of a room, 5,000 and 6,000 points."""
+    folder = tmp_path / "clean"
+    folder.mkdir()
+    for number in (5, 6):
+        scene(1000 * number, seed=number).tofile(folder / f"{number:06d}.bin")
+    return folder
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(file.name for file in folder.iterdir())
+
+
+def test_a_data_set_is_written_and_written_once(run_derain, tmp_path: Path) -> None:
+    root = tmp_path / "facility"
+    outcome = run_derain("simulate", "--out", root, *QUICK)
+    assert (outcome.code, outcome.out.split(".")[0]) == (0, f"{root}: 3 sequences, 3 scans")
+    assert names(root) == ["manifest.json", "sequences"]
+    assert names(root / "sequences") == ["000", "001", "002"]
+    assert (root / "sequences/000/ext_radar").is_dir()
+    manifest = (root / "manifest.json").read_text()
+    assert json.loads(manifest)["rain_rate_mm_h"] == {"000": 10, "001": 0, "002": 25}
+    assert run_derain("simulate", "--out", root, *QUICK).code == 0
+    outcome = run_derain("simulate", "--out", root, *QUICK, "--seed", "1")
+    assert outcome.code == 2
+    assert outcome.err == (
+        f"derain: {root}: holds a simulated data set of other parameters or of another version of "
+        "derain. Name another folder, or delete this one.\n"
+    )
+    assert (root / "manifest.json").read_text() == manifest
+
+
+def test_a_data_set_has_the_rain_and_the_sensors_asked_for(run_derain, tmp_path: Path) -> None:
+    root = tmp_path / "heavy"
+    run_derain("simulate", "--out", root, *QUICK, "--rain", "50", "--no-radar")
+    assert (root / "sequences/002/weather/000000.csv").read_text().splitlines()[1].startswith("50,")
+    assert not (root / "sequences/002/ext_radar").exists()
+
+
+def test_fusing_the_two_sensors_again_gives_the_merged_clouds(run_derain, tmp_path: Path) -> None:
+    run_derain("simulate", "--out", tmp_path / "facility", *QUICK)
+    folder = tmp_path / "facility/sequences/000"
+    sensors = ["--lidar", folder / "innoviz", "--radar", folder / "radar_pcd"]
+    where = ["--extrinsics", folder / "extrinsics.yaml", "--out", tmp_path / "fused"]
+    assert run_derain("fuse", *sensors, *where).code == 0
+    again = (tmp_path / "fused/lidar_radar_pcd/000000.bin").read_bytes()
+    assert again == (folder / "lidar_radar_pcd/000000.bin").read_bytes()
+
+
+def test_info_counts_what_was_simulated(run_derain, tmp_path: Path) -> None:
+    run_derain("simulate", "--out", tmp_path / "facility", *QUICK)
+    facts = json.loads(run_derain("info", tmp_path / "facility", "--json").out)
+    assert facts["scans"] == 3
+    assert facts["class_share"]["rain"] > 0.01
+    assert sum(facts["class_share"].values()) == pytest.approx(1)
+
+
+def rained(folder: Path, stem: str, columns: int = 4) -> tuple[NDArray[np.float32], NDArray]:
+    points = np.fromfile(folder / f"{stem}.bin", "<f4").reshape(-1, columns)
+    return points, read_labels(folder / f"{stem}.label", len(points))
+
+
+def test_clean_scans_get_rain_and_labels_that_say_which_it_is(
+    run_derain, clean: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "rainy"
+    outcome = run_derain("simulate", "--on", clean, "--rain", "50", "--out", out, "--json")
+    assert (outcome.code, outcome.err) == (0, "")
+    assert names(out) == ["000005.bin", "000005.label", "000006.bin", "000006.label"]
+    first, second = map(json.loads, outcome.out.splitlines())
+    assert list(first) == ["scan", "clean", "points", "rain", "lost"]
+    assert (first["clean"], second["clean"]) == (5000, 6000)
+    for facts in (first, second):
+        points, label = rained(out, Path(facts["scan"]).stem)
+        assert len(points) == facts["points"] == facts["clean"] - facts["lost"] + facts["rain"]
+        assert set(label) == {0, 1}
+        assert label.sum() == facts["rain"] > 0
+    before = {
+        row.tobytes() for row in np.fromfile(clean / "000005.bin", "<f4").reshape(-1, 4)[:, :3]
+    }
+    points, label = rained(out, "000005")
+    assert {row.tobytes() for row in points[label == 0, :3]} <= before
+
+
+def test_a_line_says_what_the_rain_did_to_a_scan(run_derain, clean: Path, tmp_path: Path) -> None:
+    scan = clean / "000005.bin"
+    outcome = run_derain("simulate", "--on", scan, "--rain", "0", "--out", tmp_path / "rainy")
+    assert outcome.out == f"{scan}: 5,000 points, in the rain 5,000: 0 of drops, 0 lost\n"
+
+
+def test_a_seed_gives_the_same_rain_again_and_another_seed_other_rain(
+    run_derain, clean: Path, tmp_path: Path
+) -> None:
+    contents = []
+    for run, seed in enumerate(("1", "1", "2")):
+        out = tmp_path / str(run)
+        run_derain("simulate", "--on", clean, "--rain", "25", "--out", out, "--seed", seed)
+        contents.append((out / "000005.bin").read_bytes())
+    assert contents[0] == contents[1] != contents[2]
+
+
+def test_columns_and_a_picture(run_derain, tmp_path: Path) -> None:
+    points = np.column_stack([scene(3000), np.arange(3000, dtype=np.float32) % 32])
+    points.astype("<f4").tofile(tmp_path / "scan.bin")
+    arguments = ["--columns", "x,y,z,intensity,ring", "--picture", "--rain", "50"]
+    outcome = run_derain(
+        "simulate", "--on", tmp_path / "scan.bin", *arguments, "--out", tmp_path / "o"
+    )
+    assert (outcome.code, names(tmp_path / "o")) == (0, ["scan.bin", "scan.label", "scan.png"])
+    rainy, label = rained(tmp_path / "o", "scan", columns=5)
+    assert set(rainy[:, 4]) <= set(range(32))
+    assert label.any()
+    assert (tmp_path / "o/scan.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_every_recorded_scan_gets_rain_in_its_own_format(
+    run_derain, shared: Path, tmp_path: Path
+) -> None:
+    clean = find_scans([shared / "data/clean"])
+    outcome = run_derain("simulate", "--on", *clean, "--rain", "25", "--out", tmp_path, "--json")
+    assert (outcome.code, len(outcome.out.splitlines())) == (0, len(clean))
+    for path in clean:
+        rainy = read_scan(tmp_path / path.name)
+        label = read_labels(tmp_path / f"{path.stem}.label", len(rainy))
+        assert rainy.fields.keys() == read_scan(path).fields.keys()
+        assert label.sum() > 0
+        assert rainy.valid[label == 1].all()
+
+
+def test_one_bad_scan_is_reported_and_the_rest_are_done(
+    run_derain, clean: Path, tmp_path: Path
+) -> None:
+    bad = clean / "000004.bin"
+    bad.write_bytes(b"12345")
+    outcome = run_derain("simulate", "--on", clean, "--rain", "25", "--out", tmp_path / "rainy")
+    assert outcome.code == 2
+    first, last = outcome.err.splitlines()
+    assert first.startswith(f"derain: {bad}: 5 bytes are not whole rows of 16 bytes")
+    assert last == "derain: it could not rain on 1 of 3 scans"
+    assert len(outcome.out.splitlines()) == 2
+
+
+def test_clean_scans_are_not_overwritten(run_derain, clean: Path) -> None:
+    before = {path: path.read_bytes() for path in clean.iterdir()}
+    outcome = run_derain("simulate", "--on", clean, "--rain", "25", "--out", clean)
+    assert outcome.code == 2
+    assert "would overwrite" in outcome.err
+    assert {path: path.read_bytes() for path in clean.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--sequences", "2"], "sequences: 2 are too few to train, validate and test. Give 3"),
+        (["--rain", "-1"], "rain rate: -1.0 mm/h is no rain rate. Give up to 2000 mm/h."),
+        (["--rain", "nan"], "rain rate: nan mm/h is no rain rate. Give up to 2000 mm/h."),
+        (["--seed", "-1"], "--seed: -1 is negative. Give 0 or more."),
+        (["--sensor", "mars"], "mars: no such sensor. Give a YAML file or one of mems_256,"),
+        (["--picture"], "--picture: has a meaning only with --on. Leave it out."),
+        (["--on", "x.bin"], "--rain: it rains on scans at one rate. Give one, e.g. --rain 25."),
+        (["--on", "x.bin", "--rain", "1", "2"], "--rain: it rains on scans at one rate."),
+        (["--on", "x.bin", "--rain", "-3"], "rain rate: -3.0 mm/h is no rain rate."),
+        (["--on", "x.bin", "--rain", "3"], "x.bin: there is no such file or folder. Check"),
+        (["--on", "x.bin", "--rain", "3", "--scans", "2"], "--scans: has a meaning only without"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_before_anything_is_written(
+    run_derain, tmp_path: Path, arguments: list[str], message: str
+) -> None:
+    outcome = run_derain("simulate", "--out", tmp_path / "out", *arguments)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert outcome.err.startswith(f"derain: {message}")
+    assert len(outcome.err.splitlines()) == 1
+    assert not (tmp_path / "out").exists()

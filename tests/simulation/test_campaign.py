@@ -1,0 +1,72 @@
+"""What a campaign asks for, and what it refuses."""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from derain.errors import InputError
+from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, partition
+from derain.simulation.radar import Radar
+from derain.simulation.sensor import Sensor, load_sensor
+
+
+def test_the_split_covers_every_sequence_once() -> None:
+    split = Campaign().split
+    names = [name for part in split.values() for name in part]
+    assert list(split) == ["train", "validation", "test"]
+    assert [len(part) for part in split.values()] == [16, 4, 8]
+    assert names == sorted(set(names)) == Campaign().names
+    for part in split.values():
+        assert {Campaign().rain_rate[name] for name in part} == set(Campaign().rain_rates)
+
+
+def test_a_sensor_is_given_by_its_name_or_as_it_is() -> None:
+    assert Campaign(sensor="mems_256").lidar == load_sensor("mems_256")
+    assert Campaign(sensor=Sensor(rows=7)).lidar == Sensor(rows=7)
+
+
+def test_the_description_tells_campaigns_apart_and_is_json() -> None:
+    plain = Campaign().description
+    assert json.loads(json.dumps(plain)) == plain
+    changes = [{"seed": 1}, {"sensor": "mems_256"}, {"layout": "facility"}, {"radar": Radar()}]
+    for change in changes:
+        assert replace(Campaign(), **change).description != plain
+    # A sensor file may change under its name: what it said counts.
+    assert replace(Campaign(), sensor="mems_64").description == plain
+
+
+@pytest.mark.parametrize("sequences", [3, 4, 5, 10, 25, 143])
+def test_sequences_are_parted_as_those_of_rehearse_3d(sequences: int) -> None:
+    train, validation, test = partition(sequences)
+    assert train + validation + test == sequences
+    assert validation == test >= 1
+    if sequences == 143:
+        assert (train, validation, test) == (85, 29, 29)
+
+
+def test_two_of_five_sequences_are_clean() -> None:
+    assert FACILITY_RAIN_RATES.count(0) / len(FACILITY_RAIN_RATES) == pytest.approx(0.39, abs=0.02)
+    assert set(FACILITY_RAIN_RATES) == {0, 10, 25, 50}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"train": 0}, "train: 0 is too few"),
+        ({"scans": 0}, "scans: 0 is too few"),
+        ({"seed": -1}, "seed: -1 is negative"),
+        ({"rain_rates": ()}, "rain rate: none is given"),
+        ({"rain_rates": (-5.0,)}, "rain rate: -5.0 mm/h is no rain rate"),
+        ({"rain_rates": (float("nan"),)}, "rain rate: nan mm/h is no rain rate"),
+    ],
+)
+def test_an_impossible_campaign_is_refused(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Campaign(**wrong)
+
+
+def test_too_few_sequences_cannot_be_parted() -> None:
+    with pytest.raises(InputError, match="sequences: 2 are too few"):
+        partition(2)

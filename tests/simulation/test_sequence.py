@@ -1,0 +1,131 @@
+"""One sequence: the folders of REHEARSE-3D, and how LiDAR, radar and weather belong together."""
+
+import csv
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from derain.extrinsics import read_extrinsics
+from derain.files.binary import read_binary
+from derain.files.labels import read_labels
+from derain.simulation.campaign import Campaign
+from derain.simulation.classes import TrackClass
+from derain.simulation.radar import Radar
+from derain.simulation.sequence import write_sequence
+
+FACILITY = {"scans": 3, "sensor": "mems_64", "layout": "facility", "rain_rates": (25.0,)}
+OF_LIDAR = {"innoviz", "lidar_radar_pcd", "lidar_radar_labels", "weather"}
+OF_RADAR = {"radar_pcd", "ext_radar"}
+
+
+def table(path: Path) -> dict[str, list[str]]:
+    with path.open(newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def points(path: Path) -> NDArray[np.float32]:
+    return np.fromfile(path, "<f4").reshape(-1, 4)
+
+
+def written(folder: Path, **changes: Any) -> Path:
+    write_sequence(folder, Campaign(**{**FACILITY, **changes}), "000")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folder(open3d: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written(tmp_path_factory.mktemp("sequence") / "000", radar=Radar())
+
+
+@pytest.fixture(scope="module")
+def without_radar(open3d: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written(tmp_path_factory.mktemp("sequence") / "000")
+
+
+def test_the_folders_and_files_are_those_of_rehearse_3d(folder: Path) -> None:
+    assert {file.name for file in folder.iterdir()} == OF_LIDAR | OF_RADAR | {"extrinsics.yaml"}
+    suffixes = {"lidar_radar_labels": "label", "weather": "csv", "ext_radar": "csv"}
+    for kind in OF_LIDAR | OF_RADAR:
+        frames = table(folder / kind / "metadata.csv")["frame"]
+        expected = {f"{frame}.{suffixes.get(kind, 'bin')}" for frame in frames}
+        assert {file.name for file in (folder / kind).iterdir()} == expected | {"metadata.csv"}
+        assert frames == [f"{number:06d}" for number in range(len(frames))]
+
+
+def test_without_a_radar_only_its_folders_are_missing(folder: Path, without_radar: Path) -> None:
+    assert {file.name for file in without_radar.iterdir()} == OF_LIDAR
+    for file in (without_radar / "innoviz").iterdir():
+        assert file.read_bytes() == (folder / "innoviz" / file.name).read_bytes()
+        alone = without_radar / "lidar_radar_pcd" / file.name
+        assert alone.read_bytes() == file.read_bytes()
+
+
+def test_each_sensor_keeps_its_own_time(folder: Path) -> None:
+    lidar = np.array(table(folder / "innoviz/metadata.csv")["timestamp"], float)
+    radar = np.array(table(folder / "radar_pcd/metadata.csv")["timestamp"], float)
+    assert lidar == pytest.approx([0, 0.1, 0.2])
+    assert np.diff(radar) == pytest.approx(1 / 16.5, abs=2e-6)
+    assert 0 <= radar[0] <= 1 / 16.5
+    assert lidar[-1] <= radar[-1]
+
+
+def test_a_merged_cloud_is_the_scan_and_the_radar_frame_nearest_in_time(folder: Path) -> None:
+    lidar = np.array(table(folder / "innoviz/metadata.csv")["timestamp"], float)
+    radar = np.array(table(folder / "radar_pcd/metadata.csv")["timestamp"], float)
+    mounting = read_extrinsics(folder / "extrinsics.yaml")
+    for number, time in enumerate(lidar):
+        merged = points(folder / f"lidar_radar_pcd/{number:06d}.bin")
+        scan = points(folder / f"innoviz/{number:06d}.bin")
+        frame = points(folder / f"radar_pcd/{np.abs(radar - time).argmin():06d}.bin")
+        assert np.array_equal(merged[: len(scan)], scan)
+        assert np.array_equal(merged[len(scan) :, :3], mounting(frame[:, :3]))
+        assert np.array_equal(merged[len(scan) :, 3], frame[:, 3])
+        label = read_labels(folder / f"lidar_radar_labels/{number:06d}.label", len(merged))
+        assert set(label) <= set(TrackClass)
+
+
+def test_the_radar_sees_what_the_lidar_sees(folder: Path) -> None:
+    # Masts are tall and echo well: what the radar calls a mast is beside one of the LiDAR's.
+    scan = read_binary(folder / "lidar_radar_pcd/000000.bin")
+    label = read_labels(folder / "lidar_radar_labels/000000.label", len(scan))
+    first = len(points(folder / "innoviz/000000.bin"))
+    mast = label == TrackClass.SPRINKLER
+    of_radar, of_lidar = scan.xyz[first:][mast[first:]], scan.xyz[:first][mast[:first]]
+    nearest = np.linalg.norm(of_radar[:, None, :2] - of_lidar[:, :2], axis=2).min(axis=1)
+    assert len(of_radar) > 5
+    assert np.median(nearest) < 1
+
+
+def test_the_extended_radar_has_the_same_points_and_what_was_measured_of_them(
+    folder: Path,
+) -> None:
+    extended = table(folder / "ext_radar/000001.csv")
+    names = ["x", "y", "z", "intensity", "cross_section", "velocity", "confidence"]
+    assert list(extended) == names
+    columns = {name: np.array(column, float) for name, column in extended.items()}
+    plain = points(folder / "radar_pcd/000001.bin")
+    stacked = np.stack([columns[name] for name in names[:4]], axis=1)
+    assert np.allclose(stacked, plain, rtol=1e-4, atol=1e-4)
+    # The echo of a given cross-section falls with the fourth power of the distance.
+    distance = np.linalg.norm(stacked[:, :3], axis=1)
+    loss = columns["cross_section"] - columns["intensity"]
+    assert loss == pytest.approx(40 * np.log10(distance / Radar().reach), abs=0.01)
+    assert ((columns["confidence"] > 0.9) & (columns["confidence"] <= 1)).mean() > 0.9
+
+
+def test_the_weather_is_that_of_the_campaign(folder: Path) -> None:
+    for frame in table(folder / "weather/metadata.csv")["frame"]:
+        weather = table(folder / "weather" / f"{frame}.csv")
+        assert weather["rain_rate_mm_h"] == ["25"]
+        assert 10 < float(weather["rain_rate_at_sensor_mm_h"][0]) < 50
+        assert float(weather["drop_slope_per_mm"][0]) == pytest.approx(2.0855, rel=1e-4)
+
+
+def test_clear_air_is_recorded_as_such(open3d: ModuleType, tmp_path: Path) -> None:
+    weather = table(written(tmp_path / "000", rain_rates=(0.0,)) / "weather/000000.csv")
+    assert (weather["rain_rate_mm_h"], weather["visibility_m"]) == (["0"], ["inf"])
