@@ -1,4 +1,4 @@
-"""``derain info``: what is in a scan, a label file or a model."""
+"""``derain info``: what is in a scan, a label file, a model or a data set."""
 
 import argparse
 import json
@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from derain.cli.info_folder import draw, facts_of_folder
 from derain.directions import directions
 from derain.errors import InputError
 from derain.files import read_scan
@@ -17,25 +18,43 @@ from derain.grid_fit import fit_grid
 from derain.morton import distinct_positions
 from derain.scan import Scan
 
-SUMMARY = "say what is in a scan, a label file or a model"
+SUMMARY = "say what is in a scan, a label file, a model or a data set"
 
 DESCRIPTION = """\
 Says what is in a scan, a label file, an exported model or a checkpoint, and what range image fits
-a scan. With --grid, fits one grid to all the scans, to be written into a configuration.
+a scan; and how many scans and points, by class and by rain rate, are in a data set: a folder of
+sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated), one sequence, or a folder of scans. With
+--grid, fits one grid to all the scans, to be written into a configuration.
 
   derain info scan.bin
   derain info scan.bin --columns x,y,z,intensity,ring --json
   derain info labels/000000.label
   derain info model.onnx
   derain info --grid scans/*.bin
+  derain info REHEARSE3D_PUBLIC --picture statistics.png
+  derain info WADS --json
+  derain info my_data --layout lidar,classes --card my_card.yaml
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument("files", nargs="+", type=Path, help="scans, labels, models, checkpoints")
+    parser.add_argument(
+        "files", nargs="+", type=Path, help="scans, labels, models, checkpoints, folders"
+    )
     parser.add_argument("--grid", action="store_true", help="fit one grid to all the scans")
-    parser.add_argument("--json", action="store_true", help="print one JSON object a file")
+    parser.add_argument(
+        "--json", action="store_true", help="print one JSON object a file or folder"
+    )
+    parser.add_argument(
+        "--card", help="data card that names a folder's classes (default: as its layout tells)"
+    )
+    parser.add_argument(
+        "--layout",
+        metavar="SCANS,LABELS",
+        help="names of a sequence's folders of scans and labels (default: those known)",
+    )
+    parser.add_argument("--picture", type=Path, help="PNG to draw of a folder's statistics")
     parser.add_argument(
         "--columns",
         default="x,y,z,intensity",
@@ -51,6 +70,9 @@ def main(arguments: argparse.Namespace) -> int:
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0
     for path in arguments.files:
+        if path.is_dir():
+            _describe_folder(path, arguments)
+            continue
         facts = _facts(path, columns)
         if arguments.json:
             print(json.dumps({"file": str(path), **facts}))
@@ -58,6 +80,13 @@ def main(arguments: argparse.Namespace) -> int:
             print(path)
             print(_indented(facts))
     return 0
+
+
+def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
+    facts = facts_of_folder(folder, arguments)
+    print(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
+    if arguments.picture:
+        draw(facts, arguments.picture)
 
 
 def _facts(path: Path, columns: list[str]) -> dict[str, Any]:

@@ -1,0 +1,105 @@
+"""A picture of a labelled scan and of the scene it was labelled by."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Polygon
+from numpy.typing import NDArray
+
+from derain.annotation.scene import Scene
+from derain.directions import directions
+from derain.label_transfer import UNKNOWN
+from derain.pictures import BACKGROUND
+from derain.scan import Scan
+from derain.simulation.classes import TrackClass
+
+# Bright on dark; what there is much of is dull.
+COLOURS = {
+    TrackClass.BACKGROUND: "#5c6773",
+    TrackClass.ROAD: "#a79b8e",
+    TrackClass.RAIN: "#39c5ff",
+    TrackClass.SPRINKLER: "#b58cff",
+    TrackClass.CAR: "#ff5d5d",
+    TrackClass.PEDESTRIAN: "#ffd23f",
+    TrackClass.BIKE: "#ff9a3c",
+    TrackClass.TARGET: "#5ee08a",
+}
+UNKNOWN_COLOUR = "#ff6ad5"
+
+# Metres around the road polygon that are drawn from above.
+SURROUNDINGS = 3.0
+
+
+def annotation_figure(scan: Scan, label: NDArray[np.int64], scene: Scene, title: str) -> Figure:
+    """One scan coloured by class, from above with road and boxes, and as the sensor sees it.
+
+    Args:
+        scan: The scan.
+        label: TrackClass or UNKNOWN of every row, int64 (N,).
+        scene: The scene it was labelled by.
+        title: Heading.
+    """
+    seen = scan.valid
+    points, colour = scan.xyz[seen], _colours(label[seen])
+    # What is rare is drawn last, on top.
+    rarity = np.argsort(-np.bincount(label, minlength=UNKNOWN + 1)[label[seen]], kind="stable")
+    points, colour = points[rarity], colour[rarity]
+
+    figure = Figure(figsize=(14, 10), layout="constrained")
+    figure.suptitle(title)
+    above, ahead = figure.subplots(2, 1)
+    _scatter(above, points[:, 0], points[:, 1], colour)
+    _draw_scene(above, scene)
+    azimuth, inclination = directions(points)
+    _scatter(ahead, -azimuth, inclination, colour)
+    ahead.set_xlabel("azimuth, to the right / °")
+    ahead.set_ylabel("inclination / °")
+    figure.legend(handles=_legend(label[seen]), loc="outside lower center", ncols=9, frameon=False)
+    return figure
+
+
+def _colours(label: NDArray[np.int64]) -> NDArray[np.float64]:
+    """RGBA of each class id, (N, 4)."""
+    palette = [UNKNOWN_COLOUR] * (UNKNOWN + 1)
+    for kind, colour in COLOURS.items():
+        palette[kind] = colour
+    return ListedColormap(palette)(label)
+
+
+def _legend(label: NDArray[np.int64]) -> list[Patch]:
+    counts = np.bincount(label, minlength=UNKNOWN + 1)
+    known = [
+        Patch(color=colour, label=f"{kind.name.lower()} {counts[kind]:,}")
+        for kind, colour in COLOURS.items()
+        if counts[kind]
+    ]
+    unknown = [Patch(color=UNKNOWN_COLOUR, label=f"unknown {counts[UNKNOWN]:,}")]
+    return known + unknown * bool(counts[UNKNOWN])
+
+
+def _scatter(
+    axes: Axes, x: NDArray[np.floating], y: NDArray[np.floating], colour: NDArray[np.float64]
+) -> None:
+    size = np.clip(60_000 / max(len(x), 1), 0.5, 4)
+    axes.scatter(x, y, s=size, c=colour, linewidths=0, rasterized=True)
+    axes.set_facecolor(BACKGROUND)
+
+
+def _draw_scene(axes: Axes, scene: Scene) -> None:
+    """Draws the outlines of road and boxes, from above, and looks at the road."""
+    axes.add_patch(Polygon(scene.road, fill=False, edgecolor="white", linewidth=0.8))
+    if scene.rain_area is not None:
+        colour = COLOURS[TrackClass.RAIN]
+        axes.add_patch(Polygon(scene.rain_area, fill=False, edgecolor=colour, linewidth=0.8))
+    for box in scene.boxes.values():
+        colour = COLOURS[box.kind]
+        axes.add_patch(
+            Polygon(box.footprint.corners(), fill=False, edgecolor=colour, linewidth=0.6)
+        )
+    road = np.array(scene.rain_area or scene.road)
+    (left, bottom), (right, top) = road.min(axis=0), road.max(axis=0)
+    axes.set_xlim(left - SURROUNDINGS, right + SURROUNDINGS)
+    axes.set_ylim(bottom - SURROUNDINGS, top + SURROUNDINGS)
+    axes.set_xlabel("forward / m")
+    axes.set_ylabel("left / m")

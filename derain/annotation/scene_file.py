@@ -1,0 +1,169 @@
+"""Scene files: a static scene as YAML.
+
+    height: 0.1                                  # metres above the road from which it is rain
+    road: [[2, -4], [60, -4], [60, 4], [2, 4]]   # corners x, y in order, metres, sensor frame
+    boxes:
+      car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
+      mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
+    plane: {distance: 0.1, points: 9, iterations: 1000, scans: 10, seed: 0}
+    corrections:                                 # what is different in some sequences
+      "003": {boxes: {car_1: {shift: [0.2, 0, 0]}}}
+
+Only the road is required. Where it rains beside the road, `rain_area` has the corners of the ground
+over which to look for drops. A correction may have shift, size and heading.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from derain.annotation.boxes import Box, Correction, Triple
+from derain.annotation.plane import PlaneSearch
+from derain.annotation.scene import Polygon, Scene
+from derain.annotation.yaml_entry import Entry
+from derain.files.atomic import replacing
+from derain.simulation.classes import TrackClass
+
+CLASSES = {kind.name.lower(): kind for kind in TrackClass}
+
+
+def read_scene(path: Path) -> Scene:
+    """Reads a scene file.
+
+    Raises:
+        InputError: A file that cannot be read, or a value in it that cannot be meant; the message
+            names its key.
+    """
+    parsers = {
+        "road": _polygon,
+        "boxes": _boxes,
+        "rain_area": _polygon,
+        "height": Entry.number,
+        "plane": _plane_search,
+        "corrections": _itself,
+    }
+    values = Entry.of_file(path).record(parsers, required=["road"])
+    corrections = values.pop("corrections", None)
+    scene = Scene(**values)
+    if corrections is None:
+        return scene
+    return replace(
+        scene,
+        corrections={
+            sequence: _corrections(entry, scene.boxes)
+            for sequence, entry in corrections.members().items()
+        },
+    )
+
+
+def write_scene(path: Path, scene: Scene) -> None:
+    """Writes a scene file.
+
+    Raises:
+        InputError: It cannot be written.
+    """
+    with replacing(path) as temporary:
+        text = yaml.safe_dump(as_dict(scene), sort_keys=False, default_flow_style=None)
+        temporary.write_text(text, "utf-8")
+
+
+def as_dict(scene: Scene) -> dict[str, Any]:
+    """A scene as its file holds it, of what YAML and JSON know."""
+    area = {} if scene.rain_area is None else {"rain_area": _corners(scene.rain_area)}
+    return {
+        "height": scene.height,
+        "road": _corners(scene.road),
+        **area,
+        "boxes": {
+            name: {
+                "class": box.kind.name.lower(),
+                "centre": list(box.centre),
+                "size": list(box.size),
+                "heading": box.heading,
+            }
+            for name, box in scene.boxes.items()
+        },
+        "plane": asdict(scene.plane),
+        "corrections": {
+            sequence: {"boxes": {name: _stated(each) for name, each in corrections.items()}}
+            for sequence, corrections in scene.corrections.items()
+        },
+    }
+
+
+def _corners(polygon: Polygon) -> list[list[float]]:
+    return [list(corner) for corner in polygon]
+
+
+def _stated(correction: Correction) -> dict[str, Any]:
+    return {
+        key: list(value) if isinstance(value, tuple) else value
+        for key, value in asdict(correction).items()
+        if value is not None
+    }
+
+
+def _polygon(entry: Entry) -> Polygon:
+    corners = entry.items()
+    if len(corners) < 3:
+        raise entry.fault(f"{len(corners)} corners make no polygon", "List three or more [x, y].")
+    return tuple((x, y) for x, y in (corner.numbers(2) for corner in corners))
+
+
+def _boxes(entry: Entry) -> dict[str, Box]:
+    return {name: _box(each) for name, each in entry.members().items()}
+
+
+def _box(entry: Entry) -> Box:
+    parsers = {"class": _class, "centre": _triple, "size": _size, "heading": Entry.number}
+    values = entry.record(parsers, required=["class", "centre", "size"])
+    return Box(values.pop("class"), **values)
+
+
+def _plane_search(entry: Entry) -> PlaneSearch:
+    parsers = {
+        "distance": Entry.positive,
+        "points": lambda value: value.whole(3),
+        "iterations": lambda value: value.whole(1),
+        "scans": lambda value: value.whole(1),
+        "seed": lambda value: value.whole(0),
+    }
+    return PlaneSearch(**entry.record(parsers))
+
+
+def _corrections(entry: Entry, boxes: Mapping[str, Box]) -> dict[str, Correction]:
+    corrections: Entry = entry.record({"boxes": _itself}, required=["boxes"])["boxes"]
+    for name, correction in corrections.members().items():
+        if name not in boxes:
+            raise correction.fault("there is no such box", f"Known are {', '.join(boxes)}.")
+    parsers = {"shift": _triple, "size": _size, "heading": Entry.number}
+    return {
+        name: Correction(**correction.record(parsers))
+        for name, correction in corrections.members().items()
+    }
+
+
+def _itself(entry: Entry) -> Entry:
+    """For a value that is read later: names of boxes are checked when the boxes are known."""
+    return entry
+
+
+def _class(entry: Entry) -> TrackClass:
+    if not isinstance(entry.value, str) or entry.value not in CLASSES:
+        raise entry.fault(f"there is no class {entry.value!r}", f"Known are {', '.join(CLASSES)}.")
+    return CLASSES[entry.value]
+
+
+def _triple(entry: Entry) -> Triple:
+    x, y, z = entry.numbers(3)
+    return x, y, z
+
+
+def _size(entry: Entry) -> Triple:
+    size = _triple(entry)
+    for side in entry.items():
+        side.positive()
+    return size

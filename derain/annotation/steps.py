@@ -1,0 +1,107 @@
+"""The steps that label a scan of a static scene by where its points lie.
+
+Source: REHEARSE-3D, section III.B. Step by step:
+
+1. Scans are read by `derain.files`.
+2. The road's plane: `road_plane`.
+3. Sprinklers, boxes; what is in one of them but below the plane is omitted: `annotate`.
+4. Other things, boxes: `annotate`.
+5. A polygon around the road: `Scene.road`.
+6. What is above the plane, over the polygon and in no box is rain: `annotate`.
+7. The rest over the polygon is road: `annotate`.
+8. The rest is background: `annotate`.
+9. Boxes are corrected by sequence: `Scene.in_sequence`.
+10. Points of the radar take the label of the nearest LiDAR point: `derain.label_transfer`.
+
+Rows are never dropped: what the paper omits, and rows that cannot be judged, are unknown here.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.annotation.plane import Plane, find_plane
+from derain.annotation.scene import Scene, inside
+from derain.label_transfer import UNKNOWN
+from derain.scan import Scan
+from derain.simulation.classes import TrackClass
+
+NO_BOX = -1
+
+# Wider than the rounding of a box's corners, metres.
+ROUNDING = 1e-6
+
+
+def road_plane(scans: Sequence[Scan], scene: Scene) -> Plane:
+    """Finds the plane of the road in the scans of one sequence.
+
+    The paper seeks it in all points. Here only those over the road polygon and outside boxes are
+    looked at, where the road is most of what there is: no wall can win.
+
+    Args:
+        scans: One or more scans of the sequence.
+        scene: The scene as it is in that sequence.
+
+    Raises:
+        InputError: Too few points over the road, or none of them a road's, or Open3D cannot be
+            imported.
+    """
+    return find_plane(
+        np.concatenate([_bare_road(scan, scene) for scan in scans]), scene.plane, scans[0].name
+    )
+
+
+def annotate(scan: Scan, scene: Scene, plane: Plane) -> NDArray[np.int64]:
+    """Labels the points of a scan.
+
+    Where boxes overlap, a sprinkler's goes first, then the one named first.
+
+    Args:
+        scan: The scan.
+        scene: The scene as it is in the scan's sequence.
+        plane: The plane of its road.
+
+    Returns:
+        TrackClass of every row, int64 (N,); UNKNOWN for rows that cannot be judged, and for points
+        in a sprinkler's box but below the road's plane.
+    """
+    label = np.full(len(scan), UNKNOWN, dtype=np.int64)
+    points = scan.xyz[scan.valid].astype(np.float64)
+    boxed, height = _boxed(points, scene), plane.height(points)
+    in_rain = inside(scene.rain_area or scene.road, points)
+    label[scan.valid] = np.select(
+        [
+            (boxed == TrackClass.SPRINKLER) & (height < 0),
+            boxed != NO_BOX,
+            in_rain & (height > scene.height),
+            inside(scene.road, points),
+        ],
+        [UNKNOWN, boxed, TrackClass.RAIN, TrackClass.ROAD],
+        TrackClass.BACKGROUND,
+    )
+    return label
+
+
+def _bare_road(scan: Scan, scene: Scene) -> NDArray[np.float64]:
+    """Points over the road and in no box, float64 (M, 3), metres."""
+    points = scan.xyz[scan.valid].astype(np.float64)
+    points = points[inside(scene.road, points)]
+    bare: NDArray[np.float64] = points[_boxed(points, scene) == NO_BOX]
+    return bare
+
+
+def _boxed(points: NDArray[np.float64], scene: Scene) -> NDArray[np.int64]:
+    """Class of the box that each point is in, int64 (N,); NO_BOX where it is in none."""
+    # Each box looks at the points of its own stretch of x alone.
+    order = np.argsort(points[:, 0])
+    points = points[order]
+    kind = np.full(len(points), NO_BOX, dtype=np.int64)
+    by_rank = sorted(scene.boxes.values(), key=lambda box: box.kind is not TrackClass.SPRINKLER)
+    for box in reversed(by_rank):  # the last to claim a point keeps it
+        x = box.footprint.corners()[:, 0]
+        first, last = np.searchsorted(points[:, 0], [x.min() - ROUNDING, x.max() + ROUNDING])
+        kind[first:last][box.contains(points[first:last])] = box.kind
+    in_order = np.empty_like(kind)
+    in_order[order] = kind
+    return in_order

@@ -1,0 +1,203 @@
+"""``derain annotate``: labels the scans of a static scene by its geometry."""
+
+import argparse
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from tqdm import tqdm
+
+from derain.cli.arguments import factor
+from derain.cli.outputs import refuse_clashes
+from derain.data_statistics import LAYOUTS
+from derain.errors import InputError
+from derain.files import find_scans, read_scan
+from derain.files.labels import write_labels
+from derain.label_transfer import LABEL_WITHIN, UNKNOWN, transfer_labels
+from derain.simulation.classes import TrackClass
+
+if TYPE_CHECKING:
+    from derain.annotation.plane import Plane
+    from derain.annotation.scene import Scene
+    from derain.scan import Scan
+
+SUMMARY = "label the scans of a static scene by its geometry"
+
+DESCRIPTION = """\
+Labels the scans of one sequence as REHEARSE-3D was labelled: finds the road's plane, gives what is
+in a box the box's class, calls the rest over the road rain or road by its height above the plane,
+and everything else background. Writes <stem>.label with REHEARSE-3D's class ids (255: unknown), and
+a picture of the sequence.
+
+  derain annotate sequences/003 --scene scene.yaml --out labels/003
+  derain annotate scans/*.bin --scene scene.yaml --out labels --sequence 003 --json
+  derain annotate lidar --scene scene.yaml --out labels --radar radar --within 0.5
+
+A scene file, in metres in the sensor's frame:
+
+  road: [[2, -4], [60, -4], [60, 4], [2, 4]]
+  boxes:
+    car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
+    mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
+  height: 0.1          # above the road's plane, from which it is rain
+  corrections:         # what is different in some sequences
+    "003": {boxes: {car_1: {shift: [0.2, 0, 0]}}}
+
+Radar frames are paired with scans of the same name, in the LiDAR's frame, and labelled by the
+nearest LiDAR point, in the folder radar; `derain fuse` pairs frames in time and moves them there.
+"""
+
+# Where a sequence's scans lie: those of REHEARSE-3D's LiDAR alone, before clouds merged with radar.
+SCAN_FOLDERS = ("innoviz", *dict(LAYOUTS))
+
+CLASS_NAMES = {kind.value: kind.name.lower() for kind in TrackClass} | {UNKNOWN: "unknown"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's arguments."""
+    parser.add_argument(
+        "scans", nargs="+", type=Path, help="scans, folders of scans, or a sequence's folder"
+    )
+    parser.add_argument("--scene", type=Path, required=True, help="scene file")
+    parser.add_argument("--out", type=Path, required=True, help="folder to write to")
+    parser.add_argument(
+        "--sequence", help="name whose corrections hold (default: that of the folder)"
+    )
+    parser.add_argument("--radar", type=Path, help="folder of radar frames to label as well")
+    parser.add_argument(
+        "--within",
+        type=factor,
+        default=LABEL_WITHIN,
+        metavar="METRES",
+        help="how far a label reaches to a radar point (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--picture",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="draw the sequence's middle scan (default: yes)",
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    for option in ("--columns", "--radar-columns"):
+        parser.add_argument(
+            option,
+            default="x,y,z,intensity",
+            help="names of the columns of .bin and .npy files (default: %(default)s)",
+        )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Runs the command."""
+    from derain.annotation.scene_file import read_scene
+
+    paths = find_scans(map(_folder_of_scans, arguments.scans))
+    sequence = arguments.sequence or _sequence_of(paths[0])
+    refuse_clashes(paths, arguments.out)
+    _refuse_their_labels(paths, arguments.out)
+    frames = _radar_frames(arguments.radar, paths)
+    scene = read_scene(arguments.scene).in_sequence(sequence)
+    columns = arguments.columns.split(",")
+
+    plane = _road_plane(paths, scene, columns)
+    points = _label_all(paths, frames, scene, plane, arguments)
+    report: dict[str, Any] = {
+        "sequence": sequence,
+        "scans": len(paths),
+        "points": sum(points.values()),
+        "points_by_class": {name: points[id_] for id_, name in CLASS_NAMES.items()},
+        "plane": {**asdict(plane), "slope": plane.slope},
+    }
+    if arguments.picture:
+        picture = arguments.out / f"{sequence}.png"
+        _draw(read_scan(paths[len(paths) // 2], columns), scene, plane, sequence, picture)
+        report["picture"] = str(picture)
+    print(json.dumps(report) if arguments.json else _as_text(report))
+    return 0
+
+
+def _folder_of_scans(path: Path) -> Path:
+    """The folder of scans in a sequence's folder; other paths stay."""
+    return next((path / name for name in SCAN_FOLDERS if (path / name).is_dir()), path)
+
+
+def _sequence_of(scan: Path) -> str:
+    folder = scan.absolute().parent
+    return folder.parent.name if folder.name in SCAN_FOLDERS else folder.name
+
+
+def _refuse_their_labels(scans: Sequence[Path], out: Path) -> None:
+    """Refuses to overwrite labels that came with the scans."""
+    for scan in scans:
+        for _, labels in LAYOUTS:
+            if out.resolve() == (scan.parent.parent / labels).resolve():
+                raise InputError(
+                    out, f"is where labels of {scan} lie", "Give --out another folder."
+                )
+
+
+def _radar_frames(folder: Path | None, scans: Sequence[Path]) -> dict[str, Path]:
+    """Radar frames by the stem of the scan that each belongs to."""
+    frames = {} if folder is None else {frame.stem: frame for frame in find_scans([folder])}
+    stems = {scan.stem for scan in scans}
+    for stem, frame in frames.items():
+        if stem not in stems:
+            raise InputError(
+                frame, "no scan has its name", "Pair the frames in time with `derain fuse`."
+            )
+    return frames
+
+
+def _road_plane(paths: Sequence[Path], scene: "Scene", columns: list[str]) -> "Plane":
+    from derain.annotation.steps import road_plane
+
+    chosen = np.linspace(0, len(paths) - 1, min(len(paths), scene.plane.scans)).round().astype(int)
+    return road_plane([read_scan(paths[number], columns) for number in chosen], scene)
+
+
+def _label_all(
+    paths: Sequence[Path],
+    frames: dict[str, Path],
+    scene: "Scene",
+    plane: "Plane",
+    arguments: argparse.Namespace,
+) -> Counter[int]:
+    """Writes the labels of all scans and radar frames; counts the scans' points by class."""
+    from derain.annotation.steps import annotate
+
+    points: Counter[int] = Counter()
+    for path in tqdm(paths, unit="scan", disable=None):
+        scan = read_scan(path, arguments.columns.split(","))
+        label = annotate(scan, scene, plane)
+        write_labels(arguments.out / f"{path.stem}.label", label)
+        points.update(label.tolist())
+        if path.stem in frames:
+            frame = read_scan(frames[path.stem], arguments.radar_columns.split(","))
+            transferred = transfer_labels(scan.with_label(label), frame.xyz, arguments.within)
+            write_labels(arguments.out / "radar" / f"{path.stem}.label", transferred)
+    return points
+
+
+def _draw(scan: "Scan", scene: "Scene", plane: "Plane", sequence: str, picture: Path) -> None:
+    from derain.annotation.picture import annotation_figure
+    from derain.annotation.steps import annotate
+    from derain.pictures import save
+
+    title = f"sequence {sequence}, {Path(scan.name).name}: {len(scan):,} points"
+    save(annotation_figure(scan, annotate(scan, scene, plane), scene, title), picture)
+
+
+def _as_text(report: dict[str, Any]) -> str:
+    plane, points = report["plane"], report["points"]
+    lines = [
+        f"sequence {report['sequence']}: {report['scans']:,} scans, {points:,} points",
+        f"road: {plane['offset']:.3f} m under the sensor, leaning by {plane['slope']:.2f} degrees",
+        *(
+            f"  {name:<11}{count:>14,} {count / max(points, 1):>8.2%}"
+            for name, count in report["points_by_class"].items()
+        ),
+    ]
+    return "\n".join([*lines, *([report["picture"]] if "picture" in report else [])])

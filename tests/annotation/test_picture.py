@@ -1,0 +1,53 @@
+"""The picture shows every judged point in the colour of its class, and the scene."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgba
+
+from derain.annotation.boxes import Box
+from derain.annotation.picture import COLOURS, UNKNOWN_COLOUR, annotation_figure
+from derain.annotation.scene import Scene
+from derain.hard_cases import hard_cases, scene
+from derain.label_transfer import UNKNOWN
+from derain.pictures import save
+from derain.scan import Scan
+from derain.simulation.classes import TrackClass
+
+SCENE = Scene(
+    road=((2, -4), (60, -4), (60, 4), (2, 4)),
+    boxes={"car": Box(TrackClass.CAR, (20, 0, -1), (4, 2, 1))},
+    rain_area=((0, -9), (60, -9), (60, 9), (0, 9)),
+)
+
+
+def test_both_panels_show_every_valid_point_in_the_colour_of_its_class(tmp_path: Path) -> None:
+    points = scene(900)
+    points[5] = np.nan
+    scan, label = Scan.of(points), np.resize([*TrackClass, UNKNOWN], 900)
+    figure = annotation_figure(scan, label, SCENE, "a scan")
+    for panel in figure.axes:
+        (dots,) = panel.collections
+        shown = dots.get_facecolors()
+        for kind in (*TrackClass, UNKNOWN):
+            colour = COLOURS.get(kind, UNKNOWN_COLOUR)
+            count = np.isclose(shown, to_rgba(colour)).all(axis=1).sum()
+            assert count == (label == kind)[scan.valid].sum()
+    outlines = [patch.get_edgecolor() for patch in figure.axes[0].patches]
+    colours = ["white", COLOURS[TrackClass.RAIN], COLOURS[TrackClass.CAR]]
+    assert outlines == [to_rgba(colour) for colour in colours]
+    save(figure, tmp_path / "picture.png")
+    assert (tmp_path / "picture.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("name", "scan"),
+    [case for case in hard_cases(100) if case[0] in ("empty", "nothing valid", "no intensity")],
+)
+def test_a_hard_case_is_drawn_without_a_warning(name: str, scan: Scan) -> None:
+    label = np.full(len(scan), UNKNOWN)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        annotation_figure(scan, label, Scene(SCENE.road), name).draw_without_rendering()

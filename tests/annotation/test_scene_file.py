@@ -1,0 +1,123 @@
+"""Scene files are read as they are written, and say what is wrong with them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from derain.annotation import scene_file
+from derain.annotation.boxes import Box, Correction
+from derain.annotation.plane import PlaneSearch
+from derain.annotation.scene import Scene, inside
+from derain.annotation.scene_file import as_dict, read_scene, write_scene
+from derain.errors import InputError
+from derain.simulation.classes import TrackClass
+
+SCENE = Scene(
+    road=((2, -4), (60, -4), (60, 4), (2, 4)),
+    boxes={
+        "car_1": Box(TrackClass.CAR, (20, 1, -0.6), (4.5, 1.8, 1.5), 5),
+        "mast_1": Box(TrackClass.SPRINKLER, (8, 4.5, 0.7), (0.3, 0.3, 4)),
+    },
+    rain_area=((0, -9), (60, -9), (60, 9), (0, 9)),
+    height=0.15,
+    plane=PlaneSearch(distance=0.2, points=3, iterations=50, scans=2, seed=7),
+    corrections={"003": {"car_1": Correction((0.2, 0, 0), (4, 2, 1), 0.0)}, "010": {}},
+)
+
+
+def written(path: Path, text: str) -> Path:
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_a_scene_is_read_as_it_was_written(tmp_path: Path) -> None:
+    write_scene(tmp_path / "scene.yaml", SCENE)
+    assert read_scene(tmp_path / "scene.yaml") == SCENE
+    assert yaml.safe_load((tmp_path / "scene.yaml").read_text()) == as_dict(SCENE)
+
+
+def test_the_road_is_all_that_a_scene_needs(tmp_path: Path) -> None:
+    path = written(tmp_path / "scene.yaml", "road: [[0, 0], [1, 0], [0, 1]]")
+    assert read_scene(path) == Scene(((0, 0), (1, 0), (0, 1)))
+    write_scene(path, read_scene(path))
+    assert read_scene(path) == Scene(((0, 0), (1, 0), (0, 1)))
+
+
+def test_the_example_of_the_description_can_be_read(tmp_path: Path) -> None:
+    assert scene_file.__doc__ is not None
+    _, example, _ = scene_file.__doc__.split("\n\n")
+    scene = read_scene(written(tmp_path / "scene.yaml", example))
+    assert scene.corrections == {"003": {"car_1": Correction(shift=(0.2, 0, 0))}}
+    assert [box.kind for box in scene.boxes.values()] == [TrackClass.CAR, TrackClass.SPRINKLER]
+    assert scene.height == Scene(scene.road).height
+    assert scene.plane == PlaneSearch()
+
+
+def test_corrections_hold_in_their_sequence_alone() -> None:
+    assert SCENE.in_sequence("004").boxes == SCENE.boxes
+    corrected = SCENE.in_sequence("003").boxes
+    assert corrected["car_1"] == Box(TrackClass.CAR, (20.2, 1, -0.6), (4, 2, 1), 0)
+    assert corrected["mast_1"] == SCENE.boxes["mast_1"]
+
+
+ROAD = "road: [[0, 0], [1, 0], [0, 1]]\n"
+BOX = "{class: car, centre: [0, 0, 0], size: [1, 1, 1]}"
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "reason"),
+    [
+        ("", "", "None is not a mapping"),
+        ("boxes: {}", "", "road is missing"),
+        (ROAD + "roof: 1", "roof", "there is no such key"),
+        ("road: [[0, 0], [1, 0]]", "road", "2 corners make no polygon"),
+        ("road: [[0, 0], [1, 0], [0, .nan]]", "road[2][1]", "nan is not a finite number"),
+        ("road: [[0, 0], [1, 0], [0, 1, 2]]", "road[2]", "are not 2 numbers"),
+        ("road: 5", "road", "5 is not a list"),
+        (ROAD + "height: high", "height", "'high' is not a finite number"),
+        (ROAD + "plane: {points: 2}", "plane.points", "2 is not a whole number from 3 up"),
+        (ROAD + "plane: {distance: 0}", "plane.distance", "0 is not above 0"),
+        (ROAD + "plane: {seed: true}", "plane.seed", "True is not a whole number"),
+        (ROAD + "boxes: [1]", "boxes", "[1] is not a mapping"),
+        (ROAD + "boxes: {a: {class: car}}", "boxes.a", "centre is missing"),
+        (ROAD + f"boxes: {{1: {BOX}}}", "boxes", "the key 1 is no text"),
+        (ROAD + f"boxes: {{a: {BOX.replace('car', 'cart')}}}", "boxes.a.class", "no class 'cart'"),
+        (ROAD + f"boxes: {{a: {BOX.replace('1]', '0]')}}}", "boxes.a.size[2]", "0 is not above 0"),
+        (ROAD + f"boxes: {{a: {BOX.replace('1]', '1, 1]')}}}", "boxes.a.size", "are not 3 numbers"),
+        (ROAD + "corrections: {010: {boxes: {}}}", "corrections", "the key 8 is no text"),
+        (
+            ROAD + "corrections: {'010': {boxes: {a: {}}}}",
+            "corrections.010.boxes.a",
+            "no such box",
+        ),
+    ],
+)
+def test_what_cannot_be_meant_is_named_by_its_key(
+    tmp_path: Path, text: str, key: str, reason: str
+) -> None:
+    path = written(tmp_path / "scene.yaml", text)
+    with pytest.raises(InputError) as raised:
+        read_scene(path)
+    assert str(raised.value.subject) == (f"{path}: {key}" if key else str(path))
+    assert reason in raised.value.reason
+    assert raised.value.remedy.endswith(".")
+
+
+@pytest.mark.parametrize("content", [b"road: [", b"\xff\xfe"])
+def test_a_file_that_is_not_yaml_is_refused(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "scene.yaml").write_bytes(content)
+    with pytest.raises(InputError, match=r"cannot be read as \.yaml"):
+        read_scene(tmp_path / "scene.yaml")
+    with pytest.raises(InputError, match="no such file"):
+        read_scene(tmp_path / "none.yaml")
+
+
+def test_a_bent_road_holds_what_lies_in_one_of_its_parts() -> None:
+    bend = ((0, 0), (10, 0), (10, 10), (8, 10), (8, 2), (0, 2))
+    points = np.random.default_rng(0).uniform(-2, 12, (2000, 3))
+    x, y, _ = points.T
+    first = (x > 0) & (x < 10) & (y > 0) & (y < 2)
+    second = (x > 8) & (x < 10) & (y > 0) & (y < 10)
+    assert np.array_equal(inside(bend, points), first | second)

@@ -1,0 +1,133 @@
+"""``derain info`` on folders: scans and points by class and by rain rate."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.cards import load_card
+from derain.files.labels import write_labels
+from derain.hard_cases import scene
+from derain.simulation.manifest import MAKER
+
+
+@pytest.fixture
+def data_set(tmp_path: Path) -> Path:
+    """Three sequences of two scans of 100 points: in 000 and 002 it rains, ten drops a scan."""
+    root = tmp_path / "data"
+    for name in ("000", "001", "002"):
+        for stem in ("000000", "000001"):
+            scan = root / f"sequences/{name}/lidar_radar_pcd/{stem}.bin"
+            scan.parent.mkdir(parents=True, exist_ok=True)
+            scene(100).tofile(scan)
+            drops = 0 if name == "001" else 10
+            label = np.where(np.arange(100) < drops, 3, 7)
+            write_labels(root / f"sequences/{name}/lidar_radar_labels/{stem}.label", label)
+    rates = {"000": 25.0, "001": 0.0}
+    manifest = {"made_by": MAKER, "rain_rate_mm_h": rates}
+    (root / "manifest.json").write_text(json.dumps(manifest))
+    return root
+
+
+def some(by_class: dict[str, float]) -> dict[str, float]:
+    """What is not 0."""
+    return {name: number for name, number in by_class.items() if number}
+
+
+def test_a_data_set_is_one_object_for_programs(run_derain, data_set: Path) -> None:
+    outcome = run_derain("info", data_set, "--json")
+    facts = json.loads(outcome.out)
+    assert outcome.code == 0
+    assert facts["folder"] == str(data_set)
+    assert facts["layout"] == ["lidar_radar_pcd", "lidar_radar_labels"]
+    assert facts["card"] == "simulated rain"
+    assert (facts["sequences"], facts["scans"], facts["points"]) == (3, 6, 600)
+    assert set(facts["class_share"]) == set(load_card("simulated").classes.values())
+    assert some(facts["points_by_class"]) == {"rain": 40, "road": 560}
+    assert some(facts["class_share"]) == {"rain": 40 / 600, "road": 560 / 600}
+    assert list(facts["by_rain_rate"]) == ["0", "25", "unknown"]
+    assert facts["by_rain_rate"]["0"]["class_share"]["rain"] == 0
+    assert some(facts["by_rain_rate"]["25"]["class_share"]) == {"rain": 0.1, "road": 0.9}
+
+
+def test_the_table_has_a_line_a_class_and_a_column_a_rate(run_derain, data_set: Path) -> None:
+    outcome = run_derain("info", data_set)
+    head, *lines = outcome.out.splitlines()
+    assert str(data_set) in head
+    assert "simulated rain" in head
+    cells = [line.split() for line in lines]
+    assert cells == [
+        ["all", "share", "clean", "25", "mm/h", "rain", "unknown"],
+        ["sequences", "3", "1", "1", "1"],
+        ["scans", "6", "2", "2", "2"],
+        ["points", "600", "200", "200", "200"],
+        ["rain", "40", "6.667%", "0", "20", "20"],
+        ["road", "560", "93.333%", "200", "180", "180"],
+    ]
+
+
+def test_the_card_names_the_classes(run_derain, data_set: Path, tmp_path: Path) -> None:
+    card = tmp_path / "mine.yaml"
+    card.write_text("name: mine\nclasses: {3: wet, 7: grey}\nrain: [3]")
+    facts = json.loads(run_derain("info", data_set, "--card", card, "--json").out)
+    assert facts["card"] == "mine"
+    assert list(facts["class_share"]) == ["wet", "grey"]
+
+
+def test_the_layout_tells_the_card_unless_it_is_stated(run_derain, data_set: Path) -> None:
+    (data_set / "manifest.json").unlink()
+    facts = json.loads(run_derain("info", data_set, "--json").out)
+    assert facts["card"] == "REHEARSE-3D"
+    stated = ["--layout", "lidar_radar_pcd,elsewhere"]
+    facts = json.loads(run_derain("info", data_set, *stated, "--json").out)
+    assert (facts["points"], facts["labelled_points"]) == (600, 0)
+
+
+def test_scans_without_labels_and_card_are_counted(run_derain, data_set: Path) -> None:
+    (data_set / "sequences/000/lidar_radar_labels/000000.label").unlink()
+    folder = data_set / "sequences/000/lidar_radar_pcd"
+    facts = json.loads(run_derain("info", folder, "--json").out)
+    assert (facts["scans"], facts["points"], facts["class_share"]) == (2, 200, {})
+    assert (facts["layout"], facts["card"]) == (None, None)
+    assert "no data card" in run_derain("info", folder).out
+    whole = json.loads(run_derain("info", data_set, "--json").out)
+    assert (whole["points"], whole["labelled_points"]) == (600, 500)
+
+
+def test_the_statistics_are_drawn(run_derain, data_set: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "statistics.png"
+    assert run_derain("info", data_set, "--picture", picture).code == 0
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_files_and_folders_can_be_named_together(run_derain, data_set: Path) -> None:
+    scan = data_set / "sequences/000/lidar_radar_pcd/000000.bin"
+    objects = [
+        json.loads(line) for line in run_derain("info", data_set, scan, "--json").out.splitlines()
+    ]
+    assert objects[0]["scans"] == 6
+    assert objects[1]["file"] == str(scan)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["--layout", "velodyne,labels"], "no sequence in it has a folder velodyne"),
+        (["--layout", "velodyne"], "--layout: 'velodyne' does not name two folders"),
+        (["--card", "none"], "no such data card"),
+    ],
+)
+def test_what_cannot_be_meant_is_one_line(
+    run_derain, data_set: Path, arguments: list[str], reason: str
+) -> None:
+    outcome = run_derain("info", data_set, *arguments)
+    assert (outcome.code, outcome.out) == (2, "")
+    (line,) = outcome.err.splitlines()
+    assert reason in line
+
+
+def test_an_empty_folder_is_refused(run_derain, tmp_path: Path) -> None:
+    outcome = run_derain("info", tmp_path)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "holds no scans" in outcome.err
