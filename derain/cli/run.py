@@ -1,44 +1,43 @@
-"""``derain run``: cleans scans with an exported model."""
+"""``derain run``: cleans scans with an exported model or a filter."""
 
 import argparse
 import json
 import sys
-from collections import Counter
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.cli.arguments import factor, threads
+from derain.cli.odd_scans import Warnings
+from derain.cli.outputs import refuse_clashes
 from derain.errors import InputError
+from derain.export.methods import load_method
 from derain.export.runtime import Derainer
 from derain.files import find_scans, read_scan, write_scan
-from derain.files.labels import label_beside, write_labels
-from derain.range_image import RangeView
+from derain.files.labels import write_labels
+from derain.filters import FILTERS, FilterDerainer, read_parameters
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
 
 SUMMARY = "clean scans on a CPU, without torch"
 
-DESCRIPTION = """\
+DESCRIPTION = f"""\
 Cleans scans: writes <stem>.label (1 = rain, one per row of the input) and the scan without its
 rain, in the input's format with every field kept.
 
   derain run model.onnx scan.bin --out cleaned
   derain run model.onnx scans/ more/scan.pcd --out cleaned --threads 2 --json
   derain run model.onnx nuscenes/ --out cleaned --columns x,y,z,intensity,ring
+  derain run dror scans/ --out cleaned
+  derain run dsor scans/ --out cleaned --parameters best.yaml --set range_multiplier=0.08
 
+METHOD is a model written by `derain export`, or a filter: {", ".join(FILTERS)}.
 A scan that cannot be read is reported and passed over; the exit code is then 2.
 """
-
-# Intensities this many times off the training data's are of another unit.
-INTENSITY_MISMATCH = 30.0
-
-# A larger share of points outside a model's grid are another sensor's, not a few strays.
-MOST_OUTSIDE = 0.02
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ class Cleaned:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument("model", type=Path, help="ONNX file written by `derain export`")
+    parser.add_argument("method", metavar="METHOD", help="ONNX file, or name of a filter")
     parser.add_argument("scans", nargs="+", type=Path, help="scans, or folders of scans")
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
@@ -73,20 +72,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=factor,
         default=1.0,
         metavar="FACTOR",
-        help="what takes the scans' intensities to the model's unit, e.g. 255 (default: 1)",
+        help="what takes the scans' intensities to the method's unit, e.g. 255 (default: 1)",
+    )
+    parser.add_argument(
+        "--parameters", type=Path, metavar="YAML", help="the method's parameters, as tuned"
+    )
+    parser.add_argument(
+        "--set",
+        type=_assignment,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="one parameter of the method, over those of --parameters; may be given again",
     )
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    derainer = Derainer(arguments.model, arguments.threads)
+    method = load_method(arguments.method, _parameters(arguments), arguments.threads)
     scans = find_scans(arguments.scans)
-    _refuse_clashes(scans, arguments.out)
+    refuse_clashes(scans, arguments.out)
+    warn = Warnings(method)
     failed = 0
-    warned: set[str] = set()
     for path in tqdm(scans, unit="scan", disable=None):
         try:
-            cleaned = _clean(path, derainer, arguments, warned)
+            cleaned = _clean(path, method, arguments, warn)
         except InputError as error:
             failed += 1
             tqdm.write(f"derain: {error}", sys.stderr)
@@ -98,15 +108,14 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _clean(
-    path: Path, derainer: Derainer, arguments: argparse.Namespace, warned: set[str]
+    path: Path, method: Derainer | FilterDerainer, arguments: argparse.Namespace, warn: Warnings
 ) -> Cleaned:
     stopwatch = Stopwatch()
     with stopwatch.stage("read"):
         scan = read_scan(path, arguments.columns.split(","))
-    seen = _in_unit_of_model(scan, arguments.intensity_scale)
-    _warn_once(warned, "intensity", _intensity_warning(seen, derainer))
-    _warn_once(warned, "grid", _grid_warning(seen, derainer))
-    rain = derainer.probability(seen, stopwatch) > derainer.spec.threshold
+    seen = _in_unit_of_method(scan, arguments.intensity_scale)
+    warn(seen)
+    rain = method(seen, stopwatch)
     with stopwatch.stage("write"):
         _write(arguments.out / path.name, scan, rain)
     return Cleaned(
@@ -114,18 +123,32 @@ def _clean(
     )
 
 
-def _refuse_clashes(scans: Sequence[Path], out: Path) -> None:
-    """Refuses to overwrite a scan by its cleaned self, or labels by others."""
-    stems = Counter(scan.stem for scan in scans)
-    for scan in scans:
-        if (out / scan.name).resolve() == scan.resolve():
-            raise InputError(out, f"would overwrite {scan}", "Give --out another folder.")
-        if out.resolve() == label_beside(scan).parent.resolve():
-            raise InputError(out, f"holds the labels of {scan}", "Give --out another folder.")
-        if stems[scan.stem] > 1:
-            raise InputError(
-                scan, "another scan has the same name", "Clean them in two runs, each to its --out."
-            )
+def _parameters(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Parameters of the file, and over them those that are set one by one."""
+    stated = dict(arguments.set)
+    if arguments.parameters is None:
+        return stated
+    method, parameters = read_parameters(arguments.parameters)
+    if method != arguments.method:
+        raise InputError(
+            arguments.parameters,
+            f"holds parameters of {method}, not of {arguments.method}",
+            f"Run {method} with it.",
+        )
+    return {**parameters, **stated}
+
+
+def _assignment(text: str) -> tuple[str, int | float | str]:
+    """A parameter's name and value: a number where it reads as one."""
+    name, equals, value = text.partition("=")
+    if not (name and equals and value):
+        raise argparse.ArgumentTypeError(f"{text} is not NAME=VALUE")
+    for kind in (int, float):
+        try:
+            return name, kind(value)
+        except ValueError:
+            continue
+    return name, value
 
 
 def _write(path: Path, scan: Scan, rain: NDArray[np.bool_]) -> None:
@@ -134,42 +157,7 @@ def _write(path: Path, scan: Scan, rain: NDArray[np.bool_]) -> None:
     write_labels(path.with_suffix(".label"), rain)
 
 
-def _in_unit_of_model(scan: Scan, scale: float) -> Scan:
+def _in_unit_of_method(scan: Scan, scale: float) -> Scan:
     if scan.intensity is None or scale == 1:
         return scan
     return replace(scan, intensity=scan.intensity * np.float32(scale))
-
-
-def _intensity_warning(scan: Scan, derainer: Derainer) -> str | None:
-    """What is odd about a scan's intensities, given the data that the model was trained on."""
-    spec = derainer.spec
-    if scan.intensity is None:
-        return f"no intensity: the mean of {spec.data}, {spec.mean_intensity:.3g}, stands in"
-    valid = scan.valid
-    mean = float(scan.intensity[valid].mean(dtype=np.float64)) if valid.any() else 0.0
-    expected = spec.mean_intensity
-    comparable = mean > 0 and expected > 0
-    if comparable and not 1 / INTENSITY_MISMATCH < mean / expected < INTENSITY_MISMATCH:
-        return (
-            f"mean intensity {mean:.3g}, but {expected:.3g} where the model was trained "
-            f"(unit {spec.intensity_unit}): see --intensity-scale"
-        )
-    return None
-
-
-def _grid_warning(scan: Scan, derainer: Derainer) -> str | None:
-    """What of a scan the model's range image does not show."""
-    xyz = scan.xyz[scan.valid]
-    if not isinstance(derainer.view, RangeView) or not len(xyz):
-        return None
-    outside = float((derainer.view.grid.pixel(xyz) < 0).mean())
-    if outside <= MOST_OUTSIDE:
-        return None
-    return f"{outside:.0%} of the points lie outside the grid of {derainer.spec.data}, and stay"
-
-
-def _warn_once(warned: set[str], subject: str, warning: str | None) -> None:
-    # A folder's scans have the same fault, with other numbers: the first one speaks for all.
-    if warning is not None and subject not in warned:
-        warned.add(subject)
-        tqdm.write(f"derain: warning: {warning}", sys.stderr)

@@ -1,0 +1,150 @@
+"""Times the filters against the same filters on KD-trees, and Open3D's own, in one run.
+
+    python benchmarks/filters.py WADS/sample.bin --threads 2
+
+Array in, mask out, trees and views included. Libraries that are not installed are left out:
+pip install scipy scikit-learn
+"""
+
+import argparse
+import importlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.export.latency import versions
+from derain.files import read_scan
+from derain.filters import DROR, DSOR, ROR, SOR, FilterDerainer, PointFilter
+from derain.open3d_import import import_open3d
+
+ROUNDS = 9
+
+Method = Callable[[], NDArray[np.bool_]]
+
+
+def main() -> None:
+    """Prints every method's median, and of the rivals how many times ours it is."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scan", type=Path)
+    parser.add_argument("--threads", type=int, default=2)
+    arguments = parser.parse_args()
+
+    scan = read_scan(arguments.scan)
+    scan = scan.take(scan.valid)
+    xyz = scan.xyz.astype(np.float64)
+    print(f"{len(scan):,} points, {arguments.threads} threads, median of {ROUNDS}")
+    for filter_, rivals in (
+        (DROR(), _dror(xyz, arguments.threads)),
+        (DSOR(), _dsor(xyz, arguments.threads)),
+        (ROR(), _ror(xyz)),
+        (SOR(), _sor(xyz)),
+    ):
+        derainer = FilterDerainer(filter_, arguments.threads)
+        _report(filter_, {"derain": lambda derainer=derainer: derainer(scan), **rivals})
+    print(versions())
+
+
+def _dror(xyz: NDArray[np.float64], threads: int) -> dict[str, Method]:
+    """DROR with searches by radius."""
+    radius, enough = DROR().radius_at(xyz), DROR().neighbours
+    rivals: dict[str, Method] = {}
+    if spatial := _module("scipy.spatial"):
+        rivals["SciPy cKDTree by radius"] = lambda: (
+            spatial.cKDTree(xyz).query_ball_point(xyz, radius, workers=threads, return_length=True)
+            < enough
+        )
+    if sklearn := _module("sklearn.neighbors"):
+        rivals["scikit-learn KDTree by radius, 1 thread"] = lambda: (
+            sklearn.KDTree(xyz).query_radius(xyz, radius, count_only=True) < enough
+        )
+    return rivals
+
+
+def _dsor(xyz: NDArray[np.float64], threads: int) -> dict[str, Method]:
+    """DSOR with searches for nearest neighbours."""
+    dsor = DSOR()
+
+    def judge(distances: NDArray[np.float64]) -> NDArray[np.bool_]:
+        mean = distances[:, 1:].mean(axis=1)
+        usual = mean.mean() + dsor.deviation_multiplier * mean.std(ddof=1)
+        return mean >= usual * dsor.range_multiplier * np.linalg.norm(xyz, axis=1)
+
+    rivals: dict[str, Method] = {}
+    if spatial := _module("scipy.spatial"):
+        rivals["SciPy cKDTree"] = lambda: judge(
+            spatial.cKDTree(xyz).query(xyz, dsor.neighbours, workers=threads)[0]
+        )
+    if sklearn := _module("sklearn.neighbors"):
+        rivals["scikit-learn KDTree, 1 thread"] = lambda: judge(
+            sklearn.KDTree(xyz).query(xyz, dsor.neighbours)[0]
+        )
+    return rivals
+
+
+def _ror(xyz: NDArray[np.float64]) -> dict[str, Method]:
+    return _of_open3d(
+        xyz, lambda cloud: cloud.remove_radius_outlier(ROR().neighbours - 1, ROR().radius)
+    )
+
+
+def _sor(xyz: NDArray[np.float64]) -> dict[str, Method]:
+    sor = SOR()
+    return _of_open3d(
+        xyz,
+        lambda cloud: cloud.remove_statistical_outlier(sor.neighbours, sor.deviation_multiplier),
+    )
+
+
+def _of_open3d(
+    xyz: NDArray[np.float64], remove: Callable[[object], tuple[object, list[int]]]
+) -> dict[str, Method]:
+    """Open3D's own filter, on every core of the machine."""
+    try:
+        open3d = import_open3d()
+    except InputError:
+        return {}
+
+    def removed() -> NDArray[np.bool_]:
+        cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(xyz))
+        _, kept = remove(cloud)
+        rain = np.ones(len(xyz), bool)
+        rain[np.asarray(kept, np.int64)] = False
+        return rain
+
+    return {"Open3D, all cores": removed}
+
+
+def _module(name: str) -> ModuleType | None:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        return None
+
+
+def _report(filter_: PointFilter, methods: dict[str, Method]) -> None:
+    verdicts = {name: method() for name, method in methods.items()}
+    times: dict[str, list[float]] = {name: [] for name in methods}
+    # Turn and turn about, so that whatever else the machine does hits all alike.
+    for _ in range(ROUNDS):
+        for name, method in methods.items():
+            method()  # warms the cache that the last method filled with its own
+            start = time.perf_counter()
+            method()
+            times[name].append(1e3 * (time.perf_counter() - start))
+    print(filter_)
+    ours = np.median(times["derain"])
+    for name, values in times.items():
+        differ = int((verdicts[name] != verdicts["derain"]).sum())
+        print(
+            f"  {name:40} {np.median(values):7.1f} ms, {np.median(values) / ours:5.1f} times ours; "
+            f"differs on {differ} points"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,55 @@
+"""Which points have few others around them, found without every point's neighbours.
+
+Points that are next to each other along a Morton curve are near in space. Most points of a scan
+have enough company among those few, and only the others are searched for.
+"""
+
+import numpy as np
+import small_gicp
+from numpy.typing import NDArray
+
+# Places along the curve looked at to either side: settles 86 of 100 points of the WADS sample with
+# DROR. Twice as many settle one more, for twice the time.
+STEPS = 4
+
+# Closer to the radius than this share of it, the search decides, so that rounding never does.
+MARGIN = 1e-6
+
+
+def few_around(
+    xyz: NDArray[np.float32], radius: NDArray[np.float64], count: int, threads: int
+) -> NDArray[np.bool_]:
+    """Finds the points that have fewer than ``count`` points within their radius.
+
+    Args:
+        xyz: Distinct positions along a Morton curve, float32 (M, 3), metres.
+        radius: Metres, float64 (M,); a point at exactly this distance is within.
+        count: Number of points, the point itself included.
+        threads: Threads of the search.
+
+    Returns:
+        bool (M,); the same in whatever order the points are, but sooner along a curve.
+    """
+    few = np.ones(len(xyz), bool)
+    if len(xyz) < count:
+        return few
+    places = xyz.astype(np.float64)
+    few[_company(places, radius * (1 - MARGIN)) >= count] = False
+    unsettled = np.flatnonzero(few)
+    tree = small_gicp.KdTree(places, num_threads=threads)
+    _, squared = tree.batch_knn_search(places[unsettled], count, num_threads=threads)
+    # Rounded as the distances of a view of neighbours are, which decides the same.
+    distance = np.sqrt(squared[:, count - 1].astype(np.float32))
+    few[unsettled] = distance > radius[unsettled]
+    return few
+
+
+def _company(places: NDArray[np.float64], radius: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Points within the radius among the next few along the curve, the point itself included."""
+    columns, limit = np.ascontiguousarray(places.T), np.square(radius)
+    found = np.ones(len(places), np.int64)
+    for step in range(1, min(STEPS, len(places) - 1) + 1):
+        squared = np.square(columns[:, step:] - columns[:, :-step]).sum(axis=0)
+        found[step:] += squared <= limit[step:]
+        found[:-step] += squared <= limit[:-step]
+    return found

@@ -1,0 +1,88 @@
+"""A filter, ready to judge scans as an exported model does."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.filters.point_filter import PointFilter
+from derain.filters.radius_filter import RadiusFilter
+from derain.morton import distinct_positions
+from derain.neighbours import NeighbourView, usable_cores
+from derain.scan import Scan
+from derain.stopwatch import Stopwatch
+
+
+class FilterDerainer:
+    """A filter, called as :class:`derain.export.runtime.Derainer` is.
+
+    Example:
+        >>> derainer = FilterDerainer(DROR())  # doctest: +SKIP
+        >>> clean = points[~derainer(points)]  # doctest: +SKIP
+
+    Args:
+        filter: The filter.
+        threads: Threads of the view; 0 takes every core this process may use.
+
+    Raises:
+        InputError: A negative number of threads.
+    """
+
+    def __init__(self, filter: PointFilter, threads: int = 0) -> None:
+        if threads < 0:
+            raise InputError("threads", f"{threads} is negative", "Give 0 for every core.")
+        self.filter = filter
+        self.threads = threads or usable_cores()
+
+    def __call__(
+        self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> NDArray[np.bool_]:
+        """Says which points are rain.
+
+        Args:
+            points: A Scan, or (N, ≥ 3) numbers: x, y, z in metres, then intensity.
+            stopwatch: Takes the times of the stages view, network (the filter, so that tables of
+                both line up) and back.
+
+        Returns:
+            True for rain, bool (N,), in input order; False for rows that cannot be judged.
+        """
+        scan, stopwatch = Scan.of(points), stopwatch or Stopwatch()
+        if isinstance(self.filter, RadiusFilter):
+            return self._by_radius(self.filter, scan, stopwatch)
+        return self._by_neighbours(scan, stopwatch)
+
+    def _by_neighbours(self, scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
+        with stopwatch.stage("view"):
+            view = filter_view(self.filter.neighbours, self.threads)(scan)
+        with stopwatch.stage("network"):
+            rain = self.filter.judge(view)
+        with stopwatch.stage("back"):
+            return view.back(rain.astype(np.float32)) > 0
+
+    def _by_radius(
+        self, filter: RadiusFilter, scan: Scan, stopwatch: Stopwatch
+    ) -> NDArray[np.bool_]:
+        with stopwatch.stage("view"):
+            valid = np.flatnonzero(scan.valid)
+            first, inverse = distinct_positions(scan.xyz.take(valid, axis=0))
+            xyz = scan.xyz.take(valid[first], axis=0)
+        with stopwatch.stage("network"):
+            few = filter.judge_alone(xyz, self.threads)
+        with stopwatch.stage("back"):
+            rain = np.zeros(len(scan), bool)
+            rain[valid] = few[inverse]
+            return rain
+
+
+def filter_view(neighbours: int, threads: int = 0) -> NeighbourView:
+    """How filters see a scan, several at once where it has the neighbours of the most demanding.
+
+    Args:
+        neighbours: Size of a neighbourhood, the point itself included.
+        threads: Threads of the search; 0 takes every core this process may use.
+    """
+    # No comparison with what is not a number holds: what needs intensity finds nothing without.
+    return NeighbourView(neighbours, stand_in={"intensity": math.nan}, threads=threads)

@@ -1,0 +1,54 @@
+"""What the two filters by radius share: a point is rain if it has few points around it."""
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.filters.crowding import few_around
+from derain.filters.point_filter import PointFilter
+from derain.neighbours import Neighbourhoods
+
+
+@dataclass(frozen=True)
+class RadiusFilter(PointFilter):
+    """Calls a point rain where fewer than ``neighbours`` points lie within a radius of it.
+
+    The point itself counts as one, and one at exactly the radius is within.
+    """
+
+    @abstractmethod
+    def radius_at(self, points: NDArray[np.float32]) -> NDArray[np.float64]:
+        """The radius around each point.
+
+        Args:
+            points: x, y, z in metres, then whatever else is known of them, float32 (M, ≥ 3).
+
+        Returns:
+            Metres, float64 (M,).
+        """
+
+    def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+        """Says which points are rain; see :class:`PointFilter`.
+
+        No radius is searched: at least k points lie within it exactly where the k-th nearest is
+        no farther than it.
+        """
+        if view.size < self.neighbours:
+            return np.ones(view.size, bool)  # the view's k-th nearest is then a stand-in
+        last = view.distances[:, self.neighbours - 1]
+        lonely: NDArray[np.bool_] = last > self.radius_at(view.points)
+        return lonely
+
+    def judge_alone(self, xyz: NDArray[np.float32], threads: int) -> NDArray[np.bool_]:
+        """Says the same without the neighbours of every point, which is faster.
+
+        Args:
+            xyz: Distinct positions along a Morton curve, float32 (M, 3), metres.
+            threads: Threads to use.
+
+        Returns:
+            True for rain, bool (M,).
+        """
+        return few_around(xyz, self.radius_at(xyz), self.neighbours, threads)

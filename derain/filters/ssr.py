@@ -1,0 +1,46 @@
+"""The label-free teacher of 3D-UnOutDet."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.filters.point_filter import PointFilter
+from derain.neighbours import Neighbourhoods
+
+
+@dataclass(frozen=True)
+class SSR(PointFilter):
+    """Calls a point rain if its whole neighbourhood is dim for how far apart it lies.
+
+    Rain where √k · ‖intensity · (distance + 1)²‖₂ < ``threshold``, over the k points of the
+    neighbourhood, distances being those to the point, in metres. That is the norm of the
+    spectrum of these k numbers, which the authors compute. Where the scan has fewer points, k is
+    their number. Without intensity, nothing is found.
+
+    Attributes:
+        neighbours: k, the size of a neighbourhood, the point itself included.
+        threshold: In the unit of intensity; 2.5 is for WADS, whose intensities are 0..255.
+
+    Source: 3D-UnOutDet, github.com/sporsho/3DUnOutDet, dataset/unsupervised; by Parseval's theorem
+        its norm after a Fourier transform is √k times that before.
+    """
+
+    neighbours: int = 9
+    threshold: float = 2.5
+
+    def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+        """Says which points are rain; see :class:`PointFilter`.
+
+        Args:
+            view: One scan; its intensities are not numbers where it has none.
+        """
+        k = min(self.neighbours, view.size)
+        intensity = view.points[:, 3].astype(np.float64)
+        energy = np.zeros(view.size)
+        for neighbour, distance in zip(
+            view.neighbours.T[:k], view.distances.T[:k].astype(np.float64), strict=True
+        ):
+            energy += np.square(intensity[neighbour] * np.square(distance + 1))
+        return math.sqrt(k) * np.sqrt(energy) < self.threshold

@@ -1,0 +1,47 @@
+"""A method by the name that a user gives it: an exported model, or a filter."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from derain.errors import InputError
+from derain.export.runtime import Derainer
+from derain.filters import FILTERS, FilterDerainer, filter_from
+
+
+def load_method(
+    name: str, parameters: Mapping[str, Any], threads: int = 0
+) -> Derainer | FilterDerainer:
+    """Makes a method ready to judge scans.
+
+    Args:
+        name: A filter (one of ``FILTERS``), or an ONNX file written by ``derain export``.
+        parameters: Parameters by name: those of the filter, or the ``threshold`` of the model.
+        threads: Threads to use; 0 takes every core this process may use.
+
+    Raises:
+        InputError: Neither a filter nor an exported model, a parameter that it does not have, or
+            one out of its bounds.
+    """
+    if name in FILTERS:
+        return FilterDerainer(filter_from(name, parameters), threads)
+    if not Path(name).is_file():
+        raise InputError(
+            name,
+            "no such file",
+            f"Give a model written by `derain export`, or one of {', '.join(FILTERS)}.",
+        )
+    return _with_threshold(Derainer(name, threads), name, parameters)
+
+
+def _with_threshold(derainer: Derainer, name: str, parameters: Mapping[str, Any]) -> Derainer:
+    if unknown := sorted(set(parameters) - {"threshold"}):
+        raise InputError(
+            name, f"it has no parameter {', '.join(unknown)}", "A model has its threshold alone."
+        )
+    threshold = parameters.get("threshold", derainer.spec.threshold)
+    if not (isinstance(threshold, int | float) and 0 <= threshold <= 1):
+        raise InputError(name, f"threshold is {threshold}", "Give a number from 0 to 1.")
+    derainer.spec = replace(derainer.spec, threshold=float(threshold))
+    return derainer

@@ -1,0 +1,199 @@
+"""Every filter against its definition, worked out from all pairs of points."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.typing import NDArray
+
+from derain.filters import DROR, DSOR, ROR, SOR, SSR, FilterDerainer, PointFilter, filter_view
+from derain.filters.radius_filter import RadiusFilter
+from derain.scan import Scan
+
+# Few values on a coarse grid: copies, equal distances, points at the origin, radii that are met
+# exactly. Few points: neighbourhoods larger than the scan.
+gridded = hnp.arrays(
+    np.float32,
+    st.tuples(st.integers(0, 25), st.just(4)),
+    elements=st.integers(-6, 6).map(lambda value: value / 2),
+)
+scattered = hnp.arrays(
+    np.float32,
+    st.tuples(st.integers(0, 60), st.just(4)),
+    elements=st.floats(-20, 20, width=32).map(lambda value: round(value, 3)),
+)
+clouds = pytest.mark.parametrize("clouds", [gridded, scattered], ids=["gridded", "scattered"])
+counts = st.integers(2, 12)
+
+# Which side of a limit a point falls on must not hang on rounding.
+UNCLEAR = 1e-6
+
+
+def pairs(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Distances of all pairs, float64 (M, M)."""
+    exact = xyz.astype(np.float64)
+    return np.sqrt(np.square(exact[:, None] - exact[None]).sum(axis=2))
+
+
+def positions(scan: Scan) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64]]:
+    """Distinct valid positions, the first row at each, and the position of each valid row."""
+    valid = np.flatnonzero(scan.valid)
+    xyz, first, inverse = np.unique(scan.xyz[valid], axis=0, return_index=True, return_inverse=True)
+    return xyz, valid[first], inverse.reshape(-1)
+
+
+def check(
+    scan: Scan, filter_: PointFilter, value: NDArray[np.float64], limit: NDArray[np.float64]
+) -> None:
+    """Compares verdicts on all rows whose position's value is clearly off its limit.
+
+    Rain is what lies above the limit.
+    """
+    expected = np.zeros(len(scan), bool)
+    unclear = np.zeros(len(scan), bool)
+    _, _, inverse = positions(scan)
+    expected[scan.valid] = (value > limit)[inverse]
+    unclear[scan.valid] = (np.abs(value - limit) <= UNCLEAR * np.abs(limit))[inverse]
+    wrong = FilterDerainer(filter_)(scan) != expected
+    assert not (wrong & ~unclear).any()
+
+
+def mean_of_nearest(xyz: NDArray[np.float32], neighbours: int) -> NDArray[np.float64]:
+    return np.sort(pairs(xyz), axis=1)[:, 1:neighbours].mean(axis=1)
+
+
+@settings(deadline=None, max_examples=100)
+@given(gridded, counts, st.sampled_from([0.0, 0.5, 1.0, 2.5, 7.3]))
+def test_ror_counts_the_points_within_its_radius(
+    cloud: NDArray[np.float32], neighbours: int, radius: float
+) -> None:
+    scan = Scan.of(cloud)
+    xyz, _, inverse = positions(scan)
+    expected = np.zeros(len(scan), bool)
+    # On the grid, distances that meet a radius do so exactly: a point there is within.
+    expected[scan.valid] = ((pairs(xyz) <= radius).sum(axis=1) < neighbours)[inverse]
+    np.testing.assert_array_equal(FilterDerainer(ROR(neighbours, radius))(scan), expected)
+
+
+@clouds
+@settings(deadline=None, max_examples=50)
+@given(
+    data=st.data(),
+    neighbours=counts,
+    azimuth=st.sampled_from([0.0, 0.4, 5.0, 30.0]),
+    minimum=st.sampled_from([0.0, 0.3, 1.2]),
+    variant=st.sampled_from(["code", "paper"]),
+)
+def test_dror_counts_the_points_within_a_radius_that_grows_with_range(
+    clouds: st.SearchStrategy[NDArray[np.float32]],
+    data: st.DataObject,
+    neighbours: int,
+    azimuth: float,
+    minimum: float,
+    variant: str,
+) -> None:
+    scan = Scan.of(data.draw(clouds))
+    xyz, _, _ = positions(scan)
+    horizontal = np.hypot(*xyz[:, :2].T.astype(np.float64))
+    spacing = {"code": 2 * np.sin(np.radians(azimuth)), "paper": np.radians(azimuth)}[variant]
+    radius = np.maximum(1.5 * horizontal * spacing, minimum)
+    nearest = np.sort(pairs(xyz), axis=1)
+    last = nearest[:, neighbours - 1] if len(xyz) >= neighbours else np.full(len(xyz), np.inf)
+    check(scan, DROR(neighbours, 1.5, azimuth, minimum, variant), last, radius)
+
+
+@clouds
+@settings(deadline=None, max_examples=50)
+@given(data=st.data(), neighbours=counts, deviations=st.sampled_from([0.0, 0.01, 1.5]))
+def test_sor_compares_mean_distances_with_their_mean_and_deviation(
+    clouds: st.SearchStrategy[NDArray[np.float32]],
+    data: st.DataObject,
+    neighbours: int,
+    deviations: float,
+) -> None:
+    scan = Scan.of(data.draw(clouds))
+    xyz, _, _ = positions(scan)
+    if len(xyz) < 2:
+        assert not FilterDerainer(SOR(neighbours, deviations))(scan).any()
+        return
+    mean = mean_of_nearest(xyz, neighbours)
+    limit = mean.mean() + deviations * mean.std(ddof=1)
+    check(scan, SOR(neighbours, deviations), mean, np.full(len(mean), limit))
+
+
+@clouds
+@settings(deadline=None, max_examples=50)
+@given(data=st.data(), neighbours=counts, growth=st.sampled_from([0.05, 0.4]))
+def test_dsor_lets_the_limit_grow_with_range(
+    clouds: st.SearchStrategy[NDArray[np.float32]],
+    data: st.DataObject,
+    neighbours: int,
+    growth: float,
+) -> None:
+    scan = Scan.of(data.draw(clouds))
+    xyz, _, _ = positions(scan)
+    if len(xyz) < 2:
+        assert not FilterDerainer(DSOR(neighbours, 0.3, growth))(scan).any()
+        return
+    mean = mean_of_nearest(xyz, neighbours)
+    limit = mean.mean() + 0.3 * mean.std(ddof=1)
+    distance = np.linalg.norm(xyz.astype(np.float64), axis=1)
+    check(scan, DSOR(neighbours, 0.3, growth), mean, limit * growth * distance)
+
+
+@settings(deadline=None, max_examples=50)
+@given(scattered, counts, st.sampled_from([0.0, 3.0, 40.0]))
+def test_ssr_takes_the_norm_of_the_spectrum_of_a_neighbourhood(
+    cloud: NDArray[np.float32], neighbours: int, threshold: float
+) -> None:
+    scan = Scan.of(np.abs(cloud))  # mirrored into one octant, where copies are rarer
+    xyz, first, _ = positions(scan)
+    distance = pairs(xyz)
+    nearest = np.argsort(distance, axis=1, kind="stable")[:, :neighbours]
+    tied = np.sort(distance, axis=1)
+    if (np.diff(tied) == 0).any():
+        return  # which of two equally near neighbours counts is not part of the definition
+    intensity = scan.intensity[first].astype(np.float64)[nearest]
+    near = np.take_along_axis(distance, nearest, axis=1)
+    spectrum = np.fft.fft(intensity * (near + 1) ** 2, axis=1) if len(xyz) else np.zeros((0, 1))
+    norm = np.linalg.norm(spectrum, axis=1)
+    check(scan, SSR(neighbours, threshold), -norm, np.full(len(xyz), -threshold))
+
+
+@clouds
+@settings(deadline=None, max_examples=50)
+@given(data=st.data(), neighbours=counts, spare=st.integers(0, 5))
+def test_one_wide_view_serves_every_filter_as_its_own_does(
+    clouds: st.SearchStrategy[NDArray[np.float32]],
+    data: st.DataObject,
+    neighbours: int,
+    spare: int,
+) -> None:
+    scan = Scan.of(data.draw(clouds))
+    view = filter_view(neighbours + spare)(scan)
+    for filter_ in (
+        ROR(neighbours, 1.0),
+        DROR(neighbours, azimuth_resolution=5.0),
+        SOR(neighbours),
+        DSOR(neighbours, range_multiplier=0.4),
+        SSR(neighbours, threshold=30.0),
+    ):
+        shared = view.back(filter_.judge(view).astype(np.float32)) > 0
+        np.testing.assert_array_equal(shared, FilterDerainer(filter_)(scan))
+
+
+@pytest.mark.parametrize(
+    "filter_",
+    [ROR(3, 0.35), DROR(4, azimuth_resolution=1.0), DROR(azimuth_resolution=2.0, variant="paper")],
+)
+def test_points_settled_along_the_curve_are_settled_right(filter_: RadiusFilter) -> None:
+    rng = np.random.default_rng(5)
+    scan = Scan.of(rng.normal(size=(4000, 3)) * [10, 10, 0.1])
+    view = filter_view(filter_.neighbours)(scan)
+    lonely = filter_.judge(view)
+    assert 0.05 < lonely.mean() < 0.95
+    np.testing.assert_array_equal(filter_.judge_alone(view.points[:, :3].copy(), 2), lonely)
+    shuffle = rng.permutation(view.size)
+    shuffled = filter_.judge_alone(view.points[shuffle, :3], 1)
+    np.testing.assert_array_equal(shuffled, lonely[shuffle])

@@ -1,0 +1,173 @@
+"""What holds for every filter: hard scans, copies, stages, and parameters that make no sense."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from derain.errors import InputError
+from derain.filters import (
+    DROR,
+    DSOR,
+    FILTERS,
+    ROR,
+    SOR,
+    SSR,
+    FilterDerainer,
+    filter_from,
+    read_parameters,
+)
+from derain.hard_cases import hard_cases, scene
+from derain.scan import Scan
+from derain.stopwatch import Stopwatch
+
+HARD_CASES = dict(hard_cases(largest=5000))
+every_filter = pytest.mark.parametrize("name", FILTERS)
+
+# With these, some points of a scene are rain and some are not.
+MIXED = {
+    "ror": {"radius": 0.8},
+    "sor": {},
+    "dror": {},
+    "dsor": {},
+    "ssr": {"threshold": 400},
+}
+
+
+@every_filter
+@pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
+def test_a_hard_scan_gets_an_answer_for_every_row(name: str, scan: Scan) -> None:
+    with np.errstate(all="raise", under="ignore"):
+        rain = FilterDerainer(filter_from(name, {}), threads=2)(scan)
+    assert rain.dtype == bool
+    assert rain.shape == (len(scan),)
+    assert not rain[~scan.valid].any()
+
+
+@every_filter
+def test_the_order_of_the_rows_does_not_matter(name: str) -> None:
+    derainer = FilterDerainer(filter_from(name, MIXED[name]))
+    scan = Scan.of(scene())
+    rain = derainer(scan)
+    assert 0.02 < rain.mean() < 0.98
+    shuffle = np.random.default_rng(0).permutation(len(scan))
+    np.testing.assert_array_equal(derainer(scan.take(shuffle)), rain[shuffle])
+
+
+@every_filter
+def test_copies_of_points_change_nothing_and_share_their_verdict(name: str) -> None:
+    derainer = FilterDerainer(filter_from(name, MIXED[name]))
+    points = scene()
+    rain = derainer(points)
+    np.testing.assert_array_equal(derainer(np.repeat(points, 3, axis=0)), np.repeat(rain, 3))
+
+
+@every_filter
+def test_the_number_of_threads_does_not_matter(name: str) -> None:
+    one, two = (FilterDerainer(filter_from(name, MIXED[name]), threads) for threads in (1, 2))
+    np.testing.assert_array_equal(one(scene()), two(scene()))
+
+
+@every_filter
+def test_the_time_of_each_stage_is_taken_as_for_a_model(name: str) -> None:
+    stopwatch = Stopwatch()
+    FilterDerainer(filter_from(name, MIXED[name]))(scene(50), stopwatch)
+    assert list(stopwatch.milliseconds) == ["view", "network", "back"]
+
+
+@pytest.mark.parametrize("filter_", [ROR(), DROR(), SOR(), DSOR()], ids=str)
+def test_filters_of_places_do_not_look_at_intensity(filter_) -> None:
+    scan = Scan.of(scene())
+    np.testing.assert_array_equal(
+        FilterDerainer(filter_)(replace(scan, intensity=None)), FilterDerainer(filter_)(scan)
+    )
+
+
+def test_without_intensity_ssr_finds_nothing() -> None:
+    scan = Scan.of(scene())
+    everything = FilterDerainer(SSR(threshold=1e30))
+    assert everything(scan).all()
+    assert not everything(replace(scan, intensity=None)).any()
+
+
+def test_a_lone_point_is_rain_by_radius_and_not_rain_by_statistics() -> None:
+    lone = np.array([[30, 0, 0, 50]], np.float32)
+    verdicts = {name: FilterDerainer(filter_from(name, {}))(lone).item() for name in FILTERS}
+    assert verdicts == {"ror": True, "dror": True, "sor": False, "dsor": False, "ssr": False}
+
+
+def test_a_drop_before_a_wall_is_rain_to_every_filter() -> None:
+    y, z = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 41))
+    wall = np.stack([np.full(y.size, 20), y.ravel(), z.ravel(), np.full(y.size, 90)], axis=1)
+    drops = np.array([[3, 0, 0, 0.0], [5, 1, 0, 0.0]])
+    for filter_ in (ROR(), DROR(), SOR(), DSOR(), SSR(neighbours=2, threshold=20)):
+        rain = FilterDerainer(filter_)(np.concatenate([wall, drops]))
+        assert np.flatnonzero(rain).tolist() == [len(wall), len(wall) + 1], filter_
+
+
+def test_a_filter_is_found_by_its_name_and_takes_its_parameters() -> None:
+    assert filter_from("dsor", {"range_multiplier": 0.08}) == DSOR(5, 0.01, 0.08)
+    for name, kind in FILTERS.items():
+        filter_ = filter_from(name, {})
+        assert type(filter_) is kind
+        assert filter_.name == name
+        assert filter_from(name, filter_.as_dict()) == filter_
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "message"),
+    [
+        ("rorr", {}, "rorr: no such filter. Give one of ror, sor, dror, dsor, ssr."),
+        (
+            "ror",
+            {"radios": 1},
+            "ror: it has no parameter radios. It has neighbours, radius.",
+        ),
+        ("ror", {"radius": -1}, "ror: radius is -1. Give a finite number"),
+        ("ror", {"radius": "1e-3 m"}, "ror: radius is 1e-3 m. Give a finite number"),
+        ("sor", {"deviation_multiplier": float("nan")}, "sor: deviation_multiplier is nan."),
+        ("dsor", {"range_multiplier": float("inf")}, "dsor: range_multiplier is inf."),
+        ("ssr", {"threshold": True}, "ssr: threshold is True."),
+        ("ssr", {"threshold": None}, "ssr: threshold is None."),
+        ("ssr", {"neighbours": 1}, "ssr: neighbours is 1. Give a whole number from 2"),
+        ("dror", {"neighbours": 2.5}, "dror: neighbours is 2.5."),
+        ("dror", {"neighbours": 10**9}, "dror: neighbours is 1000000000."),
+        ("dror", {"minimum_radius": -0.1}, "dror: minimum_radius is -0.1."),
+        ("dror", {"variant": "book"}, "dror: variant is book. Give one of code, paper."),
+    ],
+)
+def test_parameters_that_make_no_sense_are_refused(
+    name: str, parameters: Mapping[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError) as refusal:
+        filter_from(name, parameters)
+    assert str(refusal.value).startswith(message)
+
+
+def test_a_negative_number_of_threads_is_refused() -> None:
+    with pytest.raises(InputError, match="threads: -1 is negative"):
+        FilterDerainer(ROR(), threads=-1)
+
+
+def test_a_file_of_parameters_names_its_method(tmp_path: Path) -> None:
+    path = tmp_path / "best.yaml"
+    path.write_text("# 100 trials\nmethod: dsor\nneighbours: 7\nrange_multiplier: 0.0812\n")
+    assert read_parameters(path) == ("dsor", {"neighbours": 7, "range_multiplier": 0.0812})
+
+
+@pytest.mark.parametrize(
+    "content", ["", "3", "- dsor", "neighbours: 3", "method: 5", "method: dsor\n2: 3", "a: b: c"]
+)
+def test_a_file_that_holds_no_parameters_is_refused(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "best.yaml"
+    path.write_text(content)
+    with pytest.raises(InputError, match=r"best.yaml: .*method: dsor"):
+        read_parameters(path)
+
+
+def test_a_missing_file_of_parameters_is_reported(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none.yaml: there is no such file"):
+        read_parameters(tmp_path / "none.yaml")
