@@ -42,24 +42,18 @@ def judgement_figure(
     figure = Figure(figsize=(16, 7), layout="constrained")
     figure.suptitle(title)
     columns = figure.subplots(2, 4, sharex="row", sharey="row").T
-    error = np.select([rain & predicted, rain & ~predicted, predicted], [1, 2, 3], default=0)
     colourings = {
         "input: intensity": None,
         "truth": rain.astype(int),
         "prediction": predicted.astype(int),
-        "error": error,
+        "error": outcomes(predicted, rain),
     }
     for (above, ahead), (name, outcome) in zip(columns, colourings.items(), strict=True):
         above.set_title(name)
-        _from_above(above, scan, outcome)
-        _as_seen(ahead, scan, outcome)
-    _label_once(columns[0])
-    figure.legend(
-        handles=[Patch(color=colour, label=name) for name, colour in OUTCOMES.items()],
-        loc="outside lower center",
-        ncols=len(OUTCOMES),
-        frameon=False,
-    )
+        draw_from_above(above, scan, outcome)
+        draw_as_seen(ahead, scan, outcome)
+    label_once(columns[0])
+    explain_colours(figure)
     return figure
 
 
@@ -81,9 +75,9 @@ def before_after_figure(scan: Scan, predicted: NDArray[np.bool_], title: str) ->
     }
     for (above, ahead), (name, (part, rain)) in zip(columns, parts.items(), strict=True):
         above.set_title(name)
-        _from_above(above, part, rain.astype(int))
-        _as_seen(ahead, part, rain.astype(int))
-    _label_once(columns[0])
+        draw_from_above(above, part, rain.astype(int))
+        draw_as_seen(ahead, part, rain.astype(int))
+    label_once(columns[0])
     return figure
 
 
@@ -97,8 +91,35 @@ def save(figure: Figure, path: Path) -> None:
         figure.savefig(temporary, dpi=110)
 
 
-def _from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
-    """Draws x forward and y to the left, in metres, as far as most points reach."""
+def outcomes(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """What became of each point, as a number of ``OUTCOMES``, int64 (N,).
+
+    Args:
+        predicted: Points called rain, bool (N,).
+        rain: Points that are rain, bool (N,).
+    """
+    return np.select([rain & predicted, rain & ~predicted, predicted], [1, 2, 3], default=0)
+
+
+def explain_colours(figure: Figure) -> None:
+    """Puts a legend of ``OUTCOMES`` below everything else."""
+    figure.legend(
+        handles=[Patch(color=colour, label=name) for name, colour in OUTCOMES.items()],
+        loc="outside lower center",
+        ncols=len(OUTCOMES),
+        frameon=False,
+    )
+
+
+def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
+    """Draws x forward and y to the left, in metres, as far as most points reach.
+
+    Args:
+        axes: Where to draw.
+        scan: The scan; points that cannot be judged are not drawn.
+        outcome: What became of each point, as a number of ``OUTCOMES``, int64 (N,); None shows
+            intensity.
+    """
     seen = scan.valid
     x, y, _ = scan.xyz[seen].T
     _scatter(axes, -y, x, _colours(scan, outcome, seen))
@@ -111,8 +132,14 @@ def _from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> No
         axes.set_ylim(middle - half, middle + half)
 
 
-def _as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
-    """Draws azimuth, left being left, and inclination, in degrees."""
+def draw_as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
+    """Draws azimuth, left being left, and inclination, in degrees.
+
+    Args:
+        axes: Where to draw.
+        scan: The scan; points that cannot be judged are not drawn.
+        outcome: As for :func:`draw_from_above`.
+    """
     seen = scan.valid
     x, y, z = scan.xyz[seen].astype(np.float64).T
     azimuth = np.degrees(np.arctan2(y, x))
@@ -149,7 +176,8 @@ def _scatter(
     axes.tick_params(labelsize=8)
 
 
-def _label_once(column: NDArray[np.object_]) -> None:
+def label_once(column: NDArray[np.object_]) -> None:
+    """Names the axes of one pair of panels, from above and as seen, for all."""
     above, ahead = column
     above.set_ylabel("forward / m")
     above.set_xlabel("right / m")

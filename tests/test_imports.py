@@ -9,7 +9,16 @@ import pytest
 
 from derain.hard_cases import scene
 
-HEAVY = {"torch", "torchmetrics", "lightning", "pytorch_lightning", "open3d", "matplotlib"}
+HEAVY = {
+    "torch",
+    "torchmetrics",
+    "lightning",
+    "pytorch_lightning",
+    "open3d",
+    "matplotlib",
+    "scipy",
+    "optuna",
+}
 
 # Runs its first argument, then prints the packages that this loaded: those of the start, which an
 # editable installation or a profiler may add to, are not its doing.
@@ -66,6 +75,16 @@ def test_run_loads_nothing_heavy(scan: Path, onnx_model: Path, tmp_path: Path) -
     out = tmp_path / "out"
     assert not loaded_by(COMMAND, "run", onnx_model, scan, "--out", out) & HEAVY
     assert (out / "scan.label").stat().st_size == 400
+
+
+def test_a_filter_loads_nothing_heavy(scan: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert not loaded_by(COMMAND, "run", "dror", scan, "--out", out) & HEAVY
+    assert (out / "scan.label").stat().st_size == 400
+
+
+def test_the_statistics_of_a_folder_load_nothing_heavy(scan: Path) -> None:
+    assert not loaded_by(COMMAND, "info", scan.parent) & HEAVY
 
 
 def test_fitting_a_grid_loads_nothing_heavy(scan: Path) -> None:

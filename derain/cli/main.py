@@ -6,23 +6,42 @@ import sys
 from types import ModuleType
 
 from derain import __version__
-from derain.cli import demo, export, import_weights, info, run
+from derain.cli import (
+    annotate,
+    bench,
+    demo,
+    export,
+    fuse,
+    import_weights,
+    info,
+    run,
+    simulate,
+    tune,
+    view,
+)
 from derain.errors import InputError
 
 DESCRIPTION = """\
 Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
 
   derain demo                                           the whole story on simulated rain
-  derain run model.onnx scans/ --out cleaned            clean scans on a CPU
+  derain run model.onnx scans/ --out cleaned            clean scans on a CPU; or `run dror ...`
+  derain bench --data scans/ --methods model.onnx dsor   speed against error
   derain fit --config outdet_wads.yaml --data.root WADS train on your data
   derain export outdet.ckpt --out model.onnx            make a file that runs without torch
 """
 
 COMMANDS: dict[str, ModuleType] = {
     "run": run,
+    "bench": bench,
+    "tune": tune,
+    "view": view,
     "info": info,
     "export": export,
     "import-weights": import_weights,
+    "simulate": simulate,
+    "annotate": annotate,
+    "fuse": fuse,
     "demo": demo,
 }
 

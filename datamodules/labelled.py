@@ -1,0 +1,143 @@
+"""Labelled scans as a user names them: files, folders of scans, or the root of a data set."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from derain.cards import DataCard, load_card, packaged_cards
+from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile
+from derain.datamodules.sequences import Layout, SequenceDataModule
+from derain.errors import InputError
+from derain.files import find_scans
+from derain.files.labels import label_beside
+from derain.files.reading import reading
+from derain.simulation.manifest import read_manifest
+
+SEMANTIC_KITTI = Layout()
+REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels")
+
+# Names of the packaged data cards whose rain or snow fell in a computer.
+SIMULATED = ("simulated rain", "SnowyKITTI")
+
+
+class NamedScans(ScanDataModule):
+    """Scans named one by one or by their folders, the same ones for every part.
+
+    A scan's labels are ``<stem>.label`` beside it or in the sibling folder of labels.
+
+    Args:
+        paths: Scans, and folders with scans directly in them.
+        card: Data card of the scans.
+        loading: How the scans are read.
+    """
+
+    def __init__(self, paths: Sequence[Path], card: DataCard, loading: Loading) -> None:
+        super().__init__(card, loading)
+        self.paths = paths
+
+    def find(self, part: Part) -> list[ScanFile]:
+        """The scans, in the order they are named, those of a folder sorted by name.
+
+        Raises:
+            InputError: A path that does not exist, or a folder without scans.
+        """
+        return [ScanFile(scan, label_of(scan)) for scan in find_scans(self.paths)]
+
+
+def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> ScanDataModule:
+    """The scans that a command's ``--data`` names.
+
+    Args:
+        paths: Scans and folders of scans; or the root of one data set, which has a folder
+            ``sequences`` and the split of its manifest, if it was simulated, else of its card.
+        card: Data card of the scans.
+        loading: How the scans are read.
+
+    Raises:
+        InputError: A root whose sequences hold no folder of scans that is known.
+    """
+    root = paths[0]
+    if len(paths) > 1 or not (root / SEMANTIC_KITTI.sequences).is_dir():
+        return NamedScans(paths, card, loading)
+    split = read_manifest(root).get("split")
+    return SequenceDataModule(str(root), card, _layout_of(root), split, loading)
+
+
+def card_of(paths: Sequence[Path], name: str | None) -> DataCard:
+    """Data card of the scans that ``--data`` names.
+
+    Args:
+        paths: Scans and folders of scans, or the root of one data set.
+        name: A packaged card or a YAML file; None asks a simulated data set's manifest, and knows
+            REHEARSE-3D by its folders.
+
+    Raises:
+        InputError: No such card, or data that do not say whose they are.
+    """
+    if name is not None:
+        return load_card(name)
+    root = paths[0]
+    if read_manifest(root):
+        return load_card("simulated")
+    if any(root.glob(f"{REHEARSE3D.sequences}/*/{REHEARSE3D.scans}")):
+        return load_card("rehearse3d")
+    raise InputError(
+        root,
+        "nothing in it says which labels are rain",
+        f"Give --card: {', '.join(packaged_cards())}, or a YAML file.",
+    )
+
+
+def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
+    """Rain rate of each sequence in mm/h, by its name, as far as it is known.
+
+    Args:
+        paths: What ``--data`` names.
+        file: YAML file of ``"<sequence>": <mm/h>``; None takes a simulated data set's manifest.
+
+    Raises:
+        InputError: A file that is not of this kind.
+    """
+    if file is None:
+        return dict(read_manifest(paths[0]).get("rain_rate_mm_h", {}))
+    with reading(file):
+        text = file.read_text("utf-8")
+    try:
+        return _rates(yaml.safe_load(text))
+    except (yaml.YAMLError, TypeError, ValueError) as error:
+        raise InputError(
+            file,
+            f"not the rain rates of sequences ({error})",
+            'It needs lines such as "005": 25, the name in quotes and the rate in mm/h.',
+        ) from error
+
+
+def sequence_of(scan: Path) -> str:
+    """Name of the sequence that a scan lies in: ``<sequence>/<folder of scans>/<frame>.bin``."""
+    return scan.absolute().parent.parent.name
+
+
+def label_of(scan: Path) -> Path:
+    """Where a scan's labels lie: beside it, or in the folder that its layout has for them."""
+    if scan.parent.name == REHEARSE3D.scans:
+        return scan.parent.parent / REHEARSE3D.labels / f"{scan.stem}.label"
+    return label_beside(scan)
+
+
+def _layout_of(root: Path) -> Layout:
+    for layout in (REHEARSE3D, SEMANTIC_KITTI):
+        if next(root.glob(f"{layout.sequences}/*/{layout.scans}"), None):
+            return layout
+    raise InputError(
+        root / SEMANTIC_KITTI.sequences,
+        f"no sequence has a folder {REHEARSE3D.scans} or {SEMANTIC_KITTI.scans}",
+        "Name the folders of scans themselves.",
+    )
+
+
+def _rates(content: Any) -> dict[str, float]:
+    if not isinstance(content, dict) or not all(isinstance(name, str) for name in content):
+        raise TypeError("each sequence must be named, in quotes: 010 alone is a number")
+    return {name: float(rate) for name, rate in content.items()}

@@ -1,0 +1,54 @@
+"""Arguments that name labelled scans, the same in every command that measures."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from derain.datamodules.base import ScanDataModule
+
+
+def add_data_arguments(parser: argparse.ArgumentParser, part: str) -> None:
+    """Declares them.
+
+    Args:
+        parser: The command's parser.
+        part: Part of a data set that the command takes by default.
+    """
+    parser.add_argument(
+        "--data",
+        type=Path,
+        nargs="+",
+        required=True,
+        help="labelled scans and folders of them (labels beside them or in ../labels), "
+        "or the root of one data set",
+    )
+    parser.add_argument(
+        "--part",
+        choices=("train", "validation", "test"),
+        default=part,
+        help="part of a data set's sequences (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--card",
+        help="data card, which says what labels mean: wads, kitti, spray, rehearse3d, simulated or "
+        "a YAML file (default: as the data set's folders tell)",
+    )
+    parser.add_argument(
+        "--columns",
+        default="x,y,z,intensity",
+        help="names of the columns of .bin and .npy files (default: %(default)s)",
+    )
+
+
+def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanDataModule":
+    """The labelled scans that these arguments, and some paths, name.
+
+    Raises:
+        InputError: Data whose labels nothing explains, or a root without sequences.
+    """
+    from derain.datamodules.base import Loading
+    from derain.datamodules.labelled import card_of, labelled_scans
+
+    loading = Loading(columns=tuple(arguments.columns.split(",")))
+    return labelled_scans(paths, card_of(paths, arguments.card), loading)

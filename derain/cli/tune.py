@@ -1,0 +1,141 @@
+"""``derain tune``: the best parameters of a method, on labelled scans."""
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yaml
+from tqdm import tqdm
+
+from derain import __version__
+from derain.cli.arguments import count, threads
+from derain.cli.labelled_data import add_data_arguments, labelled
+from derain.errors import InputError
+from derain.files.atomic import replacing
+
+if TYPE_CHECKING:
+    from derain.datamodules.base import ScanDataModule, ScanFile
+    from derain.export.tuning import Tuned
+
+SUMMARY = "find a method's best parameters on labelled scans"
+
+DESCRIPTION = """\
+Finds the parameters of a filter, or the threshold of a model, that give the greatest IoU of rain on
+labelled scans, and writes them for `derain run --parameters` and `derain bench --methods`.
+
+  derain tune dsor --data scans/ --card wads --out dsor.yaml
+  derain tune dror --data REHEARSE3D_PUBLIC --scans 100 --trials 100 --out dror.yaml
+  derain tune dror --data REHEARSE3D_PUBLIC --trials 300 --storage study.db --out dror.yaml
+  derain tune outdet.onnx --data REHEARSE3D_PUBLIC --out outdet.yaml
+
+A filter is searched by Optuna, from its default parameters on; each scan's neighbours are found
+once, and take some 150 bytes a point. With --storage, a second call goes on to --trials.
+A model's threshold is found exactly, from its probabilities, without trials.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's arguments."""
+    parser.add_argument(
+        "method", metavar="METHOD", help="ror, sor, dror, dsor, ssr or an ONNX file"
+    )
+    add_data_arguments(parser, part="validation")
+    parser.add_argument("--out", type=Path, required=True, help="YAML file to write")
+    parser.add_argument(
+        "--scans", type=count, default=100, help="scans, drawn at random (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--trials", type=count, default=100, help="trials of a filter (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of what is drawn (default: 0)")
+    parser.add_argument("--storage", type=Path, help="SQLite file that keeps a filter's study")
+    parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Runs the command."""
+    from derain.export.tuning import SPACES
+
+    data = labelled(arguments, arguments.data)
+    files = _drawn(data.files(arguments.part), arguments.scans, arguments.seed)
+    tune = _tuned_filter if arguments.method in SPACES else _tuned_model
+    tuned = tune(arguments, data, files)
+    facts = (
+        f"IoU {tuned.iou:.4f} on {len(files)} scans of {data.card.name}, "
+        f"{tuned.default_iou:.4f} with the defaults"
+    )
+    _write(arguments, tuned, facts)
+    print(f"{arguments.method}: {facts}")
+    for name, value in tuned.parameters.items():
+        print(f"  {name}: {value}")
+    return 0
+
+
+def _tuned_filter(
+    arguments: argparse.Namespace, data: "ScanDataModule", files: list["ScanFile"]
+) -> "Tuned":
+    from derain.export.tuning import Search, ViewedScan, tune_filter
+
+    scans = [
+        ViewedScan.of(data.read(file), data.card, arguments.threads)
+        for file in tqdm(files, desc="finding neighbours", unit="scan", disable=None)
+    ]
+    if not any(scan.rain.any() for scan in scans):
+        raise _no_rain(data)
+    with tqdm(desc="tuning", unit="trial", total=arguments.trials, disable=None) as progress:
+        search = Search(
+            arguments.trials,
+            arguments.seed,
+            arguments.storage,
+            [str(file.scan) for file in files],
+            progress.update,
+        )
+        return tune_filter(arguments.method, scans, search)
+
+
+def _tuned_model(
+    arguments: argparse.Namespace, data: "ScanDataModule", files: list["ScanFile"]
+) -> "Tuned":
+    from derain.export.runtime import Derainer
+    from derain.export.tuning import tune_threshold
+
+    derainer = Derainer(arguments.method, arguments.threads)
+
+    def judged() -> Iterator[tuple[Any, Any]]:
+        for file in tqdm(files, desc="judging", unit="scan", disable=None):
+            scan = data.read(file)
+            known = scan.valid & ~data.card.unknown_of(scan)
+            yield derainer.probability(scan)[known], data.card.rain_of(scan)[known]
+
+    scans = list(judged())
+    if not any(rain.any() for _, rain in scans):
+        raise _no_rain(data)
+    return tune_threshold(scans, derainer.spec.threshold)
+
+
+def _drawn(files: list["ScanFile"], most: int, seed: int) -> list["ScanFile"]:
+    """At most so many of the scans, drawn at random, in their order."""
+    chance = np.random.default_rng(seed)
+    chosen = chance.choice(len(files), min(most, len(files)), replace=False)
+    return [files[number] for number in np.sort(chosen)]
+
+
+def _no_rain(data: "ScanDataModule") -> InputError:
+    rain = ", ".join(data.card.classes[id_] for id_ in data.card.rain)
+    return InputError(
+        "--data", f"no point of these scans is {rain}", "Tune on scans with rain, and their --card."
+    )
+
+
+def _write(arguments: argparse.Namespace, tuned: "Tuned", facts: str) -> None:
+    content = {"method": arguments.method, **tuned.parameters}
+    paths = " ".join(map(str, arguments.data))
+    with replacing(arguments.out) as temporary:
+        temporary.write_text(
+            f"# derain {__version__}: tune {arguments.method} --data {paths}"
+            f" --scans {arguments.scans} --trials {arguments.trials} --seed {arguments.seed}\n"
+            f"# {facts}\n{yaml.safe_dump(content, sort_keys=False)}",
+            "utf-8",
+        )

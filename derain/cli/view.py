@@ -1,0 +1,85 @@
+"""``derain view``: one scan as several methods clean it."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from derain.cli.arguments import threads
+from derain.errors import InputError
+from derain.files import read_scan
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from derain.scan import Scan
+
+SUMMARY = "draw a scan as several methods clean it"
+
+DESCRIPTION = """\
+Draws a scan, its truth where it has labels, and what each method makes of it, from above and as the
+sensor sees it.
+
+  derain view scan.bin --methods outdet.onnx dsor --out figure.png
+  derain view scan.bin --card wads --methods outdet.onnx tuned=dsor.yaml dror --out figure.png
+  derain view scan.bin --methods outdet.onnx --window
+
+A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), a filter (ror, sor, dror,
+dsor, ssr), all or none. --card says what the scan's labels mean; without it there is no truth.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's arguments."""
+    parser.add_argument("scan", type=Path)
+    parser.add_argument("--methods", nargs="+", required=True, metavar="[TITLE=]METHOD")
+    parser.add_argument("--out", type=Path, help="PNG file to write")
+    parser.add_argument("--window", action="store_true", help="open a window for each method")
+    parser.add_argument(
+        "--card", help="data card of the scan's labels (beside it or in ../labels), such as wads"
+    )
+    parser.add_argument(
+        "--columns",
+        default="x,y,z,intensity",
+        help="names of the columns of .bin and .npy files (default: %(default)s)",
+    )
+    parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Runs the command."""
+    from derain.export.bench.contestants import contestants
+    from derain.stopwatch import Stopwatch
+
+    if not (arguments.out or arguments.window):
+        raise InputError(arguments.scan, "nothing is to be done with it", "Give --out or --window.")
+    methods = contestants(arguments.methods)
+    scan = read_scan(arguments.scan, arguments.columns.split(","))
+    rain = _truth(scan, arguments)
+    predicted = {
+        method.title: method.ready(arguments.threads)(scan, Stopwatch()) for method in methods
+    }
+    if arguments.out:
+        from derain.comparison_pictures import comparison_figure
+        from derain.pictures import save
+
+        title = f"{arguments.scan.name}: {len(scan):,} points"
+        save(comparison_figure(scan, predicted, rain, title), arguments.out)
+        print(arguments.out)
+    if arguments.window:
+        from derain.comparison_window import show_comparison
+
+        show_comparison(scan, predicted, rain)
+    return 0
+
+
+def _truth(scan: "Scan", arguments: argparse.Namespace) -> "NDArray[np.bool_] | None":
+    """Which points are rain; None where no card says what the labels mean."""
+    from derain.cards import load_card
+    from derain.datamodules.labelled import label_of
+    from derain.files.labels import read_labels, semantic
+
+    if arguments.card is None:
+        return None
+    label = semantic(read_labels(label_of(arguments.scan), len(scan)))
+    return load_card(arguments.card).rain_of(scan.with_label(label))

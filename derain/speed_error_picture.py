@@ -1,0 +1,155 @@
+"""The picture that a choice of a method is made by: error against milliseconds."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation, Text
+from matplotlib.ticker import FuncFormatter
+from matplotlib.transforms import Bbox
+
+# An IoU nearer to 1 than this is drawn here: a logarithm has no place for an error of 0.
+LEAST_ERROR = 1e-4
+
+COLOURS = {"network": "#1f77b4", "filter": "#d98200", "baseline": "#6b7280"}
+MARKERS = {"network": "o", "filter": "s", "baseline": "D"}
+
+# Where a label may stand, in points from its marker: near ones first, and those to the right.
+DIRECTIONS = np.radians([0, 180, 45, -45, 135, -135, 90, -90])
+DISTANCES = (8, 16, 28, 42, 60, 84)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a method stands.
+
+    Attributes:
+        title: What it is called.
+        error: 1 - IoU.
+        milliseconds: Time from file to mask, above 0.
+        group: ``network``, ``filter`` or ``baseline``.
+    """
+
+    title: str
+    error: float
+    milliseconds: float
+    group: str
+
+
+def unbeaten(standings: Sequence[Standing]) -> list[Standing]:
+    """The methods that no other beats, one that is at least as fast and as good, by ascending time.
+
+    Of equally fast and good ones, the first speaks for all.
+    """
+    front: list[Standing] = []
+    for standing in sorted(standings, key=lambda method: (method.milliseconds, method.error)):
+        if not front or standing.error < front[-1].error:
+            front.append(standing)
+    return front
+
+
+def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
+    """Error over milliseconds, both logarithmic, and the front of those that nothing beats.
+
+    Args:
+        standings: The methods, one or more.
+        title: Heading.
+    """
+    figure = Figure(figsize=(10, 6.5))
+    FigureCanvasAgg(figure)  # measures the labels
+    figure.subplots_adjust(left=0.09, right=0.97, bottom=0.1, top=0.92)
+    axes = figure.add_subplot()
+    axes.set(xscale="log", yscale="log", title=title)
+    axes.set_xlabel("milliseconds a scan, from file to mask (median)")
+    axes.set_ylabel("error: 1 - IoU of rain")
+    _draw_front(axes, unbeaten(standings))
+    for group, marker in MARKERS.items():
+        _draw_group(axes, [s for s in standings if s.group == group], group, marker)
+    axes.margins(0.12)
+    axes.grid(which="both", color="#e5e7eb", linewidth=0.6)
+    axes.set_axisbelow(True)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(FuncFormatter(_few_digits))
+    axes.legend(loc="best", frameon=False)
+    figure.draw_without_rendering()  # now it is known where things are
+    _label(axes, standings)
+    return figure
+
+
+def _draw_front(axes: Axes, front: Sequence[Standing]) -> None:
+    x = [standing.milliseconds for standing in front]
+    y = [_drawn(standing.error) for standing in front]
+    axes.plot(x, y, color="#9ca3af", linewidth=1.2, zorder=1, label="nothing beats these")
+
+
+def _draw_group(axes: Axes, members: Sequence[Standing], group: str, marker: str) -> None:
+    if not members:
+        return
+    axes.scatter(
+        [standing.milliseconds for standing in members],
+        [_drawn(standing.error) for standing in members],
+        marker=marker,
+        color=COLOURS[group],
+        s=42,
+        zorder=2,
+        label=group,
+    )
+
+
+def _label(axes: Axes, standings: Sequence[Standing]) -> None:
+    """Writes each title where it covers no marker and no other title."""
+    places = axes.transData.transform([(s.milliseconds, _drawn(s.error)) for s in standings])
+    taken = [Bbox.from_bounds(x - 5, y - 5, 10, 10) for x, y in places]
+    legend = axes.get_legend()
+    assert legend is not None
+    taken.append(legend.get_window_extent())
+    for standing in standings:
+        for annotation in _candidates(axes, standing):
+            letters = _letters(annotation)
+            inside = all(map(axes.bbox.contains, *letters.corners().T))
+            if inside and not letters.count_overlaps(taken):
+                break
+            annotation.remove()
+        else:
+            # No room at all: over others, rather than not at all.
+            letters = _letters(next(_candidates(axes, standing)))
+        taken.append(letters)
+
+
+def _candidates(axes: Axes, standing: Standing) -> Iterator[Annotation]:
+    for distance in DISTANCES:
+        for x, y in zip(np.cos(DIRECTIONS), np.sin(DIRECTIONS), strict=True):
+            yield axes.annotate(
+                standing.title,
+                (standing.milliseconds, _drawn(standing.error)),
+                xytext=(distance * x, distance * y),
+                textcoords="offset points",
+                ha="left" if x > 0.1 else "right" if x < -0.1 else "center",
+                va="bottom" if y > 0.1 else "top" if y < -0.1 else "center",
+                fontsize=9,
+                # Lets the front pass behind the letters.
+                bbox={"boxstyle": "square,pad=0.1", "color": "white", "alpha": 0.8},
+                arrowprops={"arrowstyle": "-", "color": "#9ca3af", "linewidth": 0.6}
+                if distance > DISTANCES[0]
+                else None,
+            )
+
+
+def _letters(annotation: Annotation) -> Bbox:
+    """Where a label's letters are, without the line that leads to them."""
+    annotation.get_window_extent()  # puts the label into its place first
+    return Text.get_window_extent(annotation)
+
+
+def _drawn(error: float) -> float:
+    return max(error, LEAST_ERROR)
+
+
+def _few_digits(value: float, _: object) -> str:
+    """Names 2 and 5 between the powers of ten."""
+    digit = value / 10 ** np.floor(np.log10(value))
+    return f"{value:g}" if round(digit) in (2, 5) else ""

@@ -1,0 +1,109 @@
+"""What a method costs where it is deployed: milliseconds by stage, and memory.
+
+Each method is measured alone, in a fresh process that loads nothing of torch: no search for
+neighbours is shared, no other method's memory is counted, and a crash is that method's alone.
+"""
+
+import multiprocessing
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.export.bench.contestants import Contestant
+from derain.files import DEFAULT_COLUMNS, read_scan
+from derain.stopwatch import Stopwatch
+
+STAGES = ("read", "view", "network", "back")
+WARM_UP = 2
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How methods are timed.
+
+    Attributes:
+        scans: Scans to time them on, one or more.
+        columns: Names of the columns of ``.bin`` and ``.npy`` scans.
+        threads: Threads of view and network; 0 takes every core this process may use.
+        repeats: Timed runs on each scan.
+    """
+
+    scans: Sequence[Path]
+    columns: Sequence[str] = DEFAULT_COLUMNS
+    threads: int = 0
+    repeats: int = 3
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Milliseconds and memory of one method.
+
+    Attributes:
+        milliseconds: Time of each run by stage, float64 (runs,); 0 in stages that it has not.
+        peak_memory: Largest resident memory of a process that does this alone, in MiB, Python and
+            its libraries included; None where the system does not tell.
+        failure: What went wrong, if anything did; there are no runs then.
+    """
+
+    milliseconds: dict[str, NDArray[np.float64]]
+    peak_memory: float | None
+    failure: str | None = None
+
+    def percentile(self, percentage: float, stage: str | None = None) -> float:
+        """Milliseconds that a share of the runs stay within, of one stage or of all together.
+
+        Not a number where nothing was run.
+        """
+        times = sum(self.milliseconds.values()) if stage is None else self.milliseconds[stage]
+        return float(np.percentile(times, percentage)) if np.size(times) else float("nan")
+
+
+def measure_cost(contestant: Contestant, timing: Timing) -> Cost:
+    """Measures a method in a process of its own.
+
+    Args:
+        contestant: The method.
+        timing: What it is timed on, and how.
+    """
+    # Spawned, not forked: a fork would begin with all that this process holds.
+    process = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(max_workers=1, mp_context=process) as executor:
+        try:
+            return executor.submit(run_alone, contestant, timing).result()
+        except Exception as error:  # whatever its libraries raise is told in the method's row
+            return Cost({stage: np.zeros(0) for stage in STAGES}, None, str(error))
+
+
+def run_alone(contestant: Contestant, timing: Timing) -> Cost:
+    """Runs a method on every scan, in turns, in this process; see :func:`measure_cost`."""
+    method = contestant.ready(timing.threads)
+
+    def timed(path: Path) -> dict[str, float]:
+        stopwatch = Stopwatch()
+        with stopwatch.stage("read"):
+            scan = read_scan(path, timing.columns)
+        method(scan, stopwatch)
+        return stopwatch.milliseconds
+
+    for _ in range(WARM_UP):
+        timed(timing.scans[0])
+    runs = [timed(path) for _ in range(timing.repeats) for path in timing.scans]
+    times = {stage: np.array([run.get(stage, 0.0) for run in runs]) for stage in STAGES}
+    return Cost(times, _peak_memory())
+
+
+def _peak_memory() -> float | None:
+    """Largest resident memory of this process so far, MiB.
+
+    Not getrusage's: what it says of a new process begins with the memory of the one that began it.
+    """
+    try:
+        lines = Path("/proc/self/status").read_text("utf-8").splitlines()
+    except OSError:
+        return None
+    kibibytes = [int(line.split()[1]) for line in lines if line.startswith("VmHWM:")]
+    return kibibytes[0] / 1024 if kibibytes else None

@@ -1,0 +1,171 @@
+"""A bench as CSV, JSON and Markdown."""
+
+import csv
+import io
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from derain.export.bench.cost import STAGES
+from derain.export.bench.rows import Row
+from derain.export.markdown import markdown_table
+from derain.files.atomic import replacing
+from derain.metrics import SCORES, Counts
+
+SIMULATED_IS_EASY = (
+    "**Simulated data.** What falls in a simulation is easier to find than what falls from the "
+    "sky: these figures are no evidence of quality on real scans."
+)
+
+READING = """\
+- precision, recall, F1 and IoU are rain's, counted over the points of all scans; `per scan` is the
+  mean over scans. Points that a failed method left in a scan count as not found.
+- `IoU 95 %` is the bootstrap interval over scans, `behind best` that of the difference to the best
+  IoU, on the same draws: one that reaches 0 says that these scans do not tell the two apart. Scans
+  that follow each other are alike, which makes both too narrow.
+- ms are from file to mask, median and 95th percentile, each method alone in a process of its own
+  and no search for neighbours shared. MiB is that process's largest resident memory, Python and its
+  libraries included.
+- `position` knows only where rain was in the training scans, `intensity` only that rain is dim and
+  near; `all` and `none` look at nothing. A method that does not beat them has learnt nothing."""
+
+
+def write_report(rows: Sequence[Row], facts: Mapping[str, Any], out: Path) -> None:
+    """Writes ``bench.json``, ``bench.csv`` and ``bench.md`` into a folder.
+
+    Args:
+        rows: The rows of the table.
+        facts: What the bench depends on; see :func:`.bench.provenance`.
+        out: The folder, made if missing.
+
+    Raises:
+        InputError: A folder that cannot be written.
+    """
+    content = {**facts, "rows": [row.as_dict() for row in rows]}
+    for name, text in {
+        "bench.json": json.dumps(content, indent=1, allow_nan=False) + "\n",
+        "bench.csv": as_csv(rows),
+        "bench.md": as_markdown(rows, facts) + "\n",
+    }.items():
+        with replacing(out / name) as temporary:
+            temporary.write_text(text, "utf-8")
+
+
+def as_csv(rows: Sequence[Row]) -> str:
+    """One line a method; what is nested has names joined by dots, such as ``stages.view.p50``."""
+    lines = [_flat(row.as_dict()) for row in rows]
+    columns = list(dict.fromkeys(name for line in lines for name in line))
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(lines)
+    return text.getvalue()
+
+
+def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
+    """Tables of the whole, of classes, ranges, rain rates, sensors and stages."""
+    points = sum(vars(rows[0].scores.pooled).values())
+    parts = [
+        f"# {facts['title']}, {points:,} points",
+        f"    {facts['command']}",
+        *([SIMULATED_IS_EASY] if facts["simulated"] else []),
+        main_table(rows),
+        READING,
+        "## Called rain, by class",
+        _by_class(rows),
+        "## IoU by range",
+        _groups(rows, lambda row: row.scores.by_range),
+    ]
+    if rows[0].scores.by_rain_rate:
+        parts += ["## IoU by rain rate", _groups(rows, lambda row: row.scores.by_rain_rate)]
+    if rows[0].scores.by_sensor:
+        parts += ["## IoU by sensor", _groups(rows, lambda row: row.scores.by_sensor)]
+    parts += ["## Milliseconds by stage, median and 95th percentile", _by_stage(rows)]
+    if failures := _failures(rows):
+        parts += ["## What failed", failures]
+    return "\n\n".join([*parts, facts["versions"]])
+
+
+def main_table(rows: Sequence[Row]) -> str:
+    """Error and cost of every method."""
+    head = ["method", "P", "R", "F1", "IoU", "IoU 95 %", "behind best"]
+    head += ["F1 per scan", "IoU per scan", "ms", "p95", "weights", "MiB"]
+    return markdown_table(head, [_main_cells(row) for row in rows])
+
+
+def _main_cells(row: Row) -> list[str]:
+    values = row.as_dict()
+    return [
+        row.title + (" (!)" if row.scores.failures or row.cost.failure else ""),
+        *(f"{values[score]:.3f}" for score in SCORES),
+        _interval(row.iou_interval),
+        _interval(row.behind_best),
+        f"{values['f1_per_scan']:.3f}",
+        f"{values['iou_per_scan']:.3f}",
+        _number(values["ms"]),
+        _number(values["ms_p95"]),
+        f"{values['weights']:,}" if "weights" in values else "-",
+        _number(row.cost.peak_memory, decimals=0),
+    ]
+
+
+def _by_class(rows: Sequence[Row]) -> str:
+    """Share of each class that was called rain: recall of rain, false positives of the others."""
+    present = {name: c for name, c in rows[0].scores.by_class.items() if c.points}
+    head = ["method", *(f"{name}{' (rain)' if c.rain else ''}" for name, c in present.items())]
+    return markdown_table(
+        head,
+        [
+            [row.title, *(f"{row.scores.by_class[name].share_lost:.2%}" for name in present)]
+            for row in rows
+        ],
+    )
+
+
+def _groups(rows: Sequence[Row], groups_of: Callable[[Row], Mapping[str, Counts]]) -> str:
+    names = list(groups_of(rows[0]))
+    body = [[row.title, *(f"{groups_of(row)[name].iou:.3f}" for name in names)] for row in rows]
+    return markdown_table(["method", *names], body)
+
+
+def _by_stage(rows: Sequence[Row]) -> str:
+    body = []
+    for row in rows:
+        times = row.as_dict()["stages"].values()
+        body.append(
+            [row.title, *(f"{_number(time['p50'])} / {_number(time['p95'])}" for time in times)]
+        )
+    return markdown_table(["method", *STAGES], body)
+
+
+def _failures(rows: Sequence[Row]) -> str:
+    lines = []
+    for row in rows:
+        if failures := row.scores.failures:
+            scan, reason = next(iter(failures.items()))
+            scans = f"{len(failures)} of {len(row.scores.per_scan)} scans"
+            lines.append(f"- {row.title}: {scans}, first {scan}: {reason}")
+        if row.cost.failure:
+            lines.append(f"- {row.title} could not be timed: {row.cost.failure}")
+    return "\n".join(lines)
+
+
+def _number(value: float | None, decimals: int = 1) -> str:
+    return "-" if value is None else f"{value:,.{decimals}f}"
+
+
+def _interval(interval: tuple[float, float] | None) -> str:
+    return "-" if interval is None else f"{interval[0]:.3f} to {interval[1]:.3f}"
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            flat |= _flat(value, f"{prefix}{name}.")
+        elif isinstance(value, list | tuple):
+            flat |= _flat(dict(zip(("low", "high"), value, strict=True)), f"{prefix}{name}.")
+        else:
+            flat[prefix + name] = value
+    return flat

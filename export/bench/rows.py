@@ -1,0 +1,118 @@
+"""Rows of the bench's table: what a method scores beside what it costs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from derain.export.bench.bootstrap import Bootstrap, Interval, bootstrap
+from derain.export.bench.contestants import Contestant
+from derain.export.bench.cost import STAGES, Cost
+from derain.export.bench.scores import Scores
+from derain.metrics import SCORES, Counts
+
+
+@dataclass(frozen=True)
+class Row:
+    """How one method did.
+
+    Attributes:
+        contestant: The method.
+        scores: What it scored.
+        cost: What it cost.
+        iou_interval: 95 % interval of its IoU over scans; None for fewer than two scans.
+        behind_best: That of what the best method's IoU has over its own.
+    """
+
+    contestant: Contestant
+    scores: Scores
+    cost: Cost
+    iou_interval: Interval | None
+    behind_best: Interval | None
+
+    @property
+    def title(self) -> str:
+        """What the method is called."""
+        return self.contestant.title
+
+    @property
+    def milliseconds(self) -> float:
+        """Median time from file to mask; not a number where the method could not be timed."""
+        return self.cost.percentile(50)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The row as JSON-able primitives; what is not known is None."""
+        scores = self.scores
+        return {
+            "method": self.title,
+            "kind": self.contestant.kind,
+            **_scores(scores.pooled),
+            **{f"{name}_per_scan": _mean(scores.per_scan, name) for name in SCORES},
+            "iou_interval": self.iou_interval,
+            "iou_behind_best_interval": self.behind_best,
+            "ms": _known(self.milliseconds),
+            "ms_p95": _known(self.cost.percentile(95)),
+            "stages": {
+                stage: {f"p{p}": _known(self.cost.percentile(p, stage)) for p in (50, 95)}
+                for stage in STAGES
+            },
+            "peak_memory_mib": self.cost.peak_memory,
+            "counts": asdict(scores.pooled),
+            "by_class": {name: asdict(c) for name, c in scores.by_class.items() if c.points},
+            "by_range": _all_scores(scores.by_range),
+            "by_rain_rate": _all_scores(scores.by_rain_rate),
+            "by_sensor": _all_scores(scores.by_sensor),
+            "failed_scans": dict(scores.failures),
+            "not_timed": self.cost.failure,
+            **self.contestant.facts,
+        }
+
+
+def joined(
+    contestants: Sequence[Contestant],
+    scores: Sequence[Scores],
+    costs: Sequence[Cost],
+    generator: np.random.Generator,
+) -> list[Row]:
+    """The rows, in the order of the methods.
+
+    Args:
+        contestants: The methods, one or more.
+        scores: What each scored, on the same scans.
+        costs: What each cost.
+        generator: Draws scans for the intervals.
+    """
+    intervals = _intervals(scores, generator)
+    return [Row(*row) for row in zip(contestants, scores, costs, *intervals, strict=True)]
+
+
+def _intervals(
+    scores: Sequence[Scores], generator: np.random.Generator
+) -> tuple[Sequence[Interval | None], Sequence[Interval | None]]:
+    if len(scores[0].per_scan) < 2:
+        # One scan says nothing of how much scans differ.
+        nothing = [None] * len(scores)
+        return nothing, nothing
+    per_scan = [row.per_scan for row in scores]
+    found = np.array([[c.true_positive for c in scans] for scans in per_scan])
+    errors = np.array([[c.false_positive + c.false_negative for c in scans] for scans in per_scan])
+    drawn: Bootstrap = bootstrap(found, errors, generator)
+    return drawn.iou, drawn.behind_best
+
+
+def _scores(counts: Counts) -> dict[str, float]:
+    return {name: getattr(counts, name) for name in SCORES}
+
+
+def _all_scores(groups: Mapping[str, Counts]) -> dict[str, dict[str, float]]:
+    return {name: {**_scores(counts), **asdict(counts)} for name, counts in groups.items()}
+
+
+def _mean(per_scan: Sequence[Counts], name: str) -> float:
+    return float(np.mean([getattr(counts, name) for counts in per_scan]))
+
+
+def _known(value: float) -> float | None:
+    # JSON has no word for what is not a number.
+    return None if np.isnan(value) else value

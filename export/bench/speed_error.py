@@ -1,0 +1,37 @@
+"""Draws a bench."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from derain.export.bench.contestants import LEARNT, TRIVIAL
+from derain.export.bench.rows import Row
+from derain.filters import FILTERS
+from derain.pictures import save
+from derain.speed_error_picture import Standing, speed_error_figure
+
+
+def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) -> None:
+    """Writes the picture of error against time of all methods that could be timed.
+
+    Args:
+        rows: The rows of the table.
+        facts: What the bench depends on; see :func:`.bench.provenance`.
+        path: PNG file to write.
+
+    Raises:
+        InputError: An output that cannot be written.
+    """
+    standings = [
+        Standing(row.title, 1 - row.scores.pooled.iou, row.milliseconds, _group(row))
+        for row in rows
+        if row.cost.failure is None
+    ]
+    title = f"{facts['title']}, {facts['processor']}"
+    save(speed_error_figure(standings, title), path)
+
+
+def _group(row: Row) -> str:
+    if row.contestant.kind in FILTERS:
+        return "filter"
+    return "baseline" if row.contestant.kind in (*LEARNT, *TRIVIAL) else "network"

@@ -1,0 +1,143 @@
+"""``derain bench``: from scans to tables and a picture, and the paper's beside ours."""
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from derain.export.bench import bench
+from derain.export.bench.cost import run_alone
+from derain.simulation.campaign import MAKER
+
+FILES = ["bench.csv", "bench.json", "bench.md", "speed_error.png"]
+
+
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Times methods in this process; that each has its own is tested by itself."""
+    monkeypatch.setattr(bench, "measure_cost", run_alone)
+
+
+@pytest.fixture
+def root(tmp_path: Path, write_labelled) -> Path:
+    """A simulated data set: one training, one validation and three test sequences."""
+    root = tmp_path / "set"
+    for number in range(5):
+        folder = root / f"sequences/00{number}"
+        label = folder / "lidar_radar_labels/0.label"
+        write_labelled(folder / "lidar_radar_pcd/0.bin", label, rain=3)
+    manifest = {
+        "made_by": MAKER,
+        "split": {"train": ["000"], "validation": ["001"], "test": ["002", "003", "004"]},
+        "rain_rate_mm_h": {"000": 25, "001": 25, "002": 10, "003": 25, "004": 50},
+    }
+    (root / "manifest.json").write_text(json.dumps(manifest))
+    return root
+
+
+METHODS = ["dror", "position", "intensity", "all", "none"]
+
+
+def test_every_method_and_baseline_stands_in_one_table(
+    run_derain, root: Path, tmp_path: Path, onnx_model: Path
+) -> None:
+    out = tmp_path / "out"
+    outcome = run_derain("bench", "--data", root, "--methods", onnx_model, *METHODS, "--out", out)
+    assert outcome.code == 0, outcome.err
+    assert sorted(path.name for path in out.iterdir()) == FILES
+    content = json.loads((out / "bench.json").read_text())
+    rows = {row["method"]: row for row in content["rows"]}
+    assert list(rows) == ["outdet", *METHODS]
+    assert all(0 <= row["iou"] <= 1 and row["ms"] > 0 for row in rows.values())
+    assert rows["all"]["recall"] == 1
+    assert rows["all"]["counts"] == {
+        "true_positive": 90,
+        "false_positive": 810,
+        "false_negative": 0,
+        "true_negative": 0,
+    }
+    assert list(rows["dror"]["by_rain_rate"]) == ["10 mm/h", "25 mm/h", "50 mm/h"]
+    assert content["simulated"] is True
+    assert "Simulated data" in (out / "bench.md").read_text()
+    assert [Path(file["scan"]).parts[-3] for file in content["files"]] == ["002", "003", "004"]
+    assert all(f"| {name} " in outcome.out for name in rows)
+
+
+def test_the_command_in_the_report_makes_the_same_figures_again(
+    run_derain, root: Path, tmp_path: Path
+) -> None:
+    options = ["--limit", "2", "--distinct", "--seed", "3", "--timed", "1", "--repeats", "1"]
+    first, again = tmp_path / "first", tmp_path / "again"
+    assert not run_derain(
+        "bench", "--data", root, "--methods", "t=dsor", "all", *options, "--out", first
+    ).code
+    content = json.loads((first / "bench.json").read_text())
+    derain, *words = content["command"].split()
+    words[words.index("--out") + 1] = str(again)
+    assert derain == "derain"
+    assert run_derain(*words).code == 0
+    repeated = json.loads((again / "bench.json").read_text())
+
+    def figures(content: dict) -> list[dict]:
+        timed = {"ms", "ms_p95", "stages", "peak_memory_mib"}
+        return [{k: v for k, v in row.items() if k not in timed} for row in content["rows"]]
+
+    assert figures(repeated) == figures(content)
+    assert repeated["files"] == content["files"]
+    assert len(content["files"]) == 2
+
+
+def test_single_scans_are_benched_with_their_card(
+    run_derain, tmp_path: Path, write_labelled
+) -> None:
+    write_labelled(tmp_path / "a.bin", tmp_path / "a.label", rain=110)
+    data = ["--data", tmp_path / "a.bin", "--card", "wads"]
+    outcome = run_derain("bench", *data, "--methods", "all", "--out", tmp_path / "out")
+    assert outcome.code == 0
+    assert "# WADS, 1 scan, 300 points" in (tmp_path / "out/bench.md").read_text()
+    refused = run_derain("bench", *data, "--methods", "position", "--out", tmp_path / "no")
+    assert refused.code == 2
+    assert "position: it has no scans to learn from. Give --train" in refused.err
+    learnt = ["--train", tmp_path / "a.bin", "--methods", "position", "--out", tmp_path / "learnt"]
+    assert run_derain("bench", *data, *learnt).code == 0
+    assert not (tmp_path / "no").exists()
+
+
+def test_table_2_stands_beside_ours_for_each_part(run_derain, root: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    data = ["--paper", "table2", "--data", root, "--card", "rehearse3d"]
+    outcome = run_derain("bench", *data, "--methods", "dsor", "dror", "all", "--out", out)
+    assert outcome.code == 0, outcome.err
+    assert outcome.out == (out / "table2.md").read_text()
+    for part in ("validation", "test"):
+        assert sorted(path.name for path in (out / part).iterdir()) == FILES
+        (section,) = [s for s in outcome.out.split("\n## ") if s.startswith(part)]
+        titles = [line.split("|")[1].strip() for line in section.splitlines() if "|" in line]
+        assert titles.index("dsor, ours") == titles.index("DSOR, published") + 1
+        assert titles.index("dror, ours") == titles.index("DROR, published") + 1
+        assert titles[-1] == "all, ours"
+    ours = json.loads((out / "test/bench.json").read_text())["rows"][0]["iou"]
+    assert f"{100 * ours:.2f}" in outcome.out
+
+
+def test_table_3_takes_the_rain_rates_of_a_file(run_derain, root: Path, tmp_path: Path) -> None:
+    rates = tmp_path / "rates.yaml"
+    rates.write_text(yaml.safe_dump({"002": 50, "003": 25}))
+    out = tmp_path / "out"
+    data = ["--paper", "table3", "--data", root, "--rain-rates", rates]
+    outcome = run_derain("bench", *data, "--methods", "dsor", "--out", out)
+    assert outcome.code == 0, outcome.err
+    assert {path.name for path in out.iterdir()} == {"heavy", "medium", "table3.md"}
+    assert "Ours on simulated rain (simulated)." in outcome.out
+    assert "(*) DSOR, medium: F1" in outcome.out
+
+
+def test_the_papers_tables_need_a_data_set_with_a_split(
+    run_derain, root: Path, tmp_path: Path
+) -> None:
+    scans = root / "sequences/002/lidar_radar_pcd"
+    data = ["--paper", "table2", "--data", scans, "--card", "rehearse3d"]
+    outcome = run_derain("bench", *data, "--methods", "all", "--out", tmp_path / "out")
+    assert outcome.code == 2
+    assert "has no split, which the paper's tables ask for. Name the root." in outcome.err

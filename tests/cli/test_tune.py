@@ -1,0 +1,114 @@
+"""``derain tune``: parameters that run and bench take, and a study that goes on."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from derain.export.runtime import Derainer
+from derain.files import read_scan
+from derain.filters import filter_from, read_parameters
+
+
+@pytest.fixture
+def data(tmp_path: Path, write_labelled) -> list[str | Path]:
+    """Options for three labelled scans."""
+    for number in range(3):
+        write_labelled(
+            tmp_path / f"velodyne/{number}.bin", tmp_path / f"labels/{number}.label", rain=110
+        )
+    return ["--data", tmp_path / "velodyne", "--card", "wads"]
+
+
+def test_run_takes_what_tune_wrote(run_derain, data: list[str | Path], tmp_path: Path) -> None:
+    best = tmp_path / "best.yaml"
+    outcome = run_derain("tune", "dsor", *data, "--trials", "5", "--out", best)
+    assert outcome.code == 0, outcome.err
+    assert outcome.out.startswith("dsor: IoU 0.")
+    assert best.read_text().startswith("# derain ")
+    method, parameters = read_parameters(best)
+    assert method == "dsor"
+    filter_from(method, parameters)
+    scans = tmp_path / "velodyne"
+    cleaned = run_derain("run", "dsor", scans, "--out", tmp_path / "o", "--parameters", best)
+    assert cleaned.code == 0
+
+
+def test_the_threshold_of_a_model_is_tuned(
+    run_derain, data: list[str | Path], tmp_path: Path, onnx_model: Path
+) -> None:
+    best = tmp_path / "best.yaml"
+    assert run_derain("tune", onnx_model, *data, "--out", best).code == 0
+    method, parameters = read_parameters(best)
+    assert method == str(onnx_model)
+    derainer = Derainer(onnx_model, 1)
+    scans = [read_scan(path) for path in sorted((tmp_path / "velodyne").iterdir())]
+    probability = np.concatenate([derainer.probability(scan) for scan in scans])
+    rain = np.tile(np.arange(300) >= 270, 3)
+
+    def iou(threshold: float) -> float:
+        called = probability > threshold
+        return np.count_nonzero(called & rain) / np.count_nonzero(called | rain)
+
+    assert iou(parameters["threshold"]) == max(map(iou, [0, *probability]))
+
+
+def test_a_second_call_goes_on_and_comes_to_the_same(
+    run_derain, data: list[str | Path], tmp_path: Path
+) -> None:
+    options = [*data, "--storage", tmp_path / "study.db"]
+    for trials in ("3", "6", "6"):
+        out = tmp_path / f"{trials}.yaml"
+        assert run_derain("tune", "ror", *options, "--trials", trials, "--out", out).code == 0
+    other = run_derain("tune", "ror", *options, "--scans", "1", "--out", tmp_path / "no.yaml")
+    assert other.code == 2
+    assert "holds a study of ror on other scans. Name another --storage." in other.err
+    assert not (tmp_path / "no.yaml").exists()
+
+
+def test_the_scans_are_drawn_by_the_seed(
+    run_derain, data: list[str | Path], tmp_path: Path
+) -> None:
+    def tuned(name: str, seed: int) -> dict:
+        out = tmp_path / name
+        options = ["--scans", "1", "--trials", "1", "--seed", seed, "--out", out]
+        assert run_derain("tune", "dror", *data, *map(str, options)).code == 0
+        return yaml.safe_load(out.read_text()), out.read_text().splitlines()[1]
+
+    assert tuned("a.yaml", 1) == tuned("b.yaml", 1)
+    assert len({tuned(f"{seed}.yaml", seed)[1] for seed in range(8)}) > 1
+
+
+@pytest.mark.parametrize(
+    ("method", "reason"),
+    [("absent.onnx", "absent.onnx: no such file"), ("nothing", "nothing: no such file")],
+)
+def test_a_method_that_is_not_there_is_refused(
+    run_derain, data: list[str | Path], tmp_path: Path, method: str, reason: str
+) -> None:
+    outcome = run_derain("tune", method, *data, "--out", tmp_path / "out.yaml")
+    assert outcome.code == 2
+    assert reason in outcome.err
+
+
+def test_scans_without_rain_are_refused(run_derain, tmp_path: Path, write_labelled) -> None:
+    write_labelled(tmp_path / "a.bin", tmp_path / "a.label", rain=111)
+    data = ["--data", tmp_path / "a.bin", "--card", "wads", "--out", tmp_path / "out.yaml"]
+    outcome = run_derain("tune", "dsor", *data)
+    assert outcome.code == 2
+    assert "no point of these scans is falling-snow" in outcome.err
+    assert not (tmp_path / "out.yaml").exists()
+
+
+def test_tuning_on_real_snow_finds_better_parameters(
+    run_derain, shared: Path, tmp_path: Path
+) -> None:
+    scan = shared / "data/wads/sample.bin"
+    options = ["--data", scan, "--card", "wads", "--trials", "40", "--out", tmp_path / "best.yaml"]
+    outcome = run_derain("tune", "dsor", *options)
+    assert outcome.code == 0, outcome.err
+    words = outcome.out.splitlines()[0].split()
+    tuned, default = float(words[2]), float(words[8])
+    assert default == pytest.approx(0.626, abs=0.003)
+    assert tuned > default

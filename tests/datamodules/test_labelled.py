@@ -1,0 +1,110 @@
+"""Labelled scans are found however a user names them, and measured by the right card."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from derain.cards import load_card
+from derain.datamodules.base import Loading
+from derain.datamodules.labelled import card_of, labelled_scans, rain_rates, sequence_of
+from derain.errors import InputError
+from derain.simulation.campaign import MAKER
+
+Write = Callable[..., None]
+
+
+def in_sequences(root: Path, write: Write, scans: str, labels: str, *names: str) -> Path:
+    for name in names:
+        folder = root / "sequences" / name
+        write(folder / scans / "0.bin", folder / labels / "0.label", [0, 3])
+    return root
+
+
+@pytest.fixture
+def simulated(tmp_path: Path, write: Write) -> Path:
+    """A simulated data set of three sequences."""
+    root = in_sequences(
+        tmp_path / "set", write, "lidar_radar_pcd", "lidar_radar_labels", "000", "001", "002"
+    )
+    split = {"train": ["000"], "validation": ["001"], "test": ["002"]}
+    manifest = {"made_by": MAKER, "split": split, "rain_rate_mm_h": {"000": 0.0, "002": 25.0}}
+    (root / "manifest.json").write_text(json.dumps(manifest))
+    return root
+
+
+def found(paths: list[Path], card: str, part: str = "test") -> list[str]:
+    data = labelled_scans(paths, load_card(card), Loading())
+    return [str(file.label.relative_to(paths[0].parent)) for file in data.files(part)]
+
+
+def test_files_and_folders_are_taken_with_the_labels_beside_them(
+    tmp_path: Path, write: Write
+) -> None:
+    write(tmp_path / "a/single.bin", tmp_path / "a/single.label")
+    for frame in ("1", "0"):
+        write(tmp_path / f"velodyne/{frame}.bin", tmp_path / f"labels/{frame}.label")
+    paths = [tmp_path / "a/single.bin", tmp_path / "velodyne"]
+    data = labelled_scans(paths, load_card("kitti"), Loading())
+    assert [file.label for file in data.files("test")] == [
+        tmp_path / "a/single.label",
+        tmp_path / "labels/0.label",
+        tmp_path / "labels/1.label",
+    ]
+
+
+def test_a_folder_of_rehearse3d_has_its_labels_in_its_own_sibling(
+    tmp_path: Path, write: Write
+) -> None:
+    root = in_sequences(tmp_path, write, "lidar_radar_pcd", "lidar_radar_labels", "005")
+    (folder,) = root.glob("sequences/*/lidar_radar_pcd")
+    assert found([folder], "rehearse3d") == ["lidar_radar_labels/0.label"]
+
+
+def test_a_simulated_data_set_brings_its_split_its_card_and_its_rain(simulated: Path) -> None:
+    for part, name in {"train": "000", "validation": "001", "test": "002"}.items():
+        labels = f"set/sequences/{name}/lidar_radar_labels/0.label"
+        assert found([simulated], "simulated", part) == [labels]
+    assert card_of([simulated], None) == load_card("simulated")
+    assert rain_rates([simulated], None) == {"000": 0.0, "002": 25.0}
+
+
+def test_rehearse3d_is_known_by_its_folders_and_anything_else_needs_a_card(
+    tmp_path: Path, write: Write
+) -> None:
+    rehearse3d = in_sequences(tmp_path / "r", write, "lidar_radar_pcd", "lidar_radar_labels", "005")
+    assert card_of([rehearse3d], None) == load_card("rehearse3d")
+    assert card_of([rehearse3d], "simulated") == load_card("simulated")
+    other = in_sequences(tmp_path / "o", write, "velodyne", "labels", "00")
+    with pytest.raises(InputError, match=r"which labels are rain\. Give --card: "):
+        card_of([other], None)
+
+
+def test_the_split_of_the_card_serves_where_there_is_no_manifest(
+    tmp_path: Path, write: Write
+) -> None:
+    root = in_sequences(tmp_path / "k", write, "velodyne", "labels", "08", "09")
+    assert len(found([root], "kitti", "validation")) == 2
+
+
+def test_a_root_whose_sequences_hold_no_scans_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "sequences/00/other").mkdir(parents=True)
+    with pytest.raises(InputError, match="no sequence has a folder lidar_radar_pcd or velodyne"):
+        labelled_scans([tmp_path], load_card("kitti"), Loading())
+
+
+def test_rain_rates_are_read_by_the_name_of_the_sequence(tmp_path: Path) -> None:
+    rates = tmp_path / "rates.yaml"
+    rates.write_text('"005": 25\n"010": 10.5\n')
+    known = rain_rates([tmp_path], rates)
+    assert known == {"005": 25.0, "010": 10.5}
+    assert known[sequence_of(Path("sequences/010/lidar_radar_pcd/000000.bin"))] == 10.5
+
+
+@pytest.mark.parametrize("text", ["010: 25", '"010": heavy', "- 25", "{", ""])
+def test_what_is_no_file_of_rain_rates_is_refused(tmp_path: Path, text: str) -> None:
+    rates = tmp_path / "rates.yaml"
+    rates.write_text(text)
+    with pytest.raises(InputError, match="not the rain rates of sequences"):
+        rain_rates([tmp_path], rates)

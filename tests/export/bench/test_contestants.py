@@ -1,0 +1,77 @@
+"""Methods by the names that users give them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from derain.errors import InputError
+from derain.export.bench.contestants import contestants
+from derain.export.runtime import Derainer
+from derain.filters import DSOR
+from derain.hard_cases import scene
+from derain.scan import Scan
+from derain.stopwatch import Stopwatch
+
+
+def parameters(path: Path, **content: object) -> str:
+    path.write_text(yaml.safe_dump(content))
+    return str(path)
+
+
+def test_a_row_is_called_by_its_title_else_by_its_name(onnx_model: Path, tmp_path: Path) -> None:
+    tuned = parameters(tmp_path / "best.yaml", method="dsor", range_multiplier=0.08)
+    odd = parameters(tmp_path / "r=0.1.yaml", method="dsor", range_multiplier=0.1)
+    names = [str(onnx_model), f"fine={onnx_model}", "dror", tuned, "none", odd, f"other={odd}"]
+    rows = contestants(names)
+    assert [(row.title, row.kind) for row in rows] == [
+        ("outdet", "outdet"),
+        ("fine", "outdet"),
+        ("dror", "dror"),
+        ("best", "dsor"),
+        ("none", "none"),
+        ("r=0.1", "dsor"),
+        ("other", "dsor"),
+    ]
+    assert rows[3].filter == DSOR(range_multiplier=0.08)
+
+
+def test_a_file_of_parameters_gives_a_model_its_threshold(onnx_model: Path, tmp_path: Path) -> None:
+    file = parameters(tmp_path / "low.yaml", method=str(onnx_model), threshold=0.25)
+    (row,) = contestants([file])
+    scan = Scan.of(scene(300))
+    probability = Derainer(onnx_model, 1).probability(scan)
+    np.testing.assert_array_equal(row.ready(1)(scan, Stopwatch()), probability > 0.25)
+    assert row.facts["threshold"] == 0.25
+
+
+def test_the_weights_are_those_of_the_network(random_outdet, onnx_model: Path) -> None:
+    (row,) = contestants([str(onnx_model)])
+    trained = sum(parameter.numel() for parameter in random_outdet.network.parameters())
+    # Norms are folded into the convolutions, and the exporter adds a few shapes.
+    assert 0.9 * trained < row.facts["weights"] < 1.1 * trained
+
+
+def test_baselines_learn_from_the_scans_that_are_given() -> None:
+    scan = Scan.of(scene(300))
+    rain = np.arange(300) >= 270
+    position, intensity = contestants(["position", "intensity"], lambda: iter([(scan, rain)]))
+    for row in (position, intensity):
+        called = row.ready(1)(scan, Stopwatch())
+        assert np.count_nonzero(called & rain) / np.count_nonzero(called | rain) > 0.5
+
+
+@pytest.mark.parametrize(
+    ("names", "reason"),
+    [
+        (["nothing"], "nothing: no such file"),
+        (["absent.onnx"], "absent.onnx: no such file"),
+        (["position"], "position: it has no scans to learn from. Give --train"),
+        (["dror", "dror"], "dror: two methods are called so"),
+        (["x=dror", "x=none"], "x: two methods are called so"),
+    ],
+)
+def test_a_method_that_cannot_be_used_is_refused(names: list[str], reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        contestants(names)

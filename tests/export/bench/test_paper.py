@@ -1,0 +1,93 @@
+"""The paper's tables, and ours beside them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.cards import load_card
+from derain.datamodules.base import Loading
+from derain.datamodules.labelled import labelled_scans
+from derain.errors import InputError
+from derain.export.bench.contestants import contestants
+from derain.export.bench.cost import STAGES, Cost
+from derain.export.bench.paper import TABLES, beside_published, files_by_group, paper_table
+from derain.export.bench.rows import Row, joined
+from derain.export.bench.scores import Labelled, score
+from derain.files.labels import write_labels
+from derain.hard_cases import scene
+
+
+def rows_of(names: Sequence[str], data: Labelled) -> list[Row]:
+    methods = contestants(names)
+    costs = [Cost({stage: np.full(3, 10.0) for stage in STAGES}, 50.0) for _ in methods]
+    return joined(methods, score(methods, data, 1), costs, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_every_group_of_a_table_has_rows(name: str) -> None:
+    table = paper_table(name)
+    assert {row.group for row in table.rows} == set(table.groups)
+
+
+def test_our_rows_stand_under_those_of_the_same_method(labelled: Labelled) -> None:
+    rows = rows_of(["all", "dsor", "DSOR, again=dsor"], labelled)
+    text = beside_published(paper_table("table3"), {"heavy": rows}, "REHEARSE-3D")
+    titles = [line.split("|")[1].strip() for line in text.splitlines() if line.startswith("| ")]
+    assert titles == [
+        "method",
+        "3D-OutDet, published",
+        "DSOR, published",
+        "dsor, ours",
+        "DSOR, again, ours",
+        "all, ours",
+    ]
+    assert "| 27.08 |  39.46 | 32.12 | 19.13 |" in text
+    iou = 100 * rows[1].scores.pooled.iou
+    (own,) = [line for line in text.splitlines() if line.startswith("| dsor, ours")]
+    assert f" {iou:.2f} |" in own
+    assert "(*)" not in text
+
+
+def test_simulated_rain_stands_beside_simulated_rain_and_misprints_are_marked(
+    labelled: Labelled,
+) -> None:
+    ours = {name: rows_of(["dsor"], labelled) for name in ("heavy", "medium", "light")}
+    text = beside_published(paper_table("table3"), ours, "simulated rain")
+    assert "Ours on simulated rain (simulated)." in text
+    assert text.count("| DSOR, published (*)") == 2
+    assert "(*) DSOR, medium: F1 of this precision and recall is 81.59." in text
+    assert "(*) DSOR, light: F1 and IoU are those of a recall of 99.9, not 94.34." in text
+    assert "27.08" not in text
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """A data set in the layout of REHEARSE-3D, with two test sequences and one of validation."""
+    for sequence in ("001", "005", "006"):
+        folder = tmp_path / "sequences" / sequence
+        scan = folder / "lidar_radar_pcd/0.bin"
+        scan.parent.mkdir(parents=True)
+        scene(20).tofile(scan)
+        write_labels(folder / "lidar_radar_labels/0.label", np.zeros(20, np.int64))
+    return tmp_path
+
+
+def test_table_3_takes_the_test_scans_of_each_rain_rate(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = labelled_scans([root], load_card("rehearse3d"), Loading())
+    monkeypatch.setattr(data, "split", {"validation": ["001"], "test": ["005", "006"]})
+    table3, table2 = paper_table("table3"), paper_table("table2")
+    by_rate = files_by_group(table3, data, {"001": 25.0, "005": 50.0, "006": 10.0})
+    assert {
+        name: [f.scan.parent.parent.name for f in files] for name, files in by_rate.items()
+    } == {
+        "heavy": ["005"],
+        "light": ["006"],
+    }
+    by_part = files_by_group(table2, data, {})
+    assert {name: len(files) for name, files in by_part.items()} == {"validation": 1, "test": 2}
+    with pytest.raises(InputError, match=r"no test scan is known to have .* Give --rain-rates"):
+        files_by_group(table3, data, {"005": 30.0})

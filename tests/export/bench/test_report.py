@@ -1,0 +1,96 @@
+"""The bench's files: one set of figures, readable by people, spreadsheets and programs."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.export.bench.contestants import Contestant, contestants
+from derain.export.bench.cost import STAGES, Cost
+from derain.export.bench.report import SIMULATED_IS_EASY, as_markdown, write_report
+from derain.export.bench.rows import Row, joined
+from derain.export.bench.scores import Labelled, score
+from derain.export.bench.speed_error import draw_speed_error
+
+FACTS = {
+    "title": "made up, 3 scans",
+    "command": "derain bench",
+    "simulated": False,
+    "versions": "derain 1",
+    "processor": "abacus",
+}
+
+
+def cost(milliseconds: float) -> Cost:
+    return Cost({stage: np.full(5, milliseconds / 4) for stage in STAGES}, 100.0)
+
+
+@pytest.fixture
+def rows(labelled: Labelled) -> list[Row]:
+    """A filter, a baseline, and a method that fails wherever it is run."""
+
+    def broken(scan: object, stopwatch: object) -> np.ndarray:
+        raise MemoryError("no room")
+
+    methods = [*contestants(["dror", "all"]), Contestant("broken", "outdet", lambda _: broken)]
+    failed = Cost({stage: np.zeros(0) for stage in STAGES}, None, "no room")
+    scores = score(methods, labelled, threads=1)
+    return joined(methods, scores, [cost(40), cost(4), failed], np.random.default_rng(0))
+
+
+def test_json_and_csv_hold_the_same_figures(rows: list[Row], tmp_path: Path) -> None:
+    write_report(rows, FACTS, tmp_path / "out")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "bench.csv",
+        "bench.json",
+        "bench.md",
+    ]
+    content = json.loads((tmp_path / "out/bench.json").read_text())
+    assert content["command"] == "derain bench"
+    with (tmp_path / "out/bench.csv").open() as file:
+        lines = list(csv.DictReader(file))
+    for row, in_json, in_csv in zip(rows, content["rows"], lines, strict=True):
+        assert in_json["method"] == in_csv["method"] == row.title
+        for name in ("precision", "recall", "f1", "iou"):
+            assert in_json[name] == float(in_csv[name]) == getattr(row.scores.pooled, name)
+        assert in_json["iou_interval"] == [
+            float(in_csv["iou_interval.low"]),
+            float(in_csv["iou_interval.high"]),
+        ]
+        assert in_json["by_rain_rate"]["10 mm/h"]["iou"] == float(
+            in_csv["by_rain_rate.10 mm/h.iou"]
+        )
+    assert [row["ms"] for row in content["rows"]] == [40.0, 4.0, None]
+    assert [line["ms"] for line in lines] == ["40.0", "4.0", ""]
+    assert content["rows"][0]["parameters"]["azimuth_resolution"] == 0.16
+
+
+def test_the_tables_name_every_method_and_what_failed(rows: list[Row]) -> None:
+    text = as_markdown(rows, FACTS)
+    for heading in ("Called rain, by class", "IoU by range", "IoU by rain rate", "Milliseconds"):
+        (section,) = [part for part in text.split("\n## ") if part.startswith(heading)]
+        assert all(f"| {row.title} " in section for row in rows)
+    assert "| broken (!) |" in text
+    assert "broken: 3 of 3 scans, first" in text
+    assert "broken could not be timed: no room" in text
+    assert "IoU by sensor" not in text
+
+
+def test_simulated_data_are_called_so(rows: list[Row]) -> None:
+    assert SIMULATED_IS_EASY not in as_markdown(rows, FACTS)
+    assert SIMULATED_IS_EASY in as_markdown(rows, {**FACTS, "simulated": True})
+
+
+def test_one_scan_has_no_interval(labelled: Labelled) -> None:
+    one = Labelled(labelled.card, labelled.scans[:1], labelled.read)
+    methods = contestants(["all"])
+    (row,) = joined(methods, score(methods, one, 1), [cost(4)], np.random.default_rng(0))
+    assert row.iou_interval is None
+    assert row.as_dict()["iou_behind_best_interval"] is None
+
+
+def test_the_picture_leaves_out_what_could_not_be_timed(rows: list[Row], tmp_path: Path) -> None:
+    draw_speed_error(rows, FACTS, tmp_path / "speed_error.png")
+    assert (tmp_path / "speed_error.png").read_bytes().startswith(b"\x89PNG")
