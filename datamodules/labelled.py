@@ -103,7 +103,7 @@ def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
     if file is None:
         return dict(read_manifest(paths[0]).get("rain_rate_mm_h", {}))
     with reading(file):
-        text = file.read_text("utf-8")
+        text = file.read_bytes()
     try:
         return _rates(yaml.safe_load(text))
     except (yaml.YAMLError, TypeError, ValueError) as error:
@@ -112,6 +112,17 @@ def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
             f"not the rain rates of sequences ({error})",
             'It needs lines such as "005": 25, the name in quotes and the rate in mm/h.',
         ) from error
+
+
+def is_simulated(card: DataCard) -> bool:
+    """Whether the card is that of scans whose rain or snow fell in a computer."""
+    return card.name in SIMULATED
+
+
+def full_name(card: DataCard) -> str:
+    """Name of a card, which says so where the rain is simulated."""
+    told = "simulated" in card.name or not is_simulated(card)
+    return card.name if told else f"{card.name} (simulated)"
 
 
 def sequence_of(scan: Path) -> str:

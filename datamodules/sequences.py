@@ -66,7 +66,8 @@ class SequenceDataModule(ScanDataModule):
             raise InputError(
                 folder / self.layout.scans,
                 f"no such folder, though the split names sequence {name}",
-                "Check --data.root, or give a --data.split of the sequences that are there.",
+                "Check the root. If only some sequences are there, give `derain fit` a "
+                "--data.split, and other commands the folders of scans.",
             )
         return [
             ScanFile(scan, folder / self.layout.labels / f"{scan.stem}.label")

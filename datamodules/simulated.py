@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from derain.cards import load_card
-from derain.datamodules.base import Loading
+from derain.datamodules.base import Loading, Part, ScanFile
 from derain.datamodules.sequences import Layout, SequenceDataModule
 from derain.errors import InputError
 from derain.simulation.campaign import Campaign
@@ -48,6 +48,18 @@ class Simulated(SequenceDataModule):
         """
         if self.make:
             ensure_track(self.root, self.campaign)
+
+    def find(self, part: Part) -> list[ScanFile]:
+        """The scans of a part's sequences, in order; for prediction those of the test part.
+
+        Raises:
+            InputError: A missing sequence or scan folder, or too few sequences for such a part.
+        """
+        if not self.split["test" if part == "predict" else part]:
+            raise InputError(
+                self.root, f"no sequence is for {part}", "Simulate three sequences or more."
+            )
+        return super().find(part)
 
 
 def _split_of(root: Path) -> dict[str, list[str]]:

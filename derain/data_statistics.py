@@ -1,9 +1,11 @@
 """What a data set holds: scans and points by class and by rain rate."""
 
 import csv
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from glob import glob
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -91,15 +93,15 @@ def rate_name(rate: float | None) -> str:
 
 def find_layout(root: Path) -> tuple[str, str] | None:
     """Names of the folders of scans and labels in a data set; None where none is known."""
-    return next((layout for layout in LAYOUTS if _scan_folders(root, layout[0])), None)
+    return next((layout for layout in LAYOUTS if _scan_folders(root, layout)), None)
 
 
 def find_sequences(root: Path, layout: tuple[str, str] | None) -> list[SequenceFiles]:
     """The sequences of a data set, by name.
 
     Args:
-        root: A folder with a folder ``sequences``, the folder of sequences, a sequence, or a folder
-            of scans, which counts as one sequence.
+        root: A folder with a folder ``sequences``, the folder of sequences, a sequence, its folder
+            of scans, or any folder of scans, which counts as one sequence.
         layout: Names of a sequence's folders of scans and labels; None for a folder of scans.
 
     Raises:
@@ -107,18 +109,28 @@ def find_sequences(root: Path, layout: tuple[str, str] | None) -> list[SequenceF
     """
     if layout is None:
         return [SequenceFiles(root.absolute().name, find_scans([root]), None)]
-    folders = _scan_folders(root, layout[0])
+    folders = _scan_folders(root, layout)
     if not folders:
         raise InputError(
             root, f"no sequence in it has a folder {layout[0]}", "Name its folders with --layout."
         )
-    rates = read_manifest(root).get(RAIN_RATE, {})
+    rates = manifest_of(root).get(RAIN_RATE, {})
     sequences = []
     for folder in folders:
         name = folder.absolute().parent.name
         rate = rates[name] if name in rates else _recorded_rate(folder.parent / "weather")
         sequences.append(SequenceFiles(name, find_scans([folder]), rate))
     return sequences
+
+
+def manifest_of(root: Path) -> dict[str, Any]:
+    """The manifest of the simulated data set that a folder is, or is part of; empty if of none.
+
+    Args:
+        root: The data set, its folder ``sequences``, a sequence, or a sequence's folder of scans.
+    """
+    root = root.absolute()
+    return next(filter(None, map(read_manifest, (root, *root.parents[:3]))), {})
 
 
 def count_scan(path: Path, layout: tuple[str, str] | None, columns: Sequence[str]) -> Tally:
@@ -145,10 +157,14 @@ def count_scan(path: Path, layout: tuple[str, str] | None, columns: Sequence[str
     return tally
 
 
-def _scan_folders(root: Path, scans: str) -> list[Path]:
+def _scan_folders(root: Path, layout: tuple[str, str]) -> list[Path]:
+    scans, labels = layout
+    if root.absolute().name == scans and (root.absolute().parent / labels).is_dir():
+        return [root]
     for sequences in ("sequences/*/", "*/", ""):
-        if folders := sorted(root.glob(f"{sequences}{scans}/")):
-            return folders
+        # Not Path.glob, which finds hidden folders too: what `derain simulate` has not finished.
+        if found := glob(f"{sequences}{scans}/", root_dir=root):
+            return [root / folder for folder in sorted(found)]
     return []
 
 
@@ -167,4 +183,5 @@ def _recorded_rate(weather: Path) -> float | None:
     for record in sorted(weather.glob("*.csv")):
         with reading(record, ValueError, csv.Error), record.open(newline="") as lines:
             rates += [float(row[RAIN_RATE]) for row in csv.DictReader(lines) if row.get(RAIN_RATE)]
-    return median(rates) if rates else None
+    measured = [rate for rate in rates if math.isfinite(rate)]  # a gauge that fails writes nan
+    return median(measured) if measured else None

@@ -12,6 +12,9 @@ from derain.extrinsics import Extrinsics
 from derain.label_transfer import LABEL_WITHIN, transfer_labels
 from derain.scan import Scan
 
+# Columns that every merged file has; a channel of the radar's cannot go by their names.
+MERGED_COLUMNS = ("x", "y", "z", "intensity", "radar")
+
 # What is fused with a LiDAR scan that has no radar frame near in time.
 NO_DETECTIONS = Scan(np.zeros((0, 3), np.float32), name="no radar frame")
 
@@ -69,16 +72,20 @@ def fuse(
         also ``radar`` (1 or 0) and each of them, float32, NaN for the LiDAR.
 
     Raises:
-        InputError: A channel that the radar frame, not being empty, lacks.
+        InputError: A channel that the radar frame, not being empty, lacks, or one of
+            ``MERGED_COLUMNS``.
     """
+    for name in channels:
+        if name in MERGED_COLUMNS:
+            raise InputError(name, "is a column of the merged cloud itself", "Leave it out.")
     radar = _moved(radar, extrinsics)
     xyz = np.concatenate([lidar.xyz, radar.xyz])
     intensity = np.concatenate([_intensity(lidar), _intensity(radar)])
     is_radar = np.arange(len(xyz)) >= len(lidar)
     columns: dict[str, NDArray[Any]] = {}
     if channels:
-        columns = dict(zip("xyz", xyz.T, strict=True))
-        columns |= {"intensity": intensity, "radar": is_radar.astype(np.uint8)}
+        merged = *xyz.T, intensity, is_radar.astype(np.uint8)
+        columns = dict(zip(MERGED_COLUMNS, merged, strict=True))
         columns |= {name: _channel(name, len(lidar), radar) for name in channels}
     label = _label(lidar, radar, label_within)
     return Scan(xyz, intensity, label, is_radar, columns, name=lidar.name)

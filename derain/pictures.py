@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.scan import Scan
 
@@ -82,11 +83,13 @@ def before_after_figure(scan: Scan, predicted: NDArray[np.bool_], title: str) ->
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Writes a figure as PNG.
+    """Writes a figure in the format that the suffix names, such as PNG.
 
     Raises:
-        InputError: An output that cannot be written.
+        InputError: An output that cannot be written, or the suffix of no picture.
     """
+    if path.suffix[1:].lower() not in figure.canvas.get_supported_filetypes():
+        raise InputError(path, f"'{path.suffix}' is not the suffix of a picture", "Name it .png.")
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=110)
 

@@ -76,6 +76,8 @@ class Spec:
         try:
             known = {part.name: content[part.name] for part in fields(cls)}
             spec = cls(**{name: _immutable(value) for name, value in known.items()})
+            if len({len(spec.channels), len(spec.units), len(spec.mean), len(spec.std)}) > 1:
+                raise ValueError("channels, units, mean and std differ in number")
             return replace(spec, classes={int(id_): n for id_, n in known["classes"].items()})
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(

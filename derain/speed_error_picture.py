@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FuncFormatter
 from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
 
 # An IoU nearer to 1 than this is drawn here: a logarithm has no place for an error of 0.
 LEAST_ERROR = 1e-4
@@ -71,6 +72,7 @@ def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
     axes.margins(0.12)
     axes.grid(which="both", color="#e5e7eb", linewidth=0.6)
     axes.set_axisbelow(True)
+    axes.tick_params(which="both", length=3.5, pad=3.5)  # all numbers on one line
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(FuncFormatter(_few_digits))
@@ -101,17 +103,20 @@ def _draw_group(axes: Axes, members: Sequence[Standing], group: str, marker: str
 
 
 def _label(axes: Axes, standings: Sequence[Standing]) -> None:
-    """Writes each title where it covers no marker and no other title."""
+    """Writes each title where it covers no marker and no other title, and is nobody else's."""
     places = axes.transData.transform([(s.milliseconds, _drawn(s.error)) for s in standings])
     taken = [Bbox.from_bounds(x - 5, y - 5, 10, 10) for x, y in places]
     legend = axes.get_legend()
     assert legend is not None
     taken.append(legend.get_window_extent())
-    for standing in standings:
+    for number, standing in enumerate(standings):
         for annotation in _candidates(axes, standing):
             letters = _letters(annotation)
             inside = all(map(axes.bbox.contains, *letters.corners().T))
-            if inside and not letters.count_overlaps(taken):
+            # Without a line to lead to it, a label is read as the nearest marker's.
+            gaps = _gaps(letters, places)
+            told = annotation.arrow_patch is not None or gaps[number] == gaps.min()
+            if inside and told and not letters.count_overlaps(taken):
                 break
             annotation.remove()
         else:
@@ -143,6 +148,13 @@ def _letters(annotation: Annotation) -> Bbox:
     """Where a label's letters are, without the line that leads to them."""
     annotation.get_window_extent()  # puts the label into its place first
     return Text.get_window_extent(annotation)
+
+
+def _gaps(box: Bbox, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far each place, (n, 2), is from a box; float64 (n,), in its unit."""
+    beyond = np.maximum(np.maximum(box.min - places, places - box.max), 0)
+    gaps: NDArray[np.float64] = np.hypot(*beyond.T)
+    return gaps
 
 
 def _drawn(error: float) -> float:

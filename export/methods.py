@@ -7,7 +7,21 @@ from typing import Any
 
 from derain.errors import InputError
 from derain.export.runtime import Derainer
-from derain.filters import FILTERS, FilterDerainer, filter_from
+from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
+
+PARAMETER_SUFFIXES = (".yaml", ".yml")
+
+
+def named_method(text: str) -> tuple[str, dict[str, Any]]:
+    """The method that a user names, and its parameters as far as they are given with it.
+
+    Args:
+        text: A method's name, or a YAML file of its parameters as ``derain tune`` writes it.
+
+    Raises:
+        InputError: A YAML file that is missing, or names no method.
+    """
+    return read_parameters(text) if Path(text).suffix in PARAMETER_SUFFIXES else (text, {})
 
 
 def load_method(

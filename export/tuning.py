@@ -91,7 +91,7 @@ class Search:
         trials: Trials in all, those of an earlier run included.
         seed: Of the sampler.
         storage: SQLite file that keeps the study; None forgets it.
-        data: Names of the scans: a study goes on only with the same ones.
+        data: Names of the scans: a study goes on only with the same ones, labelled alike.
         done: Called after each trial.
     """
 
@@ -113,7 +113,7 @@ def tune_filter(name: str, scans: Sequence[ViewedScan], search: Search) -> Tuned
         search: How to search.
 
     Raises:
-        InputError: A storage that cannot be used, or holds a study of other scans.
+        InputError: A storage that cannot be used, or holds a study of other scans or labels.
 
     Source: J. Bergstra et al., "Algorithms for Hyper-Parameter Optimization", NeurIPS 2011; 100
         scans and 100 trials as in the REHEARSE-3D paper.
@@ -131,10 +131,10 @@ def tune_filter(name: str, scans: Sequence[ViewedScan], search: Search) -> Tuned
         search.done()
 
     try:
-        study = _study(name, search)
-        if not study.trials:
-            study.enqueue_trial({key: getattr(default, key) for key in SPACES[name]})
+        study = _study(name, scans, search)
         complete = study.get_trials(states=[optuna.trial.TrialState.COMPLETE])
+        if not complete:
+            study.enqueue_trial({key: getattr(default, key) for key in SPACES[name]})
         remaining = max(search.trials - len(complete), 0)
         study.optimize(objective, remaining, callbacks=[done])
     except (optuna.exceptions.OptunaError, SQLAlchemyError) as error:
@@ -189,7 +189,7 @@ def _iou_above(
     return np.count_nonzero(called & rain) / union if union else 1.0
 
 
-def _study(name: str, search: Search) -> "optuna.Study":
+def _study(name: str, scans: Sequence[ViewedScan], search: Search) -> "optuna.Study":
     """A new study, or the one of the same filter that the storage holds."""
     import optuna
 
@@ -199,11 +199,15 @@ def _study(name: str, search: Search) -> "optuna.Study":
         direction="maximize",
         load_if_exists=True,
     )
-    facts = {"scans": list(search.data), "bounds": {k: list(v) for k, v in SPACES[name].items()}}
+    facts = {
+        "scans": list(search.data),
+        "rain_and_solid": [[int(s.rain.sum()), int(s.solid.sum())] for s in scans],
+        "bounds": {k: list(v) for k, v in SPACES[name].items()},
+    }
     if study.trials and study.user_attrs != facts:
         raise InputError(
             str(search.storage),
-            f"holds a study of {name} on other scans",
+            f"holds a study of {name} on other scans or labels",
             "Name another --storage.",
         )
     for key, fact in facts.items():

@@ -37,19 +37,26 @@ def record(sequence: Path, text: str, stem: str = "000000") -> None:
 
 
 @pytest.mark.parametrize("layout", [REHEARSE3D, ("velodyne", "labels")])
-@pytest.mark.parametrize("root", ["", "sequences", "sequences/000"])
+@pytest.mark.parametrize("root", ["", "sequences", "sequences/000", "sequences/000/{scans}"])
 def test_sequences_are_found_from_the_root_to_the_sequence(
     tmp_path: Path, layout: tuple[str, str], root: str
 ) -> None:
     for name in ("001", "000"):
         add_scan(tmp_path / "sequences" / name, layout, "000001", [0] * 10)
         add_scan(tmp_path / "sequences" / name, layout, "000000", [0] * 10)
-    assert find_layout(tmp_path / root) == layout
-    sequences = find_sequences(tmp_path / root, layout)
-    expected = ["000"] if root.endswith("000") else ["000", "001"]
+    folder = tmp_path / root.format(scans=layout[0])
+    assert find_layout(folder) == layout
+    sequences = find_sequences(folder, layout)
+    expected = ["000"] if "000" in root else ["000", "001"]
     assert [sequence.name for sequence in sequences] == expected
     assert [scan.name for scan in sequences[0].scans] == ["000000.bin", "000001.bin"]
     assert sequences[0].rain_rate is None
+
+
+def test_a_sequence_that_is_not_finished_is_not_counted(tmp_path: Path) -> None:
+    for name in ("000", ".001"):
+        add_scan(tmp_path / "sequences" / name, REHEARSE3D, "000000", [0])
+    assert [sequence.name for sequence in find_sequences(tmp_path, REHEARSE3D)] == ["000"]
 
 
 def test_a_folder_of_scans_is_one_sequence(tmp_path: Path) -> None:
@@ -78,6 +85,14 @@ def test_the_manifest_states_rain_rates_before_the_weather_does(tmp_path: Path) 
     (tmp_path / "manifest.json").write_text(json.dumps(manifest))
     rates = [sequence.rain_rate for sequence in find_sequences(tmp_path, REHEARSE3D)]
     assert rates == [10, 11, None]
+
+
+def test_a_rain_gauge_that_fails_is_not_heeded(tmp_path: Path) -> None:
+    for name, rates in {"000": "nan\n9\ninf", "001": "nan"}.items():
+        add_scan(tmp_path / name, REHEARSE3D, "000000", [0])
+        record(tmp_path / name, f"rain_rate_mm_h\n{rates}\n")
+    rates = [sequence.rain_rate for sequence in find_sequences(tmp_path, REHEARSE3D)]
+    assert rates == [9, None]
 
 
 def test_a_damaged_weather_record_is_named(tmp_path: Path) -> None:

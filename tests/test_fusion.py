@@ -174,6 +174,12 @@ def test_a_channel_that_the_radar_lacks_is_named() -> None:
         fuse(Scan.of(scene(5)), radar_frame(), PLACE, channels=["snr"])
 
 
+@pytest.mark.parametrize("channel", ["x", "intensity", "radar"])
+def test_a_channel_does_not_take_the_place_of_a_merged_column(channel: str) -> None:
+    with pytest.raises(InputError, match=f"{channel}: is a column of the merged cloud itself"):
+        fuse(Scan.of(scene(5)), radar_frame(), PLACE, channels=["rcs", channel])
+
+
 @pytest.mark.parametrize(("name", "scan"), list(hard_cases(2000)))
 def test_every_hard_case_is_fused_from_either_side(name: str, scan: Scan) -> None:
     ordinary = radar_frame()

@@ -130,6 +130,13 @@ def test_a_picture_is_saved_as_png(
     assert [file.name for file in path.parent.iterdir()] == ["picture.png"]
 
 
+@pytest.mark.parametrize("name", ["picture", "picture.xyz"])
+def test_a_picture_of_no_known_format_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match=r"is not the suffix of a picture\. Name it \.png\."):
+        save(Figure(), tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_picture_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"picture\.png: cannot be written"):

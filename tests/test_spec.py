@@ -95,6 +95,14 @@ def test_classes_that_are_not_named_by_numbers_are_damage(classes: Any) -> None:
         Spec.from_dict({**SPEC.as_dict(), "classes": classes}, "m.onnx")
 
 
+@pytest.mark.parametrize("name", ["channels", "units", "mean", "std"])
+def test_channels_that_lack_a_number_are_damage(name: str) -> None:
+    content = SPEC.as_dict()
+    content[name] = content[name][:-1]
+    with pytest.raises(InputError, match=r"damaged \(channels, units, mean and std differ"):
+        Spec.from_dict(content, "m.onnx")
+
+
 def test_the_view_is_the_one_the_spec_names() -> None:
     view = SPEC.make_view(threads=2)
     assert view == NeighbourView(7, SPEC.channels, MEANS, threads=2)

@@ -55,6 +55,23 @@ def test_labels_cover_neither_each_other_nor_a_marker(seed: int) -> None:
     assert not any(box.contains(*place) for box in boxes for place in places)
 
 
+def test_a_label_beside_a_marker_is_nearer_to_it_than_to_any_other() -> None:
+    methods = [
+        Standing("right", 0.211, 239, "network"),
+        Standing("left", 0.209, 227, "network"),
+        Standing("far", 0.9, 5, "baseline"),
+        Standing("farther", 0.1, 9000, "baseline"),
+    ]
+    figure = speed_error_figure(methods, "two close together")
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    places = axes.transData.transform([(m.milliseconds, m.error) for m in methods])
+    for number, text in enumerate(axes.texts):
+        box = Text.get_window_extent(text)
+        beyond = np.maximum(np.maximum(box.min - places, places - box.max), 0)
+        assert text.arrow_patch or np.argmin(np.hypot(*beyond.T)) == number
+
+
 def test_no_error_at_all_is_drawn_at_the_least() -> None:
     figure = speed_error_figure([Standing("perfect", 0.0, 3.0, "network")], "one method")
     (collection,) = figure.axes[0].collections

@@ -27,6 +27,12 @@ from derain.annotation.yaml_entry import Entry
 from derain.files.atomic import replacing
 from derain.simulation.classes import TrackClass
 
+# Points of a candidate for the plane: more make it no better, and RANSAC less likely to find it.
+MOST_FITTED = 100
+
+# Open3D's whole numbers have 32 bits.
+LARGEST = 2**31 - 1
+
 CLASSES = {kind.name.lower(): kind for kind in TrackClass}
 
 
@@ -126,10 +132,10 @@ def _box(entry: Entry) -> Box:
 def _plane_search(entry: Entry) -> PlaneSearch:
     parsers = {
         "distance": Entry.positive,
-        "points": lambda value: value.whole(3),
-        "iterations": lambda value: value.whole(1),
-        "scans": lambda value: value.whole(1),
-        "seed": lambda value: value.whole(0),
+        "points": lambda value: value.whole(3, MOST_FITTED),
+        "iterations": lambda value: value.whole(1, LARGEST),
+        "scans": lambda value: value.whole(1, LARGEST),
+        "seed": lambda value: value.whole(0, LARGEST),
     }
     return PlaneSearch(**entry.record(parsers))
 

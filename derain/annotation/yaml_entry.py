@@ -99,10 +99,11 @@ class Entry:
             raise self.fault(f"{number:g} is not above 0", "Write one that is.")
         return number
 
-    def whole(self, least: int) -> int:
-        """A whole number of at least ``least``."""
-        if type(self.value) is not int or self.value < least:
+    def whole(self, least: int, most: int) -> int:
+        """A whole number from ``least`` to ``most``."""
+        if type(self.value) is not int or not least <= self.value <= most:
             raise self.fault(
-                f"{self.value!r} is not a whole number from {least} up", "Write one that is."
+                f"{self.value!r} is not a whole number from {least:,} to {most:,}",
+                "Write one that is.",
             )
         return self.value

@@ -1,5 +1,6 @@
 """Data cards: what must be known of a data set to train on it and to use what was trained."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
@@ -162,6 +163,8 @@ def _card(content: dict[str, Any]) -> DataCard:
             },
         }
     )
+    if len(set(card.classes.values())) < len(card.classes):
+        raise ValueError("two classes have the same name")
     if not set(card.rain) <= set(card.classes) or not card.rain:
         raise ValueError(f"rain {list(card.rain)} must name ids of its classes")
     if not set(card.unknown) <= set(card.classes) - set(card.rain):
@@ -180,6 +183,8 @@ def _numbers(values: Any, names: tuple[str, ...]) -> tuple[float, ...] | None:
     numbers = tuple(map(float, values))
     if len(numbers) != len(names):
         raise ValueError(f"{list(numbers)} must be one number each for {', '.join(names)}")
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{list(numbers)} must be finite")
     return numbers
 
 

@@ -37,15 +37,19 @@ a picture of the sequence.
   derain annotate scans/*.bin --scene scene.yaml --out labels --sequence 003 --json
   derain annotate lidar --scene scene.yaml --out labels --radar radar --within 0.5
 
-A scene file, in metres in the sensor's frame:
+A scene file, in metres and degrees in the sensor's frame (x forward, y left, z up):
 
-  road: [[2, -4], [60, -4], [60, 4], [2, 4]]
-  boxes:
+  road: [[2, -4], [60, -4], [60, 4], [2, 4]]      # corners x, y in order
+  boxes:               # size: length along the heading, width, height
     car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
     mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
   height: 0.1          # above the road's plane, from which it is rain
-  corrections:         # what is different in some sequences
+  rain_area: [[2, -9], [60, -9], [60, 9], [2, 9]] # where to look for rain; without it, the road
+  corrections:         # what is different in some sequences: shift, size or heading
     "003": {boxes: {car_1: {shift: [0.2, 0, 0]}}}
+
+The classes are background, car, sprinkler, rain, pedestrian, bike, target and road. Only the road
+is required: begin with it alone, and box what the picture shows in rain's colour and is none.
 
 Radar frames are paired with scans of the same name, in the LiDAR's frame, and labelled by the
 nearest LiDAR point, in the folder radar; `derain fuse` pairs frames in time and moves them there.

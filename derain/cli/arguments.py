@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import shlex
 
 
 def count(text: str) -> int:
@@ -20,6 +21,26 @@ def factor(text: str) -> float:
     if not (value > 0 and math.isfinite(value)):
         raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
     return value
+
+
+def command_line(arguments: argparse.Namespace, positional: str | None = None) -> str:
+    """The command line that says all this, defaults included.
+
+    Args:
+        arguments: What was parsed, with the name of the command.
+        positional: Name of the argument that is given without its name.
+    """
+    words = ["derain", arguments.command]
+    for name, value in vars(arguments).items():
+        if name == "command" or value is None or value is False:
+            continue
+        if name != positional:
+            words.append(f"--{name.replace('_', '-')}")
+        if isinstance(value, list):
+            words += map(str, value)
+        elif value is not True:
+            words.append(str(value))
+    return shlex.join(words)
 
 
 def _at_least(least: int, text: str) -> int:

@@ -1,13 +1,13 @@
 """``derain bench``: methods side by side, speed against error."""
 
 import argparse
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from derain.cli.arguments import count, threads
+from derain.cli.arguments import command_line, count, threads
 from derain.cli.labelled_data import add_data_arguments, labelled
+from derain.cli.outputs import refuse_unwritable
 from derain.errors import InputError
 from derain.files.atomic import replacing
 
@@ -86,6 +86,7 @@ def main(arguments: argparse.Namespace) -> int:
     data = labelled(arguments, arguments.data)
     rates = rain_rates(arguments.data, arguments.rain_rates)
     methods = contestants(arguments.methods, _learn_from(arguments, data))
+    refuse_unwritable(arguments.out / "bench.json")
     if arguments.paper is None:
         rows = _bench(arguments, data, data.files(arguments.part), rates, methods, arguments.out)
         print(main_table(rows))
@@ -96,7 +97,7 @@ def main(arguments: argparse.Namespace) -> int:
         group: _bench(arguments, data, files, rates, methods, arguments.out / group)
         for group, files in files_by_group(table, data, rates).items()
     }
-    text = beside_published(table, ours, data.card.name)
+    text = beside_published(table, ours, data.card)
     with replacing(arguments.out / f"{arguments.paper}.md") as temporary:
         temporary.write_text(text + "\n", "utf-8")
     print(text)
@@ -137,7 +138,7 @@ def _bench(
         arguments.repeats,
     )
     rows = run_bench(methods, scans, timing, arguments.seed)
-    facts = provenance(_command(arguments), data, files, timing, arguments.seed)
+    facts = provenance(command_line(arguments), data, files, timing, arguments.seed)
     write_report(rows, facts, out)
     draw_speed_error(rows, facts, out / "speed_error.png")
     return rows
@@ -167,17 +168,3 @@ def _require_split(arguments: argparse.Namespace, data: "ScanDataModule") -> Non
         raise InputError(
             arguments.data[0], "has no split, which the paper's tables ask for", "Name the root."
         )
-
-
-def _command(arguments: argparse.Namespace) -> str:
-    """The command line that says all this, defaults included."""
-    words = ["derain", "bench"]
-    for name, value in vars(arguments).items():
-        if name == "command" or value in (None, False):
-            continue
-        words.append(f"--{name.replace('_', '-')}")
-        if isinstance(value, list):
-            words += map(str, value)
-        elif value is not True:
-            words.append(str(value))
-    return shlex.join(words)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.cli.arguments import factor
+from derain.cli.outputs import refuse_clashes
 from derain.errors import InputError
 from derain.extrinsics import Extrinsics, read_extrinsics
 from derain.files import find_scans, read_scan, write_scan
@@ -18,6 +19,7 @@ from derain.files.frame_times import FRAME_COLUMNS, METADATA, read_frame_times
 from derain.files.labels import instance, read_labels, semantic, write_labels
 from derain.fusion import NO_DETECTIONS, fuse, nearest_in_time
 from derain.label_transfer import LABEL_WITHIN, UNKNOWN
+from derain.scan import Scan
 
 SUMMARY = "merge the frames of a LiDAR and of a 4D radar"
 
@@ -27,6 +29,8 @@ lidar_radar_pcd, in each file the points of the LiDAR, then those of the radar i
 and with --labels lidar_radar_labels.
 
   derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused
+  derain fuse --lidar innoviz --radar ext_radar --extrinsics radar_to_lidar.yaml --out fused \\
+    --extra velocity,cross_section
   derain fuse --lidar innoviz --radar radar --extrinsics radar_to_lidar.yaml --out fused \\
     --radar-columns x,y,z,doppler,rcs --extra doppler,rcs
   derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused \\
@@ -94,6 +98,7 @@ def main(arguments: argparse.Namespace) -> int:
     _refuse_overwriting(arguments)
     extrinsics = read_extrinsics(arguments.extrinsics)
     scans, frames = find_scans([arguments.lidar]), find_scans([arguments.radar])
+    refuse_clashes(scans, arguments.out / SCANS)
     times = read_frame_times(scans, arguments.metadata_columns)
     frame_times = read_frame_times(frames, arguments.metadata_columns)
     nearest = nearest_in_time(times, frame_times, arguments.within)
@@ -115,20 +120,30 @@ def main(arguments: argparse.Namespace) -> int:
 def _fuse(
     scan: Path, frame: Path | None, extrinsics: Extrinsics, arguments: argparse.Namespace
 ) -> None:
-    lidar = read_scan(scan, arguments.lidar_columns.split(","))
+    lidar = _read(scan, "lidar", arguments)
     raw = None
     if arguments.labels is not None:
         raw = read_labels(arguments.labels / f"{scan.stem}.label", len(lidar))
         lidar = lidar.with_label(semantic(raw))
     radar = NO_DETECTIONS
     if frame is not None:
-        radar = read_scan(frame, arguments.radar_columns.split(","))
+        radar = _read(frame, "radar", arguments)
     extra = list(filter(None, arguments.extra.split(",")))
     fused = fuse(lidar, radar, extrinsics, arguments.label_within, extra)
     write_scan(arguments.out / SCANS / f"{scan.stem}{'.npz' if extra else '.bin'}", fused)
     if fused.label is not None and raw is not None:
         instances = np.pad(instance(raw), (0, len(radar)))  # the radar's points are of none
         write_labels(arguments.out / LABELS / f"{scan.stem}.label", fused.label, instances)
+
+
+def _read(path: Path, sensor: str, arguments: argparse.Namespace) -> Scan:
+    """Reads a frame; what an error says of --columns is here the option of that sensor."""
+    try:
+        return read_scan(path, getattr(arguments, f"{sensor}_columns").split(","))
+    except InputError as error:
+        texts = str(error.subject), error.reason, error.remedy
+        option = f"--{sensor}-columns"
+        raise InputError(*(text.replace("--columns", option) for text in texts)) from error
 
 
 def _refuse_overwriting(arguments: argparse.Namespace) -> None:

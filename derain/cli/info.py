@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from derain.cli.info_folder import draw, facts_of_folder
 from derain.directions import directions
 from derain.errors import InputError
-from derain.files import read_scan
+from derain.files import find_scans, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.grid_fit import fit_grid
 from derain.morton import distinct_positions
@@ -30,7 +30,7 @@ sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated), one sequence, or a fold
   derain info scan.bin --columns x,y,z,intensity,ring --json
   derain info labels/000000.label
   derain info model.onnx
-  derain info --grid scans/*.bin
+  derain info --grid scans
   derain info REHEARSE3D_PUBLIC --picture statistics.png
   derain info WADS --json
   derain info my_data --layout lidar,classes --card my_card.yaml
@@ -65,8 +65,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     columns = arguments.columns.split(",")
+    _refuse_unclear_picture(arguments)
     if arguments.grid:
-        fit = fit_grid([read_scan(path, columns) for path in arguments.files]).as_dict()
+        scans = find_scans(arguments.files)
+        fit = fit_grid([read_scan(path, columns) for path in scans]).as_dict()
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0
     for path in arguments.files:
@@ -82,6 +84,14 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _refuse_unclear_picture(arguments: argparse.Namespace) -> None:
+    """Refuses a picture of anything but the statistics of one folder."""
+    if arguments.picture and (
+        arguments.grid or len(arguments.files) > 1 or not arguments.files[0].is_dir()
+    ):
+        raise InputError("--picture", "shows one folder's statistics", "Name one folder alone.")
+
+
 def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
     facts = facts_of_folder(folder, arguments)
     print(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
@@ -90,6 +100,8 @@ def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
 
 
 def _facts(path: Path, columns: list[str]) -> dict[str, Any]:
+    if not path.exists():
+        raise InputError(path, "there is no such file or folder", "Check the path.")
     match path.suffix.lower():
         case ".label":
             return _of_labels(path)
@@ -103,6 +115,12 @@ def _facts(path: Path, columns: list[str]) -> dict[str, Any]:
             model = load_model(path)
             weights = sum(parameter.numel() for parameter in model.parameters())
             return {"spec": dict(model.hparams["spec"]), "parameters": weights}
+        case ".pt" | ".pth":
+            raise InputError(
+                path,
+                "weights alone do not say how they are used",
+                "Make a checkpoint of them with `derain import-weights`.",
+            )
         case _:
             return _of_scan(read_scan(path, columns))
 
@@ -135,8 +153,6 @@ def _fitted(scan: Scan) -> dict[str, Any]:
 
 
 def _of_labels(path: Path) -> dict[str, Any]:
-    if not path.is_file():
-        raise InputError(path, "there is no such file", "Check the path.")
     labels, rest = divmod(path.stat().st_size, 4)
     if rest:
         raise InputError(path, "is not whole labels of 4 bytes", "Make the file again.")

@@ -15,10 +15,10 @@ from derain.data_statistics import (
     count_scan,
     find_layout,
     find_sequences,
+    manifest_of,
     rate_name,
 )
 from derain.errors import InputError
-from derain.simulation.manifest import read_manifest
 
 # The data card that explains labels, by the folder of their scans. SemanticKITTI's classes are on
 # the card of WADS.
@@ -140,7 +140,7 @@ def _stated(layout: str) -> tuple[str, str]:
 
 
 def _card(folder: Path, layout: tuple[str, str] | None, name: str | None) -> DataCard | None:
-    if name is None and read_manifest(folder):
+    if name is None and manifest_of(folder):
         name = "simulated"
     elif name is None and layout is not None:
         name = CARDS.get(layout[0])

@@ -2,9 +2,11 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from derain.errors import InputError
+from derain.files.atomic import replacing
 from derain.files.labels import label_beside
 
 
@@ -28,3 +30,22 @@ def refuse_clashes(scans: Sequence[Path], out: Path) -> None:
             raise InputError(
                 scan, "another scan has the same name", "Take them in two runs, each to its --out."
             )
+
+
+def refuse_unwritable(path: Path) -> None:
+    """Refuses, before long work, a file that could not be written after it.
+
+    Its folder is made if missing; what is there stays as it is.
+
+    Args:
+        path: The file that is to be written.
+
+    Raises:
+        InputError: It cannot be written.
+    """
+    with suppress(_NotYet), replacing(path):
+        raise _NotYet
+
+
+class _NotYet(Exception):  # noqa: N818, for nothing went wrong
+    """Ends a writing that was only tried."""

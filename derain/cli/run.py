@@ -15,7 +15,7 @@ from derain.cli.arguments import factor, threads
 from derain.cli.odd_scans import Warnings
 from derain.cli.outputs import refuse_clashes
 from derain.errors import InputError
-from derain.export.methods import load_method
+from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
 from derain.files import find_scans, read_scan, write_scan
 from derain.files.labels import write_labels
@@ -33,9 +33,11 @@ rain, in the input's format with every field kept.
   derain run model.onnx scans/ more/scan.pcd --out cleaned --threads 2 --json
   derain run model.onnx nuscenes/ --out cleaned --columns x,y,z,intensity,ring
   derain run dror scans/ --out cleaned
+  derain run best.yaml scans/ --out cleaned
   derain run dsor scans/ --out cleaned --parameters best.yaml --set range_multiplier=0.08
 
-METHOD is a model written by `derain export`, or a filter: {", ".join(FILTERS)}.
+METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
+or a filter: {", ".join(FILTERS)}.
 A scan that cannot be read is reported and passed over; the exit code is then 2.
 """
 
@@ -57,7 +59,9 @@ class Cleaned:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument("method", metavar="METHOD", help="ONNX file, or name of a filter")
+    parser.add_argument(
+        "method", metavar="METHOD", help="ONNX file, YAML file of parameters, or name of a filter"
+    )
     parser.add_argument("scans", nargs="+", type=Path, help="scans, or folders of scans")
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
@@ -89,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    method = load_method(arguments.method, _parameters(arguments), arguments.threads)
+    method = load_method(*_named_method(arguments), arguments.threads)
     scans = find_scans(arguments.scans)
     refuse_clashes(scans, arguments.out)
     warn = Warnings(method)
@@ -123,19 +127,20 @@ def _clean(
     )
 
 
-def _parameters(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Parameters of the file, and over them those that are set one by one."""
-    stated = dict(arguments.set)
-    if arguments.parameters is None:
-        return stated
-    method, parameters = read_parameters(arguments.parameters)
-    if method != arguments.method:
-        raise InputError(
-            arguments.parameters,
-            f"holds parameters of {method}, not of {arguments.method}",
-            f"Run {method} with it.",
-        )
-    return {**parameters, **stated}
+def _named_method(arguments: argparse.Namespace) -> tuple[str, dict[str, Any]]:
+    """The method, and its parameters: those of the files, and over them those set one by one."""
+    name, parameters = named_method(arguments.method)
+    if arguments.parameters is not None:
+        method, tuned = read_parameters(arguments.parameters)
+        # Models are files, which have more than one name.
+        if Path(method).resolve() != Path(name).resolve():
+            raise InputError(
+                arguments.parameters,
+                f"holds parameters of {method}, not of {name}",
+                f"Run {method} with it.",
+            )
+        parameters |= tuned
+    return name, parameters | dict(arguments.set)
 
 
 def _assignment(text: str) -> tuple[str, int | float | str]:

@@ -10,8 +10,9 @@ import yaml
 from tqdm import tqdm
 
 from derain import __version__
-from derain.cli.arguments import count, threads
+from derain.cli.arguments import command_line, count, threads
 from derain.cli.labelled_data import add_data_arguments, labelled
+from derain.cli.outputs import refuse_unwritable
 from derain.errors import InputError
 from derain.files.atomic import replacing
 
@@ -60,6 +61,7 @@ def main(arguments: argparse.Namespace) -> int:
 
     data = labelled(arguments, arguments.data)
     files = _drawn(data.files(arguments.part), arguments.scans, arguments.seed)
+    refuse_unwritable(arguments.out)
     tune = _tuned_filter if arguments.method in SPACES else _tuned_model
     tuned = tune(arguments, data, files)
     facts = (
@@ -98,10 +100,12 @@ def _tuned_filter(
 def _tuned_model(
     arguments: argparse.Namespace, data: "ScanDataModule", files: list["ScanFile"]
 ) -> "Tuned":
+    from derain.export.methods import load_method
     from derain.export.runtime import Derainer
     from derain.export.tuning import tune_threshold
 
-    derainer = Derainer(arguments.method, arguments.threads)
+    derainer = load_method(arguments.method, {}, arguments.threads)
+    assert isinstance(derainer, Derainer)  # every filter has its bounds
 
     def judged() -> Iterator[tuple[Any, Any]]:
         for file in tqdm(files, desc="judging", unit="scan", disable=None):
@@ -131,11 +135,9 @@ def _no_rain(data: "ScanDataModule") -> InputError:
 
 def _write(arguments: argparse.Namespace, tuned: "Tuned", facts: str) -> None:
     content = {"method": arguments.method, **tuned.parameters}
-    paths = " ".join(map(str, arguments.data))
     with replacing(arguments.out) as temporary:
         temporary.write_text(
-            f"# derain {__version__}: tune {arguments.method} --data {paths}"
-            f" --scans {arguments.scans} --trials {arguments.trials} --seed {arguments.seed}\n"
+            f"# derain {__version__}: {command_line(arguments, 'method')}\n"
             f"# {facts}\n{yaml.safe_dump(content, sort_keys=False)}",
             "utf-8",
         )

@@ -25,7 +25,8 @@ sensor sees it.
   derain view scan.bin --methods outdet.onnx --window
 
 A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), a filter (ror, sor, dror,
-dsor, ssr), all or none. --card says what the scan's labels mean; without it there is no truth.
+dsor, ssr), all or none. --card says what the scan's labels mean; without it there is no truth, and
+with it points whose label says that they are unknown are left out.
 """
 
 
@@ -55,15 +56,19 @@ def main(arguments: argparse.Namespace) -> int:
         raise InputError(arguments.scan, "nothing is to be done with it", "Give --out or --window.")
     methods = contestants(arguments.methods)
     scan = read_scan(arguments.scan, arguments.columns.split(","))
-    rain = _truth(scan, arguments)
+    truth = _truth(scan, arguments)
     predicted = {
         method.title: method.ready(arguments.threads)(scan, Stopwatch()) for method in methods
     }
+    title, rain = f"{arguments.scan.name}: {len(scan):,} points", None
+    if truth is not None:
+        rain, known = truth
+        scan, rain = scan.take(known), rain[known]
+        predicted = {name: called_rain[known] for name, called_rain in predicted.items()}
     if arguments.out:
         from derain.comparison_pictures import comparison_figure
         from derain.pictures import save
 
-        title = f"{arguments.scan.name}: {len(scan):,} points"
         save(comparison_figure(scan, predicted, rain, title), arguments.out)
         print(arguments.out)
     if arguments.window:
@@ -73,8 +78,10 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _truth(scan: "Scan", arguments: argparse.Namespace) -> "NDArray[np.bool_] | None":
-    """Which points are rain; None where no card says what the labels mean."""
+def _truth(
+    scan: "Scan", arguments: argparse.Namespace
+) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]] | None":
+    """Which points are rain, and of which it is known; None where no card says what labels mean."""
     from derain.cards import load_card
     from derain.datamodules.labelled import label_of
     from derain.files.labels import read_labels, semantic
@@ -82,4 +89,5 @@ def _truth(scan: "Scan", arguments: argparse.Namespace) -> "NDArray[np.bool_] | 
     if arguments.card is None:
         return None
     label = semantic(read_labels(label_of(arguments.scan), len(scan)))
-    return load_card(arguments.card).rain_of(scan.with_label(label))
+    card, labelled = load_card(arguments.card), scan.with_label(label)
+    return card.rain_of(labelled), ~card.unknown_of(labelled)

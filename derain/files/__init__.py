@@ -10,6 +10,8 @@ from pathlib import Path
 from derain.errors import InputError
 from derain.files.binary import read_binary, write_binary
 from derain.files.columns import DEFAULT_COLUMNS
+from derain.files.csv_table import read_csv, write_csv
+from derain.files.frame_times import METADATA
 from derain.files.numpy_arrays import read_npy, read_npz, write_npy, write_npz
 from derain.files.pcd import read_pcd, write_pcd
 from derain.files.ply import read_ply, write_ply
@@ -20,13 +22,19 @@ __all__ = ["DEFAULT_COLUMNS", "find_scans", "read_scan", "write_scan"]
 
 # Files that leave the names of their columns to the user, and files that have them.
 _STATED: dict[str, Callable[[Path, Sequence[str]], Scan]] = {".bin": read_binary, ".npy": read_npy}
-_NAMED: dict[str, Callable[[Path], Scan]] = {".npz": read_npz, ".pcd": read_pcd, ".ply": read_ply}
+_NAMED: dict[str, Callable[[Path], Scan]] = {
+    ".npz": read_npz,
+    ".pcd": read_pcd,
+    ".ply": read_ply,
+    ".csv": read_csv,
+}
 _WRITERS: dict[str, Callable[[Path, Scan], None]] = {
     ".bin": write_binary,
     ".npy": write_npy,
     ".npz": write_npz,
     ".pcd": write_pcd,
     ".ply": write_ply,
+    ".csv": write_csv,
 }
 
 
@@ -34,7 +42,7 @@ def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Sca
     """Reads one scan.
 
     Args:
-        path: The file: .bin, .npy, .npz, .pcd or .ply.
+        path: The file: .bin, .npy, .npz, .pcd, .ply or .csv.
         columns: Names of the columns of a file that does not name them itself (.bin, and .npy
             unless structured).
 
@@ -55,7 +63,7 @@ def write_scan(path: Path | str, scan: Scan) -> None:
     """Writes one scan: every column of the file it came from, else coordinates and intensity.
 
     Args:
-        path: The file: .bin, .npy, .npz, .pcd or .ply.
+        path: The file: .bin, .npy, .npz, .pcd, .ply or .csv.
         scan: The scan.
 
     Raises:
@@ -71,7 +79,8 @@ def find_scans(paths: Iterable[Path | str]) -> list[Path]:
 
     Args:
         paths: Files, which are taken as they are, and folders, which stand for the scans directly
-            in them, sorted by name. Hidden files are passed over.
+            in them, sorted by name. Passed over are hidden files, metadata.csv, which says when
+            scans were taken, and any .csv beside scans of other formats.
 
     Raises:
         InputError: A path that does not exist or may not be read, or a folder without scans.
@@ -87,8 +96,13 @@ def _scans_in(folder: Path) -> list[Path]:
     scans = sorted(
         path
         for path in folder.iterdir()
-        if path.suffix.lower() in _WRITERS and path.is_file() and not path.name.startswith(".")
+        if path.suffix.lower() in _WRITERS
+        and path.name != METADATA
+        and not path.name.startswith(".")
+        and path.is_file()
     )
+    # Beside scans of other formats a table is a record of something else, such as of poses.
+    scans = [path for path in scans if path.suffix.lower() != ".csv"] or scans
     if not scans:
         raise InputError(
             folder, f"holds no scans ({', '.join(_WRITERS)})", "Name a folder with scans in it."

@@ -25,14 +25,15 @@ def read_frame_times(
     Args:
         scans: The scans, at least one. A line of the ``metadata.csv`` beside them belongs to the
             scan of that name, whatever its suffix and the zeros before it: 000012.bin, 000012 and
-            12 are one.
+            12 are one, and so are 1634567.25.bin and 1634567.25.
         columns: Names of two columns: the scan's name, and its time.
 
     Returns:
         The time of each scan, float64 (N,), in the file's own unit, which should be seconds.
 
     Raises:
-        InputError: A file that is missing or damaged, or lacks a column or a scan.
+        InputError: A file that is missing or damaged, lacks a column or a scan, or gives a scan
+            two times.
     """
     path = scans[0].parent / METADATA
     if not path.exists():
@@ -60,11 +61,20 @@ def _times(path: Path, frame: str, timestamp: str) -> dict[str, float]:
             f"has no columns {frame} and {timestamp} ({', '.join(present)})",
             "Name those of the scan's name and its time with --metadata-columns.",
         )
-    return {_key(row[frame]): _finite(path, row[timestamp]) for row in rows}
+    times: dict[str, float] = {}
+    for row in rows:
+        name, time = row[frame], _finite(path, row[timestamp])
+        if not name:
+            raise InputError(path, "has a line that names no scan", "Complete it or leave it out.")
+        if times.setdefault(_key(name), time) != time:
+            raise InputError(path, f"gives {name} two times", "Leave one line for each scan.")
+    return times
 
 
 def _key(name: str) -> str:
-    return Path(name).stem.lstrip("0")
+    stem, dot, suffix = name.rpartition(".")
+    # Digits after a point are no suffix: scans may be named by the time of the frame.
+    return (stem if dot and not suffix.isdigit() else name).lstrip("0")
 
 
 def _finite(path: Path, text: str | None) -> float:

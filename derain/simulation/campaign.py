@@ -27,7 +27,7 @@ class Campaign:
     """What is simulated: every sequence is another track, and its scans differ in rain and noise.
 
     Attributes:
-        train: Sequences to train on.
+        train: Sequences to train on, at least one.
         validation: Sequences to choose a model with.
         test: Sequences to judge it on.
         scans: Scans per sequence.
@@ -39,8 +39,7 @@ class Campaign:
         radar: The radar; None leaves it out, and with it the folders of its scans.
 
     Raises:
-        InputError: A number of sequences or scans below 1, a negative seed, no rain rate or an
-            impossible one.
+        InputError: Too few sequences or scans, a negative seed, no rain rate or an impossible one.
     """
 
     train: int = 16
@@ -54,9 +53,11 @@ class Campaign:
     radar: Radar | None = None
 
     def __post_init__(self) -> None:
-        for name in ("train", "validation", "test", "scans"):
-            if getattr(self, name) < 1:
-                raise InputError(name, f"{getattr(self, name)} is too few", "Give 1 or more.")
+        for name, least in (("train", 1), ("validation", 0), ("test", 0), ("scans", 1)):
+            if getattr(self, name) < least:
+                raise InputError(
+                    name, f"{getattr(self, name)} is too few", f"Give {least} or more."
+                )
         if self.seed < 0:
             raise InputError("seed", f"{self.seed} is negative", "Give 0 or more.")
         if not self.rain_rates:
@@ -81,10 +82,11 @@ class Campaign:
     @property
     def split(self) -> dict[str, list[str]]:
         """Names of the sequences of each part."""
+        judged = self.train + self.validation
         return {
             "train": self.names[: self.train],
-            "validation": self.names[self.train : -self.test],
-            "test": self.names[-self.test :],
+            "validation": self.names[self.train : judged],
+            "test": self.names[judged:],
         }
 
     @property
@@ -108,12 +110,7 @@ class Campaign:
 def partition(sequences: int) -> tuple[int, int, int]:
     """How many of some sequences to train on, to validate and to test on.
 
-    Raises:
-        InputError: Fewer than three sequences.
+    Of one or two, which somebody wants to look at, none is held out.
     """
-    if sequences < 3:
-        raise InputError(
-            "sequences", f"{sequences} are too few to train, validate and test", "Give 3 or more."
-        )
-    held_out = max(1, round(HELD_OUT * sequences))
+    held_out = max(1, round(HELD_OUT * sequences)) if sequences >= 3 else 0
     return sequences - 2 * held_out, held_out, held_out

@@ -5,15 +5,20 @@ sequences/000/...   see :mod:`derain.simulation.sequence`
 
 A sequence's folder appears when it is complete, so that an interrupted run can be taken up again.
 Each sequence has its own source of chance: neither an interruption nor the number of workers
-changes a byte.
+changes a byte. Of two runs at work on one folder the second waits for the first.
 """
 
+import fcntl
 import multiprocessing
+import os
 import shutil
+import sys
+import threading
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -41,27 +46,37 @@ def ensure_track(root: Path, campaign: Campaign) -> None:
     Raises:
         InputError: As :func:`simulate_track`.
     """
-    there = read_manifest(root)
-    if there and not there.get("keep") and not _describes(there, campaign):
-        with _writing(root):
-            shutil.rmtree(root / SEQUENCES)
-            (root / MANIFEST).unlink()
-    simulate_track(root, campaign, keep=False)
+    campaign = replace(campaign, sensor=campaign.lidar)  # a file that is wrong is named first
+    with _alone(root):
+        there = read_manifest(root)
+        if there and not there.get("keep") and not _describes(there, campaign):
+            with _writing(root):
+                # The manifest last, and the rest may be gone: this run may be killed, too.
+                if (root / SEQUENCES).exists():
+                    shutil.rmtree(root / SEQUENCES)
+                (root / MANIFEST).unlink()
+        _simulate(root, campaign, workers=1, keep=False)
 
 
-def simulate_track(root: Path, campaign: Campaign, workers: int = 1, *, keep: bool = True) -> None:
+def simulate_track(root: Path, campaign: Campaign, workers: int = 1) -> None:
     """Simulates a data set, or what is missing of it.
 
     Args:
         root: Folder to write: a new or an empty one, or one that holds part of this very data set.
         campaign: What to simulate.
         workers: Processes that share the work.
-        keep: Whether :func:`ensure_track` is not to replace it later.
 
     Raises:
         InputError: The folder holds something else or cannot be written, or Open3D cannot be
             imported. What was complete by then stays, and nothing half-written.
     """
+    campaign = replace(campaign, sensor=campaign.lidar)  # a file that is wrong is named first
+    with _alone(root):
+        _simulate(root, campaign, workers, keep=True)
+
+
+def _simulate(root: Path, campaign: Campaign, workers: int, *, keep: bool) -> None:
+    """Simulates what is missing; what is not to be kept :func:`ensure_track` may replace later."""
     there = read_manifest(root)
     _refuse_others(root, there, campaign)
     if "files" in there and all((root / SEQUENCES / name).is_dir() for name in campaign.names):
@@ -74,6 +89,27 @@ def simulate_track(root: Path, campaign: Campaign, workers: int = 1, *, keep: bo
         for written in _complete_sequences(root, campaign, workers):
             files |= written
         write_manifest(root, {**description, "files": files})
+
+
+@contextmanager
+def _alone(root: Path) -> Iterator[None]:
+    """Makes the folder, and keeps other processes out of it that ask in the same way."""
+    if root.exists() and not root.is_dir():
+        raise InputError(root, "is not a folder", "Name a new or empty folder.")
+    with _writing(root):
+        root.mkdir(parents=True, exist_ok=True)
+        folder = os.open(root, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            print(f"derain: waits for another run that simulates in {root}", file=sys.stderr)
+            fcntl.flock(folder, fcntl.LOCK_EX)
+        except OSError:
+            pass  # a file system without locks: as good as alone
+        yield
+    finally:
+        os.close(folder)
 
 
 @contextmanager
@@ -100,7 +136,7 @@ def _refuse_others(root: Path, there: Mapping[str, Any], campaign: Campaign) -> 
             "holds a simulated data set of other parameters or of another version of derain",
             "Name another folder, or delete this one.",
         )
-    if not there and root.exists() and (not root.is_dir() or any(root.iterdir())):
+    if not there and any(root.iterdir()):
         raise InputError(
             root, "holds something other than a simulated data set", "Name a new or empty folder."
         )
@@ -118,12 +154,24 @@ def _complete_sequences(root: Path, campaign: Campaign, workers: int) -> Iterato
     # Not forked: the threads of Open3D would not survive it.
     context = multiprocessing.get_context("spawn")
     try:
-        with ProcessPoolExecutor(workers, context) as pool:
+        with ProcessPoolExecutor(workers, context, _end_with_parent) as pool:
             yield from progress(pool.map(complete, campaign.names))
     except BrokenProcessPool as error:
         raise InputError(
             root, "a worker was killed, perhaps for want of memory", "Try again with fewer workers."
         ) from error
+
+
+def _end_with_parent() -> None:
+    """Ends this worker when its parent is killed; it would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _complete_sequence(root: Path, campaign: Campaign, name: str) -> dict[str, str]:

@@ -227,7 +227,7 @@ def load_sensor(name: str | Path) -> Sensor:
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
         return _sensor(content)
-    except (yaml.YAMLError, UnicodeDecodeError, TypeError, ValueError, AttributeError) as error:
+    except (yaml.YAMLError, UnicodeDecodeError, TypeError, ValueError) as error:
         raise InputError(
             path,
             f"does not describe a sensor ({error})",
@@ -235,7 +235,9 @@ def load_sensor(name: str | Path) -> Sensor:
         ) from error
 
 
-def _sensor(content: dict[str, Any]) -> Sensor:
+def _sensor(content: Any) -> Sensor:
+    if not isinstance(content, dict):
+        raise ValueError("it is no mapping")
     attributes: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value for name, value in content.items()
     }

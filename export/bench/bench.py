@@ -10,7 +10,7 @@ import numpy as np
 from tqdm import tqdm
 
 from derain.datamodules.base import ScanDataModule, ScanFile
-from derain.datamodules.labelled import SIMULATED
+from derain.datamodules.labelled import full_name, is_simulated
 from derain.export.bench.contestants import Contestant
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.rows import Row, joined
@@ -55,13 +55,13 @@ def provenance(
         timing: What the methods were timed on, and how.
         seed: Of the draws behind the intervals.
     """
-    card, simulated = module.card, module.card.name in SIMULATED
+    card = module.card
     scans = "1 scan" if len(files) == 1 else f"{len(files):,} scans"
     return {
-        "title": f"{card.name}{' (simulated)' if simulated else ''}, {scans}",
+        "title": f"{full_name(card)}, {scans}",
         "command": command,
         "data": card.name,
-        "simulated": simulated,
+        "simulated": is_simulated(card),
         "licence": card.licence,
         "rain": [card.classes[id_] for id_ in card.rain],
         "seed": seed,

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from derain.baselines import PositionPrior, all_points, no_points
 from derain.errors import InputError
-from derain.export.methods import load_method
+from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
-from derain.filters import FilterDerainer, PointFilter, read_parameters
+from derain.filters import FilterDerainer, PointFilter
 from derain.one_line_rule import OneLineRule
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
@@ -28,8 +28,6 @@ Method = Callable[[Scan, Stopwatch], NDArray[np.bool_]]
 
 # Gives labelled scans and their rain, bool (N,), to whatever is learnt from them.
 LearnFrom = Callable[[], Iterable[tuple[Scan, NDArray[np.bool_]]]]
-
-PARAMETER_SUFFIXES = (".yaml", ".yml")
 
 # The baselines that look at nothing, and those that are learnt from labelled scans.
 TRIVIAL = {"all": all_points, "none": no_points}
@@ -82,13 +80,11 @@ def _contestant(text: str, learn_from: LearnFrom | None) -> Contestant:
     title, equals, name = text.partition("=")
     if not equals or Path(text).is_file():  # files may well have an equals sign in their names
         title, name = Path(text).stem, text
-    if Path(name).suffix in PARAMETER_SUFFIXES:
-        return _deployable(title, *read_parameters(name))
     if name in TRIVIAL:
         return Contestant(title, name, partial(_timed_rule, TRIVIAL[name]))
     if name in LEARNT:
         return _learnt(title, name, learn_from)
-    return _deployable(title, name, {})
+    return _deployable(title, *named_method(name))
 
 
 def _deployable(title: str, name: str, parameters: dict[str, Any]) -> Contestant:

@@ -7,8 +7,9 @@ from typing import Literal
 
 import yaml
 
+from derain.cards import DataCard
 from derain.datamodules.base import ScanDataModule, ScanFile
-from derain.datamodules.labelled import SIMULATED, sequence_of
+from derain.datamodules.labelled import full_name, is_simulated, sequence_of
 from derain.errors import InputError
 from derain.export.bench.rows import Row
 from derain.export.markdown import markdown_table
@@ -98,20 +99,19 @@ def files_by_group(
     return {name: files for name, files in groups.items() if files}
 
 
-def beside_published(table: PaperTable, ours: Mapping[str, Sequence[Row]], card: str) -> str:
+def beside_published(table: PaperTable, ours: Mapping[str, Sequence[Row]], card: DataCard) -> str:
     """Our rows under the published ones of the same method, in Markdown.
 
     Args:
         table: The table.
         ours: Our rows, by the names of the table's groups.
-        card: Name of the data card of our scans.
+        card: Data card of our scans.
     """
-    simulated = card in SIMULATED
-    published = [row for row in table.rows if row.simulated == simulated]
+    published = [row for row in table.rows if row.simulated == is_simulated(card)]
     if not published:  # table II knows no simulated rain
         published = list(table.rows)
     head = ["method", *("P", "R", "F1", "IoU"), "ms", "average"]
-    parts = [f"# {table.title}", f"Ours on {card}{' (simulated)' if simulated else ''}."]
+    parts = [f"# {table.title}", f"Ours on {full_name(card)}."]
     for name, rows in ours.items():
         group = [row for row in published if row.group == name]
         parts += [f"## {name}", markdown_table(head, _beside(group, rows))]

@@ -2,10 +2,13 @@
 
 import json
 from pathlib import Path
+from textwrap import dedent
 
 import numpy as np
 import pytest
 
+from derain.annotation.scene_file import read_scene
+from derain.cli.annotate import DESCRIPTION
 from derain.files import read_scan, write_scan
 from derain.files.labels import read_labels, semantic
 from derain.hard_cases import scene
@@ -104,6 +107,17 @@ def test_radar_points_take_the_label_of_the_nearest_point(
     (radar,) = labels(out / "radar", 20)
     assert radar[:-1].tolist() == labels(out)[1][::100][:-1].tolist()
     assert radar[-1] == UNKNOWN
+
+
+def test_the_scene_file_of_the_help_can_be_read(tmp_path: Path) -> None:
+    _, text = DESCRIPTION.split("up):\n")
+    example, _ = text.split("The classes are")
+    (tmp_path / "scene.yaml").write_text(dedent(example))
+    scene = read_scene(tmp_path / "scene.yaml")
+    assert set(scene.boxes) == {"car_1", "mast_1"}
+    assert scene.rain_area is not None
+    assert scene.in_sequence("003").boxes["car_1"].centre == (20.2, 1, -0.6)
+    assert all(kind.name.lower() in text for kind in TrackClass)
 
 
 def refused(run_derain, *arguments: str | Path) -> str:

@@ -129,7 +129,7 @@ def test_table_3_takes_the_rain_rates_of_a_file(run_derain, root: Path, tmp_path
     outcome = run_derain("bench", *data, "--methods", "dsor", "--out", out)
     assert outcome.code == 0, outcome.err
     assert {path.name for path in out.iterdir()} == {"heavy", "medium", "table3.md"}
-    assert "Ours on simulated rain (simulated)." in outcome.out
+    assert "Ours on simulated rain." in outcome.out
     assert "(*) DSOR, medium: F1" in outcome.out
 
 
@@ -141,3 +141,13 @@ def test_the_papers_tables_need_a_data_set_with_a_split(
     outcome = run_derain("bench", *data, "--methods", "all", "--out", tmp_path / "out")
     assert outcome.code == 2
     assert "has no split, which the paper's tables ask for. Name the root." in outcome.err
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
+    run_derain, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(bench, "score")
+    out = root / "manifest.json"
+    outcome = run_derain("bench", "--data", root, "--methods", "all", "--out", out)
+    assert outcome.code == 2
+    assert "bench.json: cannot be written" in outcome.err

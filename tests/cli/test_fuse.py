@@ -8,11 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from derain.errors import InputError
 from derain.extrinsics import Extrinsics
 from derain.files import read_scan
 from derain.files.labels import instance, read_labels, semantic, write_labels
 from derain.hard_cases import scene
 from derain.label_transfer import UNKNOWN
+from derain.open3d_import import import_open3d
+from derain.simulation.campaign import Campaign
+from derain.simulation.radar import Radar
+from derain.simulation.sequence import write_sequence
 
 PLACE = Extrinsics.of_pose(0.5, 0, -0.7, 0, 0, 90)
 COLUMNS = "x,y,z,doppler,rcs,range,azimuth,elevation,probability,class"
@@ -119,6 +124,33 @@ def test_real_radar_detections_keep_their_doppler_and_rcs(
     np.testing.assert_allclose(back, detections[:, :3], atol=1e-4)
 
 
+def test_the_simulators_extended_radar_brings_its_velocity_and_cross_section(
+    run_derain, tmp_path: Path
+) -> None:
+    try:
+        import_open3d()
+    except InputError as error:
+        pytest.skip(str(error))
+    write_sequence(tmp_path, Campaign(scans=1, sensor="mems_64", radar=Radar()), "000")
+    outcome = run_derain(
+        *("fuse", "--lidar", tmp_path / "innoviz", "--radar", tmp_path / "ext_radar"),
+        *("--extrinsics", tmp_path / "extrinsics.yaml", "--out", tmp_path / "out"),
+        *("--extra", "velocity,cross_section", "--within", "0.1"),
+    )
+    assert outcome.code == 0, outcome.err
+    with (tmp_path / "out/lidar_radar_pcd/metadata.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    with (tmp_path / "ext_radar" / f"{row['radar_frame']}.csv").open() as file:
+        detections = list(csv.DictReader(file))
+    fused = read_scan(tmp_path / "out/lidar_radar_pcd/000000.npz")
+    is_radar = fused.fields["radar"] == 1
+    assert is_radar.sum() == len(detections) > 0
+    for name in ("velocity", "cross_section"):
+        expected = np.float32([float(detection[name]) for detection in detections])
+        np.testing.assert_array_equal(fused.fields[name][is_radar], expected)
+        assert np.isnan(fused.fields[name][~is_radar]).all()
+
+
 def test_metadata_columns_can_be_named(run_fuse: Fuse, recording: Path) -> None:
     for sensor in ("lidar", "radar"):
         path = recording / sensor / "metadata.csv"
@@ -138,6 +170,10 @@ def without_a_label(recording: Path) -> None:
     (recording / "labels/000002.label").unlink()
 
 
+def with_one_name_twice(recording: Path) -> None:
+    np.save(recording / "lidar/000002.npy", scene(40))
+
+
 def without_extrinsics(recording: Path) -> None:
     (recording / "radar.yaml").unlink()
 
@@ -149,8 +185,15 @@ def without_extrinsics(recording: Path) -> None:
         (on_another_clock, [], "radar: no frame is within 0.05 s of a LiDAR scan"),
         (without_a_label, ["--labels"], "000002.label: there is no such file"),
         (without_extrinsics, [], "radar.yaml: there is no such file"),
+        (with_one_name_twice, [], "another scan has the same name"),
+        (None, ["--extra", "intensity"], "is a column of the merged cloud itself"),
         (None, ["--extra", "doppler"], "has no column doppler of numbers (x, y, z, intensity)"),
         (None, ["--radar-columns", "x,y,z,doppler,rcs"], "are not whole rows of 20 bytes"),
+        (
+            None,
+            ["--lidar-columns", "x,y,z"],
+            "whole rows of 12 bytes (x,y,z). Name the file's columns with --lidar-columns",
+        ),
         (None, ["--metadata-columns", "frame,time"], "has no columns frame and time"),
     ],
 )

@@ -46,6 +46,7 @@ def test_one_grid_is_fitted_to_all_scans_and_can_be_configured(run_derain, tmp_p
     printed = yaml.safe_load(run_derain("info", "--grid", *paths).out)
     assert grid_of(printed["grid"], "info") == fit.grid
     assert strict_json(run_derain("info", "--grid", "--json", *paths).out) == printed
+    assert strict_json(run_derain("info", "--grid", "--json", tmp_path).out) == printed
 
 
 def strict_json(text: str) -> dict[str, object]:
@@ -175,10 +176,12 @@ def test_a_scan_without_a_valid_point_has_no_grid(run_derain, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("name", "content", "reason"),
     [
+        ("none", None, "there is no such file"),
         ("none.bin", None, "there is no such file"),
         ("none.label", None, "there is no such file"),
-        ("none.onnx", None, "no such file"),
-        ("none.ckpt", None, "no such file"),
+        ("none.onnx", None, "there is no such file"),
+        ("none.ckpt", None, "there is no such file"),
+        ("weights.pt", b"12345", "weights alone do not say how they are used"),
         ("cut.bin", b"12345", "5 bytes are not whole rows of 16 bytes"),
         ("cut.label", b"12345", "is not whole labels of 4 bytes"),
         ("noise.onnx", b"12345", "not an ONNX model"),

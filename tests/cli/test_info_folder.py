@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pytest
@@ -84,9 +85,21 @@ def test_the_layout_tells_the_card_unless_it_is_stated(run_derain, data_set: Pat
     assert (facts["points"], facts["labelled_points"]) == (600, 0)
 
 
-def test_scans_without_labels_and_card_are_counted(run_derain, data_set: Path) -> None:
+@pytest.mark.parametrize("part", ["sequences", "sequences/000", "sequences/000/lidar_radar_pcd"])
+def test_a_part_of_a_simulated_set_is_known_as_simulated(
+    run_derain, data_set: Path, part: str
+) -> None:
+    facts = json.loads(run_derain("info", data_set / part, "--json").out)
+    assert facts["card"] == "simulated rain"
+    assert some(facts["by_rain_rate"]["25"]["points_by_class"]) == {"rain": 20, "road": 180}
+
+
+def test_scans_without_labels_and_card_are_counted(
+    run_derain, data_set: Path, tmp_path: Path
+) -> None:
     (data_set / "sequences/000/lidar_radar_labels/000000.label").unlink()
-    folder = data_set / "sequences/000/lidar_radar_pcd"
+    folder = tmp_path / "alone"
+    copytree(data_set / "sequences/000/lidar_radar_pcd", folder)
     facts = json.loads(run_derain("info", folder, "--json").out)
     assert (facts["scans"], facts["points"], facts["class_share"]) == (2, 200, {})
     assert (facts["layout"], facts["card"]) == (None, None)
@@ -99,6 +112,14 @@ def test_the_statistics_are_drawn(run_derain, data_set: Path, tmp_path: Path) ->
     picture = tmp_path / "statistics.png"
     assert run_derain("info", data_set, "--picture", picture).code == 0
     assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_picture_shows_one_folder_alone(run_derain, data_set: Path, tmp_path: Path) -> None:
+    scan = data_set / "sequences/000/lidar_radar_pcd/000000.bin"
+    for named in ([scan], [data_set, data_set], ["--grid", data_set]):
+        outcome = run_derain("info", *named, "--picture", tmp_path / "statistics.png")
+        assert (outcome.code, outcome.out) == (2, "")
+        assert "--picture: shows one folder's statistics" in outcome.err
 
 
 def test_files_and_folders_can_be_named_together(run_derain, data_set: Path) -> None:

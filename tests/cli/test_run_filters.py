@@ -59,6 +59,8 @@ def test_parameters_come_from_a_file_and_one_by_one(run_derain, scan: Path, tmp_
     tuned.write_text("method: dsor\nneighbours: 4\nrange_multiplier: 0.02\n")
     run_derain("run", "dsor", scan, "--out", out, "--parameters", tuned)
     assert rain_in(out) == FilterDerainer(DSOR(4, 0.01, 0.02))(scene(400)).tolist()
+    run_derain("run", tuned, scan, "--out", tmp_path / "same")
+    assert rain_in(tmp_path / "same") == rain_in(out)
     options = ["--parameters", tuned, "--set", "range_multiplier=7e-2"]
     run_derain("run", "dsor", scan, "--out", out, *options, "--set", "deviation_multiplier=1")
     assert rain_in(out) == FilterDerainer(DSOR(4, 1.0, 0.07))(scene(400)).tolist()
@@ -125,6 +127,17 @@ def test_what_cannot_be_used_is_refused_before_any_work(
     assert outcome.out == ""
     assert reason in outcome.err.splitlines()[-1]
     assert not Path("out").exists()
+
+
+def test_parameters_of_a_model_are_its_own_however_its_file_is_named(
+    run_derain, onnx_model: Path, scan: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(scan.parent)
+    Path("tuned.yaml").write_text(
+        f"method: {onnx_model.parent}/../{onnx_model.parent.name}/{onnx_model.name}\nthreshold: 0\n"
+    )
+    outcome = run_derain("run", onnx_model, scan, "--out", "out", "--parameters", "tuned.yaml")
+    assert outcome.code == 0, outcome.err
 
 
 def test_a_model_takes_a_threshold_of_its_own(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from derain.datamodules.simulated import Simulated
 from derain.errors import InputError
 from derain.files import find_scans, read_scan
 from derain.files.labels import read_labels
@@ -62,6 +63,32 @@ def test_a_data_set_has_the_rain_and_the_sensors_asked_for(run_derain, tmp_path:
     run_derain("simulate", "--out", root, *QUICK, "--rain", "50", "--no-radar")
     assert (root / "sequences/002/weather/000000.csv").read_text().splitlines()[1].startswith("50,")
     assert not (root / "sequences/002/ext_radar").exists()
+
+
+def test_streets_are_other_places_than_facilities(run_derain, tmp_path: Path) -> None:
+    lowest = []
+    for layout in ("facility", "street"):
+        root = tmp_path / layout
+        options = [*QUICK, "--rain", "0", "--no-radar", "--layout", layout]
+        assert run_derain("simulate", "--out", root, *options).code == 0
+        campaign = json.loads((root / "manifest.json").read_text())["campaign"]
+        assert campaign["layout"] == layout
+        scan = read_scan(root / "sequences/000/innoviz/000000.bin")
+        lowest.append(scan.range[scan.xyz[:, 2] > -0.9].min())
+    # Boughs and bushes stand nearer in a street than anything above the road of a facility.
+    assert lowest[1] < lowest[0]
+
+
+def test_one_sequence_is_enough_to_look_at_but_not_to_train(run_derain, tmp_path: Path) -> None:
+    root = tmp_path / "one"
+    assert run_derain("simulate", "--out", root, *QUICK, "--sequences", "1").code == 0
+    assert names(root / "sequences") == ["000"]
+    outcome = run_derain("info", root, "--json")
+    assert json.loads(outcome.out)["scans"] == 1
+    data = Simulated(str(root), make=False)
+    assert len(data.files("train")) == 1
+    with pytest.raises(InputError, match="no sequence is for validation"):
+        data.files("validation")
 
 
 def test_fusing_the_two_sensors_again_gives_the_merged_clouds(run_derain, tmp_path: Path) -> None:
@@ -178,7 +205,6 @@ def test_clean_scans_are_not_overwritten(run_derain, clean: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--sequences", "2"], "sequences: 2 are too few to train, validate and test. Give 3"),
         (["--rain", "-1"], "rain rate: -1.0 mm/h is no rain rate. Give up to 2000 mm/h."),
         (["--rain", "nan"], "rain rate: nan mm/h is no rain rate. Give up to 2000 mm/h."),
         (["--seed", "-1"], "--seed: -1 is negative. Give 0 or more."),

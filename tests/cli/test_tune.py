@@ -1,5 +1,6 @@
 """``derain tune``: parameters that run and bench take, and a study that goes on."""
 
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,10 @@ def test_run_takes_what_tune_wrote(run_derain, data: list[str | Path], tmp_path:
     outcome = run_derain("tune", "dsor", *data, "--trials", "5", "--out", best)
     assert outcome.code == 0, outcome.err
     assert outcome.out.startswith("dsor: IoU 0.")
-    assert best.read_text().startswith("# derain ")
+    command = best.read_text().splitlines()[0].partition(": derain ")[2]
+    assert f"tune dsor --data {tmp_path / 'velodyne'} --part validation --card wads" in command
+    again = run_derain(*shlex.split(command), "--out", tmp_path / "again.yaml")
+    assert again.out == outcome.out
     method, parameters = read_parameters(best)
     assert method == "dsor"
     filter_from(method, parameters)
@@ -63,7 +67,7 @@ def test_a_second_call_goes_on_and_comes_to_the_same(
         assert run_derain("tune", "ror", *options, "--trials", trials, "--out", out).code == 0
     other = run_derain("tune", "ror", *options, "--scans", "1", "--out", tmp_path / "no.yaml")
     assert other.code == 2
-    assert "holds a study of ror on other scans. Name another --storage." in other.err
+    assert "holds a study of ror on other scans or labels. Name another --storage." in other.err
     assert not (tmp_path / "no.yaml").exists()
 
 
@@ -112,3 +116,24 @@ def test_tuning_on_real_snow_finds_better_parameters(
     tuned, default = float(words[2]), float(words[8])
     assert default == pytest.approx(0.626, abs=0.003)
     assert tuned > default
+
+
+def test_what_cannot_be_written_is_refused_before_any_work(
+    run_derain, data: list[str | Path], tmp_path: Path
+) -> None:
+    storage = tmp_path / "study.db"
+    out = tmp_path / "velodyne/0.bin/no.yaml"
+    outcome = run_derain("tune", "dsor", *data, "--storage", storage, "--out", out)
+    assert outcome.code == 2
+    assert "no.yaml: cannot be written" in outcome.err
+    assert not storage.exists()
+
+
+def test_what_is_no_method_is_told_what_methods_there_are(
+    run_derain, data: list[str | Path], tmp_path: Path
+) -> None:
+    outcome = run_derain("tune", "dzor", *data, "--out", tmp_path / "no.yaml")
+    assert outcome.code == 2
+    assert "dzor: no such file. Give a model written by `derain export`, or one of ror" in (
+        outcome.err
+    )

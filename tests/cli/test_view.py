@@ -1,9 +1,13 @@
 """``derain view``: one scan, several methods, one picture."""
 
 from pathlib import Path
+from unittest.mock import Mock
 
+import numpy as np
 import pytest
 
+from derain import comparison_pictures
+from derain.files.labels import write_labels
 from derain.hard_cases import scene
 
 
@@ -37,3 +41,16 @@ def test_a_card_without_labels_is_refused(run_derain, tmp_path: Path) -> None:
     assert outcome.code == 2
     assert "bare.label: there is no such file" in outcome.err
     assert not (tmp_path / "out.png").exists()
+
+
+def test_points_that_nobody_knows_are_not_judged(
+    run_derain, scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_labels(tmp_path / "labels/7.label", np.repeat([255, 0, 3], [100, 170, 30]))
+    drawn = Mock(wraps=comparison_pictures.comparison_figure)
+    monkeypatch.setattr(comparison_pictures, "comparison_figure", drawn)
+    options = ["--methods", "all", "--card", "rehearse3d", "--out", tmp_path / "out.png"]
+    assert run_derain("view", scan, *options).code == 0
+    shown, predicted, rain, title = drawn.call_args.args
+    assert (len(shown), len(predicted["all"]), rain.sum()) == (200, 200, 30)
+    assert title == "7.bin: 300 points"

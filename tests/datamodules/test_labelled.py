@@ -102,9 +102,9 @@ def test_rain_rates_are_read_by_the_name_of_the_sequence(tmp_path: Path) -> None
     assert known[sequence_of(Path("sequences/010/lidar_radar_pcd/000000.bin"))] == 10.5
 
 
-@pytest.mark.parametrize("text", ["010: 25", '"010": heavy', "- 25", "{", ""])
+@pytest.mark.parametrize("text", ["010: 25", '"010": heavy', "- 25", "{", "", "\xd9"])
 def test_what_is_no_file_of_rain_rates_is_refused(tmp_path: Path, text: str) -> None:
     rates = tmp_path / "rates.yaml"
-    rates.write_text(text)
+    rates.write_text(text, "latin-1")
     with pytest.raises(InputError, match="not the rain rates of sequences"):
         rain_rates([tmp_path], rates)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis.extra import numpy as arrays
 
 from derain.cards import DataCard
 from derain.errors import InputError
+from derain.export import tuning
 from derain.export.tuning import (
     SPACES,
     Search,
@@ -107,6 +109,29 @@ def test_a_stored_study_goes_on_to_the_number_of_trials(
         tune_filter("dsor", viewed, search(9, storage, data="b")[0])
     # Another filter has a study of its own in the same file.
     assert tune_filter("ror", viewed, search(1, storage, data="b")[0]).iou > 0
+
+
+def test_a_study_goes_on_only_with_the_same_labels(
+    viewed: list[ViewedScan], tmp_path: Path
+) -> None:
+    storage = tmp_path / "study.db"
+    tune_filter("dsor", viewed, search(1, storage)[0])
+    other = DataCard("made up", {0: "solid", 3: "rain", 9: "also rain"}, rain=(3, 9))
+    relabelled = [ViewedScan.of(labelled(seed), other, threads=1) for seed in (1, 2)]
+    with pytest.raises(InputError, match="other scans or labels"):
+        tune_filter("dsor", relabelled, search(2, storage)[0])
+
+
+def test_a_study_stopped_in_its_first_trial_starts_from_the_defaults_again(
+    viewed: list[ViewedScan], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    storage = tmp_path / "study.db"
+    with monkeypatch.context() as patch:
+        patch.setattr(tuning, "pooled_iou", Mock(side_effect=KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            tune_filter("dsor", viewed, search(3, storage)[0])
+    tuned = tune_filter("dsor", viewed, search(1, storage)[0])
+    assert tuned.parameters == filter_from("dsor", {}).as_dict()
 
 
 @pytest.mark.parametrize("make", [Path.mkdir, lambda path: path.write_text("no database" * 99)])

@@ -136,9 +136,18 @@ def test_names_in_upper_case_and_names_as_text_are_understood(tmp_path: Path) ->
 def test_an_unknown_suffix_is_refused_with_the_known_ones(
     tmp_path: Path, use: Callable[[Path], object]
 ) -> None:
+    known = r"Known are \.bin, \.npy, \.npz, \.pcd, \.ply, \.csv\."
     for name in ("scan.las", "scan"):
-        with pytest.raises(InputError, match=r"Known are \.bin, \.npy, \.npz, \.pcd, \.ply\."):
+        with pytest.raises(InputError, match=known):
             use(tmp_path / name)
+
+
+def test_tables_are_scans_where_there_are_no_others(tmp_path: Path) -> None:
+    for name in ("0.csv", "1.csv", "metadata.csv"):
+        (tmp_path / name).touch()
+    assert [path.name for path in find_scans([tmp_path])] == ["0.csv", "1.csv"]
+    (tmp_path / "2.bin").touch()
+    assert [path.name for path in find_scans([tmp_path])] == ["2.bin"]
 
 
 def test_folders_stand_for_their_scans_in_order_and_files_for_themselves(tmp_path: Path) -> None:

@@ -25,6 +25,16 @@ def test_suffix_and_zeros_before_a_name_make_no_difference(tmp_path: Path, frame
     assert read_frame_times(scans).tolist() == [5, 6]
 
 
+def test_scans_may_be_named_by_their_time(tmp_path: Path) -> None:
+    text = "frame,timestamp\n17.25,1\n17.5.pcd,2\n17,3\n"
+    scans = written(tmp_path, text, "17.25.bin", "17.5.bin", "17.bin")
+    assert read_frame_times(scans).tolist() == [1, 2, 3]
+
+
+def test_the_same_line_may_come_twice(tmp_path: Path) -> None:
+    assert read_frame_times(written(tmp_path, "frame,timestamp\n0,1\n0,1\n", "0.bin")) == [1]
+
+
 def test_columns_of_other_names_can_be_stated(tmp_path: Path) -> None:
     scans = written(tmp_path, "\ufeffstem,camera,seconds\na,1,2.5\n", "a.bin")
     assert read_frame_times(scans, ["stem", "seconds"]).tolist() == [2.5]
@@ -45,6 +55,8 @@ def test_lines_of_scans_that_are_not_asked_for_do_no_harm(tmp_path: Path) -> Non
         ("frame,timestamp\n0,nan\n", "'nan' is not a time"),
         ("frame,timestamp\n0,\n", "'' is not a time"),
         ("frame,timestamp\n0\n", "'None' is not a time"),
+        ("timestamp,frame\n1\n", "has a line that names no scan"),
+        ("frame,timestamp\n0,1\n000.pcd,2\n", r"gives 000\.pcd two times"),
     ],
 )
 def test_what_does_not_say_when_is_refused(tmp_path: Path, text: str, reason: str) -> None:

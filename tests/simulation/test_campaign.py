@@ -55,6 +55,7 @@ def test_two_of_five_sequences_are_clean() -> None:
     ("wrong", "message"),
     [
         ({"train": 0}, "train: 0 is too few"),
+        ({"validation": -1}, "validation: -1 is too few"),
         ({"scans": 0}, "scans: 0 is too few"),
         ({"seed": -1}, "seed: -1 is negative"),
         ({"rain_rates": ()}, "rain rate: none is given"),
@@ -67,6 +68,8 @@ def test_an_impossible_campaign_is_refused(wrong: dict[str, Any], message: str) 
         Campaign(**wrong)
 
 
-def test_too_few_sequences_cannot_be_parted() -> None:
-    with pytest.raises(InputError, match="sequences: 2 are too few"):
-        partition(2)
+@pytest.mark.parametrize("sequences", [1, 2])
+def test_of_one_or_two_sequences_none_is_held_out(sequences: int) -> None:
+    campaign = Campaign(*partition(sequences))
+    assert campaign.split == {"train": campaign.names, "validation": [], "test": []}
+    assert len(campaign.names) == sequences

@@ -1,10 +1,14 @@
 """The data set that the simulation writes: whole, resumable, the same from any workers."""
 
+import fcntl
 import hashlib
 import json
+import os
 import shutil
 import subprocess
 import sys
+import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -162,6 +166,42 @@ def test_an_interrupted_run_is_taken_up_again(
     assert checksums(root) == checksums(track)
 
 
+def test_no_worker_outlives_a_run_that_is_killed(open3d: ModuleType, tmp_path: Path) -> None:
+    root = tmp_path / "track"
+    code = (
+        "from pathlib import Path; from derain.simulation.campaign import Campaign; "
+        "from derain.simulation.dataset import simulate_track; "
+        f"simulate_track(Path({str(root)!r}), Campaign(scans=50), workers=2)"
+    )
+    run = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE)
+    give_up = time.monotonic() + 60
+    while not list(root.glob("sequences/.*")) and time.monotonic() < give_up:
+        time.sleep(0.05)
+    run.kill()
+    run.communicate(timeout=30)  # returns when nobody holds the other end of the pipe
+    before = times(root)
+    time.sleep(0.5)
+    assert times(root) == before
+
+
+def test_a_second_run_waits_for_the_first(
+    track: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = tmp_path / "track"
+    root.mkdir()
+    first = os.open(root, os.O_RDONLY)
+    fcntl.flock(first, fcntl.LOCK_EX)
+    second = threading.Thread(target=simulate_track, args=(root, TINY))
+    second.start()
+    second.join(0.5)
+    assert second.is_alive()
+    assert list(root.iterdir()) == []
+    os.close(first)
+    second.join(60)
+    assert checksums(root) == checksums(track)
+    assert capsys.readouterr().err.startswith("derain: waits for another run")
+
+
 def test_nothing_half_written_stays(
     open3d: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -185,12 +225,35 @@ def test_a_data_set_made_for_a_program_is_replaced_by_that_of_another_campaign(
     assert len(list(root.rglob("lidar_radar_pcd/*.bin"))) == 3
 
 
+def test_a_replacement_that_was_killed_is_taken_up_again(
+    open3d: ModuleType, tmp_path: Path
+) -> None:
+    root, smaller = tmp_path / "track", replace(TINY, train=1, scans=1)
+    ensure_track(root, smaller)
+    shutil.rmtree(root / "sequences")
+    ensure_track(root, replace(smaller, seed=1))
+    assert read_manifest(root)["campaign"]["seed"] == 1
+    assert len(list(root.rglob("lidar_radar_pcd/*.bin"))) == 3
+
+
 def test_a_data_set_made_for_a_person_is_never_replaced(track: Path) -> None:
     before = times(track)
     for make in (simulate_track, ensure_track):
         with pytest.raises(InputError, match="of other parameters or of another version"):
             make(track, replace(TINY, seed=1))
     assert times(track) == before
+
+
+def test_a_sensor_that_is_not_there_leaves_no_folder(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="mars: no such sensor"):
+        simulate_track(tmp_path / "track", replace(TINY, sensor="mars"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_is_no_folder_to_write_to(tmp_path: Path) -> None:
+    (tmp_path / "track").write_text("")
+    with pytest.raises(InputError, match="track: is not a folder"):
+        simulate_track(tmp_path / "track", TINY)
 
 
 def test_a_folder_with_other_things_is_left_alone(tmp_path: Path) -> None:

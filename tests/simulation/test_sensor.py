@@ -137,6 +137,7 @@ def test_a_sensor_file_states_what_differs_from_the_defaults(tmp_path: Path) -> 
     [
         "rows: 0",
         "rows: 64.5",
+        "- rows",
         "columns: -1",
         "colour: red",
         "azimuth: [10, -10]",

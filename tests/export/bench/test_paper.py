@@ -33,7 +33,7 @@ def test_every_group_of_a_table_has_rows(name: str) -> None:
 
 def test_our_rows_stand_under_those_of_the_same_method(labelled: Labelled) -> None:
     rows = rows_of(["all", "dsor", "DSOR, again=dsor"], labelled)
-    text = beside_published(paper_table("table3"), {"heavy": rows}, "REHEARSE-3D")
+    text = beside_published(paper_table("table3"), {"heavy": rows}, load_card("rehearse3d"))
     titles = [line.split("|")[1].strip() for line in text.splitlines() if line.startswith("| ")]
     assert titles == [
         "method",
@@ -54,8 +54,8 @@ def test_simulated_rain_stands_beside_simulated_rain_and_misprints_are_marked(
     labelled: Labelled,
 ) -> None:
     ours = {name: rows_of(["dsor"], labelled) for name in ("heavy", "medium", "light")}
-    text = beside_published(paper_table("table3"), ours, "simulated rain")
-    assert "Ours on simulated rain (simulated)." in text
+    text = beside_published(paper_table("table3"), ours, load_card("simulated"))
+    assert "Ours on simulated rain." in text
     assert text.count("| DSOR, published (*)") == 2
     assert "(*) DSOR, medium: F1 of this precision and recall is 81.59." in text
     assert "(*) DSOR, light: F1 and IoU are those of a recall of 99.9, not 94.34." in text

@@ -1,0 +1,192 @@
+"""CSV tables of points: what is read, what is refused, and that every value comes back."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from derain import InputError, Scan
+from derain.files import find_scans, read_scan, write_scan
+from derain.files.columns import scan_of
+
+KINDS = ("b1", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8")
+# Names with what CSV itself is made of, and with bytes that are not UTF-8.
+NAMES = st.text("ab;,\"' äλ\udce4", min_size=2, max_size=6).filter(
+    lambda name: name == name.strip()
+)
+EXTENDED_RADAR = """\
+x,y,z,intensity,cross_section,velocity,confidence
+12.5,-3.25,0.5,21,7.5,-1.25,0.99
+1e1,nan,-0.0,8,,inf,1
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "scan.csv"
+
+
+def read(file: Path, text: str | bytes) -> Scan:
+    file.write_bytes(text.encode() if isinstance(text, str) else text)
+    return read_scan(file)
+
+
+def test_the_extended_radar_of_rehearse_3d_is_read(file: Path) -> None:
+    scan = read(file, EXTENDED_RADAR)
+    expected = np.array([[12.5, -3.25, 0.5], [10, np.nan, -0.0]], np.float32)
+    np.testing.assert_array_equal(scan.xyz, expected, strict=True)
+    assert np.signbit(scan.xyz[1, 2])
+    np.testing.assert_array_equal(scan.intensity, np.array([21, 8], np.float32), strict=True)
+    assert list(scan.fields) == EXTENDED_RADAR.splitlines()[0].split(",")
+    np.testing.assert_array_equal(scan.fields["intensity"], np.array([21, 8]), strict=True)
+    np.testing.assert_array_equal(scan.fields["cross_section"], [7.5, np.nan], strict=True)
+    np.testing.assert_array_equal(scan.fields["velocity"], [-1.25, np.inf], strict=True)
+    np.testing.assert_array_equal(scan.fields["confidence"], [0.99, 1], strict=True)
+    assert scan.valid.tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace(",", ";"),
+        lambda text: text.replace(",", " , "),
+        lambda text: "\n" + text.replace("\n", "\n  \n\n"),
+        lambda text: text.rstrip("\n"),
+        lambda text: "\ufeff" + text,
+        lambda text: "".join(
+            ", ".join(f'"{value}"' for value in line.split(",")) + "\n"
+            for line in text.splitlines()
+        ),
+    ],
+    ids=["crlf", "semicolons", "spaces", "empty lines", "no last end", "byte order mark", "quotes"],
+)
+def test_the_many_ways_to_write_a_table_make_no_difference(
+    file: Path, written: Callable[[str], str]
+) -> None:
+    expected = read(file, EXTENDED_RADAR)
+    scan = read(file, written(EXTENDED_RADAR))
+    assert list(scan.fields) == list(expected.fields)
+    for name, column in expected.fields.items():
+        np.testing.assert_array_equal(scan.fields[name], column, strict=True)
+
+
+def test_a_point_of_which_nothing_is_known_keeps_its_row(file: Path) -> None:
+    scan = read(file, "x,y,z\n1,2,3\n,,\n4,5,6\n")
+    np.testing.assert_array_equal(scan.xyz, [[1, 2, 3], [np.nan] * 3, [4, 5, 6]])
+
+
+def test_names_alone_are_a_scan_of_no_points(file: Path) -> None:
+    scan = read(file, "x,y,z,velocity\n")
+    assert (len(scan), list(scan.fields)) == (0, ["x", "y", "z", "velocity"])
+    assert {column.dtype for column in scan.fields.values()} == {np.dtype(np.float64)}
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", r"cannot be read as \.csv \(no names of columns\)"),
+        (" \n\n", r"cannot be read as \.csv \(no names of columns\)"),
+        ("x,y,z\n1,2,3\n\n1,2\n", "line 4 has 2 values for 3 columns"),
+        ("x,y,z\n1,2,3,4\n", "line 2 has 4 values for 3 columns"),
+        ("x,y,z\n\n1,2,3\n1,tree,3\n", "line 4: y is 'tree', not a number"),
+        ("x;y;z\n1,5;2,5;3,5\n", "line 2: x is '1,5', not a number"),
+        ("x,y,z\n1,2,3#4\n", "line 2: z is '3#4', not a number"),
+        ("x,y,z,x \n1,2,3,4\n", "line 1 names two columns alike: x, y, z, x"),
+        ('x,y,z\n1,"2,3\n', "cannot be read as .csv"),
+        ("x,y\n1,2\n", r"has no x, y and z among its columns \(x, y\)"),
+        ("1,2,3\n4,5,6\n", r"has no x, y and z among its columns \(1, 2, 3\)"),
+        (bytes(range(256)), "has no x, y and z among its columns|cannot be read as .csv"),
+    ],
+)
+def test_what_is_no_table_of_points_is_refused(file: Path, text: str | bytes, reason: str) -> None:
+    with pytest.raises(InputError, match=reason) as refusal:
+        read(file, text)
+    assert refusal.value.subject in (file, str(file))
+
+
+@st.composite
+def scans(draw: st.DrawFn) -> Scan:
+    """A scan of up to six points with columns of random bits."""
+    points = draw(st.integers(0, 6))
+    further = draw(st.lists(NAMES, max_size=4, unique=True))
+    columns = [(axis, draw(st.sampled_from(("f4", "f8")))) for axis in "xyz"]
+    columns += [(name, draw(st.sampled_from(KINDS))) for name in further]
+    fields = {}
+    for name, kind in draw(st.permutations(columns)):
+        if kind == "b1":
+            fields[name] = draw(arrays(bool, points))
+        else:
+            fields[name] = draw(arrays(f"u{kind[1]}", points)).view(kind)
+    return scan_of(Path("drawn"), fields)
+
+
+@settings(
+    max_examples=200,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],  # one file serves all examples
+)
+@given(scan=scans())
+def test_every_value_comes_back(file: Path, scan: Scan) -> None:
+    write_scan(file, scan)
+    copy = read_scan(file)
+    assert list(copy.fields) == list(scan.fields)
+    for name, column in scan.fields.items():
+        other = copy.fields[name]
+        whole = len(scan) > 0 and column.dtype.kind != "f"
+        assert other.dtype.kind in ("iu" if whole else "f")
+        assert other.dtype.itemsize == 8
+        # Compared as the type that was written: int64 and uint64 have no common one without loss.
+        np.testing.assert_array_equal(other.astype(column.dtype), column, strict=True)
+        if column.dtype.kind == "f":
+            np.testing.assert_array_equal(other, column.astype(np.float64))
+            known = ~np.isnan(column)
+            np.testing.assert_array_equal(np.signbit(other[known]), np.signbit(column[known]))
+    np.testing.assert_array_equal(copy.xyz, scan.xyz)
+
+
+def test_another_program_reads_the_values_too(file: Path, scan: Scan) -> None:
+    write_scan(file, scan)
+    with file.open(newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    for name, column in scan.fields.items():
+        assert [float(row[name]) for row in rows] == column.tolist()
+
+
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_a_cleaned_table_holds_the_other_lines_as_they_were(file: Path, separator: str) -> None:
+    lines = ["x,y,z,cross section", "0.1,2.0,-3.5,7", "1e-07,nan,inf,8", "0.3,-0.0,5.0,9"]
+    text = [line.replace(",", separator) + "\n" for line in lines]
+    scan = read(file, "".join(text))
+    write_scan(file, scan.take(np.array([True, False, True])))
+    assert file.read_text() == "".join([text[0], text[1], text[3]])
+
+
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [
+        ("normal", np.ones((2, 3), np.float32)),
+        ("name", np.array(["car", "tree"])),
+        ("complex", np.ones(2, np.complex64)),
+        (" padded", np.ones(2)),
+        ("two\nlines", np.ones(2)),
+    ],
+)
+def test_what_would_not_come_back_is_not_written(file: Path, name: str, column: np.ndarray) -> None:
+    scan = Scan(np.ones((2, 3), np.float32), fields={"xyz": np.ones((2, 3)), name: column})
+    with pytest.raises(InputError, match="has no place for the column"):
+        write_scan(file, scan)
+    assert not list(file.parent.iterdir())
+
+
+def test_the_times_beside_scans_are_no_scan(tmp_path: Path) -> None:
+    (tmp_path / "metadata.csv").write_text("frame,timestamp\n000000,0.0\n")
+    with pytest.raises(InputError, match="holds no scans"):
+        find_scans([tmp_path])
+    (tmp_path / "000000.csv").touch()
+    assert [scan.name for scan in find_scans([tmp_path])] == ["000000.csv"]
