@@ -71,8 +71,8 @@ def before_after_figure(scan: Scan, predicted: NDArray[np.bool_], title: str) ->
     columns = figure.subplots(2, 2, sharex="row", sharey="row", height_ratios=(3, 2)).T
     kept = scan.take(~predicted)
     parts = {
-        f"before: {len(scan):,} points, {predicted.sum():,} of them rain": (scan, predicted),
-        f"after: {len(kept):,} points": (kept, np.zeros(len(kept), bool)),
+        f"before: {scan.valid.sum():,} points, {predicted.sum():,} of them rain": (scan, predicted),
+        f"after: {kept.valid.sum():,} points": (kept, np.zeros(len(kept), bool)),
     }
     for (above, ahead), (name, (part, rain)) in zip(columns, parts.items(), strict=True):
         above.set_title(name)
