@@ -93,8 +93,8 @@ def test_before_and_after_differ_by_what_was_found(
     figure = before_after_figure(scan, predicted, "a scan")
     removed = int(predicted.sum())
     titles = list(panels(figure))
-    assert titles[0].startswith("before: 200 points")
-    assert titles[-1] == f"after: {200 - removed} points"
+    assert titles[0].startswith("before: 196 points")
+    assert titles[-1] == f"after: {196 - removed} points"
     for before, after in zip(*(panels(figure)[titles[end]] for end in (0, -1)), strict=True):
         assert dots_of(figure, before, "rain, removed") == removed
         assert len(dots(figure, before)) == 196
