@@ -7,19 +7,14 @@ from typing import Any
 import yaml
 
 from derain.cards import DataCard, load_card, packaged_cards
+from derain.data_layout import REHEARSE3D, SEMANTIC_KITTI, Layout
 from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile
-from derain.datamodules.sequences import Layout, SequenceDataModule
+from derain.datamodules.sequences import SequenceDataModule
 from derain.errors import InputError
 from derain.files import find_scans
 from derain.files.labels import label_beside
 from derain.files.reading import reading
 from derain.simulation.manifest import read_manifest
-
-SEMANTIC_KITTI = Layout()
-REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels")
-
-# Names of the packaged data cards whose rain or snow fell in a computer.
-SIMULATED = ("simulated rain", "SnowyKITTI")
 
 
 class NamedScans(ScanDataModule):
@@ -114,14 +109,9 @@ def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
         ) from error
 
 
-def is_simulated(card: DataCard) -> bool:
-    """Whether the card is that of scans whose rain or snow fell in a computer."""
-    return card.name in SIMULATED
-
-
 def full_name(card: DataCard) -> str:
     """Name of a card, which says so where the rain is simulated."""
-    told = "simulated" in card.name or not is_simulated(card)
+    told = "simulated" in card.name or not card.simulated
     return card.name if told else f"{card.name} (simulated)"
 
 

@@ -1,8 +1,9 @@
 """REHEARSE-3D: emulated rain, a MEMS LiDAR fused with a 4D radar."""
 
 from derain.cards import load_card
+from derain.data_layout import REHEARSE3D, Layout
 from derain.datamodules.base import Loading
-from derain.datamodules.sequences import Layout, SequenceDataModule
+from derain.datamodules.sequences import SequenceDataModule
 
 
 class Rehearse3D(SequenceDataModule):
@@ -22,7 +23,7 @@ class Rehearse3D(SequenceDataModule):
     def __init__(
         self,
         root: str,
-        layout: Layout = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels"),
+        layout: Layout = REHEARSE3D,
         split: dict[str, list[str]] | None = None,
         loading: Loading = Loading(),
     ) -> None:

@@ -1,28 +1,13 @@
 """The layout of SemanticKITTI and its kin: a folder of sequences, each with scans and labels."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from derain.cards import DataCard
+from derain.data_layout import Layout
 from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile
 from derain.errors import InputError
 from derain.files import find_scans
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where scans and labels lie: ``root/<sequences>/<sequence>/<scans>/<frame>.bin``.
-
-    Attributes:
-        sequences: Name of the folder of sequences.
-        scans: Name of a sequence's folder of scans.
-        labels: Name of a sequence's folder of labels, ``<frame>.label``.
-    """
-
-    sequences: str = "sequences"
-    scans: str = "velodyne"
-    labels: str = "labels"
 
 
 class SequenceDataModule(ScanDataModule):

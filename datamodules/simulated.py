@@ -3,8 +3,9 @@
 from pathlib import Path
 
 from derain.cards import load_card
+from derain.data_layout import REHEARSE3D
 from derain.datamodules.base import Loading, Part, ScanFile
-from derain.datamodules.sequences import Layout, SequenceDataModule
+from derain.datamodules.sequences import SequenceDataModule
 from derain.errors import InputError
 from derain.simulation.campaign import Campaign
 from derain.simulation.dataset import ensure_track
@@ -34,9 +35,8 @@ class Simulated(SequenceDataModule):
         make: bool = True,
         loading: Loading = Loading(),
     ) -> None:
-        layout = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels")
         split = campaign.split if make else _split_of(Path(root))
-        super().__init__(root, load_card("simulated"), layout, split, loading)
+        super().__init__(root, load_card("simulated"), REHEARSE3D, split, loading)
         self.campaign = campaign
         self.make = make
 

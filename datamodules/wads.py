@@ -1,8 +1,9 @@
 """WADS: real snow on a 64-beam LiDAR."""
 
 from derain.cards import load_card
+from derain.data_layout import SEMANTIC_KITTI, Layout
 from derain.datamodules.base import Loading
-from derain.datamodules.sequences import Layout, SequenceDataModule
+from derain.datamodules.sequences import SequenceDataModule
 
 
 class Wads(SequenceDataModule):
@@ -24,7 +25,7 @@ class Wads(SequenceDataModule):
     def __init__(
         self,
         root: str,
-        layout: Layout = Layout(scans="velodyne", labels="labels"),
+        layout: Layout = SEMANTIC_KITTI,
         split: dict[str, list[str]] | None = None,
         loading: Loading = Loading(deduplicate=True),
     ) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from derain.data_layout import REHEARSE3D, SEMANTIC_KITTI
 from derain.errors import InputError
 from derain.files import find_scans, read_scan
 from derain.files.labels import label_beside, read_labels, semantic
@@ -19,7 +20,7 @@ from derain.files.reading import reading
 from derain.simulation.manifest import read_manifest
 
 # Folders of scans and of their labels: those of REHEARSE-3D, and those of SemanticKITTI and WADS.
-LAYOUTS = (("lidar_radar_pcd", "lidar_radar_labels"), ("velodyne", "labels"))
+LAYOUTS = tuple((layout.scans, layout.labels) for layout in (REHEARSE3D, SEMANTIC_KITTI))
 
 # Column of a weather record, mm/h.
 RAIN_RATE = "rain_rate_mm_h"

@@ -131,6 +131,7 @@ def test_extra_statistics_join_those_that_a_card_has(card_file: Path) -> None:
         {"rain": 3},
         {"rain": [5]},
         {"unknown": [5]},
+        {"simulated": "no"},
         {"unknown": [0, 3]},
         {"unknown": 4},
         {"mean": [1, 2, 3]},

@@ -36,6 +36,7 @@ class DataCard:
         range: Mean and standard deviation of range in metres; None if not known.
         extra: Mean and standard deviation of further channels, by name, such as ``doppler``.
         rain_share: Share of rain among the training points; None if not known.
+        simulated: Whether its rain or snow fell in a computer; scores on it are labelled so.
         split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
     """
 
@@ -50,6 +51,7 @@ class DataCard:
     range: tuple[float, ...] | None = None
     extra: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rain_share: float | None = None
+    simulated: bool = False
     split: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
@@ -172,6 +174,8 @@ def _card(content: dict[str, Any]) -> DataCard:
     stds = [*(card.std or ()), *(card.range or ())[1:], *(std for _, std in card.extra.values())]
     if min(stds, default=1) <= 0:
         raise ValueError(f"standard deviations {stds} must be positive")
+    if not isinstance(card.simulated, bool):
+        raise TypeError(f"simulated is {card.simulated!r}, and must be true or false")
     if card.rain_share is not None and not 0 <= card.rain_share <= 1:
         raise ValueError(f"rain_share {card.rain_share} must be within 0 and 1")
     return card

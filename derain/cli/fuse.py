@@ -11,6 +11,7 @@ from tqdm import tqdm
 
 from derain.cli.arguments import factor
 from derain.cli.outputs import refuse_clashes
+from derain.data_layout import REHEARSE3D
 from derain.errors import InputError
 from derain.extrinsics import Extrinsics, read_extrinsics
 from derain.files import find_scans, read_scan, write_scan
@@ -45,8 +46,7 @@ frame (its name), timestamp (in seconds). The label of a radar point is that of 
 point, {UNKNOWN} (unknown) if none is near. A LiDAR scan without a radar frame stays alone.
 """
 
-SCANS = "lidar_radar_pcd"
-LABELS = "lidar_radar_labels"
+SCANS, LABELS = REHEARSE3D.scans, REHEARSE3D.labels
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

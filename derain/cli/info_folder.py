@@ -9,6 +9,7 @@ from typing import Any
 from tqdm import tqdm
 
 from derain.cards import DataCard, load_card
+from derain.data_layout import REHEARSE3D, SEMANTIC_KITTI
 from derain.data_statistics import (
     Tally,
     class_name,
@@ -22,7 +23,7 @@ from derain.errors import InputError
 
 # The data card that explains labels, by the folder of their scans. SemanticKITTI's classes are on
 # the card of WADS.
-CARDS = {"lidar_radar_pcd": "rehearse3d", "velodyne": "wads"}
+CARDS = {REHEARSE3D.scans: "rehearse3d", SEMANTIC_KITTI.scans: "wads"}
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ def add_data_arguments(parser: argparse.ArgumentParser, part: str) -> None:
     parser.add_argument(
         "--card",
         help="data card, which says what labels mean: wads, kitti, spray, rehearse3d, simulated, "
-        "derain (1 = rain) or a YAML file (default: as the data set's folders tell)",
+        "derain (of simulate --on) or a YAML file (default: as the data set's folders tell)",
     )
     parser.add_argument(
         "--columns",

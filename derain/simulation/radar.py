@@ -126,12 +126,32 @@ class Radar:
         )
 
 
-def detect(track: Track, rain: RainField, radar: Radar, generator: np.random.Generator) -> Scan:
-    """Makes one frame of a radar that stands on the track, at the origin and at its height.
+def mean_echoes(track: Track, rain: RainField, radar: Radar) -> NDArray[np.float64]:
+    """Mean echo of every class in every cell, the same in all frames: nothing on the track moves.
 
     Args:
-        track: The track; nothing on it moves.
+        track: The track; the radar stands on it at the origin, at its height.
         rain: The rain.
+        radar: The radar; its noise counts as background.
+
+    Returns:
+        Radar cross-section in m², float64 (classes, *radar.shape).
+
+    Raises:
+        InputError: Open3D cannot be imported.
+    """
+    _, _, distance = radar.centres()
+    mean, farthest = surface_echoes(track, radar)
+    mean[TrackClass.RAIN] += rain_echoes(rain, farthest, radar)
+    mean[TrackClass.BACKGROUND] += 10 ** (radar.leakage / 10) + (distance / radar.reach) ** 4
+    return mean
+
+
+def detect(mean: NDArray[np.float64], radar: Radar, generator: np.random.Generator) -> Scan:
+    """Makes one frame.
+
+    Args:
+        mean: What :func:`mean_echoes` gave.
         radar: The radar.
         generator: Source of chance.
 
@@ -139,14 +159,8 @@ def detect(track: Track, rain: RainField, radar: Radar, generator: np.random.Gen
         The detections, in the radar's frame: ``fields`` has x, y, z (metres), doppler (m/s, along
         the line of sight, positive recedes) and rcs (dBsm), all float32. Labels are the TrackClass
         of what returned most; that of noise is background.
-
-    Raises:
-        InputError: Open3D cannot be imported.
     """
     inclination, azimuth, distance = radar.centres()
-    mean, farthest = surface_echoes(track, radar)
-    mean[TrackClass.RAIN] += rain_echoes(rain, farthest, radar)
-    mean[TrackClass.BACKGROUND] += 10 ** (radar.leakage / 10) + (distance / radar.reach) ** 4
     echo = mean.sum(axis=0) * generator.exponential(size=radar.shape)
     found = echo > _threshold(echo, radar.false_alarm_rate)
 

@@ -21,6 +21,7 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
 
+from derain.data_layout import REHEARSE3D
 from derain.extrinsics import POSE, Extrinsics
 from derain.files.atomic import replacing
 from derain.files.binary import write_binary
@@ -31,7 +32,7 @@ from derain.scan import Scan, to_float32
 from derain.simulation.campaign import Campaign
 from derain.simulation.facility import lay_out_facility
 from derain.simulation.layout import lay_out_track
-from derain.simulation.radar import Radar, detect
+from derain.simulation.radar import Radar, detect, mean_echoes
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
 from derain.simulation.sensor import Sensor
@@ -88,10 +89,10 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
         joined = fuse(scan, frame, mounting)
         assert joined.label is not None  # as both of its parts are labelled
         write_binary(folder / "innoviz" / f"{stem}.bin", scan)
-        write_binary(folder / "lidar_radar_pcd" / f"{stem}.bin", joined)
-        write_labels(folder / "lidar_radar_labels" / f"{stem}.label", joined.label)
+        write_binary(folder / REHEARSE3D.scans / f"{stem}.bin", joined)
+        write_labels(folder / REHEARSE3D.labels / f"{stem}.label", joined.label)
         _write_table(folder / "weather" / f"{stem}.csv", asdict(scene.weather))
-    for kind in ("innoviz", "lidar_radar_pcd", "lidar_radar_labels", "weather"):
+    for kind in ("innoviz", REHEARSE3D.scans, REHEARSE3D.labels, "weather"):
         _write_times(folder / kind, times)
 
 
@@ -114,9 +115,8 @@ def _record_radar(
     period = 1 / radar.frame_rate
     # The two sensors run freely: the radar's first frame comes at any time of its period.
     times = np.arange(generator.uniform(0, period), scan_times[-1] + period, period)
-    frames = [
-        _with_intensity(detect(scene.track, scene.rain, radar, generator), radar) for _ in times
-    ]
+    mean = mean_echoes(scene.track, scene.rain, radar)
+    frames = [_with_intensity(detect(mean, radar, generator), radar) for _ in times]
     for stem, frame in zip(_stems(len(times)), frames, strict=True):
         write_binary(folder / "radar_pcd" / f"{stem}.bin", replace(frame, fields={}))
         _write_table(folder / "ext_radar" / f"{stem}.csv", _extended(frame))

@@ -10,7 +10,7 @@ import numpy as np
 from tqdm import tqdm
 
 from derain.datamodules.base import ScanDataModule, ScanFile
-from derain.datamodules.labelled import full_name, is_simulated
+from derain.datamodules.labelled import full_name
 from derain.export.bench.contestants import Contestant
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.rows import Row, joined
@@ -61,7 +61,7 @@ def provenance(
         "title": f"{full_name(card)}, {scans}",
         "command": command,
         "data": card.name,
-        "simulated": is_simulated(card),
+        "simulated": card.simulated,
         "licence": card.licence,
         "rain": [card.classes[id_] for id_ in card.rain],
         "seed": seed,

@@ -9,7 +9,7 @@ import yaml
 
 from derain.cards import DataCard
 from derain.datamodules.base import ScanDataModule, ScanFile
-from derain.datamodules.labelled import full_name, is_simulated, sequence_of
+from derain.datamodules.labelled import full_name, sequence_of
 from derain.errors import InputError
 from derain.export.bench.rows import Row
 from derain.export.markdown import markdown_table
@@ -107,7 +107,7 @@ def beside_published(table: PaperTable, ours: Mapping[str, Sequence[Row]], card:
         ours: Our rows, by the names of the table's groups.
         card: Data card of our scans.
     """
-    published = [row for row in table.rows if row.simulated == is_simulated(card)]
+    published = [row for row in table.rows if row.simulated == card.simulated]
     if not published:  # table II knows no simulated rain
         published = list(table.rows)
     head = ["method", *("P", "R", "F1", "IoU"), "ms", "average"]

@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
+from derain.data_layout import Layout
 from derain.datamodules.rehearse3d import Rehearse3D
-from derain.datamodules.sequences import Layout, SequenceDataModule
+from derain.datamodules.sequences import SequenceDataModule
 from derain.datamodules.wads import Wads
 from derain.errors import InputError
 

@@ -104,7 +104,7 @@ def test_the_network_sees_cube_roots(
 def says_snow(
     image: NDArray[np.float64], change: NDArray[np.float64], rule: SelectionRule
 ) -> NDArray[np.bool_]:
-    """The published rule, word for word (reference: LiSnowNet, section 4.4)."""
+    """The published rule, word for word (Source: M.-Y. Yu et al., IROS 2022)."""
     distance, height, intensity = image
     of_range, of_intensity = change
     snow = of_range * of_intensity**3 > rule.residual

@@ -36,7 +36,10 @@ def as_published(
     neighbours: NDArray[np.int64],
     training: bool = False,
 ) -> NDArray[np.float64]:
-    """The published formula, term by term, without dropout (reference: 3D_OutDet, _out_det.py)."""
+    """The published formula, term by term, without dropout.
+
+    Source: sporsho/3D_OutDet, _out_det.py.
+    """
     p = {key: tensor.double().numpy() for key, tensor in state_dict.items()}
 
     def batch_norm(x: NDArray[np.float64], name: str) -> NDArray[np.float64]:

@@ -20,6 +20,7 @@ from derain.simulation.radar import (
     REFERENCE_CELLS,
     Radar,
     detect,
+    mean_echoes,
     rain_echoes,
     surface_echoes,
     volume_reflectivity,
@@ -47,7 +48,8 @@ OPEN = Track.of([plate(-50, 1)])
 
 def frames(track: Track, radar: Radar, count: int, rain: RainField = DRY) -> list[Scan]:
     generator = np.random.default_rng(0)
-    return [detect(track, rain, radar, generator) for _ in range(count)]
+    mean = mean_echoes(track, rain, radar)
+    return [detect(mean, radar, generator) for _ in range(count)]
 
 
 def labels(scans: list[Scan]) -> NDArray[np.int64]:
@@ -226,8 +228,9 @@ def test_a_frame_of_a_street_has_hundreds_of_detections_and_hardly_any_rain(seed
 
 def test_a_frame_has_named_columns_and_follows_from_its_seed() -> None:
     track = lay_out_track(np.random.default_rng(0))
-    one, same = (detect(track, HEAVY, Radar(), np.random.default_rng(7)) for _ in range(2))
-    other = detect(track, HEAVY, Radar(), np.random.default_rng(8))
+    mean = mean_echoes(track, HEAVY, Radar())
+    one, same = (detect(mean, Radar(), np.random.default_rng(7)) for _ in range(2))
+    other = detect(mean, Radar(), np.random.default_rng(8))
     assert {name: values.dtype for name, values in one.fields.items()} == dict.fromkeys(
         ["x", "y", "z", "doppler", "rcs"], np.dtype(np.float32)
     )
