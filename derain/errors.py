@@ -2,6 +2,9 @@
 
 from pathlib import Path
 
+# A reason longer than this hides what it says; what made it so long may be millions of characters.
+LONGEST_REASON = 1000
+
 
 class InputError(ValueError):
     """Something the user gave cannot be used.
@@ -16,7 +19,9 @@ class InputError(ValueError):
 
     def __init__(self, subject: str | Path, reason: str, remedy: str) -> None:
         reason = " ".join(reason.split())  # what other libraries say may run over several lines
-        super().__init__(f"{subject}: {reason}. {remedy}")
+        if len(reason) > LONGEST_REASON:
+            reason = f"{reason[:LONGEST_REASON]} ..."
+        super().__init__(printable(f"{subject}: {reason}. {remedy}"))
         self.subject = subject
         self.reason = reason
         self.remedy = remedy
@@ -24,3 +29,12 @@ class InputError(ValueError):
     def __reduce__(self) -> tuple[type["InputError"], tuple[str | Path, str, str]]:
         # An error crosses the process boundary of a data loader's worker by pickling.
         return type(self), (self.subject, self.reason, self.remedy)
+
+
+def printable(text: str) -> str:
+    """The same text with escapes for what a terminal must not be sent.
+
+    Names of files and what stands in them may hold control sequences, line breaks, marks that turn
+    the direction of writing, and bytes that are no text.
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

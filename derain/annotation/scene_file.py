@@ -23,7 +23,7 @@ import yaml
 from derain.annotation.boxes import Box, Correction, Triple
 from derain.annotation.plane import PlaneSearch
 from derain.annotation.scene import Polygon, Scene
-from derain.annotation.yaml_entry import Entry
+from derain.documents import Entry
 from derain.files.atomic import replacing
 from derain.simulation.classes import TrackClass
 
@@ -51,7 +51,7 @@ def read_scene(path: Path) -> Scene:
         "plane": _plane_search,
         "corrections": _itself,
     }
-    values = Entry.of_file(path).record(parsers, required=["road"])
+    values = Entry.of_yaml(path).record(parsers, required=["road"])
     corrections = values.pop("corrections", None)
     scene = Scene(**values)
     if corrections is None:

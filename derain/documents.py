@@ -1,0 +1,241 @@
+"""Small YAML and JSON documents from users and models, read within bounds.
+
+Nothing in them is trusted: a document may be large, deeply nested or full of aliases that stand for
+one another, and every value may be of another kind than it should be.
+"""
+
+import json
+import math
+import reprlib
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from derain.errors import InputError
+from derain.files.reading import reading
+
+# Far more than any card, scene or Spec takes, and read in a second.
+LARGEST_DOCUMENT = 2**20
+
+# The deepest document of derain, a Spec in a checkpoint's proof, has five levels.
+DEEPEST = 32
+
+# What PyYAML lets out: its own errors, and what Python says of a tag such as !!int over no number.
+_YAML_DAMAGE = (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError, RecursionError)
+
+# The parser in C where PyYAML was built with it: ten times faster on a large document.
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+_SHORT = reprlib.Repr()
+_SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, 60, 60
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A value of a document that knows where it stands, so that what is wrong with it can be said.
+
+    Every method raises InputError for a value of another kind than it reads; the message has the
+    document and the key.
+
+    Attributes:
+        source: The file, or whatever else holds the document.
+        key: Keys that lead to the value, joined by dots; empty for the whole document.
+        value: What stands there.
+    """
+
+    source: Path | str
+    key: str
+    value: Any
+
+    @classmethod
+    def of_yaml(cls, path: Path, largest: int = LARGEST_DOCUMENT) -> "Entry":
+        """The whole of a YAML file.
+
+        Args:
+            path: The file.
+            largest: Bytes that it may have.
+
+        Raises:
+            InputError: A file that cannot be read, is too large or nested too deeply, uses aliases,
+                or is not YAML.
+        """
+        with reading(path, *_YAML_DAMAGE):
+            text = _text(path, largest)
+            _refuse_depth_and_aliases(text)
+            return cls(path, "", yaml.load(text, _LOADER))
+
+    @classmethod
+    def of_json_file(cls, path: Path, largest: int = LARGEST_DOCUMENT) -> "Entry":
+        """The whole of a JSON file; arguments and errors as for :meth:`of_yaml`."""
+        with reading(path, ValueError, RecursionError):
+            return cls(path, "", _parsed_json(_text(path, largest)))
+
+    @classmethod
+    def of_json(cls, text: str, source: Path | str) -> "Entry":
+        """A JSON document that stands in something else, such as the metadata of a model.
+
+        Args:
+            text: The document.
+            source: What it stands in, for messages.
+
+        Raises:
+            InputError: A text that is too large or nested too deeply, or is not JSON.
+        """
+        try:
+            if len(text) > LARGEST_DOCUMENT:
+                raise ValueError(f"{len(text):,} characters")
+            return cls(source, "", _parsed_json(text))
+        except (ValueError, RecursionError) as error:
+            raise InputError(source, f"not JSON ({error})", "Write it again.") from error
+
+    def fault(self, reason: str, remedy: str) -> InputError:
+        """The error that says what is wrong here."""
+        return InputError(
+            f"{self.source}: {short(self.key)}" if self.key else self.source, reason, remedy
+        )
+
+    def members(self) -> dict[str, "Entry"]:
+        """The values of a mapping by their keys, which must be text."""
+        if not isinstance(self.value, dict):
+            raise self.fault(f"{shown(self.value)} is not a mapping", "Write `key: value` pairs.")
+        for key in self.value:
+            if not isinstance(key, str):
+                raise self.fault(
+                    f"the key {shown(key)} is no text", "Quote it: 010 alone is a number."
+                )
+        return {
+            key: Entry(self.source, f"{self.key}.{key}" if self.key else key, value)
+            for key, value in self.value.items()
+        }
+
+    def record(
+        self, parsers: Mapping[str, Callable[["Entry"], Any]], required: Collection[str] = ()
+    ) -> dict[str, Any]:
+        """What is in a mapping whose keys are known.
+
+        Args:
+            parsers: What reads the value, by key.
+            required: Keys that may not be missing.
+        """
+        members = self.members()
+        for key, entry in members.items():
+            if key not in parsers:
+                raise entry.fault("there is no such key", f"Known are {', '.join(parsers)}.")
+        for key in required:
+            if key not in members:
+                raise self.fault(f"{key} is missing", "Add it.")
+        return {key: parsers[key](entry) for key, entry in members.items()}
+
+    def items(self) -> list["Entry"]:
+        """The values of a list."""
+        if not isinstance(self.value, list):
+            raise self.fault(f"{shown(self.value)} is not a list", "Write [values, in, brackets].")
+        return [
+            Entry(self.source, f"{self.key}[{number}]", value)
+            for number, value in enumerate(self.value)
+        ]
+
+    def numbers(self, count: int) -> tuple[float, ...]:
+        """A list of so many finite numbers."""
+        items = self.items()
+        if len(items) != count:
+            raise self.fault(f"{shown(self.value)} are not {count} numbers", f"Write {count}.")
+        return tuple(item.number() for item in items)
+
+    def number(self) -> float:
+        """A finite number."""
+        # Not isinstance: to Python, true and false are numbers. A whole number may have more digits
+        # than a float can hold.
+        if type(self.value) not in (int, float) or not -math.inf < self.value < math.inf:
+            raise self.fault(f"{shown(self.value)} is not a finite number", "Write one number.")
+        try:
+            return float(self.value)
+        except OverflowError:
+            raise self.fault("the number is too large", "Write one number.") from None
+
+    def positive(self) -> float:
+        """A finite number above 0."""
+        number = self.number()
+        if number <= 0:
+            raise self.fault(f"{number:g} is not above 0", "Write one that is.")
+        return number
+
+    def within(self, least: float, most: float) -> float:
+        """A number from ``least`` to ``most``."""
+        number = self.number()
+        if not least <= number <= most:
+            raise self.fault(
+                f"{number:g} is not within {least:g} and {most:g}", "Write one that is."
+            )
+        return number
+
+    def whole(self, least: int, most: int) -> int:
+        """A whole number from ``least`` to ``most``."""
+        if type(self.value) is not int or not least <= self.value <= most:
+            raise self.fault(
+                f"{shown(self.value)} is not a whole number from {least:,} to {most:,}",
+                "Write one that is.",
+            )
+        return self.value
+
+    def truth(self) -> bool:
+        """True or false."""
+        if not isinstance(self.value, bool):
+            raise self.fault(f"{shown(self.value)} is neither true nor false", "Write one of them.")
+        return self.value
+
+    def text(self) -> str:
+        """A text."""
+        if not isinstance(self.value, str):
+            raise self.fault(f"{shown(self.value)} is no text", "Put it in quotes.")
+        return self.value
+
+
+def shown(value: Any) -> str:
+    """A value as a message shows it: cut where it is long, however large it is."""
+    try:
+        return _SHORT.repr(value)
+    except ValueError:  # Python refuses to write out whole numbers of thousands of digits
+        return "a number of very many digits"
+
+
+def short(text: str) -> str:
+    """A text as a message shows it, without quotes and cut where it is long."""
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _text(path: Path, largest: int) -> str:
+    with path.open("rb") as file:
+        content = file.read(largest + 1)
+    if len(content) > largest:
+        raise ValueError(f"more than {largest:,} bytes")
+    return content.decode("utf-8")
+
+
+def _parsed_json(text: str) -> Any:
+    value = json.loads(text)
+    _refuse_depth(value)
+    return value
+
+
+def _refuse_depth(value: Any, depth: int = 0) -> None:
+    if depth > DEEPEST:
+        raise ValueError(f"nested more than {DEEPEST} deep")
+    if isinstance(value, dict | list):
+        for part in value.values() if isinstance(value, dict) else value:
+            _refuse_depth(part, depth + 1)
+
+
+def _refuse_depth_and_aliases(text: str) -> None:
+    """Refuses, before anything is built, what could be far larger than its text."""
+    depth = 0
+    for event in yaml.parse(text, _LOADER):
+        if isinstance(event, yaml.AliasEvent):
+            raise ValueError(f"the alias *{short(event.anchor)}: write out what it stands for")
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise ValueError(f"nested more than {DEEPEST} deep")
