@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numpy as np
 import pytest
+from filelock import FileLock
 
 from derain.cli.main import main
 from derain.export.runtime import METADATA_KEY
@@ -66,6 +68,24 @@ def run_derain(capsys: pytest.CaptureFixture[str]) -> RunDerain:
 
 
 @pytest.fixture(scope="session")
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Makes a file by name once for all processes that share out the tests."""
+    shared_out = "PYTEST_XDIST_WORKER" in os.environ
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if shared_out else own) / "made_once"
+    folder.mkdir(exist_ok=True)
+
+    def make(name: str, write: Callable[[Path], object]) -> Path:
+        path = folder / name
+        with FileLock(f"{path}.lock"):
+            if not path.exists():
+                write(path)
+        return path
+
+    return make
+
+
+@pytest.fixture(scope="session")
 def random_outdet() -> "OutDet":
     """3D-OutDet with random weights and the statistics of WADS; it calls half of a scene rain."""
     import torch
@@ -90,23 +110,19 @@ def random_outdet() -> "OutDet":
 
 
 @pytest.fixture(scope="session")
-def checkpoint(random_outdet: "OutDet", tmp_path_factory: pytest.TempPathFactory) -> Path:
+def checkpoint(random_outdet: "OutDet", made_once: Callable[..., Path]) -> Path:
     """A checkpoint of that network."""
     from derain.models.checkpoint import save_model
 
-    path = tmp_path_factory.mktemp("checkpoint") / "outdet.ckpt"
-    save_model(random_outdet, path)
-    return path
+    return made_once("outdet.ckpt", partial(save_model, random_outdet))
 
 
 @pytest.fixture(scope="session")
-def onnx_model(random_outdet: "OutDet", tmp_path_factory: pytest.TempPathFactory) -> Path:
+def onnx_model(random_outdet: "OutDet", made_once: Callable[..., Path]) -> Path:
     """The same network, exported."""
     from derain.export.onnx_file import export
 
-    path = tmp_path_factory.mktemp("onnx") / "outdet.onnx"
-    export(random_outdet, path)
-    return path
+    return made_once("outdet.onnx", partial(export, random_outdet))
 
 
 @pytest.fixture(scope="session")
@@ -171,13 +187,11 @@ def image_model(request: pytest.FixtureRequest) -> "DerainingModule":
 
 
 @pytest.fixture(scope="session")
-def image_onnx(image_model: "DerainingModule", tmp_path_factory: pytest.TempPathFactory) -> Path:
+def image_onnx(image_model: "DerainingModule", made_once: Callable[..., Path]) -> Path:
     """The same network, exported."""
     from derain.export.onnx_file import export
 
-    path = tmp_path_factory.mktemp("onnx") / f"{image_model.NAME}.onnx"
-    export(image_model, path)
-    return path
+    return made_once(f"{image_model.NAME}.onnx", partial(export, image_model))
 
 
 @pytest.fixture
