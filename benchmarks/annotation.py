@@ -23,6 +23,7 @@ from derain.annotation.plane import Plane
 from derain.annotation.scene import Scene, inside
 from derain.annotation.steps import annotate, road_plane
 from derain.annotation.track_scene import scene_of_track
+from derain.counts import ratio
 from derain.label_transfer import UNKNOWN
 from derain.pictures import save
 from derain.scan import Scan
@@ -88,8 +89,8 @@ class Findings:
     @property
     def iou(self) -> NDArray[np.float64]:
         """Intersection over union of each class; NaN for one that does not occur."""
-        union = self.table.sum(axis=0) + self.table.sum(axis=1) - self.table.diagonal()
-        return self.table.diagonal() / np.where(union, union, np.nan)
+        hits = self.table.diagonal()
+        return ratio(hits, self.table.sum(axis=0) + self.table.sum(axis=1) - hits, np.nan)
 
 
 def _reasons(scan: Scan, label: NDArray[np.int64], scene: Scene, plane: Plane) -> dict[str, int]:

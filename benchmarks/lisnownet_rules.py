@@ -15,7 +15,7 @@ import torch
 from labelled import read_labelled
 
 from derain.cards import load_card
-from derain.metrics import SCORES, Counts
+from derain.counts import SCORES, Counts
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
 from derain.probability import probability_of_rain
@@ -56,16 +56,14 @@ def main() -> None:
 def _counts(model: LiSnowNet, scans: list[Scan]) -> Counts:
     view = model.spec.make_view()
     card = load_card("wads")
-    outcomes = np.zeros(4, np.int64)
+    total = Counts()
     for scan in scans:
         seen = view(scan)
         with torch.inference_mode():
             logits = model(**{name: torch.from_numpy(a) for name, a in seen.inputs().items()})
         found = seen.back(probability_of_rain(logits.numpy())) > model.spec.threshold
-        rain = card.rain_of(scan)
-        parts = (found & rain, found & ~rain, ~found & rain, ~found & ~rain)
-        outcomes += [part.sum() for part in parts]
-    return Counts(*outcomes.tolist())
+        total += Counts.of(found, card.rain_of(scan))
+    return total
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from labelled import read_labelled
 from numpy.typing import NDArray
 
 from derain.cards import load_card
+from derain.counts import Counts
 from derain.grid_fit import fit_grid
 from derain.range_image import RangeView
 from derain.scan import Scan
@@ -33,8 +34,7 @@ class Tally:
     hidden: int = 0
     pixels: int = 0
     empty: int = 0
-    found: int = 0
-    either: int = 0
+    rain: Counts = field(default_factory=Counts)
     view: list[float] = field(default_factory=list)
     back: list[float] = field(default_factory=list)
 
@@ -50,8 +50,7 @@ class Tally:
         self.hidden += int(image.hidden.sum())
         self.pixels += image.size
         self.empty += int((~image.valid).sum())
-        self.found += int((called & rain).sum())
-        self.either += int((called | rain).sum())
+        self.rain += Counts.of(called, rain)
         self.view.append(stopwatch.milliseconds["view"])
         self.back.append(stopwatch.milliseconds["back"])
 
@@ -60,7 +59,7 @@ class Tally:
         return [
             f"{self.hidden / self.points:.1%}",
             f"{self.empty / self.pixels:.1%}",
-            f"{self.found / self.either:.3f}",
+            f"{self.rain.iou:.3f}",
             f"{np.median(self.view):.1f}",
             f"{np.median(self.back):.1f}",
         ]

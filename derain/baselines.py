@@ -11,6 +11,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.counts import intersection_over_union
 from derain.errors import InputError
 from derain.scan import Scan
 
@@ -104,7 +105,7 @@ class _Voxels(NamedTuple):
         share = (self.rain + total / self.points.sum()) / (self.points + 1)
         order = np.argsort(-share, kind="stable")
         hits, called = np.cumsum(self.rain[order]), np.cumsum(self.points[order])
-        iou = hits / (total + called - hits)
+        iou = intersection_over_union(hits, total - hits + called - hits)
         # Voxels of one share are called alike: only the last of them ends a choice.
         iou[:-1][np.diff(share[order]) == 0] = 0
         return order[: np.argmax(iou) + 1]

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from derain.counts import Counts
 from derain.pictures import draw_as_seen, draw_from_above, explain_colours, label_once, outcomes
 from derain.scan import Scan
 
@@ -57,6 +58,5 @@ def _panels(
         if rain is None:
             yield f"{name}: {called_rain.sum():,} points removed", called_rain.astype(np.int64)
         else:
-            union = np.count_nonzero(called_rain | rain)
-            iou = np.count_nonzero(called_rain & rain) / union if union else 1.0
+            iou = Counts.of(called_rain, rain).iou
             yield f"{name}: IoU {iou:.3f}", outcomes(called_rain, rain)

@@ -10,52 +10,8 @@ from torch import Tensor
 from torchmetrics import Metric
 from torchmetrics.utilities import dim_zero_cat
 
+from derain.counts import SCORES, Counts, ratio
 from derain.errors import InputError
-
-SCORES = ("precision", "recall", "f1", "iou")
-
-
-@dataclass(frozen=True)
-class Counts:
-    """Points by what they are and what they were called; rain is the positive class.
-
-    A score whose denominator is zero is 1: nothing was there to be got wrong. So a rain-free scan
-    left as it is scores 1 throughout, and one point falsely called rain takes its precision, F1
-    and IoU to 0 (its recall stays 1). No points at all score 1.
-
-    Attributes:
-        true_positive: Rain called rain.
-        false_positive: Other points called rain.
-        false_negative: Rain not called rain.
-        true_negative: Other points not called rain.
-    """
-
-    true_positive: int
-    false_positive: int
-    false_negative: int
-    true_negative: int
-
-    @property
-    def precision(self) -> float:
-        """Share of rain among the points called rain; 1 where none was."""
-        return _ratio(self.true_positive, self.true_positive + self.false_positive)
-
-    @property
-    def recall(self) -> float:
-        """Share of the rain that was called rain; 1 where there is none."""
-        return _ratio(self.true_positive, self.true_positive + self.false_negative)
-
-    @property
-    def f1(self) -> float:
-        """Harmonic mean of precision and recall; 1 where no point is rain or called rain."""
-        errors = self.false_positive + self.false_negative
-        return _ratio(2 * self.true_positive, 2 * self.true_positive + errors)
-
-    @property
-    def iou(self) -> float:
-        """Intersection over union of rain; 1 where no point is rain or called rain."""
-        errors = self.false_positive + self.false_negative
-        return _ratio(self.true_positive, self.true_positive + errors)
 
 
 @dataclass(frozen=True)
@@ -78,7 +34,7 @@ class ClassCounts:
 
         A class without points has the share of a perfect answer: 1 if it is rain, else 0.
         """
-        return _ratio(self.called_rain, self.points, undefined=float(self.rain))
+        return float(ratio(self.called_rain, self.points, undefined=float(self.rain)))
 
 
 class RainMetrics(Metric):
@@ -178,7 +134,7 @@ class RainMetrics(Metric):
         scores = {score: getattr(pooled, score) for score in SCORES}
         for score in SCORES:
             total = math.fsum(getattr(counts, score) for counts in per_scan)
-            scores[f"{score}_per_scan"] = _ratio(total, len(per_scan))
+            scores[f"{score}_per_scan"] = float(ratio(total, len(per_scan)))
         return {
             name: torch.tensor(score, dtype=torch.float32, device=self.device)
             for name, score in scores.items()
@@ -240,11 +196,6 @@ class RainMetrics(Metric):
         false_negative, true_positive = table[self.is_rain].sum(dim=0).tolist()
         true_negative, false_positive = table[~self.is_rain].sum(dim=0).tolist()
         return Counts(true_positive, false_positive, false_negative, true_negative)
-
-
-def _ratio(part: float, whole: float, undefined: float = 1.0) -> float:
-    # Python divides integers of any size with correct rounding.
-    return part / whole if whole else undefined
 
 
 def _check(classes: Mapping[int, str], rain: Collection[int], range_edges: Sequence[float]) -> None:

@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.counts import intersection_over_union
 from derain.scan import Scan
 
 STEPS = 200
@@ -63,8 +64,8 @@ class OneLineRule:
             np.searchsorted(limit, column)
             for limit, column in zip(limits, (intensity, distance), strict=True)
         ]
-        within = [_within(cells, chosen, limits) for chosen in (rain, ~rain)]
-        iou = within[0] / (rain.sum() + within[1])
+        hits, false = (_within(cells, chosen, limits) for chosen in (rain, ~rain))
+        iou = intersection_over_union(hits, rain.sum() - hits + false)
         row, column = np.unravel_index(np.argmax(iou), iou.shape)
         return cls(float(limits[0][row]), float(limits[1][column]))
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.cards import DataCard
+from derain.counts import Counts, intersection_over_union
 from derain.errors import InputError
 from derain.filters import PointFilter, filter_from
 from derain.filters.derainer import filter_view
@@ -161,32 +162,24 @@ def tune_threshold(
     # Points of one probability are called alike: only the last of them ends a choice. No threshold
     # is below 0, so that points of probability 0 are never called.
     last = np.append(falling[1:] < falling[:-1], True) & (falling > 0)
-    iou = np.where(last, hits / np.maximum(rain.sum() + called - hits, 1), 0.0)
+    errors = rain.sum() - hits + called - hits
+    iou = np.where(last, intersection_over_union(hits, errors), 0.0)
     best = int(np.argmax(iou))
     following = falling[best + 1] if best + 1 < len(falling) else np.float32(0)
     # Midway, so that a rounding of the last digit decides nothing, where there is a midway.
     middle = (falling[best] + following) / 2
     chosen = middle if middle < falling[best] else following
-    default = _iou_above(threshold, probability, rain)
+    default = Counts.of(probability > threshold, rain).iou
     return Tuned({"threshold": float(chosen)}, float(iou[best]), default)
 
 
 def pooled_iou(filter: PointFilter, scans: Sequence[ViewedScan]) -> float:
     """IoU of rain over the points of all scans; 1 where there is none and none is found."""
-    found = errors = 0
+    total = Counts()
     for scan in scans:
-        called = filter.judge(scan.view)
-        found += int(np.count_nonzero(called & scan.rain))
-        errors += int(np.count_nonzero((~called & scan.rain) | (called & scan.solid)))
-    return found / (found + errors) if found + errors else 1.0
-
-
-def _iou_above(
-    threshold: float, probability: NDArray[np.float32], rain: NDArray[np.bool_]
-) -> float:
-    called = probability > threshold
-    union = np.count_nonzero(called | rain)
-    return np.count_nonzero(called & rain) / union if union else 1.0
+        known = scan.rain | scan.solid
+        total += Counts.of(filter.judge(scan.view)[known], scan.rain[known])
+    return total.iou
 
 
 def _study(name: str, scans: Sequence[ViewedScan], search: Search) -> "optuna.Study":

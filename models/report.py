@@ -5,8 +5,9 @@ from pathlib import Path
 
 import lightning
 
+from derain.counts import SCORES
 from derain.files.atomic import replacing
-from derain.metrics import SCORES, RainMetrics
+from derain.metrics import RainMetrics
 from derain.models.base import DerainingModule
 
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from derain.baselines import PositionPrior, all_points, no_points
+from derain.counts import Counts
 from derain.errors import InputError
 from derain.hard_cases import hard_cases, scene
 from derain.scan import Scan
@@ -20,8 +21,7 @@ Truth = tuple[Scan, NDArray[np.bool_]]
 
 
 def iou(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
-    union = np.count_nonzero(predicted | rain)
-    return np.count_nonzero(predicted & rain) / union if union else 1.0
+    return Counts.of(predicted, rain).iou
 
 
 def in_voxels(voxels: list[int], rain: list[bool]) -> Truth:

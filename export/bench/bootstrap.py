@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.counts import intersection_over_union
+
 DRAWS = 2000
 CONFIDENCE = 0.95
 
@@ -45,15 +47,9 @@ def bootstrap(
     scans = found.shape[1]
     # How often each scan is drawn.
     times = generator.multinomial(scans, np.full(scans, 1 / scans), DRAWS)
-    iou = _iou(found @ times.T, errors @ times.T)
-    best = np.argmax(_iou(found.sum(axis=1), errors.sum(axis=1)))
+    iou = intersection_over_union(found @ times.T, errors @ times.T)
+    best = np.argmax(intersection_over_union(found.sum(axis=1), errors.sum(axis=1)))
     return Bootstrap(_intervals(iou), _intervals(iou[best] - iou))
-
-
-def _iou(found: NDArray[np.int64], errors: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Intersection over union; 1 where nothing was there to be got wrong."""
-    union = found + errors
-    return np.where(union > 0, found / np.maximum(union, 1), 1.0)
 
 
 def _intervals(draws: NDArray[np.float64]) -> list[Interval]:

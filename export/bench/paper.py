@@ -8,12 +8,12 @@ from typing import Literal
 import yaml
 
 from derain.cards import DataCard
+from derain.counts import SCORES
 from derain.datamodules.base import ScanDataModule, ScanFile
 from derain.datamodules.labelled import full_name, sequence_of
 from derain.errors import InputError
 from derain.export.bench.rows import Row
 from derain.export.markdown import markdown_table
-from derain.metrics import SCORES
 
 TABLES = ("table2", "table3")
 

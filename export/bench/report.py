@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from derain.counts import SCORES, Counts
 from derain.export.bench.cost import STAGES
 from derain.export.bench.rows import Row
 from derain.export.markdown import markdown_table
 from derain.files.atomic import replacing
-from derain.metrics import SCORES, Counts
 
 SIMULATED_IS_EASY = (
     "**Simulated data.** What falls in a simulation is easier to find than what falls from the "

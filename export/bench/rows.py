@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from derain.counts import SCORES, Counts
 from derain.export.bench.bootstrap import Bootstrap, Interval, bootstrap
 from derain.export.bench.contestants import Contestant
 from derain.export.bench.cost import STAGES, Cost
 from derain.export.bench.scores import Scores
-from derain.metrics import SCORES, Counts
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """How good methods are: counted over the points of all scans, and over many a part of them."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.cards import DataCard
+from derain.counts import Counts
 from derain.export.bench.contestants import Contestant, Method
 from derain.filters import PointFilter
 from derain.filters.derainer import filter_view
-from derain.metrics import ClassCounts, Counts, RainMetrics
+from derain.metrics import ClassCounts, RainMetrics
 from derain.morton import distinct_positions
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
@@ -131,7 +132,7 @@ class _Tally:
             rain, known = self.card.rain_of(scan), ~self.card.unknown_of(scan)
             for sensor, points in {"LiDAR": ~scan.radar, "radar": scan.radar}.items():
                 rows = known & points
-                self.by_sensor.setdefault(sensor, []).append(_counts(predicted[rows], rain[rows]))
+                self.by_sensor.setdefault(sensor, []).append(Counts.of(predicted[rows], rain[rows]))
 
     def scores(self, rain_rates: Sequence[float | None]) -> Scores:
         """The counts so far, given the rain rate of each scan in mm/h."""
@@ -145,8 +146,8 @@ class _Tally:
             per_scan,
             self.metrics.by_class(),
             self.metrics.by_range(),
-            {f"{rate:g} mm/h": _total(by_rate[rate]) for rate in sorted(by_rate)},
-            {sensor: _total(parts) for sensor, parts in self.by_sensor.items()},
+            {f"{rate:g} mm/h": sum(by_rate[rate], Counts()) for rate in sorted(by_rate)},
+            {sensor: sum(parts, Counts()) for sensor, parts in self.by_sensor.items()},
             self.failures,
         )
 
@@ -156,12 +157,3 @@ def _distinct_rows(scan: Scan) -> NDArray[np.int64]:
     judged = np.flatnonzero(scan.valid)
     first, _ = distinct_positions(scan.xyz[judged])
     return np.sort(judged[first])
-
-
-def _counts(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> Counts:
-    parts = (rain & predicted, ~rain & predicted, rain & ~predicted, ~rain & ~predicted)
-    return Counts(*(int(part.sum()) for part in parts))
-
-
-def _total(parts: Sequence[Counts]) -> Counts:
-    return Counts(*(sum(column) for column in zip(*map(astuple, parts), strict=True)))

@@ -1,0 +1,90 @@
+"""Points by what they are and what they were called, and the scores that follow from them."""
+
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+SCORES = ("precision", "recall", "f1", "iou")
+
+
+def ratio(part: ArrayLike, whole: ArrayLike, undefined: float = 1.0) -> NDArray[np.float64]:
+    """What share each part is of its whole, float64, of the shape that the two have together.
+
+    Args:
+        part: Numbers, or one.
+        whole: Numbers, or one.
+        undefined: The share where the whole is 0; 1 says that nothing was there to be got wrong.
+    """
+    part, whole = np.broadcast_arrays(part, whole)
+    shares = np.full(whole.shape, undefined, np.float64)
+    return np.divide(part, whole, out=shares, where=whole != 0)
+
+
+def intersection_over_union(hits: ArrayLike, errors: ArrayLike) -> NDArray[np.float64]:
+    """IoU of rain, float64; 1 where no point is rain or called rain.
+
+    Args:
+        hits: Points of rain called rain, or one number of them for each choice.
+        errors: Rain not called rain and other points called rain, together; of the same shape.
+    """
+    return ratio(hits, np.add(hits, errors))
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Points by what they are and what they were called; rain is the positive class.
+
+    A score whose denominator is zero is 1: nothing was there to be got wrong. So a rain-free scan
+    left as it is scores 1 throughout, and one point falsely called rain takes its precision, F1
+    and IoU to 0 (its recall stays 1). No points at all score 1.
+
+    Attributes:
+        true_positive: Rain called rain.
+        false_positive: Other points called rain.
+        false_negative: Rain not called rain.
+        true_negative: Other points not called rain.
+    """
+
+    true_positive: int = 0
+    false_positive: int = 0
+    false_negative: int = 0
+    true_negative: int = 0
+
+    @classmethod
+    def of(cls, called_rain: NDArray[np.bool_], rain: NDArray[np.bool_]) -> "Counts":
+        """Counts points.
+
+        Args:
+            called_rain: Points called rain, bool (N,).
+            rain: Points that are rain, bool (N,).
+        """
+        called, wet = int(np.count_nonzero(called_rain)), int(np.count_nonzero(rain))
+        hits = int(np.count_nonzero(called_rain & rain))
+        return cls(hits, called - hits, wet - hits, len(rain) - called - wet + hits)
+
+    def __add__(self, other: "Counts") -> "Counts":
+        """Counts of the points of both."""
+        return Counts(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    @property
+    def precision(self) -> float:
+        """Share of rain among the points called rain; 1 where none was."""
+        return float(ratio(self.true_positive, self.true_positive + self.false_positive))
+
+    @property
+    def recall(self) -> float:
+        """Share of the rain that was called rain; 1 where there is none."""
+        return float(ratio(self.true_positive, self.true_positive + self.false_negative))
+
+    @property
+    def f1(self) -> float:
+        """Harmonic mean of precision and recall; 1 where no point is rain or called rain."""
+        errors = self.false_positive + self.false_negative
+        return float(ratio(2 * self.true_positive, 2 * self.true_positive + errors))
+
+    @property
+    def iou(self) -> float:
+        """Intersection over union of rain; 1 where no point is rain or called rain."""
+        errors = self.false_positive + self.false_negative
+        return float(intersection_over_union(self.true_positive, errors))
