@@ -19,7 +19,7 @@ from derain.datamodules.statistics import evenly_spaced, measured
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.files.labels import read_labels, semantic
-from derain.morton import distinct_positions
+from derain.morton import distinct_rows
 from derain.scan import Scan
 from derain.spec import Spec
 from derain.view import View
@@ -242,9 +242,8 @@ class ScanDataModule(lightning.LightningDataModule):
 
     def _read_distinct(self, file: ScanFile) -> Scan:
         scan = self.read(file)
-        judged = np.flatnonzero(scan.valid)
-        first, _ = distinct_positions(scan.xyz[judged])
-        return scan.take(np.sort(judged[first]))
+        first, _ = distinct_rows(scan)
+        return scan.take(np.sort(first))
 
 
 def _packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:

@@ -5,7 +5,7 @@ import small_gicp
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.morton import distinct_positions
+from derain.morton import distinct_rows
 from derain.neighbours import usable_cores
 from derain.scan import Scan
 
@@ -42,9 +42,8 @@ def transfer_labels(
     if labelled.label is None:
         raise InputError(labelled.name, "it has no labels", "Give its label file.")
     label = np.full(len(xyz), UNKNOWN, np.int64)
-    valid = np.flatnonzero(labelled.valid)
     # The first row of each position only, for a kd-tree gives any of those that are equally near.
-    source = valid[distinct_positions(labelled.xyz[valid])[0]]
+    source, _ = distinct_rows(labelled)
     asked = np.flatnonzero(Scan(xyz).valid)
     if len(source) and len(asked):
         threads = usable_cores()

@@ -10,7 +10,7 @@ import small_gicp
 from numpy.typing import NDArray
 
 from derain.channels import filled_values
-from derain.morton import distinct_positions
+from derain.morton import distinct_rows
 from derain.scan import Scan
 
 
@@ -109,12 +109,7 @@ class NeighbourView:
 
     def __call__(self, scan: Scan) -> Neighbourhoods:
         """Views a scan."""
-        valid = np.flatnonzero(scan.valid)
-        # take is four times faster than indexing for rows of three numbers.
-        first, inverse_of_valid = distinct_positions(scan.xyz.take(valid, axis=0))
-        inverse = np.full(len(scan), -1, np.int64)
-        inverse[valid] = inverse_of_valid
-        first = valid[first]
+        first, inverse = distinct_rows(scan)
         xyz = scan.xyz.take(first, axis=0)
         neighbours, distances = nearest_neighbours(
             xyz, self.neighbours, rank=first, threads=self.threads

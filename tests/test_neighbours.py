@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
-from derain.morton import distinct_positions, morton_code
+from derain.morton import distinct_positions, distinct_rows, morton_code
 from derain.neighbours import Neighbourhoods, NeighbourView, nearest_neighbours
 from derain.scan import Scan
 
@@ -70,6 +70,22 @@ def test_distinct_positions_are_those_of_numpy_unique(xyz: NDArray[np.float32]) 
     assert sorted(first) == sorted(expected_first)
     assert len(first) == len(expected)
     np.testing.assert_array_equal(xyz[first][inverse], xyz)
+
+
+@settings(deadline=None)
+@given(gridded, st.randoms(use_true_random=False))
+def test_distinct_rows_are_those_of_the_rows_that_can_be_judged(
+    xyz: NDArray[np.float32], random
+) -> None:
+    lost = np.array([random.random() < 0.3 for _ in xyz], bool)
+    scan = Scan(np.where(lost[:, None], np.float32(np.nan), xyz))
+    seen: dict[bytes, int] = {}
+    for row in np.flatnonzero(scan.valid):
+        seen.setdefault((scan.xyz[row] + 0).tobytes(), row)
+    first, inverse = distinct_rows(scan)
+    assert sorted(first) == list(seen.values())
+    np.testing.assert_array_equal(inverse < 0, ~scan.valid)
+    np.testing.assert_array_equal(scan.xyz[first][inverse[scan.valid]], scan.xyz[scan.valid])
 
 
 def test_equal_points_apart_in_one_crowded_cell_are_found() -> None:

@@ -15,7 +15,7 @@ from derain.errors import InputError
 from derain.files import find_scans, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.grid_fit import fit_grid
-from derain.morton import distinct_positions
+from derain.morton import distinct_rows
 from derain.scan import Scan
 
 SUMMARY = "say what is in a scan, a label file, a model or a data set"
@@ -132,7 +132,7 @@ def _of_scan(scan: Scan) -> dict[str, Any]:
     return {
         "points": len(scan),
         "valid": int(valid.sum()),
-        "distinct positions": len(distinct_positions(scan.xyz[valid])[0]),
+        "distinct positions": len(distinct_rows(scan)[0]),
         "organised": "no" if scan.shape is None else f"{scan.shape[0]} x {scan.shape[1]}",
         "fields": {name: str(column.dtype) for name, column in scan.fields.items()},
         "x / m": _span(points[:, 0]),

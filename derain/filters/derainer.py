@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.filters.point_filter import PointFilter
 from derain.filters.radius_filter import RadiusFilter
-from derain.morton import distinct_positions
+from derain.morton import distinct_rows
 from derain.neighbours import NeighbourView, usable_cores
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
@@ -66,14 +66,14 @@ class FilterDerainer:
         self, filter: RadiusFilter, scan: Scan, stopwatch: Stopwatch
     ) -> NDArray[np.bool_]:
         with stopwatch.stage("view"):
-            valid = np.flatnonzero(scan.valid)
-            first, inverse = distinct_positions(scan.xyz.take(valid, axis=0))
-            xyz = scan.xyz.take(valid[first], axis=0)
+            first, inverse = distinct_rows(scan)
+            xyz = scan.xyz.take(first, axis=0)
         with stopwatch.stage("network"):
             few = filter.judge_alone(xyz, self.threads)
         with stopwatch.stage("back"):
             rain = np.zeros(len(scan), bool)
-            rain[valid] = few[inverse]
+            judged = inverse >= 0
+            rain[judged] = few[inverse[judged]]
             return rain
 
 

@@ -16,7 +16,7 @@ from derain.export.bench.contestants import Contestant, Method
 from derain.filters import PointFilter
 from derain.filters.derainer import filter_view
 from derain.metrics import ClassCounts, RainMetrics
-from derain.morton import distinct_positions
+from derain.morton import distinct_rows
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
 
@@ -154,6 +154,5 @@ class _Tally:
 
 def _distinct_rows(scan: Scan) -> NDArray[np.int64]:
     """The first row at each position, in order; rows that cannot be judged are left out."""
-    judged = np.flatnonzero(scan.valid)
-    first, _ = distinct_positions(scan.xyz[judged])
-    return np.sort(judged[first])
+    first, _ = distinct_rows(scan)
+    return np.sort(first)
