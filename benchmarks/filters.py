@@ -8,13 +8,13 @@ pip install scipy scikit-learn
 
 import argparse
 import importlib
-import time
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
+from turns import milliseconds_in_turns
 
 from derain.errors import InputError
 from derain.export.latency import versions
@@ -128,14 +128,7 @@ def _module(name: str) -> ModuleType | None:
 
 def _report(filter_: PointFilter, methods: dict[str, Method]) -> None:
     verdicts = {name: method() for name, method in methods.items()}
-    times: dict[str, list[float]] = {name: [] for name in methods}
-    # Turn and turn about, so that whatever else the machine does hits all alike.
-    for _ in range(ROUNDS):
-        for name, method in methods.items():
-            method()  # warms the cache that the last method filled with its own
-            start = time.perf_counter()
-            method()
-            times[name].append(1e3 * (time.perf_counter() - start))
+    times = milliseconds_in_turns(methods, ROUNDS)
     print(filter_)
     ours = np.median(times["derain"])
     for name, values in times.items():

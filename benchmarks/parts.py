@@ -8,13 +8,13 @@ Libraries that are not installed are left out: pip install scipy pykdtree
 import argparse
 import importlib
 import tempfile
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 import small_gicp
 from numpy.typing import NDArray
+from turns import milliseconds_in_turns
 
 from derain.export.latency import versions
 from derain.export.onnx_file import export
@@ -94,15 +94,8 @@ def _module(name: str) -> object:
 
 
 def _report(title: str, candidates: Mapping[str, Callable[[], object]]) -> None:
-    times: dict[str, list[float]] = {name: [] for name in candidates}
-    for _ in range(ROUNDS):
-        for name, run in candidates.items():
-            run()  # warms the cache that the last candidate filled with its own
-            start = time.perf_counter()
-            run()
-            times[name].append(1e3 * (time.perf_counter() - start))
     print(title)
-    for name, values in times.items():
+    for name, values in milliseconds_in_turns(candidates, ROUNDS).items():
         print(f"  {name:32} {np.median(values):7.1f} ms")
 
 

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import onnxruntime
+from numpy.typing import NDArray
 
 import derain
 from derain.export.runtime import Derainer
+from derain.export.timing import timed_runs
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.hard_cases import scene
-from derain.stopwatch import Stopwatch
 
 WARM_UP = 5
 PERCENTILES = (50, 90, 99)
@@ -24,13 +25,14 @@ class Latency:
     """Milliseconds of every run.
 
     Attributes:
-        stages: Milliseconds of each run, by stage: read, view, network, back, and total.
+        stages: Milliseconds of each run, by stage: read, view, network, back, and total, float64
+            (runs,).
         points: Points of the scan.
         threads: Threads of view and network.
         versions: The processor, and the software that ran.
     """
 
-    stages: dict[str, list[float]]
+    stages: dict[str, NDArray[np.float64]]
     points: int
     threads: int
     versions: str
@@ -71,9 +73,8 @@ def measure_latency(
             scan, columns = Path(folder) / "scene.bin", DEFAULT_COLUMNS
             scene(100_000).tofile(scan)
         derainer = Derainer(model, threads)
-        runs = [_run(derainer, scan, columns) for _ in range(WARM_UP + repeats)][WARM_UP:]
-        stages = {stage: [run[stage] for run in runs] for stage in runs[0]}
-        stages["total"] = [sum(run.values()) for run in runs]
+        stages = timed_runs(derainer.probability, [scan], columns, WARM_UP, repeats)
+        stages["total"] = np.sum(list(stages.values()), axis=0)
         return Latency(stages, len(read_scan(scan, columns)), derainer.threads, versions())
 
 
@@ -93,11 +94,3 @@ def processor() -> str:
         lines = []
     names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.processor() or platform.machine()
-
-
-def _run(derainer: Derainer, path: Path, columns: Sequence[str]) -> dict[str, float]:
-    stopwatch = Stopwatch()
-    with stopwatch.stage("read"):
-        scan = read_scan(path, columns)
-    derainer.probability(scan, stopwatch)
-    return stopwatch.milliseconds

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.export.bench.contestants import Contestant
-from derain.files import DEFAULT_COLUMNS, read_scan
-from derain.stopwatch import Stopwatch
+from derain.export.timing import STAGES, timed_runs
+from derain.files import DEFAULT_COLUMNS
 
-STAGES = ("read", "view", "network", "back")
 WARM_UP = 2
 
 
@@ -81,18 +80,7 @@ def measure_cost(contestant: Contestant, timing: Timing) -> Cost:
 def run_alone(contestant: Contestant, timing: Timing) -> Cost:
     """Runs a method on every scan, in turns, in this process; see :func:`measure_cost`."""
     method = contestant.ready(timing.threads)
-
-    def timed(path: Path) -> dict[str, float]:
-        stopwatch = Stopwatch()
-        with stopwatch.stage("read"):
-            scan = read_scan(path, timing.columns)
-        method(scan, stopwatch)
-        return stopwatch.milliseconds
-
-    for _ in range(WARM_UP):
-        timed(timing.scans[0])
-    runs = [timed(path) for _ in range(timing.repeats) for path in timing.scans]
-    times = {stage: np.array([run.get(stage, 0.0) for run in runs]) for stage in STAGES}
+    times = timed_runs(method, timing.scans, timing.columns, WARM_UP, timing.repeats)
     return Cost(times, _peak_memory())
 
 

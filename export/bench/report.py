@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from derain.counts import SCORES, Counts
-from derain.export.bench.cost import STAGES
 from derain.export.bench.rows import Row
 from derain.export.markdown import markdown_table
+from derain.export.timing import STAGES
 from derain.files.atomic import replacing
 
 SIMULATED_IS_EASY = (

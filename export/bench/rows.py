@@ -9,8 +9,9 @@ import numpy as np
 from derain.counts import SCORES, Counts
 from derain.export.bench.bootstrap import Bootstrap, Interval, bootstrap
 from derain.export.bench.contestants import Contestant
-from derain.export.bench.cost import STAGES, Cost
+from derain.export.bench.cost import Cost
 from derain.export.bench.scores import Scores
+from derain.export.timing import STAGES
 
 
 @dataclass(frozen=True)

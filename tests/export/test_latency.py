@@ -49,8 +49,8 @@ def test_without_a_scan_a_made_up_one_of_100_000_points_is_timed(
 
 
 def test_the_report_is_a_table_of_percentiles() -> None:
-    times = [float(time) for time in range(101)]
-    report = Latency({"read": [2.0] * 101, "total": times}, 115_881, 2, "a processor; versions")
+    stages = {"read": np.full(101, 2.0), "total": np.arange(101.0)}
+    report = Latency(stages, 115_881, 2, "a processor; versions")
     assert str(report).splitlines() == [
         "115,881 points, 2 threads, 101 runs, milliseconds",
         "stage         p50      p90      p99",

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from derain.export.bench.contestants import Contestant, contestants
-from derain.export.bench.cost import STAGES, WARM_UP, Timing, measure_cost, run_alone
+from derain.export.bench.cost import WARM_UP, Timing, measure_cost, run_alone
 from derain.export.bench.scores import Labelled
 from derain.export.methods import load_method
+from derain.export.timing import STAGES
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
 

@@ -11,10 +11,11 @@ from derain.datamodules.base import Loading
 from derain.datamodules.labelled import labelled_scans
 from derain.errors import InputError
 from derain.export.bench.contestants import contestants
-from derain.export.bench.cost import STAGES, Cost
+from derain.export.bench.cost import Cost
 from derain.export.bench.paper import TABLES, beside_published, files_by_group, paper_table
 from derain.export.bench.rows import Row, joined
 from derain.export.bench.scores import Labelled, score
+from derain.export.timing import STAGES
 from derain.files.labels import write_labels
 from derain.hard_cases import scene
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from derain.export.bench.contestants import Contestant, contestants
-from derain.export.bench.cost import STAGES, Cost
+from derain.export.bench.cost import Cost
 from derain.export.bench.report import SIMULATED_IS_EASY, as_markdown, write_report
 from derain.export.bench.rows import Row, joined
 from derain.export.bench.scores import Labelled, score
 from derain.export.bench.speed_error import draw_speed_error
+from derain.export.timing import STAGES
 
 FACTS = {
     "title": "made up, 3 scans",
