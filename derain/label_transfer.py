@@ -4,9 +4,9 @@ import numpy as np
 import small_gicp
 from numpy.typing import NDArray
 
+from derain.cores import usable_cores
 from derain.errors import InputError
 from derain.morton import distinct_rows
-from derain.neighbours import usable_cores
 from derain.scan import Scan
 
 # Class of points of which no label is known; no class of REHEARSE-3D, SemanticKITTI or WADS.

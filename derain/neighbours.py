@@ -1,6 +1,5 @@
 """The neighbour view: every point of a scan with its nearest neighbours."""
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -10,6 +9,7 @@ import small_gicp
 from numpy.typing import NDArray
 
 from derain.channels import filled_values
+from derain.cores import usable_cores
 from derain.morton import distinct_rows
 from derain.scan import Scan
 
@@ -195,8 +195,3 @@ def _settle(
         open_ended = near_squared[:, -1] == near_squared[:, k - 1]
         pending = pending[open_ended & (width < len(rank))]
     return rows, squared
-
-
-def usable_cores() -> int:
-    """Cores this process may use, which in a container are fewer than the machine has."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

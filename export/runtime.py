@@ -8,8 +8,8 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
+from derain.cores import usable_cores
 from derain.errors import InputError
-from derain.neighbours import usable_cores
 from derain.probability import probability_of_rain
 from derain.scan import Scan
 from derain.spec import Spec

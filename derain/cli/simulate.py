@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from derain.cli.arguments import count
+from derain.cores import usable_cores
 from derain.errors import InputError
-from derain.neighbours import usable_cores
 
 SUMMARY = "make a data set of simulated rain, or let it rain on clean scans"
 

@@ -1,0 +1,69 @@
+"""How many cores this process may use."""
+
+import os
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path, PurePosixPath
+
+# Where Linux says which control groups a process is in, and where it keeps them.
+MEMBERSHIP = Path("/proc/self/cgroup")
+GROUPS = Path("/sys/fs/cgroup")
+
+
+def usable_cores(membership: Path = MEMBERSHIP, groups: Path = GROUPS) -> int:
+    """Cores this process may use, at least one.
+
+    They are those it may run on, but no more than its share of processor time keeps busy, rounded
+    up, where it is in a container that has one: further threads would only wait for these.
+
+    Args:
+        membership: File that names the control groups of the process, of version 1 or 2.
+        groups: Folder that they are mounted below.
+    """
+    return max(1, min([_allowed_cores(), *_quotas(membership, groups)]))
+
+
+def _allowed_cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _quotas(membership: Path, groups: Path) -> Iterator[int]:
+    """Cores that each group's quota keeps busy; a file that is absent or odd sets none."""
+    for group in _groups(membership, groups):
+        for read in (_version_1, _version_2):
+            with suppress(OSError, ValueError):
+                quota, period = read(group)
+                if quota > 0 and period > 0:
+                    yield -(-quota // period)
+
+
+def _groups(membership: Path, groups: Path) -> Iterator[Path]:
+    """The groups of the process that may limit its time, and all above them, which do as well.
+
+    In a container the path may be the machine's, while the container's group is mounted on top.
+    """
+    with suppress(OSError, ValueError):
+        for line in membership.read_text("utf-8").splitlines():
+            _, controllers, path = line.split(":", 2)  # of version 2 if it names no controllers
+            if not controllers or "cpu" in controllers.split(","):
+                own = PurePosixPath(path.lstrip("/"))
+                for group in (own, *own.parents):
+                    yield groups / controllers / group
+
+
+def _version_1(group: Path) -> tuple[int, int]:
+    """Microseconds of time in each period of so many; -1 for no limit.
+
+    Source: Linux, Documentation/scheduler/sched-bwc.rst.
+    """
+    quota = int((group / "cpu.cfs_quota_us").read_text("utf-8"))
+    return quota, int((group / "cpu.cfs_period_us").read_text("utf-8"))
+
+
+def _version_2(group: Path) -> tuple[int, int]:
+    """The same; ``max``, which is no number, for no limit.
+
+    Source: Linux, Documentation/admin-guide/cgroup-v2.rst, cpu.max.
+    """
+    quota, period = (group / "cpu.max").read_text("utf-8").split()
+    return int(quota), int(period)
