@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import signal
 import sys
 from types import ModuleType
 
@@ -19,6 +20,7 @@ from derain.cli import (
     tune,
     view,
 )
+from derain.cli.signals import interrupting
 from derain.errors import InputError
 
 DESCRIPTION = """\
@@ -61,13 +63,15 @@ def main(arguments: list[str] | None = None) -> int:
         arguments: Command line without the program's name; by default that of the process.
 
     Returns:
-        Exit code: 0, or 2 where the user's input cannot be used.
+        Exit code: 0, or 2 where the user's input cannot be used, or 128 and the number of the
+        signal that ended it.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     try:
-        code = _run(arguments)
-        sys.stdout.flush()  # here, where a pipe that broke is still ours to handle
-        return code
+        with interrupting():
+            code = _run(arguments)
+            sys.stdout.flush()  # here, where a pipe that broke is still ours to handle
+            return code
     except InputError as error:
         print(f"derain: {error}", file=sys.stderr)
         return 2
@@ -75,9 +79,20 @@ def main(arguments: list[str] | None = None) -> int:
         # Whoever read our output has had enough; Python must not try to flush the rest.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except KeyboardInterrupt:
-        print("derain: interrupted", file=sys.stderr)
-        return 130
+    except KeyboardInterrupt as interruption:
+        return _interrupted(interruption)
+    except SystemExit as leaving:
+        if isinstance(leaving.__context__, KeyboardInterrupt):  # Lightning leaves in its own way
+            return _interrupted(leaving.__context__)
+        raise
+
+
+def _interrupted(interruption: KeyboardInterrupt) -> int:
+    """Tells of the signal that ended the command, as its exit code does."""
+    number = getattr(interruption, "signal", signal.SIGINT)
+    by = "" if number == signal.SIGINT else f" by {number.name}"
+    print(f"derain: interrupted{by}", file=sys.stderr)
+    return 128 + number
 
 
 def _run(arguments: list[str]) -> int:

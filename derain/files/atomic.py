@@ -1,12 +1,12 @@
 """Writing a file whole or not at all."""
 
 import os
-import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from derain.errors import InputError
+from derain.files.temporary import temporary_beside
 
 
 @contextmanager
@@ -14,7 +14,8 @@ def replacing(path: Path) -> Iterator[Path]:
     """Lends a temporary file that takes the place of `path` when the block ends well.
 
     Until then `path` stays as it was; after an error the temporary file is gone. It is hidden, has
-    the same suffix and lies in the same folder, which is created if missing.
+    the same suffix and lies in the same folder, which is created if missing. What a killed process
+    leaves there goes with the next one that writes to the folder.
 
     Args:
         path: The file to write.
@@ -29,14 +30,10 @@ def replacing(path: Path) -> Iterator[Path]:
     try:
         if path.exists() and not path.is_file():
             raise InputError(path, "is not a file that can be replaced", "Name a file to write.")
-        temporary = path.with_name(f".derain-{secrets.token_hex(8)}{path.suffix}")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            temporary.touch(exist_ok=False)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with temporary_beside(path) as temporary:
             yield temporary
             os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
     except OSError as error:
         raise InputError(
             path,

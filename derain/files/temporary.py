@@ -1,0 +1,69 @@
+"""Temporary files, which the next run removes where this one is killed."""
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+
+from derain.files.lock import lock
+
+PREFIX = ".derain-"
+
+
+@contextmanager
+def temporary_beside(path: Path) -> Iterator[Path]:
+    """Lends an empty file in the folder of another, hidden and of the same suffix.
+
+    It is gone when the block ends. A process that is killed leaves it; it holds a lock that goes
+    with the process, so that others can tell.
+
+    Args:
+        path: The other file, which need not exist.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    remove_abandoned(path.parent)
+    temporary = path.with_name(f"{PREFIX}{secrets.token_hex(8)}{path.suffix}")
+    try:
+        descriptor = _made(temporary)
+        try:
+            yield temporary
+        finally:
+            if descriptor is not None:
+                os.close(descriptor)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _made(file: Path) -> int | None:
+    """Makes a file and holds it locked; None without locks, where nobody removes it either."""
+    while True:
+        descriptor = os.open(file, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
+        try:
+            lock(descriptor, wait=True)
+        except OSError:
+            os.close(descriptor)
+            return None
+        if os.fstat(descriptor).st_nlink:
+            return descriptor
+        os.close(descriptor)  # somebody took it for abandoned before it was locked
+
+
+@cache
+def remove_abandoned(folder: Path) -> None:
+    """Removes what killed processes have left in a folder, once in the life of this process.
+
+    Args:
+        folder: The folder, which need not exist.
+    """
+    for file in folder.glob(f"{PREFIX}*"):
+        with suppress(OSError):  # somebody else's, or gone, or on a file system without locks
+            descriptor = os.open(file, os.O_RDWR)
+            try:
+                if lock(descriptor, wait=False):
+                    file.unlink()
+            finally:
+                os.close(descriptor)

@@ -1,0 +1,80 @@
+"""A command that is asked to end clears up, and says by its exit code what ended it."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from derain.cli.signals import ENDING, interrupting
+from derain.files.atomic import replacing
+
+# `derain info` that writes its argument, slowly.
+WRITES = """
+import sys, time
+from pathlib import Path
+from derain.cli.main import COMMANDS, main
+from derain.files.atomic import replacing
+
+def write(arguments):
+    with replacing(Path(sys.argv[1])) as temporary:
+        temporary.write_bytes(b"half")
+        print("writing", flush=True)
+        time.sleep(60)
+
+COMMANDS["info"].main = write
+sys.exit(main(["info", "scan.bin"]))
+"""
+
+
+def stopped(path: Path, by: signal.Signals) -> tuple[int, str]:
+    """Exit code and error output of a command that is stopped while it writes a file."""
+    command = [sys.executable, "-c", WRITES, path]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline() == "writing\n"
+        process.send_signal(by)
+        _, error = process.communicate(timeout=60)
+    return process.returncode, error
+
+
+@pytest.mark.parametrize("by", ENDING, ids=lambda by: by.name)
+def test_a_command_that_is_asked_to_end_leaves_nothing_half_written(
+    tmp_path: Path, by: signal.Signals
+) -> None:
+    path = tmp_path / "result.bin"
+    path.write_bytes(b"old")
+    name = "" if by == signal.SIGINT else f" by {by.name}"
+    assert stopped(path, by) == (128 + by, f"derain: interrupted{name}\n")
+    assert list(tmp_path.iterdir()) == [path]
+    assert path.read_bytes() == b"old"
+
+
+def test_what_a_killed_command_leaves_goes_with_the_next_and_what_is_in_use_stays(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "result.bin"
+    assert stopped(path, signal.SIGKILL) == (-signal.SIGKILL, "")
+    (abandoned,) = tmp_path.iterdir()
+    command = [sys.executable, "-c", WRITES, path]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "writing\n"
+        (in_use,) = tmp_path.iterdir()
+        assert in_use != abandoned
+        with replacing(path) as temporary:
+            assert set(tmp_path.iterdir()) == {in_use, temporary}
+        process.kill()
+    assert set(tmp_path.iterdir()) == {in_use, path}
+
+
+def test_signals_that_others_listen_to_are_left_to_them() -> None:
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        with interrupting():
+            signal.raise_signal(signal.SIGTERM)
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert signal.getsignal(signal.SIGTERM) is before
