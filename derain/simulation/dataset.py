@@ -8,16 +8,12 @@ Each sequence has its own source of chance: neither an interruption nor the numb
 changes a byte. Of two runs at work on one folder the second waits for the first.
 """
 
-import fcntl
-import multiprocessing
 import os
 import shutil
 import sys
-import threading
 from collections.abc import Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -26,9 +22,12 @@ from typing import Any
 from tqdm import tqdm
 
 from derain.errors import InputError
+from derain.files.lock import lock
+from derain.files.temporary import remove_abandoned
 from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MANIFEST, checksums, read_manifest, write_manifest
 from derain.simulation.sequence import write_sequence
+from derain.workers import worker_pool
 
 SEQUENCES = "sequences"
 
@@ -84,10 +83,11 @@ def _simulate(root: Path, campaign: Campaign, workers: int, *, keep: bool) -> No
     description = {**campaign.description, "keep": keep}
     files: dict[str, str] = {}
     with _writing(root):
-        (root / SEQUENCES).mkdir(parents=True, exist_ok=True)
-        write_manifest(root, description)
-        for written in _complete_sequences(root, campaign, workers):
-            files |= written
+        write_manifest(root, description)  # first: without it the folder is somebody else's
+        (root / SEQUENCES).mkdir(exist_ok=True)
+        with closing(_complete_sequences(root, campaign, workers)) as complete:
+            for written in complete:
+                files |= written
         write_manifest(root, {**description, "files": files})
 
 
@@ -98,18 +98,26 @@ def _alone(root: Path) -> Iterator[None]:
         raise InputError(root, "is not a folder", "Name a new or empty folder.")
     with _writing(root):
         root.mkdir(parents=True, exist_ok=True)
-        folder = os.open(root, os.O_RDONLY)
+    folder = _locked(root)
     try:
-        try:
-            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            print(f"derain: waits for another run that simulates in {root}", file=sys.stderr)
-            fcntl.flock(folder, fcntl.LOCK_EX)
-        except OSError:
-            pass  # a file system without locks: as good as alone
+        remove_abandoned(root)
         yield
     finally:
-        os.close(folder)
+        if folder is not None:
+            os.close(folder)
+
+
+def _locked(root: Path) -> int | None:
+    """The folder, held locked; None where there are no locks, which is as good as alone."""
+    try:
+        folder = os.open(root, os.O_RDONLY)
+    except OSError:
+        return None  # Windows opens no folders
+    with suppress(OSError):
+        if not lock(folder, wait=False):
+            print(f"derain: waits for another run that simulates in {root}", file=sys.stderr)
+            lock(folder, wait=True)
+    return folder
 
 
 @contextmanager
@@ -151,32 +159,24 @@ def _complete_sequences(root: Path, campaign: Campaign, workers: int) -> Iterato
     if workers == 1:
         yield from progress(map(complete, campaign.names))
         return
-    # Not forked: the threads of Open3D would not survive it.
-    context = multiprocessing.get_context("spawn")
     try:
-        with ProcessPoolExecutor(workers, context, _end_with_parent) as pool:
+        with worker_pool(workers) as pool:
             yield from progress(pool.map(complete, campaign.names))
     except BrokenProcessPool as error:
         raise InputError(
             root, "a worker was killed, perhaps for want of memory", "Try again with fewer workers."
         ) from error
+    finally:
+        for name in campaign.names:  # a worker that is stopped does not clear up
+            shutil.rmtree(_unfinished(root, name), ignore_errors=True)
 
 
-def _end_with_parent() -> None:
-    """Ends this worker when its parent is killed; it would wait for work for ever."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def watch() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+def _unfinished(root: Path, name: str) -> Path:
+    return root / SEQUENCES / f".{name}"
 
 
 def _complete_sequence(root: Path, campaign: Campaign, name: str) -> dict[str, str]:
-    folder = root / SEQUENCES / name
-    unfinished = folder.with_name(f".{name}")
+    folder, unfinished = root / SEQUENCES / name, _unfinished(root, name)
     if not folder.exists():
         shutil.rmtree(unfinished, ignore_errors=True)  # of a run that was killed
         try:

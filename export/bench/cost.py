@@ -4,9 +4,7 @@ Each method is measured alone, in a fresh process that loads nothing of torch: n
 neighbours is shared, no other method's memory is counted, and a crash is that method's alone.
 """
 
-import multiprocessing
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +14,7 @@ from numpy.typing import NDArray
 from derain.export.bench.contestants import Contestant
 from derain.export.timing import STAGES, timed_runs
 from derain.files import DEFAULT_COLUMNS
+from derain.workers import worker_pool
 
 WARM_UP = 2
 
@@ -68,11 +67,9 @@ def measure_cost(contestant: Contestant, timing: Timing) -> Cost:
         contestant: The method.
         timing: What it is timed on, and how.
     """
-    # Spawned, not forked: a fork would begin with all that this process holds.
-    process = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(max_workers=1, mp_context=process) as executor:
+    with worker_pool(1) as pool:
         try:
-            return executor.submit(run_alone, contestant, timing).result()
+            return pool.submit(run_alone, contestant, timing).result()
         except Exception as error:  # whatever its libraries raise is told in the method's row
             return Cost({stage: np.zeros(0) for stage in STAGES}, None, str(error))
 

@@ -1,0 +1,62 @@
+"""Processes that work for this one, and end with it however it ends."""
+
+import multiprocessing
+import os
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+
+# Tells the processes that Lightning starts for a run on several devices which process began it.
+LAUNCHER = "DERAIN_LAUNCHER"
+
+
+@contextmanager
+def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Lends processes that share work.
+
+    When the block ends with an error, or by a signal, nobody waits for what they are at. When this
+    process is killed they end as well, instead of waiting for work for ever.
+
+    Args:
+        workers: How many.
+    """
+    others = set(multiprocessing.active_children())
+    # Not forked: a fork would hold all that this process holds, but none of its threads.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context, _end_with_parent) as pool:
+        try:
+            yield pool
+        except BaseException:
+            for worker in set(multiprocessing.active_children()) - others:
+                worker.kill()
+            raise
+
+
+def end_with_launcher() -> None:
+    """Ends this process when the one that began its run is gone, if that is another process.
+
+    Lightning runs the command again for each further device. Where its first process is killed the
+    others would wait for it. Windows does not tell when a parent is gone.
+    """
+    launcher = int(os.environ.setdefault(LAUNCHER, str(os.getpid())))
+    if "LOCAL_RANK" in os.environ and launcher != os.getpid():
+        threading.Thread(target=_watch, args=(launcher,), daemon=True).start()
+
+
+def _watch(launcher: int) -> None:
+    while os.getppid() == launcher:
+        time.sleep(1)
+    os._exit(1)
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
