@@ -2,19 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from derain.cards import DataCard, load_card, packaged_cards
 from derain.data_layout import REHEARSE3D, SEMANTIC_KITTI, Layout
 from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile
 from derain.datamodules.sequences import SequenceDataModule
+from derain.documents import Entry
 from derain.errors import InputError
 from derain.files import find_scans
 from derain.files.labels import label_beside
-from derain.files.reading import reading
-from derain.simulation.manifest import read_manifest
+from derain.simulation.manifest import RAIN_RATE, rates_of_sequences, read_manifest
 
 
 class NamedScans(ScanDataModule):
@@ -96,17 +93,8 @@ def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
         InputError: A file that is not of this kind.
     """
     if file is None:
-        return dict(read_manifest(paths[0]).get("rain_rate_mm_h", {}))
-    with reading(file):
-        text = file.read_bytes()
-    try:
-        return _rates(yaml.safe_load(text))
-    except (yaml.YAMLError, TypeError, ValueError) as error:
-        raise InputError(
-            file,
-            f"not the rain rates of sequences ({error})",
-            'It needs lines such as "005": 25, the name in quotes and the rate in mm/h.',
-        ) from error
+        return dict(read_manifest(paths[0]).get(RAIN_RATE, {}))
+    return rates_of_sequences(Entry.of_yaml(file))
 
 
 def full_name(card: DataCard) -> str:
@@ -136,9 +124,3 @@ def _layout_of(root: Path) -> Layout:
         f"no sequence has a folder {REHEARSE3D.scans} or {SEMANTIC_KITTI.scans}",
         "Name the folders of scans themselves.",
     )
-
-
-def _rates(content: Any) -> dict[str, float]:
-    if not isinstance(content, dict) or not all(isinstance(name, str) for name in content):
-        raise TypeError("each sequence must be named, in quotes: 010 alone is a number")
-    return {name: float(rate) for name, rate in content.items()}

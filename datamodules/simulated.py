@@ -64,7 +64,7 @@ class Simulated(SequenceDataModule):
 
 def _split_of(root: Path) -> dict[str, list[str]]:
     manifest = read_manifest(root)
-    if "files" not in manifest:
+    if not {"files", "split"} <= manifest.keys():
         raise InputError(
             root,
             "holds no complete simulated data set",

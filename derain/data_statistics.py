@@ -17,13 +17,10 @@ from derain.errors import InputError
 from derain.files import find_scans, read_scan
 from derain.files.labels import label_beside, read_labels, semantic
 from derain.files.reading import reading
-from derain.simulation.manifest import read_manifest
+from derain.simulation.manifest import RAIN_RATE, read_manifest
 
 # Folders of scans and of their labels: those of REHEARSE-3D, and those of SemanticKITTI and WADS.
 LAYOUTS = tuple((layout.scans, layout.labels) for layout in (REHEARSE3D, SEMANTIC_KITTI))
-
-# Column of a weather record, mm/h.
-RAIN_RATE = "rain_rate_mm_h"
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ one another, and every value may be of another kind than it should be.
 
 import json
 import math
+import re
 import reprlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
@@ -23,11 +24,23 @@ LARGEST_DOCUMENT = 2**20
 # The deepest document of derain, a Spec in a checkpoint's proof, has five levels.
 DEEPEST = 32
 
+# In memory a value takes up to a hundred times the two characters that it may be written with: a
+# document may have one for so many of the bytes that it may have.
+BYTES_PER_VALUE = 16
+
 # What PyYAML lets out: its own errors, and what Python says of a tag such as !!int over no number.
 _YAML_DAMAGE = (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError, RecursionError)
 
 # The parser in C where PyYAML was built with it: ten times faster on a large document.
-_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_LOADER: Any = type("_Loader", (getattr(yaml, "CSafeLoader", yaml.SafeLoader),), {})
+
+# A number with an exponent, such as 4e-6, which PyYAML takes for a text.
+# Source: YAML 1.2.2, section 10.3.2, core schema.
+_LOADER.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+$"),
+    list("-+.0123456789"),
+)
 
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, 60, 60
@@ -64,14 +77,14 @@ class Entry:
         """
         with reading(path, *_YAML_DAMAGE):
             text = _text(path, largest)
-            _refuse_depth_and_aliases(text)
+            _refuse_what_unfolds(text, largest // BYTES_PER_VALUE)
             return cls(path, "", yaml.load(text, _LOADER))
 
     @classmethod
     def of_json_file(cls, path: Path, largest: int = LARGEST_DOCUMENT) -> "Entry":
         """The whole of a JSON file; arguments and errors as for :meth:`of_yaml`."""
         with reading(path, ValueError, RecursionError):
-            return cls(path, "", _parsed_json(_text(path, largest)))
+            return cls(path, "", _parsed_json(_text(path, largest), largest // BYTES_PER_VALUE))
 
     @classmethod
     def of_json(cls, text: str, source: Path | str) -> "Entry":
@@ -87,7 +100,7 @@ class Entry:
         try:
             if len(text) > LARGEST_DOCUMENT:
                 raise ValueError(f"{len(text):,} characters")
-            return cls(source, "", _parsed_json(text))
+            return cls(source, "", _parsed_json(text, LARGEST_DOCUMENT // BYTES_PER_VALUE))
         except (ValueError, RecursionError) as error:
             raise InputError(source, f"not JSON ({error})", "Write it again.") from error
 
@@ -108,6 +121,17 @@ class Entry:
                 )
         return {
             key: Entry(self.source, f"{self.key}.{key}" if self.key else key, value)
+            for key, value in self.value.items()
+        }
+
+    def numbered(self, least: int, most: int) -> dict[int, "Entry"]:
+        """The values of a mapping by their keys, which must be whole numbers of this span."""
+        if not isinstance(self.value, dict):
+            raise self.fault(f"{shown(self.value)} is not a mapping", "Write `0: value` pairs.")
+        return {
+            Entry(self.source, self.key, key).whole(least, most): Entry(
+                self.source, f"{self.key}.{shown(key)}", value
+            )
             for key, value in self.value.items()
         }
 
@@ -138,10 +162,10 @@ class Entry:
             for number, value in enumerate(self.value)
         ]
 
-    def numbers(self, count: int) -> tuple[float, ...]:
-        """A list of so many finite numbers."""
+    def numbers(self, count: int | None = None) -> tuple[float, ...]:
+        """A list of so many finite numbers, or of any number of them."""
         items = self.items()
-        if len(items) != count:
+        if count is not None and len(items) != count:
             raise self.fault(f"{shown(self.value)} are not {count} numbers", f"Write {count}.")
         return tuple(item.number() for item in items)
 
@@ -188,10 +212,25 @@ class Entry:
         return self.value
 
     def text(self) -> str:
-        """A text."""
+        """A text, which may be the name of a file."""
         if not isinstance(self.value, str):
             raise self.fault(f"{shown(self.value)} is no text", "Put it in quotes.")
+        if "\0" in self.value:
+            raise self.fault("it has a null character", "Leave it out.")
         return self.value
+
+    def texts(self) -> tuple[str, ...]:
+        """A list of texts."""
+        return tuple(item.text() for item in self.items())
+
+    def scalar(self) -> str | bool | int | float:
+        """A text, a finite number, or true or false."""
+        if isinstance(self.value, str):
+            return self.text()
+        if isinstance(self.value, bool):
+            return self.value
+        number = self.number()
+        return self.value if isinstance(self.value, int) else number
 
 
 def shown(value: Any) -> str:
@@ -215,7 +254,10 @@ def _text(path: Path, largest: int) -> str:
     return content.decode("utf-8")
 
 
-def _parsed_json(text: str) -> Any:
+def _parsed_json(text: str, most: int) -> Any:
+    # At least as many as there are values: what stands in texts counts as well.
+    if sum(map(text.count, ",:[{")) > most:
+        raise ValueError(f"more than {most:,} values")
     value = json.loads(text)
     _refuse_depth(value)
     return value
@@ -229,10 +271,12 @@ def _refuse_depth(value: Any, depth: int = 0) -> None:
             _refuse_depth(part, depth + 1)
 
 
-def _refuse_depth_and_aliases(text: str) -> None:
-    """Refuses, before anything is built, what could be far larger than its text."""
+def _refuse_what_unfolds(text: str, most: int) -> None:
+    """Refuses, before anything is built, what would be far larger than its text."""
     depth = 0
-    for event in yaml.parse(text, _LOADER):
+    for number, event in enumerate(yaml.parse(text, _LOADER)):
+        if number > most:
+            raise ValueError(f"more than {most:,} values")
         if isinstance(event, yaml.AliasEvent):
             raise ValueError(f"the alias *{short(event.anchor)}: write out what it stands for")
         depth += isinstance(event, yaml.CollectionStartEvent)

@@ -2,14 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
+from derain.documents import Entry
 from derain.errors import InputError
-from derain.files.reading import reading
 from derain.scan import to_float32
 
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -40,8 +38,7 @@ class Extrinsics:
         if not np.array_equal(self.matrix[3], (0, 0, 0, 1)):
             raise ValueError(f"the matrix's last row is {self.matrix[3].tolist()}, not 0 0 0 1")
         rotation = self.matrix[:3, :3]
-        stretched = np.abs(rotation @ rotation.T - np.eye(3)).max() > ROUNDING
-        if stretched or np.linalg.det(rotation) < 0:
+        if not _is_rotation(rotation):
             raise ValueError("the matrix's upper left 3 x 3 numbers are not a rotation")
 
     @classmethod
@@ -86,28 +83,35 @@ def read_extrinsics(path: Path) -> Extrinsics:
     Raises:
         InputError: A file that is missing or says something else, or a motion that is not rigid.
     """
-    with reading(path, UnicodeDecodeError):
-        text = path.read_text(encoding="utf-8")
+    document = Entry.of_yaml(path)
     try:
-        return _extrinsics(yaml.safe_load(text))
-    except (yaml.YAMLError, TypeError, ValueError) as error:
-        raise InputError(
-            path,
-            f"not extrinsics ({error})",
+        return _extrinsics(document)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise document.fault(str(error), "Write the sensor's pose, or a rigid motion.") from error
+
+
+def _extrinsics(document: Entry) -> Extrinsics:
+    values = document.members()
+    if values.keys() == {"matrix"}:
+        rows = values["matrix"].items()
+        return Extrinsics(np.array([row.numbers(4) for row in rows], np.float64))
+    if values.keys() != set(POSE):
+        raise document.fault(
+            f"its keys are {', '.join(values)}",
             f"It needs {', '.join(POSE)} (metres, degrees), or matrix (4 rows of 4 numbers).",
-        ) from error
+        )
+    return Extrinsics.of_pose(**{name: value.number() for name, value in values.items()})
 
 
-def _extrinsics(content: Any) -> Extrinsics:
-    match content:
-        case {"matrix": rows, **rest} if not rest:
-            return Extrinsics(np.array(rows, dtype=np.float64))
-        case dict() if content.keys() == set(POSE):
-            return Extrinsics.of_pose(**{name: float(value) for name, value in content.items()})
-        case dict():
-            raise ValueError(f"its keys are {', '.join(map(str, content))}")
-        case _:
-            raise ValueError("it is no mapping")
+def _is_rotation(matrix: NDArray[np.float64]) -> bool:
+    # The first is asked first: squares of what is far larger would not be numbers.
+    return bool(
+        np.abs(matrix).max() <= 1 + ROUNDING
+        and np.abs(matrix @ matrix.T - np.eye(3)).max() <= ROUNDING
+        and np.linalg.det(matrix) > 0
+    )
 
 
 def _rotation(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:

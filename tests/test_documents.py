@@ -60,6 +60,59 @@ def test_a_number_is_finite_and_no_truth_value(value: object) -> None:
         Entry("file", "a.b", value).number()
 
 
+def test_many_small_values_in_a_document_are_too_many(tmp_path: Path) -> None:
+    path = tmp_path / "document"
+    path.write_text("[" + "[]," * 100_000 + "0]")  # 300 kB, and 10 MB in memory
+    for read in (Entry.of_yaml, Entry.of_json_file):
+        with pytest.raises(InputError, match="more than 65,536 values"):
+            read(path)
+    assert len(Entry.of_json_file(path, 100 * LARGEST_DOCUMENT).items()) == 100_001
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("4e-6", 4e-6),
+        ("-1E3", -1e3),
+        ("+.5e+2", 50.0),
+        ("2.5e1", 25.0),
+        ("1.5", 1.5),
+        ("12", 12),
+        ("'4e-6'", "4e-6"),
+        ("4e-6 m", "4e-6 m"),
+        ("e5", "e5"),
+        ("0e1f", "0e1f"),
+    ],
+)
+def test_a_number_with_an_exponent_is_one_with_and_without_a_point(
+    text: str, value: object, tmp_path: Path
+) -> None:
+    path = tmp_path / "document.yaml"
+    path.write_text(f"a: {text}")
+    read = Entry.of_yaml(path).value["a"]
+    assert (type(read), read) == (type(value), value)
+
+
+def test_a_mapping_may_have_numbers_for_keys() -> None:
+    entry = Entry("file", "classes", {0: "ground", 3: "rain"})
+    assert {id_: name.text() for id_, name in entry.numbered(0, 9).items()} == entry.value
+    for wrong in ([], {"0": "a"}, {10: "a"}, {True: "a"}, {1.0: "a"}, {None: "a"}, {16**5000: "a"}):
+        with pytest.raises(InputError, match="file: classes: "):
+            Entry("file", "classes", wrong).numbered(0, 9)
+
+
+@pytest.mark.parametrize("value", ["text", 5, -2.5, True, False])
+def test_a_scalar_is_text_a_finite_number_or_a_truth_value(value: object) -> None:
+    read = Entry("file", "a", value).scalar()
+    assert (type(read), read) == (type(value), value)
+
+
+@pytest.mark.parametrize("value", [None, [], {}, float("inf"), 10**400, "null\0"])
+def test_anything_else_is_no_scalar(value: object) -> None:
+    with pytest.raises(InputError, match="file: a: "):
+        Entry("file", "a", value).scalar()
+
+
 def test_values_are_cut_in_messages() -> None:
     nested: object = "x"
     for _ in range(8):

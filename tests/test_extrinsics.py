@@ -1,5 +1,6 @@
 """Where a sensor is: against SciPy's rotations, and what no sensor's place can be."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -75,30 +76,39 @@ def rigid(**changes: float) -> list[list[float]]:
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
-        ("", "it is no mapping"),
-        ("- 1", "it is no mapping"),
+        ("", "None is not a mapping"),
+        ("- 1", "[1] is not a mapping"),
         ("a: [", "while parsing"),
         ("{x: 1}", "its keys are x"),
-        ("{}", "its keys are "),
+        ("{}", "its keys are. It needs x, y, z"),
         (
             "{x: 0, y: 0, z: 0, roll: 0, pitch: 0, yaws: 0}",
             "its keys are x, y, z, roll, pitch, yaws",
         ),
-        ("{x: 0, y: 0, z: 0, roll: 0, pitch: 0, yaw: left}", "could not convert"),
-        ("{x: 0, y: 0, z: 0, roll: 0, pitch: 0, yaw: .nan}", "not finite"),
-        ("{x: .inf, y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}", "not finite"),
-        ("{x: [1], y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}", "float"),
-        ("matrix: 5", r"shape \(\), not \(4, 4\)"),
-        ("matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]", r"shape \(3, 3\), not \(4, 4\)"),
-        ("matrix: [[1, 0], [0]]", "inhomogeneous"),
+        ("{x: 0, y: 0, z: 0, roll: 0, pitch: 0, yaw: left}", "yaw: 'left' is not a finite number"),
+        ("{x: 0, y: 0, z: 0, roll: 0, pitch: 0, yaw: .nan}", "yaw: nan is not a finite number"),
+        ("{x: .inf, y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}", "x: inf is not a finite number"),
+        ("{x: [1], y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}", "x: [1] is not a finite number"),
+        (f"{{x: 1{'0' * 400}, y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}}", "x: the number is too"),
+        ("matrix: 5", "matrix: 5 is not a list"),
+        ("matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]", "matrix[0]: [1, 0, 0] are not 4 numbers"),
+        ("matrix: [[1, 0, 0, 0]]", "shape (1, 4), not (4, 4)"),
+        ("matrix: []", "shape (0,), not (4, 4)"),
+        ("matrix: [[1, 0], [0]]", "matrix[0]: [1, 0] are not 4 numbers"),
         (yaml.safe_dump({"matrix": rigid(), "x": 1}), "its keys are matrix, x"),
         (yaml.safe_dump({"matrix": rigid(at_00=-1.0)}), "not a rotation"),
         (yaml.safe_dump({"matrix": rigid(at_00=1.01)}), "not a rotation"),
         (yaml.safe_dump({"matrix": rigid(at_01=0.1)}), "not a rotation"),
         (yaml.safe_dump({"matrix": rigid(at_00=0.0)}), "not a rotation"),
+        # Products of these are infinite, and their sum is not a number.
+        (yaml.safe_dump({"matrix": rigid(at_00=1e200, at_11=-1e200)}), "not a rotation"),
+        (
+            yaml.safe_dump({"matrix": rigid(at_00=1e200, at_01=1e200, at_10=1e200, at_11=-1e200)}),
+            "not a rotation",
+        ),
         (yaml.safe_dump({"matrix": rigid(at_30=2.0)}), "last row"),
         (yaml.safe_dump({"matrix": rigid(at_33=2.0)}), "last row"),
-        (yaml.safe_dump({"matrix": rigid(at_03=float("nan"))}), "not finite"),
+        (yaml.safe_dump({"matrix": rigid(at_03=float("nan"))}), "nan is not a finite number"),
     ],
 )
 def test_what_is_no_rigid_motion_is_refused_in_one_line(
@@ -106,9 +116,16 @@ def test_what_is_no_rigid_motion_is_refused_in_one_line(
 ) -> None:
     path = tmp_path / "radar.yaml"
     path.write_text(content)
-    with pytest.raises(InputError, match=rf"radar\.yaml: not extrinsics \(.*{reason}") as refusal:
+    with pytest.raises(InputError, match=rf"radar\.yaml: .*{re.escape(reason)}") as refusal:
         read_extrinsics(path)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_number_may_be_written_with_an_exponent_alone(tmp_path: Path) -> None:
+    path = tmp_path / "radar.yaml"
+    path.write_text("{x: 5e-1, y: -2E1, z: .5e3, roll: 0, pitch: 1.5e1, yaw: 0}")
+    expected = Extrinsics.of_pose(0.5, -20, 500, 0, 15, 0)
+    np.testing.assert_array_equal(read_extrinsics(path).matrix, expected.matrix)
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:

@@ -23,12 +23,15 @@ import yaml
 from derain.annotation.boxes import Box, Correction, Triple
 from derain.annotation.plane import PlaneSearch
 from derain.annotation.scene import Polygon, Scene
-from derain.documents import Entry
+from derain.documents import Entry, shown
 from derain.files.atomic import replacing
 from derain.simulation.classes import TrackClass
 
 # Points of a candidate for the plane: more make it no better, and RANSAC less likely to find it.
 MOST_FITTED = 100
+
+# No LiDAR sees as far, metres, and a product of three such lengths is still a number.
+FARTHEST = 1e6
 
 # Open3D's whole numbers have 32 bits.
 LARGEST = 2**31 - 1
@@ -47,7 +50,7 @@ def read_scene(path: Path) -> Scene:
         "road": _polygon,
         "boxes": _boxes,
         "rain_area": _polygon,
-        "height": Entry.number,
+        "height": _metres,
         "plane": _plane_search,
         "corrections": _itself,
     }
@@ -116,7 +119,9 @@ def _polygon(entry: Entry) -> Polygon:
     corners = entry.items()
     if len(corners) < 3:
         raise entry.fault(f"{len(corners)} corners make no polygon", "List three or more [x, y].")
-    return tuple((x, y) for x, y in (corner.numbers(2) for corner in corners))
+    for corner in corners:
+        corner.numbers(2)
+    return tuple((x, y) for x, y in (map(_metres, corner.items()) for corner in corners))
 
 
 def _boxes(entry: Entry) -> dict[str, Box]:
@@ -131,7 +136,7 @@ def _box(entry: Entry) -> Box:
 
 def _plane_search(entry: Entry) -> PlaneSearch:
     parsers = {
-        "distance": Entry.positive,
+        "distance": _length,
         "points": lambda value: value.whole(3, MOST_FITTED),
         "iterations": lambda value: value.whole(1, LARGEST),
         "scans": lambda value: value.whole(1, LARGEST),
@@ -159,17 +164,28 @@ def _itself(entry: Entry) -> Entry:
 
 def _class(entry: Entry) -> TrackClass:
     if not isinstance(entry.value, str) or entry.value not in CLASSES:
-        raise entry.fault(f"there is no class {entry.value!r}", f"Known are {', '.join(CLASSES)}.")
+        raise entry.fault(
+            f"there is no class {shown(entry.value)}", f"Known are {', '.join(CLASSES)}."
+        )
     return CLASSES[entry.value]
 
 
 def _triple(entry: Entry) -> Triple:
-    x, y, z = entry.numbers(3)
+    entry.numbers(3)
+    x, y, z = map(_metres, entry.items())
     return x, y, z
 
 
 def _size(entry: Entry) -> Triple:
-    size = _triple(entry)
-    for side in entry.items():
-        side.positive()
-    return size
+    entry.numbers(3)
+    length, width, height = map(_length, entry.items())
+    return length, width, height
+
+
+def _metres(entry: Entry) -> float:
+    return entry.within(-FARTHEST, FARTHEST)
+
+
+def _length(entry: Entry) -> float:
+    entry.positive()
+    return _metres(entry)

@@ -1,19 +1,22 @@
 """Data cards: what must be known of a data set to train on it and to use what was trained."""
 
-import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from derain.channels import UNITS
+from derain.documents import Entry, shown
 from derain.errors import InputError
+from derain.files.labels import LARGEST_ID
+from derain.files.reading import reading
 from derain.scan import Scan
+
+Parsed = TypeVar("Parsed")
 
 # What mean and std are of, in their order.
 CHANNELS = ("x", "y", "z", "intensity")
@@ -135,64 +138,73 @@ def load_card(name: str | Path) -> DataCard:
     """
     cards = packaged_cards()
     path = cards.get(str(name), Path(name))
-    if not path.is_file():
+    with reading(path):
+        exists = path.is_file()
+    if not exists:
         raise InputError(
             name, "no such data card", f"Give a YAML file or one of {', '.join(cards)}."
         )
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-        return _card(content)
-    except (yaml.YAMLError, UnicodeDecodeError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(
-            path, f"not a data card ({error})", "It needs name, classes (id: name) and rain (ids)."
-        ) from error
+    return _card(Entry.of_yaml(path))
 
 
-def _card(content: dict[str, Any]) -> DataCard:
-    card = DataCard(
-        **{
-            **content,
-            "classes": {int(id_): str(name) for id_, name in content.get("classes", {}).items()},
-            "rain": tuple(int(id_) for id_ in content.get("rain", ())),
-            "unknown": tuple(int(id_) for id_ in content.get("unknown", ())),
-            "split": {part: _names(names) for part, names in content.get("split", {}).items()},
-            "mean": _numbers(content.get("mean"), CHANNELS),
-            "std": _numbers(content.get("std"), CHANNELS),
-            "range": _numbers(content.get("range"), ("mean", "std")),
-            "extra": {
-                str(name): _numbers(numbers, ("mean", "std"))
-                for name, numbers in content.get("extra", {}).items()
-            },
-        }
-    )
+def _card(document: Entry) -> DataCard:
+    parsers: dict[str, Callable[[Entry], Any]] = {
+        "name": Entry.text,
+        "classes": _classes,
+        "rain": _ids,
+        "unknown": _ids,
+        "licence": Entry.text,
+        "intensity_unit": Entry.text,
+        "mean": _if_known(lambda entry: entry.numbers(len(CHANNELS))),
+        "std": _if_known(_deviations),
+        "range": _if_known(_mean_and_deviation),
+        "extra": lambda entry: _each(entry, _mean_and_deviation),
+        "rain_share": _if_known(lambda entry: entry.within(0, 1)),
+        "simulated": Entry.truth,
+        "split": lambda entry: _each(entry, Entry.texts),
+    }
+    card = DataCard(**document.record(parsers, required=["name", "classes", "rain"]))
+    members = document.members()
     if len(set(card.classes.values())) < len(card.classes):
-        raise ValueError("two classes have the same name")
-    if not set(card.rain) <= set(card.classes) or not card.rain:
-        raise ValueError(f"rain {list(card.rain)} must name ids of its classes")
-    if not set(card.unknown) <= set(card.classes) - set(card.rain):
-        raise ValueError(f"unknown {list(card.unknown)} must name ids of its classes without rain")
-    stds = [*(card.std or ()), *(card.range or ())[1:], *(std for _, std in card.extra.values())]
-    if min(stds, default=1) <= 0:
-        raise ValueError(f"standard deviations {stds} must be positive")
-    if not isinstance(card.simulated, bool):
-        raise TypeError(f"simulated is {card.simulated!r}, and must be true or false")
-    if card.rain_share is not None and not 0 <= card.rain_share <= 1:
-        raise ValueError(f"rain_share {card.rain_share} must be within 0 and 1")
+        raise members["classes"].fault("two classes have the same name", "Give each its own.")
+    if not card.rain:
+        raise members["rain"].fault("it names no class", "Give the ids of those that are rain.")
+    for key, ids, known in (
+        ("rain", card.rain, card.classes.keys()),
+        ("unknown", card.unknown, card.classes.keys() - set(card.rain)),
+    ):
+        if not known >= set(ids):
+            raise members[key].fault(
+                f"{shown(list(ids))} are not all ids of classes"
+                f"{' that are not rain' if key == 'unknown' else ''}",
+                "Name ids that stand under classes.",
+            )
     return card
 
 
-def _numbers(values: Any, names: tuple[str, ...]) -> tuple[float, ...] | None:
-    if values is None:
-        return None
-    numbers = tuple(map(float, values))
-    if len(numbers) != len(names):
-        raise ValueError(f"{list(numbers)} must be one number each for {', '.join(names)}")
-    if not all(map(math.isfinite, numbers)):
-        raise ValueError(f"{list(numbers)} must be finite")
+def _classes(entry: Entry) -> dict[int, str]:
+    return {id_: name.text() for id_, name in entry.numbered(0, LARGEST_ID).items()}
+
+
+def _ids(entry: Entry) -> tuple[int, ...]:
+    return tuple(item.whole(0, LARGEST_ID) for item in entry.items())
+
+
+def _deviations(entry: Entry) -> tuple[float, ...]:
+    for item in entry.items():
+        item.positive()
+    return entry.numbers(len(CHANNELS))
+
+
+def _mean_and_deviation(entry: Entry) -> tuple[float, ...]:
+    numbers = entry.numbers(2)
+    entry.items()[1].positive()
     return numbers
 
 
-def _names(names: Any) -> tuple[str, ...]:
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise TypeError(f"{names} must be a list of sequences, each quoted: 010 alone is a number")
-    return tuple(names)
+def _if_known(parser: Callable[[Entry], Parsed]) -> Callable[[Entry], Parsed | None]:
+    return lambda entry: None if entry.value is None else parser(entry)
+
+
+def _each(entry: Entry, parser: Callable[[Entry], Parsed]) -> dict[str, Parsed]:
+    return {name: parser(member) for name, member in entry.members().items()}

@@ -1,8 +1,9 @@
 """When the scans of a folder were taken: its ``metadata.csv``, which REHEARSE-3D has as well."""
 
 import csv
+import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,9 @@ from derain.errors import InputError
 from derain.files.reading import reading
 
 METADATA = "metadata.csv"
+
+# Lines for a hundred thousand scans. What is read of a line takes up to forty times its length.
+LARGEST = 2**23
 
 # Names of the columns that hold a scan's name and its time; those of REHEARSE-3D are not published.
 FRAME_COLUMNS = ("frame", "timestamp")
@@ -50,25 +54,35 @@ def read_frame_times(
 
 
 def _times(path: Path, frame: str, timestamp: str) -> dict[str, float]:
-    damage = UnicodeDecodeError, csv.Error
-    with reading(path, *damage), path.open(newline="", encoding="utf-8-sig") as file:
-        lines = csv.DictReader(file, skipinitialspace=True)
-        present = lines.fieldnames or ()
-        rows = list(lines)
-    if not {frame, timestamp} <= set(present):
-        raise InputError(
-            path,
-            f"has no columns {frame} and {timestamp} ({', '.join(present)})",
-            "Name those of the scan's name and its time with --metadata-columns.",
-        )
     times: dict[str, float] = {}
-    for row in rows:
-        name, time = row[frame], _finite(path, row[timestamp])
+    for name, time in _lines(path, frame, timestamp):
+        seconds = _finite(path, time)
         if not name:
             raise InputError(path, "has a line that names no scan", "Complete it or leave it out.")
-        if times.setdefault(_key(name), time) != time:
+        if times.setdefault(_key(name), seconds) != seconds:
             raise InputError(path, f"gives {name} two times", "Leave one line for each scan.")
     return times
+
+
+def _lines(path: Path, *columns: str) -> Iterator[list[str | None]]:
+    """What every line has in some columns."""
+    with reading(path, UnicodeDecodeError, csv.Error), path.open("rb") as file:
+        if len(content := file.read(LARGEST + 1)) > LARGEST:
+            raise InputError(
+                path, f"has more than {LARGEST:,} bytes", "Leave a line for each scan."
+            )
+        lines = csv.DictReader(
+            io.StringIO(content.decode("utf-8-sig"), newline=""), skipinitialspace=True
+        )
+        present = lines.fieldnames or ()
+        if not set(columns) <= set(present):
+            raise InputError(
+                path,
+                f"has no columns {' and '.join(columns)} ({', '.join(present)})",
+                "Name those of the scan's name and its time with --metadata-columns.",
+            )
+        for line in lines:
+            yield [line[name] for name in columns]
 
 
 def _key(name: str) -> str:

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.documents import shown
 from derain.errors import InputError
 from derain.filters.radius_filter import RadiusFilter
 
@@ -54,7 +55,7 @@ class DROR(RadiusFilter):
         if self.variant not in get_args(Variant):
             raise InputError(
                 self.name,
-                f"variant is {self.variant}",
+                f"variant is {shown(self.variant)}",
                 f"Give one of {', '.join(get_args(Variant))}.",
             )
 

@@ -1,6 +1,5 @@
 """What every filter is: a few numbers, and a verdict on each point from its neighbourhood."""
 
-import math
 from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass, fields
 from numbers import Integral, Real
@@ -9,11 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.documents import shown
 from derain.errors import InputError
 from derain.neighbours import Neighbourhoods
 
 # No published filter looks at more than 51, and a search for thousands would fill the memory.
 MOST_NEIGHBOURS = 200
+
+# Beyond any limit that a filter may know, and a square of it is still a number.
+LARGEST = 1e100
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,7 @@ class PointFilter(ABC):
 
     Raises:
         InputError: ``neighbours`` that is not a whole number from 2 to 200, or another number that
-            is negative or not finite.
+            is negative, not finite or above 1e100.
     """
 
     neighbours: int
@@ -66,14 +69,16 @@ def _check_neighbours(filter_name: str, value: Any) -> None:
     if not (whole and 2 <= value <= MOST_NEIGHBOURS):
         raise InputError(
             filter_name,
-            f"neighbours is {value}",
+            f"neighbours is {shown(value)}",
             f"Give a whole number from 2 (the point itself and one more) to {MOST_NEIGHBOURS}.",
         )
 
 
 def _check_number(filter_name: str, parameter: str, value: Any) -> None:
     number = isinstance(value, Real) and not isinstance(value, bool)
-    if not (number and math.isfinite(value) and value >= 0):
+    if not (number and 0 <= value <= LARGEST):
         raise InputError(
-            filter_name, f"{parameter} is {value}", "Give a finite number that is not negative."
+            filter_name,
+            f"{parameter} is {shown(value)}",
+            f"Give a finite number that is not negative, {LARGEST:g} at most.",
         )

@@ -6,8 +6,9 @@ from itertools import cycle
 from typing import Any, Literal
 
 from derain import __version__
+from derain.documents import shown
 from derain.errors import InputError
-from derain.simulation.manifest import MAKER
+from derain.simulation.manifest import MAKER, RAIN_RATE
 from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.sensor import Sensor, load_sensor
@@ -16,6 +17,9 @@ from derain.simulation.sensor import Sensor, load_sensor
 # comes is not published. The first is rainy, for it may be all that there is to train on.
 # Source: REHEARSE-3D, sections III.A and III.C.
 FACILITY_RAIN_RATES = (10.0, 0.0, 25.0, 0.0, 50.0)
+
+# Sequences of a part, and scans of a sequence: months of simulation.
+MOST = 100_000
 
 # Shares of the sequences to validate and to test on: 28 and 29 of 143.
 # Source: data_cfg.yaml of the SalsaNext model published with REHEARSE-3D.
@@ -39,7 +43,8 @@ class Campaign:
         radar: The radar; None leaves it out, and with it the folders of its scans.
 
     Raises:
-        InputError: Too few sequences or scans, a negative seed, no rain rate or an impossible one.
+        InputError: Too few or too many sequences or scans, a negative seed, no rain rate or an
+            impossible one.
     """
 
     train: int = 16
@@ -54,12 +59,14 @@ class Campaign:
 
     def __post_init__(self) -> None:
         for name, least in (("train", 1), ("validation", 0), ("test", 0), ("scans", 1)):
-            if getattr(self, name) < least:
+            count = getattr(self, name)
+            if not least <= count <= MOST:
+                few_or_many = "few" if count < least else "many"
                 raise InputError(
-                    name, f"{getattr(self, name)} is too few", f"Give {least} or more."
+                    name, f"{shown(count)} is too {few_or_many}", f"Give {least} to {MOST:,}."
                 )
         if self.seed < 0:
-            raise InputError("seed", f"{self.seed} is negative", "Give 0 or more.")
+            raise InputError("seed", f"{shown(self.seed)} is negative", "Give 0 or more.")
         if not self.rain_rates:
             raise InputError("rain rate", "none is given", "Give one or more, in mm/h.")
         for rate in self.rain_rates:
@@ -102,7 +109,7 @@ class Campaign:
             "version": __version__,
             "campaign": asdict(replace(self, sensor=self.lidar)),
             "split": self.split,
-            "rain_rate_mm_h": self.rain_rate,
+            RAIN_RATE: self.rain_rate,
         }
         return dict(json.loads(json.dumps(content)))
 

@@ -10,21 +10,62 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from derain.documents import Entry
+from derain.errors import InputError
 from derain.files.atomic import replacing
+from derain.simulation.rain_field import HARDEST_RAIN
 
 MANIFEST = "manifest.json"
 
 # By this a manifest is known.
 MAKER = "derain.simulation"
 
+# Parts of its split.
+PARTS = ("train", "validation", "test")
+
+# Key of the rain rate of each sequence.
+RAIN_RATE = "rain_rate_mm_h"
+
+# A file takes 130 bytes: those of half a million.
+LARGEST_MANIFEST = 2**26
+
 
 def read_manifest(root: Path) -> dict[str, Any]:
-    """The manifest of a simulated data set, finished or not; empty where there is none."""
+    """The manifest of a simulated data set, finished or not; empty where there is none.
+
+    Returns:
+        As far as the file has them: ``split``, lists of sequences by part; ``rain_rate_mm_h``, by
+        sequence; ``files``, checksums by path; and what the data set was made from.
+
+    Raises:
+        InputError: A manifest of derain's with a value of another kind.
+    """
     try:
-        content = json.loads((root / MANIFEST).read_text("utf-8"))
-    except (OSError, ValueError):
+        document = Entry.of_json_file(root / MANIFEST, LARGEST_MANIFEST)
+    except InputError:
         return {}
-    return content if isinstance(content, dict) and content.get("made_by") == MAKER else {}
+    content = document.value
+    if not isinstance(content, dict) or content.get("made_by") != MAKER:
+        return {}
+    values = document.members()
+    for key, check in (
+        ("split", _split),
+        (RAIN_RATE, rates_of_sequences),
+        ("files", _checksums),
+        ("keep", Entry.truth),
+    ):
+        if key in values:
+            check(values[key])
+    return content
+
+
+def rates_of_sequences(entry: Entry) -> dict[str, float]:
+    """Rain rates in mm/h by the name of the sequence, which must be in quotes.
+
+    Raises:
+        InputError: Anything else, or a rate that no rain has.
+    """
+    return {name: rate.within(0, HARDEST_RAIN) for name, rate in entry.members().items()}
 
 
 def write_manifest(root: Path, content: Mapping[str, Any]) -> None:
@@ -44,3 +85,12 @@ def checksums(folder: Path, root: Path) -> dict[str, str]:
         for file in sorted(folder.rglob("*"))
         if file.is_file()
     }
+
+
+def _split(entry: Entry) -> None:
+    entry.record(dict.fromkeys(PARTS, Entry.texts), required=PARTS)
+
+
+def _checksums(entry: Entry) -> None:
+    for checksum in entry.members().values():
+        checksum.text()

@@ -1,20 +1,25 @@
 """A scanning LiDAR: where its beams point, what it can detect, and how it measures."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
+from derain.documents import Entry, shown
 from derain.errors import InputError
+from derain.files.reading import reading
 from derain.scan import Scan
 from derain.spherical_grid import FULL_CIRCLE
 
 FULL_SCALE_INTENSITY = 255.0
+
+# Sensors of today have a tenth of it; the rays of so many take 200 MB.
+MOST_BEAMS = 2**22
 
 # Standard deviation of what a detector adds to every intensity, a modelling choice: one count.
 DARK_NOISE = 1.0
@@ -109,8 +114,8 @@ class Sensor:
         possible = {
             "azimuth": right < left <= right + FULL_CIRCLE,
             "inclination": -90 <= lowest < highest <= 90,
-            "columns": isinstance(self.columns, int) and self.columns >= 1,
-            "rows": isinstance(self.rows, int) and self.rows >= 1,
+            "columns": isinstance(self.columns, int) and 1 <= self.columns <= MOST_BEAMS,
+            "rows": isinstance(self.rows, int) and 1 <= self.rows * self.columns <= MOST_BEAMS,
             "row_inclinations": len(self.row_inclinations) in (0, self.rows)
             and all(-90 <= inclination <= 90 for inclination in self.row_inclinations),
             "minimum_range": self.minimum_range > 0,
@@ -127,7 +132,7 @@ class Sensor:
         for name, is_possible in possible.items():
             if not is_possible:
                 raise InputError(
-                    f"sensor: {name}", f"{getattr(self, name)} is impossible", "Correct it."
+                    f"sensor: {name}", f"{shown(getattr(self, name))} is impossible", "Correct it."
                 )
 
     def beams(self) -> NDArray[np.float64]:
@@ -220,25 +225,43 @@ def load_sensor(name: str | Path) -> Sensor:
     """
     sensors = packaged_sensors()
     path = sensors.get(str(name), Path(name))
-    if not path.is_file():
+    with reading(path):
+        exists = path.is_file()
+    if not exists:
         raise InputError(
             name, "no such sensor", f"Give a YAML file or one of {', '.join(sensors)}."
         )
+    values = Entry.of_yaml(path).record(_PARSERS)
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-        return _sensor(content)
-    except (yaml.YAMLError, UnicodeDecodeError, TypeError, ValueError) as error:
+        return Sensor(**values)
+    except InputError as error:
         raise InputError(
-            path,
-            f"does not describe a sensor ({error})",
-            "Take a packaged one as a pattern; an exponent needs a point, as in 4.0e-6.",
+            path, f"{error.subject}: {error.reason}", "Take a packaged one as a pattern."
         ) from error
 
 
-def _sensor(content: Any) -> Sensor:
-    if not isinstance(content, dict):
-        raise ValueError("it is no mapping")
-    attributes: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value for name, value in content.items()
-    }
-    return Sensor(**attributes)
+def _span(entry: Entry) -> tuple[float, ...]:
+    return entry.numbers(2)
+
+
+def _beams(entry: Entry) -> int:
+    return entry.whole(1, MOST_BEAMS)
+
+
+_PARSERS: dict[str, Callable[[Entry], Any]] = {
+    "azimuth": _span,
+    "inclination": _span,
+    "columns": _beams,
+    "rows": _beams,
+    "row_inclinations": Entry.numbers,
+    "minimum_range": Entry.number,
+    "maximum_range": Entry.number,
+    "aperture": Entry.number,
+    "beam_divergence": Entry.number,
+    "detection_threshold": Entry.number,
+    "range_noise": Entry.number,
+    "intensity_noise": Entry.number,
+    "mounting_height": Entry.number,
+    "returns": Entry.text,
+    "frame_rate": Entry.number,
+}

@@ -76,6 +76,11 @@ BOX = "{class: car, centre: [0, 0, 0], size: [1, 1, 1]}"
         ("road: [[0, 0], [1, 0], [0, .nan]]", "road[2][1]", "nan is not a finite number"),
         ("road: [[0, 0], [1, 0], [0, 1, 2]]", "road[2]", "are not 2 numbers"),
         ("road: 5", "road", "5 is not a list"),
+        ("road: [[0, 0], [1, 0], [0, 1e300]]", "road[2][1]", "1e+300 is not within"),
+        (ROAD + "height: -1e300", "height", "-1e+300 is not within"),
+        (ROAD + "plane: {distance: 1e300}", "plane.distance", "1e+300 is not within"),
+        (ROAD + f"height: 1{'0' * 400}", "height", "the number is too large"),
+        (ROAD + "corrections: []", "corrections", "[] is not a mapping"),
         (ROAD + "height: high", "height", "'high' is not a finite number"),
         (ROAD + "plane: {points: 2}", "plane.points", "2 is not a whole number from 3 to 100"),
         (ROAD + "plane: {distance: 0}", "plane.distance", "0 is not above 0"),
@@ -85,6 +90,12 @@ BOX = "{class: car, centre: [0, 0, 0], size: [1, 1, 1]}"
         (ROAD + "boxes: {a: {class: car}}", "boxes.a", "centre is missing"),
         (ROAD + f"boxes: {{1: {BOX}}}", "boxes", "the key 1 is no text"),
         (ROAD + f"boxes: {{a: {BOX.replace('car', 'cart')}}}", "boxes.a.class", "no class 'cart'"),
+        (
+            ROAD + f"boxes: {{a: {BOX.replace('car', 'c' * 10**5)}}}",
+            "boxes.a.class",
+            "no class 'ccc",
+        ),
+        (ROAD + f"boxes: {{a: {BOX.replace('1]', '1e300]')}}}", "boxes.a.size[2]", "not within"),
         (ROAD + f"boxes: {{a: {BOX.replace('1]', '0]')}}}", "boxes.a.size[2]", "0 is not above 0"),
         (ROAD + f"boxes: {{a: {BOX.replace('1]', '1, 1]')}}}", "boxes.a.size", "are not 3 numbers"),
         (ROAD + "corrections: {010: {boxes: {}}}", "corrections", "the key 8 is no text"),
@@ -104,6 +115,7 @@ def test_what_cannot_be_meant_is_named_by_its_key(
     assert str(raised.value.subject) == (f"{path}: {key}" if key else str(path))
     assert reason in raised.value.reason
     assert raised.value.remedy.endswith(".")
+    assert len(str(raised.value)) < len(str(path)) + 300
 
 
 @pytest.mark.parametrize("content", [b"road: [", b"\xff\xfe"])

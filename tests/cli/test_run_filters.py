@@ -100,7 +100,7 @@ def test_the_intensity_scale_reaches_the_filter(run_derain, scan: Path, tmp_path
     [
         (["drorr"], "derain: drorr: no such file. Give a model written by `derain export`, or one"),
         (["ror", "--set", "radios=1"], "derain: ror: it has no parameter radios."),
-        (["ror", "--set", "radius=wide"], "derain: ror: radius is wide."),
+        (["ror", "--set", "radius=wide"], "derain: ror: radius is 'wide'."),
         (["ror", "--set", "radius"], "--set: radius is not NAME=VALUE"),
         (["ror", "--set", "radius="], "--set: radius= is not NAME=VALUE"),
         (["ror", "--parameters", "none.yaml"], "derain: none.yaml: there is no such file."),

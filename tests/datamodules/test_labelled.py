@@ -102,9 +102,26 @@ def test_rain_rates_are_read_by_the_name_of_the_sequence(tmp_path: Path) -> None
     assert known[sequence_of(Path("sequences/010/lidar_radar_pcd/000000.bin"))] == 10.5
 
 
-@pytest.mark.parametrize("text", ["010: 25", '"010": heavy', "- 25", "{", "", "\xd9"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "010: 25",
+        '"010": heavy',
+        '"010": .inf',
+        '"010": -5',
+        f'"010": 1{"0" * 400}',
+        '"010": [25]',
+        '"010": &a [*a]',
+        "- 25",
+        "{",
+        "",
+        "[" * 10_000,
+        "\xd9",
+    ],
+)
 def test_what_is_no_file_of_rain_rates_is_refused(tmp_path: Path, text: str) -> None:
     rates = tmp_path / "rates.yaml"
     rates.write_text(text, "latin-1")
-    with pytest.raises(InputError, match="not the rain rates of sequences"):
+    with pytest.raises(InputError, match=r"rates\.yaml: ") as refusal:
         rain_rates([tmp_path], rates)
+    assert len(str(refusal.value)) < len(str(rates)) + 500

@@ -10,6 +10,7 @@ from derain.errors import InputError
 from derain.open3d_import import import_open3d
 from derain.simulation.campaign import Campaign
 from derain.simulation.dataset import simulate_track
+from derain.simulation.manifest import MAKER, write_manifest
 from derain.simulation.sensor import Sensor
 
 TINY = Campaign(
@@ -71,6 +72,9 @@ def test_a_data_set_that_is_there_is_taken_as_it_is(root: Path) -> None:
 
 
 def test_what_is_not_to_be_made_must_be_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds no complete simulated data set"):
+        Simulated(str(tmp_path), make=False)
+    write_manifest(tmp_path, {"made_by": MAKER, "files": {}})
     with pytest.raises(InputError, match="holds no complete simulated data set"):
         Simulated(str(tmp_path), make=False)
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from derain.errors import InputError
+from derain.errors import LONGEST_REASON, InputError
 from derain.files.frame_times import read_frame_times
 
 
@@ -53,6 +53,12 @@ def test_lines_of_scans_that_are_not_asked_for_do_no_harm(tmp_path: Path) -> Non
         ("frame,timestamp\n1,1\n", r"has no line for 000000\.bin"),
         ("frame,timestamp\n0,soon\n", "'soon' is not a time"),
         ("frame,timestamp\n0,nan\n", "'nan' is not a time"),
+        ("frame,timestamp\n0,-inf\n", "'-inf' is not a time"),
+        (f"frame,timestamp\n0,1{'0' * 400}\n", "'1000"),
+        (f"frame,timestamp\n0,{'a' * 10**5}\n", "'aaaa"),
+        (f"frame,timestamp\n0,{'1' * 10**6}\n", "cannot be read as"),
+        (f"frame,timestamp\n{'0,1' * 3 * 2**20}", "has more than 8,388,608 bytes"),
+        (",".join(map(str, range(10**5))), "has no columns frame and timestamp"),
         ("frame,timestamp\n0,\n", "'' is not a time"),
         ("frame,timestamp\n0\n", "'None' is not a time"),
         ("timestamp,frame\n1\n", "has a line that names no scan"),
@@ -61,8 +67,9 @@ def test_lines_of_scans_that_are_not_asked_for_do_no_harm(tmp_path: Path) -> Non
 )
 def test_what_does_not_say_when_is_refused(tmp_path: Path, text: str, reason: str) -> None:
     scans = written(tmp_path, text, "000000.bin")
-    with pytest.raises(InputError, match=rf"metadata\.csv: {reason}"):
+    with pytest.raises(InputError, match=rf"metadata\.csv: {reason}") as refusal:
         read_frame_times(scans)
+    assert len(str(refusal.value)) < len(str(tmp_path)) + LONGEST_REASON + 200
 
 
 def test_a_missing_or_damaged_file_is_named(tmp_path: Path) -> None:

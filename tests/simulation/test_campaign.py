@@ -57,6 +57,8 @@ def test_two_of_five_sequences_are_clean() -> None:
         ({"train": 0}, "train: 0 is too few"),
         ({"validation": -1}, "validation: -1 is too few"),
         ({"scans": 0}, "scans: 0 is too few"),
+        ({"scans": 10**9}, "scans: 1000000000 is too many"),
+        ({"test": 16**5000}, "test: a number of very many digits is too many"),
         ({"seed": -1}, "seed: -1 is negative"),
         ({"rain_rates": ()}, "rain rate: none is given"),
         ({"rain_rates": (-5.0,)}, "rain rate: -5.0 mm/h is no rain rate"),

@@ -144,7 +144,15 @@ def test_a_sensor_file_states_what_differs_from_the_defaults(tmp_path: Path) -> 
         "azimuth: [-200, 200]",
         "inclination: [5]",
         "rows: 3\nrow_inclinations: [1, 2]",
-        "detection_threshold: 4e-6",  # a text, to YAML
+        "detection_threshold: '4e-6'",
+        "rows: 1000000000",
+        "rows: 100000\ncolumns: 100000",
+        "azimuth: [0, [0]]",
+        "azimuth: 5",
+        "row_inclinations: {}",
+        f"maximum_range: 1{'0' * 400}",
+        "azimuth: [-1.0e+308, 1.0e+308]",
+        "returns: [strongest]",
         "maximum_range: .inf",
         "minimum_range: .nan",
         "returns: first",
@@ -157,8 +165,9 @@ def test_a_sensor_file_states_what_differs_from_the_defaults(tmp_path: Path) -> 
 def test_a_file_that_describes_no_sensor_is_refused(content: str, tmp_path: Path) -> None:
     path = tmp_path / "broken.yaml"
     path.write_text(content)
-    with pytest.raises(InputError, match="does not describe a sensor"):
+    with pytest.raises(InputError, match=r"broken\.yaml: ") as refusal:
         load_sensor(path)
+    assert len(str(refusal.value)) < len(str(path)) + 300
 
 
 def test_a_sensor_that_is_nowhere_is_refused() -> None:

@@ -1,0 +1,78 @@
+"""The manifest of a simulated data set is known, and what is wrong with it is said."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from derain.documents import shown
+from derain.errors import InputError
+from derain.simulation.campaign import Campaign
+from derain.simulation.manifest import MAKER, read_manifest, write_manifest
+
+CHECKSUM = 64 * "0"
+
+
+def test_a_manifest_comes_back(tmp_path: Path) -> None:
+    content = {**Campaign().description, "keep": True, "files": {"sequences/000/a.bin": CHECKSUM}}
+    write_manifest(tmp_path, content)
+    assert read_manifest(tmp_path) == content
+
+
+def test_a_manifest_of_a_large_data_set_comes_back(tmp_path: Path) -> None:
+    files = {f"sequences/{n // 500:03d}/velodyne/{n:06d}.bin": CHECKSUM for n in range(20_000)}
+    write_manifest(tmp_path, {"made_by": MAKER, "files": files})
+    assert read_manifest(tmp_path)["files"] == files
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        "5",
+        "null",
+        '{"made_by": "somebody else", "split": 5}',
+        '{"made_by": ["derain.simulation"]}',
+        "[" * 100_000,
+        '{"made_by": "derain.simulation", "campaign": ' + f"{40 * '['}{40 * ']'}}}",
+        "\xff",
+    ],
+    ids=shown,
+)
+def test_what_derain_did_not_write_is_no_manifest_of_its(tmp_path: Path, text: str) -> None:
+    (tmp_path / "manifest.json").write_text(text, "latin-1")
+    assert read_manifest(tmp_path) == {}
+
+
+def test_a_folder_without_a_manifest_has_an_empty_one(tmp_path: Path) -> None:
+    assert read_manifest(tmp_path) == {}
+    assert read_manifest(tmp_path / "none") == {}
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "where"),
+    [
+        ("split", ["000"], "split"),
+        ("split", {"train": ["000"], "test": ["001"]}, "split"),
+        ("split", {"train": "000", "validation": [], "test": []}, "split.train"),
+        ("split", {"train": [[]], "validation": [], "test": []}, "split.train[0]"),
+        ("rain_rate_mm_h", [10], "rain_rate_mm_h"),
+        ("rain_rate_mm_h", {"000": [10]}, "rain_rate_mm_h.000"),
+        ("rain_rate_mm_h", {"000": float("nan")}, "rain_rate_mm_h.000"),
+        ("rain_rate_mm_h", {"000": -1}, "rain_rate_mm_h.000"),
+        ("rain_rate_mm_h", {"000": 10**400}, "rain_rate_mm_h.000"),
+        ("files", None, "files"),
+        ("files", {"a": 1}, "files.a"),
+        ("keep", "no", "keep"),
+    ],
+)
+def test_a_manifest_with_a_value_of_another_kind_is_refused(
+    tmp_path: Path, key: str, value: Any, where: str
+) -> None:
+    write_manifest(tmp_path, {"made_by": MAKER, key: value})
+    with pytest.raises(InputError) as refusal:
+        read_manifest(tmp_path)
+    assert refusal.value.subject == f"{tmp_path / 'manifest.json'}: {where}"
+    assert len(str(refusal.value)) < len(str(tmp_path)) + 300
