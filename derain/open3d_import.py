@@ -1,35 +1,80 @@
-"""Imports Open3D, which wants a system library that a bare Debian lacks."""
+"""Imports Open3D, an extra of derain's that wants a system library which a bare Debian lacks."""
 
+import contextlib
 import ctypes
+import os
 import sys
+from importlib.util import find_spec
+from pathlib import Path
 from types import ModuleType
 
 from derain.errors import InputError
+
+# What Open3D links against, as the dynamic linker calls it.
+LIBUSB = "libusb-1.0.so.0"
 
 
 def import_open3d() -> ModuleType:
     """Imports Open3D where it is needed; nothing else in derain imports it.
 
-    On Linux, Open3D links against libusb-1.0.so.0. The wheel libusb-package carries that library
-    under the same SONAME, so loading it first satisfies the dynamic linker.
-
     Returns:
         The module open3d.
 
     Raises:
-        InputError: Open3D or a library it links against is missing.
+        InputError: Open3D is not installed, or a library it links against is missing.
     """
+    make_open3d_loadable()
     try:
-        if sys.platform == "linux":
-            import libusb_package
-
-            ctypes.CDLL(str(libusb_package.get_library_path()), ctypes.RTLD_GLOBAL)
         import open3d
-    except (ImportError, OSError) as error:
+    except ModuleNotFoundError as error:
+        if error.name != "open3d":
+            raise _broken(error) from error
         raise InputError(
             "open3d",
-            f"cannot be imported ({error})",
-            "Install derain's dependencies again with pip, or the system library it names.",
+            "is not installed, and this command casts rays or shows a window with it",
+            "pip install 'derain[scene]'",
         ) from error
+    except (ImportError, OSError) as error:
+        raise _broken(error) from error
     module: ModuleType = open3d
     return module
+
+
+def make_open3d_loadable() -> None:
+    """Lets every program load Open3D, not derain alone, where it is installed.
+
+    On Linux, Open3D links against libusb-1.0.so.0, which the wheel libusb-package carries. Loading
+    that before Open3D would serve this process alone. TensorBoard, however, loads Open3D's plug-in
+    whenever it starts, and dies where it cannot. So a link to the library is left beside Open3D's
+    own, where those look first for what they need. Where that folder may not be written, the
+    library is loaded into this process.
+    """
+    open3d = find_spec("open3d")
+    if sys.platform != "linux" or open3d is None or open3d.origin is None:
+        return
+    with contextlib.suppress(OSError):
+        ctypes.CDLL(LIBUSB)
+        return  # the system has it
+    with contextlib.suppress(ImportError, OSError):  # Open3D will name what it lacks
+        import libusb_package
+
+        _lay_beside(Path(open3d.origin).parent, Path(libusb_package.get_library_path()))
+
+
+def _lay_beside(folder: Path, library: Path) -> None:
+    """Links to the library in a folder, or loads it where that cannot be done."""
+    link = folder / LIBUSB
+    try:
+        if not link.exists():
+            link.unlink(missing_ok=True)  # it points to a package that was there once
+            link.symlink_to(os.path.relpath(library, folder))
+    except FileExistsError:
+        pass  # another process has just made it
+    except OSError:
+        ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
+
+
+def _broken(error: Exception) -> InputError:
+    return InputError(
+        "open3d", f"cannot be imported ({error})", "Install the system library that it names."
+    )

@@ -24,6 +24,7 @@ from derain.models.panels import ScanPanels
 from derain.models.prediction import PredictionWriter
 from derain.models.report import TestReport
 from derain.models.salsanext import SalsaNext
+from derain.open3d_import import make_open3d_loadable
 
 EXAMPLES = {
     "fit": """\
@@ -127,6 +128,7 @@ def train(arguments: list[str]) -> None:
     Raises:
         InputError: A configuration that does not exist, or what data and model raise.
     """
+    make_open3d_loadable()  # TensorBoard is to start, and show what this run logs
     # Lightning means the mixing of both; arguments of the command line are all that we pass on.
     warnings.filterwarnings("ignore", message="LightningCLI's args parameter")
     # Lightning 2.6 uses a name that torch 2.13 deprecates.

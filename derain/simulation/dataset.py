@@ -24,6 +24,7 @@ from tqdm import tqdm
 from derain.errors import InputError
 from derain.files.lock import lock
 from derain.files.temporary import remove_abandoned
+from derain.open3d_import import import_open3d
 from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MANIFEST, checksums, read_manifest, write_manifest
 from derain.simulation.sequence import write_sequence
@@ -80,6 +81,7 @@ def _simulate(root: Path, campaign: Campaign, workers: int, *, keep: bool) -> No
     _refuse_others(root, there, campaign)
     if "files" in there and all((root / SEQUENCES / name).is_dir() for name in campaign.names):
         return
+    import_open3d()  # where it is missing, nothing is begun
     description = {**campaign.description, "keep": keep}
     files: dict[str, str] = {}
     with _writing(root):
