@@ -16,6 +16,9 @@ from derain.scan import Scan
 # have them, and a data card has their statistics only where a network has asked for them.
 USUAL_CHANNELS = ("x", "y", "z", "intensity", "range")
 
+# Far more than any sensor measures of a point.
+MOST_CHANNELS = 64
+
 UNITS = {
     **dict.fromkeys(("x", "y", "z", "range"), "m"),
     "doppler": "m/s",

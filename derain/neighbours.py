@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import small_gicp
@@ -10,8 +10,12 @@ from numpy.typing import NDArray
 
 from derain.channels import filled_values
 from derain.cores import usable_cores
+from derain.documents import Entry
 from derain.morton import distinct_rows
 from derain.scan import Scan
+
+# Seven times as many as 3D-OutDet looks at. A hundred thousand points have 80 MB of them.
+MOST_NEIGHBOURS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +110,21 @@ class NeighbourView:
     channels: tuple[str, ...] = ("x", "y", "z", "intensity")
     stand_in: Mapping[str, float] = field(default_factory=dict)
     threads: int = 0
+
+    @classmethod
+    def of(
+        cls, entry: Entry, channels: tuple[str, ...], stand_in: Mapping[str, float], threads: int
+    ) -> Self:
+        """The view that a Spec describes by its ``kind`` and its ``neighbours``.
+
+        Raises:
+            InputError: Something that does not describe it.
+        """
+        found = entry.record(
+            {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NEIGHBOURS)},
+            required=("neighbours",),
+        )
+        return cls(found["neighbours"], channels, stand_in, threads)
 
     def __call__(self, scan: Scan) -> Neighbourhoods:
         """Views a scan."""

@@ -2,15 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.channels import filled_values
+from derain.documents import Entry
 from derain.errors import InputError
 from derain.scan import Scan
-from derain.spherical_grid import SphericalGrid
+from derain.spherical_grid import SphericalGrid, grid_at
 from derain.view import IGNORED
 from derain.way_back import WAYS_BACK, ProjectedPoints
 
@@ -140,6 +141,19 @@ class RangeView:
                 f"no such way back: '{self.way_back}'",
                 f"Known are {', '.join(WAYS_BACK)}.",
             )
+
+    @classmethod
+    def of(cls, entry: Entry, channels: tuple[str, ...], stand_in: Mapping[str, float]) -> Self:
+        """The view that a Spec describes by its ``kind``, ``grid`` and ``way_back``.
+
+        Raises:
+            InputError: Something that does not describe it.
+        """
+        found = entry.record(
+            {"kind": Entry.text, "grid": grid_at, "way_back": Entry.text},
+            required=("grid", "way_back"),
+        )
+        return cls(found["grid"], channels, found["way_back"], stand_in)
 
     def __call__(self, scan: Scan) -> RangeImage:
         """Views a scan."""

@@ -1,19 +1,23 @@
 """The Spec: everything needed to use a trained network besides its weights."""
 
 import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from derain.channels import MOST_CHANNELS
+from derain.documents import Entry, shown
 from derain.errors import InputError
 from derain.neighbours import NeighbourView
 from derain.range_image import RangeView
 from derain.scan import Scan
-from derain.spherical_grid import SphericalGrid
 from derain.view import View
 
 SCHEMA = 1
+
+# A label has two bytes for its class.
+LARGEST_ID = 65_535
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,8 @@ class Spec:
         threshold: A point is rain where its probability is greater.
         data: Name of the training data.
         licence: Licence of the training data.
+        training: Stems of the scans that it was trained on, by the name of their sequence; none
+            stands for the whole sequence. Empty where that is not known.
         schema: Version of this layout.
     """
 
@@ -49,6 +55,7 @@ class Spec:
     units: tuple[str, ...]
     rule: Mapping[str, float] = field(default_factory=dict)
     threshold: float = 0.5
+    training: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     schema: int = SCHEMA
 
     def as_dict(self) -> dict[str, Any]:
@@ -57,37 +64,32 @@ class Spec:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any], source: str | Path) -> "Spec":
-        """Reads a Spec back.
+        """Reads a Spec back. It is not trusted: every value is looked at before it is used.
 
         Args:
-            content: What :meth:`as_dict` gave.
+            content: What :meth:`as_dict` gave, of this derain or of an earlier one: what has a
+                default may be missing.
             source: The file it was found in, for messages.
 
         Raises:
             InputError: A newer schema, or something that is not a Spec.
         """
-        schema = content.get("schema")
-        if isinstance(schema, int) and schema > SCHEMA:
-            raise InputError(
-                source,
-                f"its Spec has schema {schema}, newer than this derain's {SCHEMA}",
-                "Upgrade derain.",
-            )
+        entry = Entry("its Spec", "", content)
         try:
-            known = {part.name: content[part.name] for part in fields(cls)}
-            spec = cls(**{name: _immutable(value) for name, value in known.items()})
-            if len({len(spec.channels), len(spec.units), len(spec.mean), len(spec.std)}) > 1:
-                raise ValueError("channels, units, mean and std differ in number")
-            return replace(spec, classes={int(id_): n for id_, n in known["classes"].items()})
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            _refuse_newer(entry)
+            spec = cls(**entry.record(_PARSERS, _REQUIRED))
+            _refuse_contradictions(spec, entry)
+            _view_of(entry.members()["view"], spec)
+        except InputError as error:
             raise InputError(
-                source, f"its Spec is damaged ({error})", "Export the model again."
+                source, f"{error.subject}: {error.reason}", "Upgrade derain, or export it again."
             ) from error
+        return spec
 
     @property
     def mean_intensity(self) -> float:
         """Mean intensity of the training points; 0 for a network that sees none."""
-        return self._means.get("intensity", 0.0)
+        return self.means.get("intensity", 0.0)
 
     @property
     def intensity_unit(self) -> str:
@@ -96,7 +98,7 @@ class Spec:
 
     def missing_channels(self, scan: Scan) -> dict[str, float]:
         """Channels that a scan has not got, and the means that stand in for them, by name."""
-        return {name: mean for name, mean in self._means.items() if scan.channel(name) is None}
+        return {name: mean for name, mean in self.means.items() if scan.channel(name) is None}
 
     def make_view(self, threads: int = 0) -> View:
         """The view that the network sees a scan through.
@@ -107,19 +109,82 @@ class Spec:
         Raises:
             InputError: A kind of view that this derain does not know.
         """
-        match dict(self.view):
-            case {"kind": NeighbourView.KIND, "neighbours": neighbours}:
-                return NeighbourView(neighbours, self.channels, self._means, threads)
-            case {"kind": RangeView.KIND, "grid": grid, "way_back": way_back}:
-                grid = SphericalGrid.from_dict(grid, self.network)
-                return RangeView(grid, self.channels, way_back, self._means)
-        kind = self.view.get("kind")
-        raise InputError(self.network, f"unknown view {kind!r}", "Upgrade derain.")
+        return _view_of(Entry(self.network, "view", dict(self.view)), self, threads)
 
     @property
-    def _means(self) -> dict[str, float]:
+    def means(self) -> dict[str, float]:
+        """Mean of each channel over the training points, by its name."""
         return dict(zip(self.channels, self.mean, strict=True))
 
 
-def _immutable(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+def _view_of(entry: Entry, spec: Spec, threads: int = 0) -> View:
+    """The view that an entry describes, with the channels of a Spec."""
+    kind = entry.members().get("kind", Entry(entry.source, f"{entry.key}.kind", None))
+    match kind.value:
+        case NeighbourView.KIND:
+            return NeighbourView.of(entry, spec.channels, spec.means, threads)
+        case RangeView.KIND:
+            return RangeView.of(entry, spec.channels, spec.means)
+    raise kind.fault(f"unknown view {shown(kind.value)}", "Upgrade derain.")
+
+
+def _refuse_newer(entry: Entry) -> None:
+    """Refuses a Spec of a later layout, of which nothing else can be said."""
+    schema = entry.members().get("schema")
+    if schema is not None and isinstance(schema.value, int) and schema.value > SCHEMA:
+        raise entry.fault(
+            f"schema {shown(schema.value)} is newer than this derain's {SCHEMA}", "Upgrade derain."
+        )
+
+
+def _refuse_contradictions(spec: Spec, entry: Entry) -> None:
+    """Refuses values that are possible one by one, but not together."""
+    if len({len(spec.channels), len(spec.units), len(spec.mean), len(spec.std)}) > 1:
+        raise entry.fault("channels, units, mean and std differ in number", "Write one each.")
+    if not spec.channels or len(set(spec.channels)) < len(spec.channels):
+        raise entry.fault(
+            f"channels {shown(spec.channels)} are none, or not distinct", "Name them."
+        )
+    if not set(spec.rain) <= set(spec.classes):
+        raise entry.fault(f"rain {shown(spec.rain)} is not of its classes", "Name ids of them.")
+
+
+def _texts(entry: Entry) -> tuple[str, ...]:
+    return tuple(item.text() for item in entry.items())
+
+
+def _channels(entry: Entry) -> tuple[str, ...]:
+    if len(entry.items()) > MOST_CHANNELS:
+        raise entry.fault(f"more than {MOST_CHANNELS} channels", "Name fewer.")
+    return _texts(entry)
+
+
+def _classes(entry: Entry) -> dict[int, str]:
+    return {_id(key, name): name.text() for key, name in entry.members().items()}
+
+
+def _id(key: str, entry: Entry) -> int:
+    if not (key.isascii() and key.isdigit() and len(key) <= 5 and int(key) <= LARGEST_ID):
+        raise entry.fault(f"{shown(key)} is not the id of a class", "Write a whole number.")
+    return int(key)
+
+
+# What reads each part of a Spec.
+_PARSERS: dict[str, Callable[[Entry], Any]] = {
+    "network": Entry.text,
+    "view": lambda entry: {key: part.value for key, part in entry.members().items()},
+    "mean": lambda entry: tuple(item.number() for item in entry.items()),
+    "std": lambda entry: tuple(item.positive() for item in entry.items()),
+    "classes": _classes,
+    "rain": lambda entry: tuple(item.whole(0, LARGEST_ID) for item in entry.items()),
+    "data": Entry.text,
+    "licence": Entry.text,
+    "channels": _channels,
+    "units": _texts,
+    "rule": lambda entry: {name: part.number() for name, part in entry.members().items()},
+    "threshold": lambda entry: entry.within(0, 1),
+    "training": lambda entry: {name: _texts(part) for name, part in entry.members().items()},
+    "schema": lambda entry: entry.whole(1, SCHEMA),
+}
+
+_REQUIRED = [part.name for part in fields(Spec) if part.default is MISSING is part.default_factory]

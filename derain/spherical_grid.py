@@ -1,8 +1,7 @@
 """A spherical grid: the rows and columns of directions that a range image is made of."""
 
 import itertools
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -11,11 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.directions import directions
+from derain.documents import Entry, shown
 from derain.errors import InputError
 from derain.published_grids import PUBLISHED_GRIDS
 
 FULL_CIRCLE = 360.0
 ALL_AROUND = (-180.0, 180.0)
+
+# 512 beams by 8192 steps: more than any sensor has, and an image of 84 MB.
+MOST_PIXELS = 2**22
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,7 @@ class SphericalGrid:
         edges: Borders of the H rows from top to bottom, H + 1 inclinations, degrees.
 
     Raises:
-        InputError: Bounds that leave no room, or that no direction can have.
+        InputError: Bounds that leave no room, or that no direction can have; more than MOST_PIXELS.
     """
 
     columns: int
@@ -45,6 +48,11 @@ class SphericalGrid:
         if self.rows < 1 or self.columns < 1:
             raise _wrong(
                 f"{self.rows} rows by {self.columns} columns", "Give at least one of each."
+            )
+        if self.rows * self.columns > MOST_PIXELS:
+            raise _wrong(
+                f"{self.rows} rows by {self.columns} columns",
+                f"Give at most {MOST_PIXELS:,} pixels.",
             )
         if not (-FULL_CIRCLE <= right < left <= right + FULL_CIRCLE):
             raise _wrong(
@@ -183,63 +191,58 @@ def grid_of(config: str | Mapping[str, Any], source: str | Path) -> SphericalGri
     Raises:
         InputError: An unknown name, or something that does not describe a grid.
     """
-    if isinstance(config, str) and config not in PUBLISHED_GRIDS:
-        raise InputError(
-            source,
-            f"there is no grid named '{config}'",
+    return grid_at(Entry(source, "", config))
+
+
+def grid_at(entry: Entry) -> SphericalGrid:
+    """The grid that stands in a document, as :func:`grid_of` takes it.
+
+    Raises:
+        InputError: An unknown name, or something that does not describe a grid.
+    """
+    if not isinstance(entry.value, str):
+        return _described(entry)
+    if entry.value not in PUBLISHED_GRIDS:
+        raise entry.fault(
+            f"there is no grid named {shown(entry.value)}",
             f"Known are {', '.join(PUBLISHED_GRIDS)}; or describe one by columns, rows and "
             "inclination.",
         )
+    return _described(Entry(entry.source, entry.key, PUBLISHED_GRIDS[entry.value]))
+
+
+def _described(entry: Entry) -> SphericalGrid:
+    parts = {"azimuth": ALL_AROUND, **entry.record(_PARSERS, required=("columns",))}
+    columns, azimuth = parts.pop("columns"), parts.pop("azimuth")
     try:
-        return _described(PUBLISHED_GRIDS[config] if isinstance(config, str) else config)
+        match sorted(parts):
+            case ["inclination", "rows"]:
+                return SphericalGrid.even(parts["rows"], columns, parts["inclination"], azimuth)
+            case ["beams"]:
+                return SphericalGrid.of_beams(parts["beams"], columns, azimuth)
+            case ["edges"]:
+                return SphericalGrid(columns, azimuth, parts["edges"])
     except InputError as error:
-        raise InputError(source, f"a grid of {error.reason}", error.remedy) from error
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            source,
-            f"not a grid ({error})",
-            "Give columns, and rows with inclination, or beams, or edges; azimuth if not all "
-            "around.",
-        ) from error
+        raise entry.fault(f"a grid of {error.reason}", error.remedy) from error
+    raise entry.fault(
+        f"its rows are described by {', '.join(parts) or 'nothing'}",
+        "Give rows with inclination, or beams, or edges.",
+    )
 
 
-def _described(config: Mapping[str, Any]) -> SphericalGrid:
-    rest = {"azimuth": ALL_AROUND, **config}
-    columns = _whole(rest.pop("columns", None), "columns")
-    azimuth = _two(rest.pop("azimuth"), "azimuth")
-    match sorted(rest):
-        case ["inclination", "rows"]:
-            inclination = _two(rest["inclination"], "inclination")
-            return SphericalGrid.even(_whole(rest["rows"], "rows"), columns, inclination, azimuth)
-        case ["beams"]:
-            return SphericalGrid.of_beams(_numbers(rest["beams"], "beams"), columns, azimuth)
-        case ["edges"]:
-            return SphericalGrid(columns, azimuth, _numbers(rest["edges"], "edges"))
-        case names:
-            raise ValueError(f"its rows are described by {', '.join(names) or 'nothing'}")
+def _numbers(entry: Entry) -> tuple[float, ...]:
+    return tuple(item.number() for item in entry.items())
 
 
-def _whole(value: Any, name: str) -> int:
-    if not isinstance(value, int) or isinstance(value, bool):
-        raise TypeError(f"{name} must be a whole number, not {value!r}")
-    return value
-
-
-def _two(values: Any, name: str) -> tuple[float, float]:
-    numbers = _numbers(values, name)
-    if len(numbers) != 2:
-        raise ValueError(f"{name} must be two numbers, not {len(numbers)}")
-    return numbers[0], numbers[1]
-
-
-def _numbers(values: Any, name: str) -> tuple[float, ...]:
-    if not isinstance(values, list | tuple) or not all(_is_number(value) for value in values):
-        raise TypeError(f"{name} must be a list of numbers")
-    return tuple(float(value) for value in values)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+# What reads each part of a grid's description. No image has more rows or columns than pixels.
+_PARSERS: dict[str, Callable[[Entry], Any]] = {
+    "columns": lambda entry: entry.whole(1, MOST_PIXELS),
+    "rows": lambda entry: entry.whole(1, MOST_PIXELS),
+    "azimuth": lambda entry: entry.numbers(2),
+    "inclination": lambda entry: entry.numbers(2),
+    "beams": _numbers,
+    "edges": _numbers,
+}
 
 
 def _wrong(reason: str, remedy: str) -> InputError:

@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from derain.channels import MOST_CHANNELS
 from derain.errors import InputError
-from derain.neighbours import NeighbourView
+from derain.neighbours import MOST_NEIGHBOURS, NeighbourView
 from derain.range_image import RangeView
 from derain.scan import Scan
 from derain.spec import SCHEMA, Spec
-from derain.spherical_grid import SphericalGrid
+from derain.spherical_grid import MOST_PIXELS, SphericalGrid
 from derain.way_back import WAYS_BACK
 
 SPEC = Spec(
@@ -34,21 +35,28 @@ SPEC = Spec(
 
 MEANS = {"x": 1.0, "y": 2.0, "z": 3.0, "intensity": 4.0}
 
+MEANS_OF = ("channels", "units", "mean", "std")
+
 four_numbers = st.tuples(*[st.floats(-1e6, 1e6)] * 4)
 specs = st.builds(
-    Spec,
+    lambda classes, share, **parts: Spec(
+        classes=classes, rain=tuple(sorted(classes)[: round(share * len(classes))]), **parts
+    ),
     network=st.text(),
-    view=st.fixed_dictionaries({"kind": st.just("neighbours"), "neighbours": st.integers(1, 64)}),
+    view=st.fixed_dictionaries(
+        {"kind": st.just("neighbours"), "neighbours": st.integers(1, MOST_NEIGHBOURS)}
+    ),
     mean=four_numbers,
-    std=four_numbers,
+    std=st.tuples(*[st.floats(1e-6, 1e6)] * 4),
     classes=st.dictionaries(st.integers(0, 65535), st.text()),
-    rain=st.lists(st.integers(0, 65535)).map(tuple),
+    share=st.floats(0, 1),
     data=st.text(),
     licence=st.text(),
     channels=st.just(("x", "y", "z", "intensity")),
     units=st.tuples(*[st.text()] * 4),
     rule=st.dictionaries(st.text(), st.floats(-1e6, 1e6)),
     threshold=st.floats(0, 1),
+    training=st.dictionaries(st.text(), st.lists(st.text()).map(tuple)),
 )
 
 
@@ -69,37 +77,78 @@ def test_a_spec_read_back_cannot_be_changed() -> None:
         spec.threshold = 0.9  # type: ignore[misc]
 
 
-def test_what_a_later_derain_adds_within_the_schema_is_passed_over() -> None:
-    assert Spec.from_dict({**SPEC.as_dict(), "sensor": "unheard of"}, "model") == SPEC
+def test_what_a_later_derain_adds_within_the_schema_is_refused_by_its_name() -> None:
+    with pytest.raises(InputError, match=r"m\.onnx: its Spec: sensor: there is no such key\."):
+        Spec.from_dict({**SPEC.as_dict(), "sensor": "unheard of"}, "m.onnx")
 
 
-def test_a_newer_schema_asks_for_an_upgrade() -> None:
-    newer = {"schema": SCHEMA + 1, "everything": "else may differ"}
-    with pytest.raises(InputError, match=r"m\.onnx: its Spec has schema .* Upgrade derain\."):
+@pytest.mark.parametrize("schema", [SCHEMA + 1, 10**400], ids=["next", "far"])
+def test_a_newer_schema_asks_for_an_upgrade(schema: int) -> None:
+    newer = {"schema": schema, "everything": "else may differ"}
+    with pytest.raises(InputError, match=r"m\.onnx: its Spec: schema .* newer .* Upgrade derain"):
         Spec.from_dict(newer, "m.onnx")
 
 
-@pytest.mark.parametrize("name", SPEC.as_dict())
-def test_a_spec_that_lacks_something_is_damaged(name: str) -> None:
+DEFAULTS = {"rule": {}, "threshold": 0.5, "training": {}, "schema": SCHEMA}
+
+
+@pytest.mark.parametrize("name", DEFAULTS)
+def test_what_has_a_default_may_be_missing(name: str) -> None:
     content = SPEC.as_dict()
     del content[name]
-    with pytest.raises(InputError, match=rf"m\.onnx: its Spec is damaged \('{name}'\)"):
+    assert Spec.from_dict(content, "m.onnx") == replace(SPEC, **{name: DEFAULTS[name]})
+
+
+@pytest.mark.parametrize("name", SPEC.as_dict().keys() - DEFAULTS)
+def test_a_spec_that_lacks_something_else_is_refused(name: str) -> None:
+    content = SPEC.as_dict()
+    del content[name]
+    with pytest.raises(InputError, match=rf"m\.onnx: its Spec: {name} is missing"):
         Spec.from_dict(content, "m.onnx")
 
 
+NAN, HUGE = float("nan"), 10**400
+
+
 @pytest.mark.parametrize(
-    "classes", [None, [], "rain", {"three": "rain"}], ids=["none", "list", "text", "no number"]
+    ("change", "reason"),
+    [
+        *(({"classes": wrong}, "classes") for wrong in (None, [], "rain", {"three": "rain"})),
+        *(({"classes": wrong}, "classes") for wrong in ({"-1": "r"}, {"65536": "r"}, {"3": 4})),
+        *(({"rain": wrong}, "rain") for wrong in ([4], [3.0], [True], [-1], 3, "110", [HUGE])),
+        *(({"std": [1, 2, 3, wrong]}, r"std\[3\]") for wrong in (0, -1, NAN, None, HUGE)),
+        *(({"mean": [wrong, 2, 3, 4]}, r"mean\[0\]") for wrong in (NAN, "1", [], True, HUGE)),
+        *(({"threshold": wrong}, "threshold") for wrong in (NAN, -0.1, 1.1, "0.5", None, HUGE)),
+        *(({"channels": wrong}, "channels") for wrong in ("xyzi", [1, 2, 3, 4], ["x"] * 4)),
+        ({"channels": ["x"] * (MOST_CHANNELS + 1)}, "more than 64 channels"),
+        ({"channels": [], "units": [], "mean": [], "std": []}, "channels .* are none"),
+        *(({name: [*SPEC.as_dict()[name]][:-1]}, "differ in number") for name in MEANS_OF),
+        *(({"rule": wrong}, "rule") for wrong in (None, [1], {"residual": "a"}, {"a": HUGE})),
+        *(({"training": wrong}, "training") for wrong in ([], {"00": "01"}, {"00": [1]})),
+        *(({name: 3}, name) for name in ("network", "data", "licence")),
+        *(({"schema": wrong}, "schema") for wrong in (0, "1", None, 1.0)),
+        *(({"view": wrong}, "view") for wrong in (None, [], "neighbours", {}, {"kind": []})),
+        ({"view": {"kind": "voxels"}}, "view.kind: unknown view 'voxels'"),
+        ({"view": {"kind": "neighbours"}}, "view: neighbours is missing"),
+        *(
+            ({"view": {"kind": "neighbours", "neighbours": wrong}}, r"view\.neighbours")
+            for wrong in (-1, 0, MOST_NEIGHBOURS + 1, 10**9, HUGE, 9.0, True, "9", None)
+        ),
+        ({"view": {"kind": "neighbours", "neighbours": 9, "k": 9}}, r"view\.k: there is no"),
+    ],
+    ids=str,
 )
-def test_classes_that_are_not_named_by_numbers_are_damage(classes: Any) -> None:
-    with pytest.raises(InputError, match=r"m\.onnx: its Spec is damaged"):
-        Spec.from_dict({**SPEC.as_dict(), "classes": classes}, "m.onnx")
+def test_a_value_that_cannot_be_is_refused_where_it_stands(
+    change: dict[str, Any], reason: str
+) -> None:
+    with pytest.raises(InputError, match=rf"m\.onnx: its Spec: .*{reason}") as refusal:
+        Spec.from_dict({**SPEC.as_dict(), **change}, "m.onnx")
+    assert len(str(refusal.value)) < 300
 
 
-@pytest.mark.parametrize("name", ["channels", "units", "mean", "std"])
-def test_channels_that_lack_a_number_are_damage(name: str) -> None:
-    content = SPEC.as_dict()
-    content[name] = content[name][:-1]
-    with pytest.raises(InputError, match=r"damaged \(channels, units, mean and std differ"):
+@pytest.mark.parametrize("content", [None, [], "Spec", {1: 2}], ids=str)
+def test_what_is_no_mapping_is_no_spec(content: Any) -> None:
+    with pytest.raises(InputError, match=r"m\.onnx: its Spec: "):
         Spec.from_dict(content, "m.onnx")
 
 
@@ -146,16 +195,22 @@ def test_a_network_that_sees_no_intensity_has_no_unit_of_it() -> None:
     ("change", "reason"),
     [
         ({"way_back": "guess"}, "no such way back: 'guess'"),
-        ({"grid": {"columns": 8}}, "salsanext: not a grid"),
-        ({"grid": None}, "salsanext: not a grid"),
+        ({"way_back": 3}, "view.way_back: 3 is no text"),
+        ({"grid": {"columns": 8}}, "view.grid: its rows are described by nothing"),
+        ({"grid": None}, "view.grid: None is not a mapping"),
+        ({"grid": {"columns": 10**9, "edges": [1.0, 0.0]}}, r"view\.grid\.columns: 1000000000"),
+        ({"grid": {"columns": 1, "rows": 10**9, "inclination": [0, 1]}}, r"view\.grid\.rows"),
+        (
+            {"grid": {"columns": MOST_PIXELS, "edges": [2.0, 1.0, 0.0]}},
+            "a grid of 2 rows by 4194304 columns",
+        ),
+        ({"grid": {"columns": 8, "edges": [1.0, HUGE]}}, r"view\.grid\.edges\[1\]"),
     ],
+    ids=str,
 )
 def test_a_range_view_that_cannot_be_is_refused(change: dict[str, Any], reason: str) -> None:
+    spec = of_range_view(**change)
     with pytest.raises(InputError, match=reason):
-        of_range_view(**change).make_view()
-
-
-def test_an_unknown_view_asks_for_an_upgrade() -> None:
-    content = {**SPEC.as_dict(), "view": {"kind": "voxels"}}
-    with pytest.raises(InputError, match=r"unknown view 'voxels'\. Upgrade derain\."):
-        Spec.from_dict(content, "m.onnx").make_view()
+        spec.make_view()
+    with pytest.raises(InputError, match=rf"m\.onnx: .*{reason}"):
+        Spec.from_dict({**SPEC.as_dict(), "view": spec.view}, "m.onnx")
