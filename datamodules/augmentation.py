@@ -1,10 +1,13 @@
 """What training changes about a scan before the network sees it."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from derain.scan import Scan
+from derain.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
 
 @dataclass(frozen=True)
@@ -15,8 +18,12 @@ class Augmentation:
     on WADS, and leaves the neighbours' distances those of the still cloud. Here the jitter is in
     metres and comes before the view, so that coordinates and distances agree.
 
+    What a network sees stays where the network looks: only one that sees all around has its scans
+    turned, and where it sees less, they are mirrored about the middle of what it sees.
+
     Attributes:
-        rotation_probability: Share of scans that are turned by an angle of 0 to 360 degrees.
+        rotation_probability: Share of scans that are turned by an angle of 0 to 360 degrees, where
+            the network sees all around.
         jitter_probability: Share of scans whose coordinates are jittered.
         jitter: Standard deviation of the jitter in metres, about a LiDAR's range noise.
         mirror_probability: Share of scans whose left and right change places.
@@ -34,22 +41,41 @@ class Augmentation:
     dropping_probability: float = 0.0
     dropping: float = 0.5
 
-    def __call__(self, scan: Scan, rng: np.random.Generator) -> Scan:
-        """Returns a changed copy; labels and intensities stay with their points, in their order."""
+    def __call__(
+        self, scan: Scan, rng: np.random.Generator, azimuth: tuple[float, float] = ALL_AROUND
+    ) -> Scan:
+        """Returns a changed copy; labels and intensities stay with their points, in their order.
+
+        Args:
+            scan: The scan.
+            rng: Draws what is changed.
+            azimuth: What the network sees: right and left bound, degrees counter-clockwise from x.
+        """
+        right, left = azimuth
+        sees_all_around = left - right == FULL_CIRCLE
         valid = scan.valid  # no return is no return, wherever it is turned
         moved = scan.xyz[valid]
-        if rng.random() < self.rotation_probability:
-            angle = rng.uniform(0, 2 * np.pi)
-            cosine, sine = np.cos(angle), np.sin(angle)
-            rotation = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]], np.float32)
-            moved = moved @ rotation
+        if rng.random() < self.rotation_probability and sees_all_around:
+            moved = moved @ _turn(rng.uniform(0, 2 * np.pi))
         if rng.random() < self.jitter_probability:
             moved = moved + rng.normal(0, self.jitter, moved.shape).astype(np.float32)
         if rng.random() < self.mirror_probability:
-            moved = moved * np.array([1, -1, 1], np.float32)
+            moved = moved @ _mirror(0.0 if sees_all_around else math.radians(left + right) / 2)
         xyz = scan.xyz.copy()
         xyz[valid] = moved
         changed = replace(scan, xyz=xyz)
         if rng.random() < self.dropping_probability:
             return changed.take(rng.random(len(scan)) >= rng.uniform(0, self.dropping))
         return changed
+
+
+def _turn(angle: float) -> NDArray[np.float32]:
+    """Turns rows of x, y, z about the vertical axis."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]], np.float32)
+
+
+def _mirror(azimuth: float) -> NDArray[np.float32]:
+    """Mirrors rows of x, y, z in the vertical plane that points to an azimuth, radians."""
+    cosine, sine = np.cos(2 * azimuth), np.sin(2 * azimuth)
+    return np.array([[cosine, sine, 0], [sine, -cosine, 0], [0, 0, 1]], np.float32)

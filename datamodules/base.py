@@ -8,19 +8,20 @@ from typing import Any, Literal
 
 import lightning
 import numpy as np
-import torch
 from torch.utils.data import DataLoader, Dataset
 
 from derain.batch import Batch, Sample
 from derain.cards import DataCard
 from derain.channels import extra_channels, with_columns
 from derain.datamodules.augmentation import Augmentation
+from derain.datamodules.order import MeasuringOrder, Pick, TrainingOrder
 from derain.datamodules.statistics import evenly_spaced, measured
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.morton import distinct_rows
 from derain.scan import Scan
+from derain.seeds import Draw, generator, run_seed
 from derain.spec import Spec
 from derain.view import View
 
@@ -43,7 +44,8 @@ class ScanDataset(Dataset[Sample | InputError]):
         read: Reads one of them.
         view: What the network sees.
         card: Data card that says which labels are rain.
-        augmentation: Changes each scan anew; None leaves them as they are.
+        augmentation: Changes each scan anew every epoch; None leaves them as they are.
+        seed: Seed of the run; with the epoch and the scan it says how that scan is changed.
     """
 
     def __init__(
@@ -53,31 +55,33 @@ class ScanDataset(Dataset[Sample | InputError]):
         view: View,
         card: DataCard,
         augmentation: Augmentation | None = None,
+        seed: int = 0,
     ) -> None:
         self.files = files
         self.read = read
         self.view = view
         self.card = card
         self.augmentation = augmentation
+        self.seed = seed
 
     def __len__(self) -> int:
         return len(self.files)
 
-    def __getitem__(self, number: int) -> Sample | InputError:
+    def __getitem__(self, pick: Pick | int) -> Sample | InputError:
         # What a worker raises becomes a RuntimeError with a traceback in the training process;
         # what it returns crosses as it is, and is raised there.
         try:
-            return self._sample(self.files[number])
+            # Lightning's --trainer.overfit_batches brings its own order: numbers alone.
+            return self._sample(pick if isinstance(pick, Pick) else Pick(pick))
         except InputError as error:
             return error
 
-    def _sample(self, file: ScanFile) -> Sample:
-        scan = self.read(file)
+    def _sample(self, pick: Pick) -> Sample:
+        scan = self.read(self.files[pick.number])
         if self.augmentation is not None:
-            # torch's generator differs by run seed, epoch and worker; NumPy's global one does not.
-            seed = int(torch.randint(2**62, ()).item())
-            scan = self.augmentation(scan, np.random.default_rng(seed))
-        return Sample.of(scan, self.view(scan), self.card)
+            chance = generator(Draw.AUGMENTATION, self.seed, pick.epoch, pick.number)
+            scan = self.augmentation(scan, chance, self.view.azimuth)
+        return Sample.of(scan, self.view(scan), self.card, pick.measured)
 
 
 @dataclass(frozen=True)
@@ -88,15 +92,15 @@ class Loading:
         batch_size: Scans in a batch.
         workers: Processes that read and view scans; 0 does it in the training process.
         columns: Names of the columns of ``.bin`` and ``.npy`` files.
-        deduplicate: Measure on distinct points, each counted once. Predictions are for every row
-            in any case.
+        deduplicate: Whether points at one position are measured once; None does as the data card
+            says. Predictions are for every row in any case.
         augmentation: What training changes about its scans.
     """
 
     batch_size: int = 1
     workers: int = 0
     columns: tuple[str, ...] = DEFAULT_COLUMNS
-    deduplicate: bool = False
+    deduplicate: bool | None = None
     augmentation: Augmentation = field(default_factory=Augmentation)
 
 
@@ -114,6 +118,12 @@ class ScanDataModule(lightning.LightningDataModule):
         super().__init__()
         self.card = card
         self.loading = loading
+
+    @property
+    def distinct(self) -> bool:
+        """Whether points at one position are measured once."""
+        asked = self.loading.deduplicate
+        return self.card.deduplicate if asked is None else asked
 
     @abstractmethod
     def find(self, part: Part) -> list[ScanFile]:
@@ -164,8 +174,8 @@ class ScanDataModule(lightning.LightningDataModule):
         return map(self.read, evenly_spaced(self.files("train"), most))
 
     def train_dataloader(self) -> DataLoader[Sample | InputError]:
-        """Training scans, shuffled and augmented."""
-        return self._loader("train", self.loading.augmentation)
+        """Training scans, in another order and augmented anew every epoch."""
+        return self._loader("train")
 
     def val_dataloader(self) -> DataLoader[Sample | InputError]:
         """Validation scans, in order."""
@@ -200,33 +210,47 @@ class ScanDataModule(lightning.LightningDataModule):
             )
         return scan.with_label(label)
 
+    def read_measured(self, file: ScanFile) -> Scan:
+        """Reads what is measured of a scan, with its labels.
+
+        Raises:
+            InputError: A file that cannot be read, or labels that are not in the data card.
+        """
+        return self._read_distinct(file) if self.distinct else self.read(file)
+
     def on_before_batch_transfer(self, batch: Batch | InputError, dataloader_idx: int) -> Batch:
         """Raises what went wrong where the batch was made, perhaps in another process."""
         if isinstance(batch, InputError):
             raise batch
         return batch
 
-    def _loader(
-        self, part: Part, augmentation: Augmentation | None = None
-    ) -> DataLoader[Sample | InputError]:
+    def _loader(self, part: Part) -> DataLoader[Sample | InputError]:
         spec: Spec = self.trainer.lightning_module.spec  # type: ignore[union-attr, assignment]
         # Jitter would pull equal points apart, which the view takes for one in deployment.
-        distinct = part == "train" or (self.loading.deduplicate and part != "predict")
+        read = {"train": self._read_distinct, "predict": self.read}.get(part, self.read_measured)
         dataset = ScanDataset(
             self.files(part),
-            self._read_distinct if distinct else self.read,
+            read,
             spec.make_view(threads=1 if self.loading.workers else 0),
             self.card,
-            augmentation,
+            self.loading.augmentation if part == "train" else None,
+            run_seed(),
         )
         return DataLoader(
             dataset,
             batch_size=self.loading.batch_size,
-            shuffle=part == "train",
+            sampler=self._order(part, dataset),
             num_workers=self.loading.workers,
             persistent_workers=self.loading.workers > 0,
             collate_fn=_packed,
         )
+
+    def _order(self, part: Part, dataset: ScanDataset) -> TrainingOrder | MeasuringOrder:
+        assert self.trainer is not None  # it is what asks for loaders
+        processes, process = self.trainer.world_size, self.trainer.global_rank
+        if part == "train":
+            return TrainingOrder(dataset, dataset.seed, processes, process)
+        return MeasuringOrder(dataset, self.loading.batch_size, processes, process)
 
     @property
     def _model(self) -> Any:

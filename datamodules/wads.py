@@ -10,7 +10,7 @@ class Wads(SequenceDataModule):
     """WADS as published, with the split of 3D-OutDet.
 
     Its raw scans hold about 40 % of their points twice. They are measured on distinct points, as
-    the published results are; predictions are for every row of the raw file.
+    the published results are and as its data card says; predictions are for every row of the file.
 
     Args:
         root: Folder of the data set.
@@ -27,6 +27,6 @@ class Wads(SequenceDataModule):
         root: str,
         layout: Layout = SEMANTIC_KITTI,
         split: dict[str, list[str]] | None = None,
-        loading: Loading = Loading(deduplicate=True),
+        loading: Loading = Loading(),
     ) -> None:
         super().__init__(root, load_card("wads"), layout, split, loading)

@@ -5,13 +5,16 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 from torchmetrics import Metric
 from torchmetrics.utilities import dim_zero_cat
 
 from derain.counts import SCORES, Counts, ratio
 from derain.errors import InputError
+from derain.scan import Scan
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,24 @@ class RainMetrics(Metric):
 
         self.cells += cells
         self.scan_counts.append(outcomes)
+
+    def update_scan(self, scan: Scan, predicted: NDArray[np.bool_]) -> None:
+        """Counts the points of one labelled scan.
+
+        Args:
+            scan: A scan with labels.
+            predicted: True for the points called rain, bool (N,).
+
+        Raises:
+            InputError: A label that is no class.
+        """
+        self.update(
+            predicted=torch.from_numpy(predicted).to(self.device),
+            label=torch.from_numpy(scan.label).to(self.device),
+            range=torch.from_numpy(scan.range).to(self.device),
+            scan=torch.zeros(len(scan), dtype=torch.int64, device=self.device),
+            scans=1,
+        )
 
     def compute(self) -> dict[str, Tensor]:
         """Every score over all points, and as the mean over scans (``…_per_scan``).

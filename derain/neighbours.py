@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -13,6 +14,8 @@ from derain.cores import usable_cores
 from derain.documents import Entry
 from derain.morton import distinct_rows
 from derain.scan import Scan
+from derain.spherical_grid import ALL_AROUND
+from derain.view import WayToRows
 
 # Seven times as many as 3D-OutDet looks at. A hundred thousand points have 80 MB of them.
 MOST_NEIGHBOURS = 64
@@ -75,10 +78,11 @@ class Neighbourhoods:
         Returns:
             One value per row of the scan in its order, float32 (N,); 0 for invalid rows.
         """
-        result = np.zeros(len(self.inverse), np.float32)
-        judged = self.inverse >= 0
-        result[judged] = score[self.inverse[judged]]
-        return result
+        return _to_rows(self.inverse, score)
+
+    def way_to_rows(self) -> WayToRows:
+        """What :meth:`back` does, without the inputs."""
+        return partial(_to_rows, self.inverse)
 
     @staticmethod
     def pack(views: Sequence["Neighbourhoods"]) -> dict[str, NDArray[Any]]:
@@ -126,6 +130,11 @@ class NeighbourView:
         )
         return cls(found["neighbours"], channels, stand_in, threads)
 
+    @property
+    def azimuth(self) -> tuple[float, float]:
+        """What it sees: everything around."""
+        return ALL_AROUND
+
     def __call__(self, scan: Scan) -> Neighbourhoods:
         """Views a scan."""
         first, inverse = distinct_rows(scan)
@@ -136,6 +145,13 @@ class NeighbourView:
         values = filled_values(scan, first, self.channels, self.stand_in)
         points = np.ascontiguousarray(values.T)
         return Neighbourhoods(points, neighbours, distances, first, inverse)
+
+
+def _to_rows(inverse: NDArray[np.int64], score: NDArray[np.float32]) -> NDArray[np.float32]:
+    result = np.zeros(len(inverse), np.float32)
+    judged = inverse >= 0
+    result[judged] = score[inverse[judged]]
+    return result
 
 
 def nearest_neighbours(

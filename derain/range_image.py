@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -12,7 +13,7 @@ from derain.documents import Entry
 from derain.errors import InputError
 from derain.scan import Scan
 from derain.spherical_grid import SphericalGrid, grid_at
-from derain.view import IGNORED
+from derain.view import IGNORED, WayToRows
 from derain.way_back import WAYS_BACK, ProjectedPoints
 
 CHANNELS = ("range", "x", "y", "z", "intensity")
@@ -83,6 +84,10 @@ class RangeImage:
             One value per row of the scan in its order, float32 (N,); 0 for invalid rows and for
             points outside the grid, which nobody judged.
         """
+        return self.way_to_rows()(score)
+
+    def way_to_rows(self) -> WayToRows:
+        """What :meth:`back` does, without the image."""
         judged = np.flatnonzero(self.pixel >= 0)
         points = ProjectedPoints(
             self.pixel[judged],
@@ -90,9 +95,7 @@ class RangeImage:
             self._nearest().reshape(self.valid.shape),
             self.wraps,
         )
-        result = np.zeros(len(self.pixel), np.float32)
-        result[judged] = WAYS_BACK[self.way_back](points, score)
-        return result
+        return partial(_to_rows, self.way_back, points, judged, len(self.pixel))
 
     @staticmethod
     def pack(views: Sequence["RangeImage"]) -> dict[str, NDArray[Any]]:
@@ -108,6 +111,18 @@ class RangeImage:
         shown = self.winner >= 0
         nearest[shown] = self.range[self.winner[shown]]
         return nearest
+
+
+def _to_rows(
+    way_back: str,
+    points: ProjectedPoints,
+    judged: NDArray[np.int64],
+    rows: int,
+    score: NDArray[np.float32],
+) -> NDArray[np.float32]:
+    result = np.zeros(rows, np.float32)
+    result[judged] = WAYS_BACK[way_back](points, score)
+    return result
 
 
 @dataclass(frozen=True)
@@ -154,6 +169,11 @@ class RangeView:
             required=("grid", "way_back"),
         )
         return cls(found["grid"], channels, found["way_back"], stand_in)
+
+    @property
+    def azimuth(self) -> tuple[float, float]:
+        """What it sees: the grid's right and left bound, degrees counter-clockwise from x."""
+        return self.grid.azimuth
 
     def __call__(self, scan: Scan) -> RangeImage:
         """Views a scan."""

@@ -1,6 +1,6 @@
 """What every view of a scan can do: be a network's input, and carry its scores back."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -10,6 +10,9 @@ from derain.scan import Scan
 
 # In a target: nothing is there to be judged, such as in a pixel without a return.
 IGNORED = -1
+
+# Carries scores of a view's cells, float32 (M,), to the rows of its scan, float32 (N,).
+WayToRows = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 
 class ViewedScan(Protocol):
@@ -43,6 +46,9 @@ class ViewedScan(Protocol):
     def back(self, score: NDArray[np.float32]) -> NDArray[np.float32]:
         """Carries scores of the cells, float32 (M,), to the scan's rows, float32 (N,)."""
 
+    def way_to_rows(self) -> WayToRows:
+        """What :meth:`back` does, without the inputs: what is needed once they were scored."""
+
     @staticmethod
     def pack(views: Sequence[Any]) -> dict[str, NDArray[Any]]:
         """The inputs of several scans as one batch."""
@@ -56,6 +62,10 @@ class View(Protocol):
     """
 
     KIND: ClassVar[str]
+
+    @property
+    def azimuth(self) -> tuple[float, float]:
+        """What it sees: right and left bound, degrees counter-clockwise from x."""
 
     def __call__(self, scan: Scan) -> ViewedScan:
         """Views a scan."""

@@ -14,9 +14,11 @@ from torch import Tensor, nn
 from derain.batch import Batch
 from derain.cards import DataCard
 from derain.errors import InputError
+from derain.mean_losses import MeanLosses
 from derain.metrics import RainMetrics
 from derain.probability import probability_of_rain
 from derain.scan import Scan
+from derain.seeds import Draw, generator, run_seed
 from derain.spec import Spec
 
 # What the checkpoint of a run is chosen by, the more the better: the IoU of the validation scans
@@ -71,6 +73,7 @@ class DerainingModule(lightning.LightningModule):
             )
         self.channels = tuple(channels)
         self._spec: Spec | None = None
+        self.mean_losses = MeanLosses()
         # Not in the state_dict: the Spec holds them.
         self.register_buffer("mean", torch.zeros(len(channels)), persistent=False)
         self.register_buffer("std", torch.ones(len(channels)), persistent=False)
@@ -206,16 +209,27 @@ class DerainingModule(lightning.LightningModule):
             if isinstance(logger, TensorBoardLogger):
                 logger.log_hyperparams(parameters, {"hp_metric": 0.0})
 
+    def on_train_batch_start(self, batch: Batch, batch_idx: int) -> None:
+        """Draws dropout by seed, epoch, step and process, so that a resume changes nothing."""
+        step = (self.current_epoch, batch_idx, self.global_rank)
+        torch.manual_seed(int(generator(Draw.NETWORK, run_seed(), *step).integers(2**63)))
+
     def training_step(self, batch: Batch) -> Tensor:
         """Loss of one batch."""
         losses, _ = self.losses(batch)
-        self._log_losses(batch, losses, "train")
+        self.log_dict(
+            {f"train/{name}": value for name, value in losses.items()},
+            on_step=False,
+            on_epoch=True,
+            sync_dist=True,
+            batch_size=len(batch.cells),
+        )
         return losses["loss"]
 
     def validation_step(self, batch: Batch) -> list[NDArray[np.float32]]:
         """Loss of one batch, its points counted, and the probability of each, as for predict."""
         losses, logits = self.losses(batch)
-        self._log_losses(batch, losses, "val")
+        self.mean_losses.update(losses, scans=len(batch.measured))
         return self._count(batch, logits)
 
     def test_step(self, batch: Batch) -> None:
@@ -227,23 +241,17 @@ class DerainingModule(lightning.LightningModule):
         return self.probabilities(batch, self(**batch.inputs))
 
     def on_validation_epoch_start(self) -> None:
-        """Forgets the scores of the last epoch, or of the sanity check."""
+        """Forgets losses and scores of the last epoch, or of the sanity check."""
+        self.mean_losses.reset()
         self.metrics.reset()
 
     def on_validation_epoch_end(self) -> None:
-        """Logs the scores of the epoch."""
+        """Logs losses and scores of the epoch."""
+        losses = self.mean_losses.compute()
+        self._log_alike({f"val/{name}": loss for name, loss in losses.items()})
+        if not self.LEARNS_FROM_LABELS:
+            self._log_alike({MERIT: -losses["loss"]})
         self._log_scores("val")
-
-    def on_test_start(self) -> None:
-        """Refuses to test on several devices, which share out the scans and count some twice.
-
-        Raises:
-            InputError: More than one device.
-        """
-        if self.trainer.world_size > 1:
-            raise InputError(
-                "--trainer.devices", "several would count some scans twice", "Test on one device."
-            )
 
     def on_test_epoch_start(self) -> None:
         """Forgets the scores of another test."""
@@ -254,42 +262,39 @@ class DerainingModule(lightning.LightningModule):
         self._log_scores("test")
 
     def probabilities(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
-        """Carries logits back to every row of every scan, as the deployed model does."""
-        return [
-            sample.view.back(probability_of_rain(scores.float().cpu().numpy()))
-            for sample, scores in zip(batch.samples, batch.split(logits), strict=True)
-        ]
+        """Carries logits back to every row of every scan, as the deployed model does.
 
-    def _log_losses(self, batch: Batch, losses: Mapping[str, Tensor], part: str) -> None:
-        values = {f"{part}/{name}": value for name, value in losses.items()}
-        if part == "val" and not self.LEARNS_FROM_LABELS:
-            values[MERIT] = -losses["loss"]
-        self.log_dict(
-            values, on_step=False, on_epoch=True, sync_dist=True, batch_size=len(batch.samples)
-        )
+        Args:
+            batch: A batch.
+            logits: Of "not rain" and "rain" of every cell, float (M, 2).
+
+        Returns:
+            The probability of rain, a float32 (N,) for each scan that is measured.
+        """
+        if not batch.measured:
+            return []
+        return [
+            scan.way_to_rows(probability_of_rain(scores.float().cpu().numpy()))
+            for scan, scores in zip(batch.measured, batch.split(logits), strict=True)
+        ]
 
     def _count(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
         probabilities = self.probabilities(batch, logits)
-        for sample, probability in zip(batch.samples, probabilities, strict=True):
-            scan = sample.scan
-            if scan.label is None:
-                continue
-            self.metrics.update(
-                predicted=torch.from_numpy(probability > self.spec.threshold).to(self.device),
-                label=torch.from_numpy(scan.label).to(self.device),
-                range=torch.from_numpy(scan.range).to(self.device),
-                scan=torch.zeros(len(scan), dtype=torch.int64, device=self.device),
-                scans=1,
-            )
+        for measured, probability in zip(batch.measured, probabilities, strict=True):
+            if measured.scan.label is not None:
+                self.metrics.update_scan(measured.scan, probability > self.spec.threshold)
         return probabilities
 
     def _log_scores(self, part: str) -> None:
         if not self.metrics.per_scan():  # scans without labels measure nothing
             return
         scores = self.metrics.compute()
-        self.log_dict({f"{part}/{name}": score for name, score in scores.items()})
-        self.log(f"{part}_iou", scores["iou"], prog_bar=True, logger=False)
+        self._log_alike({f"{part}/{name}": score for name, score in scores.items()})
+        self._log_alike({f"{part}_iou": scores["iou"]}, prog_bar=True, logger=False)
         if part == "val":
-            self.log("hp_metric", scores["iou"])
-            if self.LEARNS_FROM_LABELS:
-                self.log(MERIT, scores["iou"])
+            merit = {MERIT: scores["iou"]} if self.LEARNS_FROM_LABELS else {}
+            self._log_alike({"hp_metric": scores["iou"], **merit})
+
+    def _log_alike(self, values: Mapping[str, Tensor], **options: Any) -> None:
+        """Logs what all processes have computed alike; the largest of equal numbers is exact."""
+        self.log_dict(values, sync_dist=True, reduce_fx="max", **options)

@@ -13,6 +13,8 @@ from derain.pictures import judgement_figure
 class ScanPanels(lightning.Callback):
     """Logs input, truth, prediction and error of the first rainy validation scans.
 
+    Of several processes the first draws, of the scans that it measures.
+
     Args:
         scans: How many scans to show; 0 shows none.
     """
@@ -23,7 +25,8 @@ class ScanPanels(lightning.Callback):
 
     def on_validation_epoch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
         """Starts counting anew; the order of validation scans is fixed."""
-        self.left = 0 if trainer.sanity_checking else self.scans
+        draws = trainer.is_global_zero and not trainer.sanity_checking
+        self.left = self.scans if draws else 0
 
     def on_validation_batch_end(
         self,
@@ -36,15 +39,14 @@ class ScanPanels(lightning.Callback):
         """Draws the batch's rainy scans while there are panels left to fill."""
         if not self.left or not isinstance(trainer.logger, TensorBoardLogger):
             return
-        for sample, probability in zip(batch.samples, outputs, strict=True):
-            if not self.left or sample.scan.label is None:
+        for measured, probability in zip(batch.measured, outputs, strict=True):
+            scan = measured.scan
+            if not self.left or scan.label is None:
                 continue
-            rain = model.card.rain_of(sample.scan)
+            rain = model.card.rain_of(scan)
             if not rain.any():
                 continue
-            figure = judgement_figure(
-                sample.scan, probability > model.spec.threshold, rain, sample.scan.name
-            )
+            figure = judgement_figure(scan, probability > model.spec.threshold, rain, scan.name)
             name = f"validation scan {self.scans - self.left}"
             trainer.logger.experiment.add_figure(name, figure, trainer.global_step)
             self.left -= 1

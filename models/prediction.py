@@ -7,6 +7,7 @@ from typing import Any
 
 import lightning
 import numpy as np
+import torch
 from lightning.pytorch.callbacks import BasePredictionWriter
 from numpy.typing import NDArray
 
@@ -26,9 +27,13 @@ class PredictionWriter(BasePredictionWriter):
         super().__init__(write_interval="batch")
         self.folder = Path(folder)
         self.root = "."
+        self.written = 0
 
     def on_predict_start(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
         """Finds the folder that all scans lie below."""
+        # What is written need not be kept: probabilities of a data set fill gigabytes.
+        trainer.predict_loop.return_predictions = False
+        self.written = 0
         files = trainer.datamodule.files("predict")  # type: ignore[attr-defined]
         self.root = os.path.commonpath([file.scan.parent for file in files])
 
@@ -46,6 +51,15 @@ class PredictionWriter(BasePredictionWriter):
         Raises:
             InputError: A folder that cannot be written.
         """
-        for sample, probability in zip(batch.samples, prediction, strict=True):
-            path = self.folder / os.path.relpath(sample.scan.name, self.root)
+        for measured, probability in zip(batch.measured, prediction, strict=True):
+            path = self.folder / os.path.relpath(measured.scan.name, self.root)
             write_labels(path.with_suffix(".label"), probability > model.spec.threshold)
+            self.written += 1
+
+    def on_predict_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
+        """Says what was written, by all processes together."""
+        of_this = torch.tensor(self.written, device=model.device)
+        written = int(trainer.strategy.reduce(of_this, reduce_op="sum"))
+        if trainer.is_global_zero:
+            files = "1 label file" if written == 1 else f"{written:,} label files"
+            print(f"Wrote {files} to {self.folder}")

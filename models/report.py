@@ -18,11 +18,16 @@ class TestReport(lightning.Callback):
 
     def on_test_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
         """Prints the report, and writes it beside the run's log where there is one."""
-        print(as_text(model.metrics, model.card.name))
-        if trainer.log_dir is not None:
-            path = Path(trainer.log_dir) / "test.json"
+        # Counts and folder are put together by all processes, the report is the first one's.
+        text, scores = as_text(model.metrics, model.card.name), as_dict(model.metrics)
+        folder = trainer.log_dir
+        if not trainer.is_global_zero:
+            return
+        print(text)
+        if folder is not None:
+            path = Path(folder) / "test.json"
             with replacing(path) as temporary:
-                temporary.write_text(json.dumps(as_dict(model.metrics), indent=2) + "\n")
+                temporary.write_text(json.dumps(scores, indent=2) + "\n")
             print(f"Written to {path}")
 
 

@@ -1,5 +1,7 @@
 """Batches of scans: packed together, taken apart again."""
 
+import pickle
+
 import numpy as np
 import pytest
 import torch
@@ -82,6 +84,38 @@ def test_cells_of_unknown_points_are_not_to_be_judged(view: View) -> None:
     assert set(expected.tolist()) == {0, 1, IGNORED}
 
 
+@pytest.mark.parametrize(
+    "view",
+    [NeighbourView(5), RangeView(SphericalGrid.even(8, 30, (-30, 30)))],
+    ids=["neighbours", "range"],
+)
+def test_a_batch_that_is_measured_carries_the_scans_and_one_that_is_not_tensors_alone(
+    view: View,
+) -> None:
+    scans = [Scan.of(scene(size, seed=size)) for size in (200, 0, 90)]
+    seen = [view(scan) for scan in scans]
+
+    def batch(measured: bool) -> Batch:
+        pairs = zip(scans, seen, strict=True)
+        return Batch.of([Sample(scan, viewed, None, measured) for scan, viewed in pairs])
+
+    told, untold = batch(measured=True), batch(measured=False)
+    sent: Batch = pickle.loads(pickle.dumps(told))
+    scores = sent.split(torch.rand(sum(told.cells)))
+    for scan, viewed, score, measured in zip(scans, seen, scores, sent.measured, strict=True):
+        np.testing.assert_array_equal(measured.scan.xyz, scan.xyz)
+        np.testing.assert_array_equal(
+            measured.way_to_rows(score.numpy()), viewed.back(score.numpy())
+        )
+    assert not untold.measured
+    assert untold.cells == told.cells
+    tensors = sum(tensor.nbytes for tensor in untold.inputs.values())
+    assert len(pickle.dumps(untold)) < tensors + 2000  # names, shapes and types
+    # Of a point its coordinates, intensity, range and the way back, of a pixel what it shows.
+    most = sum(44 * len(scan) + 4 * viewed.size for scan, viewed in zip(scans, seen, strict=True))
+    assert len(pickle.dumps(told)) < tensors + most + 5000
+
+
 def test_a_scan_without_labels_has_no_target() -> None:
     scan = Scan.of(scene(20))
     card = DataCard("ours", {3: "rain"}, rain=(3,))
@@ -93,5 +127,6 @@ def test_tensors_follow_to_another_device_and_scans_stay() -> None:
     moved = batch.to(torch.device("meta"))
     assert moved.target is not None
     assert {tensor.device.type for tensor in [*moved.inputs.values(), moved.target]} == {"meta"}
-    assert moved.samples is batch.samples
+    assert moved.cells == batch.cells
+    assert moved.measured is batch.measured
     assert Batch.of([sample(3, labelled=False)]).to(torch.device("meta")).target is None

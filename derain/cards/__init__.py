@@ -40,6 +40,8 @@ class DataCard:
         extra: Mean and standard deviation of further channels, by name, such as ``doppler``.
         rain_share: Share of rain among the training points; None if not known.
         simulated: Whether its rain or snow fell in a computer; scores on it are labelled so.
+        deduplicate: Whether results on it count points at one position once, as those of a sensor
+            that writes many points twice are published.
         split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
     """
 
@@ -55,6 +57,7 @@ class DataCard:
     extra: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rain_share: float | None = None
     simulated: bool = False
+    deduplicate: bool = False
     split: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
@@ -161,6 +164,7 @@ def _card(document: Entry) -> DataCard:
         "extra": lambda entry: _each(entry, _mean_and_deviation),
         "rain_share": _if_known(lambda entry: entry.within(0, 1)),
         "simulated": Entry.truth,
+        "deduplicate": Entry.truth,
         "split": lambda entry: _each(entry, Entry.texts),
     }
     card = DataCard(**document.record(parsers, required=["name", "classes", "rain"]))

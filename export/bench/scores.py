@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from tqdm import tqdm
 
@@ -121,13 +120,7 @@ class _Tally:
             self.failures[scan.name] = str(error)
             predicted = np.zeros(len(scan), bool)
         scan, predicted = scan.take(counted), predicted[counted]
-        self.metrics.update(
-            predicted=torch.from_numpy(predicted),
-            label=torch.from_numpy(scan.label),
-            range=torch.from_numpy(scan.range),
-            scan=torch.zeros(len(scan), dtype=torch.int64),
-            scans=1,
-        )
+        self.metrics.update_scan(scan, predicted)
         if scan.radar is not None:
             rain, known = self.card.rain_of(scan), ~self.card.unknown_of(scan)
             for sensor, points in {"LiDAR": ~scan.radar, "radar": scan.radar}.items():

@@ -42,7 +42,7 @@ def connect() -> Callable[..., ScanDataModule]:
         data.setup("fit")
         model = OutDet(neighbours=neighbours)
         model.adopt(model.spec_for(data.card))
-        data.trainer = SimpleNamespace(lightning_module=model)
+        data.trainer = SimpleNamespace(lightning_module=model, world_size=1, global_rank=0)
         return data
 
     return connect

@@ -51,7 +51,11 @@ def batches(data: ScanDataModule, part: str) -> list[Batch]:
 
 
 def scans(data: ScanDataModule, part: str) -> list[Scan]:
-    return [sample.scan for batch in batches(data, part) for sample in batch.samples]
+    """What a model is given in one epoch; batches of training scans are tensors alone."""
+    if part == "train":
+        loader: Any = data.train_dataloader()
+        return [loader.dataset[pick].scan for pick in loader.sampler]
+    return [measured.scan for batch in batches(data, part) for measured in batch.measured]
 
 
 def lengths(data: ScanDataModule, part: str) -> list[int]:
@@ -69,39 +73,11 @@ def test_what_is_not_trained_on_comes_in_order_and_untouched(
                 np.testing.assert_array_equal(np.c_[scan.xyz, scan.intensity], points)
 
 
-def test_training_scans_come_in_another_order_every_epoch(
-    folder: Callable[..., Folder], connect: Connect
-) -> None:
-    torch.manual_seed(0)
-    data = connect(folder())
-    epochs = [lengths(data, "train") for _ in range(5)]
-    assert {tuple(sorted(epoch)) for epoch in epochs} == {tuple(range(40, 40 + SCANS))}
-    assert len({tuple(epoch) for epoch in epochs}) > 1
-
-
-@pytest.mark.parametrize("workers", [0, 1])
-def test_training_scans_are_augmented_anew_every_epoch(
-    folder: Callable[..., Folder], connect: Connect, workers: int
-) -> None:
-    def epochs(seed: int) -> list[list[Scan]]:
-        torch.manual_seed(seed)
-        turned = Augmentation(rotation_probability=1, jitter_probability=0)
-        loader = connect(folder(augmentation=turned, workers=workers)).train_dataloader()
-        drawn = [[batch.samples[0].scan for batch in loader] for _ in range(2)]
-        return [sorted(epoch, key=len) for epoch in drawn]
-
-    first, second = epochs(seed=0)
-    again, _ = epochs(seed=0)
-    for one, other, repeated in zip(first, second, again, strict=True):
-        assert not np.allclose(one.xyz, other.xyz)
-        np.testing.assert_array_equal(one.xyz, repeated.xyz)
-
-
 def test_scans_are_packed_in_batches_of_the_size_asked_for(
     folder: Callable[..., Folder], connect: Connect
 ) -> None:
     first, second = batches(connect(folder(batch_size=4)), "val")
-    assert (len(first.samples), len(second.samples)) == (4, 2)
+    assert (first.cells, second.cells) == ([40, 41, 42, 43], [44, 45])
     assert len(first.inputs["points"]) == 40 + 41 + 42 + 43
 
 
@@ -109,10 +85,10 @@ def test_the_target_is_one_where_the_card_says_rain(
     folder: Callable[..., Folder], connect: Connect
 ) -> None:
     for batch in batches(connect(folder()), "val"):
-        (sample,) = batch.samples
-        assert sample.scan.label is not None
+        (measured,) = batch.measured
+        assert measured.scan.label is not None
         assert batch.target is not None
-        expected = sample.scan.label[sample.view.first] == SNOW
+        expected = measured.scan.label[NeighbourView()(measured.scan).first] == SNOW
         np.testing.assert_array_equal(batch.target.numpy(), expected)
         assert 0 < expected.sum() < len(expected)
 
@@ -125,11 +101,11 @@ def test_prediction_scans_have_no_target(folder: Callable[..., Folder], connect:
 def test_the_view_is_the_models(
     folder: Callable[..., Folder], connect: Connect, neighbours: int
 ) -> None:
-    (sample,) = batches(connect(folder(), neighbours), "val")[0].samples
-    assert sample.view.neighbours.shape == (40, neighbours)
-    expected = NeighbourView(neighbours)(sample.scan)
-    np.testing.assert_array_equal(sample.view.neighbours, expected.neighbours)
-    np.testing.assert_array_equal(sample.view.distances, expected.distances)
+    batch = batches(connect(folder(), neighbours), "val")[0]
+    assert batch.inputs["neighbours"].shape == (40, neighbours)
+    expected = NeighbourView(neighbours)(batch.measured[0].scan)
+    np.testing.assert_array_equal(batch.inputs["neighbours"], expected.neighbours)
+    np.testing.assert_array_equal(batch.inputs["distances"], expected.distances)
 
 
 def test_a_worker_gives_what_the_process_itself_gives(
@@ -153,25 +129,26 @@ def test_a_data_set_can_be_sent_to_a_worker(
     np.testing.assert_array_equal(sent[3].view.points, dataset[3].view.points)
 
 
+@pytest.mark.parametrize("loading", [{}, {"batch_size": 4}, {"deduplicate": True}], ids=str)
 def test_duplicates_are_measured_once_and_every_row_is_predicted(
-    tmp_path: Path, write: Write, connect: Connect
+    tmp_path: Path, write: Write, connect: Connect, loading: dict[str, Any]
 ) -> None:
     distinct = scene(30)
     rows = np.random.default_rng(0).permutation(np.resize(np.arange(30), 75))
     points = np.concatenate([distinct[rows], np.full((5, 4), np.nan, np.float32)])
     write(tmp_path / "a.bin", tmp_path / "a.label", [0, SNOW], points)
     parts = {part: ["a.bin"] for part in ("train", "validation", "test")}
-    loading = Loading(deduplicate=True, augmentation=STILL)
-    data = connect(Folder(str(tmp_path), "wads", **parts, loading=loading))
+    still = Loading(augmentation=STILL, **loading)  # the data card asks for it where this does not
+    data = connect(Folder(str(tmp_path), "wads", **parts, loading=still))
     for part in ("train", "val", "test"):
         (scan,) = scans(data, part)
         # The rows that remain are the first of their kind, in the order of the file.
         first = np.sort(np.unique(rows, return_index=True)[1])
         np.testing.assert_array_equal(scan.xyz, points[first, :3])
         np.testing.assert_array_equal(scan.label, np.resize([0, SNOW], 80)[first])
-    ((sample,),) = (batch.samples for batch in batches(data, "predict"))
+    ((measured,),) = (batch.measured for batch in batches(data, "predict"))
     score = np.arange(1, 31, dtype=np.float32)
-    back = sample.view.back(score)
+    back = measured.way_to_rows(score)
     assert len(back) == 80
     np.testing.assert_array_equal(back[75:], 0)
     assert len(set(back[:75].tolist())) == 30
@@ -179,11 +156,13 @@ def test_duplicates_are_measured_once_and_every_row_is_predicted(
         assert len(set(back[:75][rows == row].tolist())) == 1
 
 
+@pytest.mark.parametrize(("card", "asked"), [("kitti", None), ("wads", False)])
 def test_without_asking_duplicates_are_counted_as_often_as_they_are_there(
-    tmp_path: Path, write: Write, connect: Connect
+    tmp_path: Path, write: Write, connect: Connect, card: str, asked: bool | None
 ) -> None:
     write(tmp_path / "a.bin", tmp_path / "a.label", [0], np.repeat(scene(10), 3, axis=0))
-    data = connect(Folder(str(tmp_path), "wads", train=["a.bin"], test=["a.bin"]))
+    loading = Loading(deduplicate=asked)
+    data = connect(Folder(str(tmp_path), card, train=["a.bin"], test=["a.bin"], loading=loading))
     assert lengths(data, "test") == [30]
 
 
@@ -209,7 +188,7 @@ def unsupervised(small_grid: dict[str, Any]) -> Connect:
 
     def connect(data: ScanDataModule) -> ScanDataModule:
         model = LiSnowNet(small_grid, width=2)
-        data.trainer = SimpleNamespace(lightning_module=model)
+        data.trainer = SimpleNamespace(lightning_module=model, world_size=1, global_rank=0)
         data.setup("fit")
         model.adopt(model.spec_for(data.card))
         return data
@@ -232,7 +211,7 @@ def test_such_a_model_is_validated_on_the_labels_that_there_are(
     data = unsupervised(folder(batch_size=SCANS))
     (tmp_path / "2.label").unlink()
     (batch,) = batches(data, "val")
-    labelled = [sample.scan.label is not None for sample in batch.samples]
+    labelled = [measured.scan.label is not None for measured in batch.measured]
     assert labelled == [True, True, False, True, True, True]
     assert batch.target is None  # there is none for all of them
     with pytest.raises(InputError, match=r"2\.bin: its labels are not at"):
@@ -263,11 +242,14 @@ def test_statistics_but_not_the_share_of_rain_are_measured_without_labels(
 def test_range_images_of_a_batch_have_one_size(
     folder: Callable[..., Folder], unsupervised: Connect
 ) -> None:
-    (batch,) = batches(unsupervised(folder(batch_size=SCANS)), "val")
+    data = unsupervised(folder(batch_size=SCANS))
+    view = data.trainer.lightning_module.spec.make_view()
+    (batch,) = batches(data, "val")
     assert batch.inputs["image"].shape == (SCANS, 3, 18, 60)
     assert batch.inputs["valid"].shape == (SCANS, 1, 18, 60)
-    for number, sample in enumerate(batch.samples):
-        assert torch.equal(batch.inputs["image"][number], torch.from_numpy(sample.view.image))
+    for number, measured in enumerate(batch.measured):
+        image = torch.from_numpy(view(measured.scan).image)
+        assert torch.equal(batch.inputs["image"][number], image)
 
 
 def test_the_statistics_of_a_card_are_left_alone(folder: Callable[..., Folder]) -> None:

@@ -51,7 +51,7 @@ def folder(request: pytest.FixtureRequest, tmp_path: Path) -> MakeFolder:
         data = Folder(
             str(tmp_path), str(tmp_path / "card.yaml"), **parts, loading=Loading(**loading)
         )
-        data.trainer = SimpleNamespace(lightning_module=model)
+        data.trainer = SimpleNamespace(lightning_module=model, world_size=1, global_rank=0)
         return data
 
     return make
@@ -71,10 +71,10 @@ def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(
     model.adopt(model.spec_for(data.card))
     assert model.spec.units[4:] == ("dBsm", "0 or 1", "m/s")
     for number, batch in enumerate(data.test_dataloader()):
-        (sample,) = batch.samples
-        assert set(sample.scan.fields) == {"radar", "doppler", "rcs"}
+        (measured,) = batch.measured
+        assert set(measured.scan.fields) == {"radar", "doppler", "rcs"}
         points = batch.inputs["points"].numpy()
-        rows = sample.view.first
+        rows = model.spec.make_view()(measured.scan).first
         for place, name in enumerate(model.channels):
             column = scans[number].channel(name)[rows]
             known = ~np.isnan(column)
@@ -103,8 +103,9 @@ def test_columns_stay_with_their_points_where_training_drops_and_turns_points(
     data.setup("fit")
     model.adopt(model.spec_for(data.card))
     lost = 0
-    for batch in data.train_dataloader():
-        scan = batch.samples[0].scan
+    loader = data.train_dataloader()
+    for pick in loader.sampler:
+        scan = loader.dataset[pick].scan
         lost += 60 - len(scan)
         by_intensity = {
             original.intensity[row]: original.fields["rcs"][row]

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from derain.data_layout import Layout
+from derain.datamodules.base import Loading
 from derain.datamodules.rehearse3d import Rehearse3D
 from derain.datamodules.sequences import SequenceDataModule
 from derain.datamodules.wads import Wads
@@ -56,8 +57,9 @@ def test_wads_is_split_as_published() -> None:
 
 
 def test_wads_is_measured_on_distinct_points() -> None:
-    assert Wads(root="somewhere").loading.deduplicate
-    assert not Rehearse3D(root="somewhere").loading.deduplicate
+    assert Wads(root="somewhere", loading=Loading(batch_size=4)).distinct
+    assert not Wads(root="somewhere", loading=Loading(deduplicate=False)).distinct
+    assert not Rehearse3D(root="somewhere").distinct
 
 
 def test_scans_come_in_the_order_of_the_split_with_their_labels(

@@ -130,7 +130,7 @@ def step(model: DerainingModule, batch: Batch, bfloat16: bool = False) -> None:
     with torch.autocast("cpu", dtype=torch.bfloat16, enabled=bfloat16):
         losses, logits = model.losses(batch)
     losses["loss"].backward()
-    assert logits.shape == (sum(sample.view.size for sample in batch.samples), 2)
+    assert logits.shape == (sum(batch.cells), 2)
     assert logits.isfinite().all()
     assert all(loss.isfinite() for loss in losses.values())
     for parameter in model.parameters():

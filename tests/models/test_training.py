@@ -9,8 +9,10 @@ import lightning
 import numpy as np
 import pytest
 import torch
+from lightning.pytorch.callbacks import ModelCheckpoint
 from numpy.typing import NDArray
 
+from derain.batch import Batch
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
@@ -19,8 +21,11 @@ from derain.errors import InputError
 from derain.files.labels import write_labels
 from derain.hard_cases import scene
 from derain.losses import class_weights
+from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
+from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
+from derain.models.salsanext import SalsaNext
 from derain.one_line_rule import OneLineRule
 from derain.open3d_import import import_open3d
 from derain.scan import Scan
@@ -153,32 +158,71 @@ def test_the_same_seed_gives_the_same_weights_and_another_does_not(
     assert differ(first, trained(seed=2))
 
 
-class SameDropout(lightning.Callback):
-    """Draws the dropout of a step from its number: generators are not in a checkpoint."""
+def networks() -> dict[str, Callable[[], DerainingModule]]:
+    """Small ones of every kind; each draws dropout."""
+    grid = {"rows": 16, "columns": 64, "inclination": [-30.0, 20.0]}
+    return {
+        "outdet": lambda: OutDet(milestones=(1, 3)),
+        "salsanext": lambda: SalsaNext(grid=grid, width=2, warm_up=1.5),
+        "lisnownet": lambda: LiSnowNet(grid=grid, width=2),
+    }
 
-    def on_train_batch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
-        torch.manual_seed(trainer.global_step)
 
-
-def test_a_run_goes_on_from_a_checkpoint_as_if_it_had_not_stopped(
-    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+@pytest.mark.parametrize("workers", [0, 2])
+@pytest.mark.parametrize("network", networks())
+def test_a_run_goes_on_from_its_last_checkpoint_as_if_it_had_not_stopped(
+    make_trainer: MakeTrainer,
+    scenes: Callable[..., Folder],
+    tmp_path: Path,
+    network: str,
+    workers: int,
 ) -> None:
-    still = Augmentation(rotation_probability=0, jitter_probability=0)
+    # All that training draws: order, every augmentation, dropout.
+    changed = Augmentation(mirror_probability=0.5, dropping_probability=0.5)
 
     def fit(epochs: int, checkpoint: Path | None = None) -> lightning.Trainer:
         lightning.seed_everything(0)
-        trainer = make_trainer(epochs=epochs, callbacks=[SameDropout()])
-        data = scenes(train="0.bin", augmentation=still)
-        trainer.fit(OutDet(milestones=(1, 3)), data, ckpt_path=checkpoint)
+        torch.rand(epochs)  # what else draws is not to matter
+        last = ModelCheckpoint(tmp_path, filename=f"last{epochs}", enable_version_counter=False)
+        trainer = make_trainer(epochs=epochs, callbacks=[last], enable_checkpointing=True)
+        data = scenes(augmentation=changed, batch_size=2, workers=workers)
+        trainer.fit(networks()[network](), data, ckpt_path=checkpoint)
         return trainer
 
     straight, stopped = fit(epochs=4), fit(epochs=2)
-    stopped.save_checkpoint(tmp_path / "half.ckpt")
-    resumed = fit(epochs=4, checkpoint=tmp_path / "half.ckpt")
-    assert resumed.global_step == straight.global_step == 4
+    resumed = fit(epochs=4, checkpoint=tmp_path / "last2.ckpt")
+    assert resumed.global_step == straight.global_step == 8
     assert_same(resumed.lightning_module, straight.lightning_module)
     assert differ(resumed.lightning_module, stopped.lightning_module)
-    assert [group["lr"] for group in resumed.optimizers[0].param_groups] == [pytest.approx(1e-5)]
+    schedules = [run.optimizers[0].param_groups[0]["lr"] for run in (straight, resumed)]
+    assert schedules[0] == schedules[1]
+    assert resumed.callback_metrics.keys() == straight.callback_metrics.keys()
+    for name, value in straight.callback_metrics.items():
+        assert torch.equal(resumed.callback_metrics[name], value), name
+
+
+def test_a_run_that_stopped_in_the_middle_of_an_epoch_does_not_start_from_the_first(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+) -> None:
+    class Seen(lightning.Callback):
+        def __init__(self) -> None:
+            self.points: list[list[float]] = []
+
+        def on_train_batch_start(self, trainer: Any, module: Any, batch: Batch, *_: Any) -> None:
+            self.points.append(batch.inputs["points"].sum(dim=0).tolist())
+
+    def fit(steps: int, checkpoint: Path | None = None) -> list[list[float]]:
+        lightning.seed_everything(0)
+        seen = Seen()
+        trainer = make_trainer(epochs=-1, max_steps=steps, callbacks=[seen])
+        trainer.fit(OutDet(), scenes(), ckpt_path=checkpoint)
+        trainer.save_checkpoint(tmp_path / "middle.ckpt")
+        return seen.points
+
+    first = fit(steps=4)  # of three an epoch
+    onward = fit(steps=9, checkpoint=tmp_path / "middle.ckpt")
+    assert len(onward) == 5
+    assert not [points for points in onward if points in first[:3]]
 
 
 def test_a_checkpoint_of_a_run_is_a_model(

@@ -1,0 +1,83 @@
+"""Which scan a process reads, and when."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from torch.utils.data import Dataset, DistributedSampler
+
+from derain.seeds import Draw, generator
+
+
+class Pick(NamedTuple):
+    """One scan to be read.
+
+    Attributes:
+        number: Its number among the scans of its part.
+        epoch: The epoch that it is read in.
+        measured: Whether what a network says of it is counted or written.
+    """
+
+    number: int
+    epoch: int = 0
+    measured: bool = True
+
+
+class TrainingOrder(DistributedSampler[Pick]):
+    """Every scan once an epoch, in an order that is a function of the run's seed and the epoch.
+
+    Processes take the scans in turn: at each step they see together what one process would see in a
+    batch as many times as large. So that all take as many steps, the first of the order may come
+    twice.
+
+    Lightning tells the epoch to every sampler, and leaves those of this kind alone on several
+    processes.
+
+    Args:
+        scans: The scans.
+        seed: Seed of the run.
+        processes: How many processes share the scans.
+        process: Which of them this is.
+    """
+
+    def __init__(self, scans: Dataset[object], seed: int, processes: int, process: int) -> None:
+        super().__init__(scans, processes, process, seed=seed)
+
+    def __iter__(self) -> Iterator[Pick]:
+        chance = generator(Draw.ORDER, self.seed, self.epoch)
+        order = np.resize(chance.permutation(len(self.dataset)), self.total_size)
+        for number in order[self.rank :: self.num_replicas]:
+            yield Pick(int(number), self.epoch, measured=False)
+
+
+class MeasuringOrder(DistributedSampler[Pick]):
+    """Every scan once, in order, whole batches going to the processes in turn.
+
+    So a batch is the same however many processes there are. Where one has a batch less, it reads a
+    scan again that is not measured: processes wait for each other at every step.
+
+    Args:
+        scans: The scans.
+        batch_size: Scans in a batch.
+        processes: How many processes share the scans.
+        process: Which of them this is.
+    """
+
+    def __init__(
+        self, scans: Dataset[object], batch_size: int, processes: int, process: int
+    ) -> None:
+        super().__init__(scans, processes, process, shuffle=False)
+        numbers = range(len(scans))
+        batches = [
+            numbers[start : start + batch_size] for start in range(0, len(numbers), batch_size)
+        ]
+        own = batches[process::processes]
+        self.picks = [Pick(number) for batch in own for number in batch]
+        if len(own) < len(batches[::processes]):
+            self.picks.append(Pick(0, measured=False))
+
+    def __len__(self) -> int:
+        return len(self.picks)
+
+    def __iter__(self) -> Iterator[Pick]:
+        return iter(self.picks)

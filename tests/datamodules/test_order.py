@@ -1,0 +1,138 @@
+"""Who reads which scan, and when: every one once, on any number of processes."""
+
+from collections.abc import Callable
+from itertools import zip_longest
+from pathlib import Path
+from types import SimpleNamespace
+
+import lightning
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from torch.utils.data import BatchSampler
+
+from derain.batch import Batch
+from derain.datamodules.augmentation import Augmentation
+from derain.datamodules.base import Loading, ScanDataModule
+from derain.datamodules.folder import Folder
+from derain.datamodules.order import MeasuringOrder, Pick, TrainingOrder
+from derain.hard_cases import scene
+
+SIZES = st.integers(1, 30)
+PROCESSES = st.integers(1, 5)
+EVERYTHING = Augmentation(1, 1, mirror_probability=0.5, dropping_probability=1)
+
+
+def orders(scans: int, processes: int, epoch: int = 0, seed: int = 0) -> list[list[Pick]]:
+    """What each process reads in an epoch of training."""
+    samplers = [TrainingOrder(range(scans), seed, processes, own) for own in range(processes)]
+    for sampler in samplers:
+        sampler.set_epoch(epoch)
+        assert len(sampler) == len(list(sampler))
+    return [list(sampler) for sampler in samplers]
+
+
+@given(SIZES, PROCESSES, st.integers(0, 9), st.integers(0, 2**32 - 1))
+def test_an_epoch_of_training_reads_every_scan_and_none_more_often_than_it_must(
+    scans: int, processes: int, epoch: int, seed: int
+) -> None:
+    shares = orders(scans, processes, epoch, seed)
+    (steps,) = {len(share) for share in shares}
+    assert steps == -(-scans // processes)
+    together = [pick for step in zip(*shares, strict=True) for pick in step]
+    (alone,) = orders(scans, 1, epoch, seed)
+    # In turn, so that a step of all processes is a batch of one.
+    assert together == (alone * processes)[: len(together)]
+    assert sorted(pick.number for pick in alone) == list(range(scans))
+    assert {(pick.epoch, pick.measured) for pick in together} == {(epoch, False)}
+
+
+def test_orders_differ_by_seed_and_epoch_and_put_no_scan_first() -> None:
+    drawn = [orders(40, 1, epoch, seed)[0] for epoch in range(10) for seed in range(40)]
+    numbers = {tuple(pick.number for pick in order) for order in drawn}
+    assert len(numbers) == 400
+    first = np.bincount([order[0] for order in numbers], minlength=40)
+    assert first.max() < 30  # of 10 on average
+    assert (first > 0).all()
+
+
+@given(SIZES, PROCESSES, st.integers(1, 7))
+def test_every_scan_is_measured_once_in_the_same_batches_on_any_number_of_processes(
+    scans: int, processes: int, batch_size: int
+) -> None:
+    samplers = [
+        MeasuringOrder(range(scans), batch_size, processes, own) for own in range(processes)
+    ]
+    assert all(len(sampler) == len(list(sampler)) for sampler in samplers)
+    shares = [list(BatchSampler(sampler, batch_size, drop_last=False)) for sampler in samplers]
+    assert len({len(share) for share in shares}) == 1  # nobody waits for nobody
+    batches = [batch for step in zip_longest(*shares) for batch in step]
+    for batch in batches:
+        assert len({pick.measured for pick in batch}) == 1
+    measured = [[pick.number for pick in batch] for batch in batches if batch[0].measured]
+    numbers = list(range(scans))
+    assert measured == [numbers[i : i + batch_size] for i in range(0, scans, batch_size)]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Callable[..., Folder]:
+    """Makes a data module of five scans, of 40, 41, ... points."""
+    for number in range(5):
+        scene(40 + number, seed=number).tofile(tmp_path / f"{number}.bin")
+        np.zeros(40 + number, "<u4").tofile(tmp_path / f"{number}.label")
+
+    def make(**loading: object) -> Folder:
+        parts = {"train": ["*.bin"], "validation": ["*.bin"], "test": ["*.bin"]}
+        return Folder(str(tmp_path), "wads", **parts, loading=Loading(**loading))
+
+    return make
+
+
+def trained_on(data: ScanDataModule, epochs: range) -> list[list[Batch]]:
+    """Batches of some epochs, as Lightning has them read."""
+    loader = data.train_dataloader()
+    received = []
+    for epoch in epochs:
+        loader.sampler.set_epoch(epoch)
+        received.append(list(loader))
+    return received
+
+
+def same(one: Batch, other: Batch) -> bool:
+    pairs = [*zip(one.inputs.values(), other.inputs.values(), strict=True)]
+    return all(a.shape == b.shape and torch.equal(a, b) for a, b in pairs)
+
+
+@pytest.mark.parametrize("workers", [0, 1, 2])
+def test_scans_are_changed_by_seed_epoch_and_scan_whoever_reads_them_and_wherever_a_run_starts(
+    folder: Callable[..., Folder], connect: Callable[..., ScanDataModule], workers: int
+) -> None:
+    lightning.seed_everything(3)
+    here = connect(folder(augmentation=EVERYTHING, batch_size=2))
+    expected = trained_on(here, range(4))
+    torch.manual_seed(workers)  # nobody else's draws matter
+    there = connect(folder(augmentation=EVERYTHING, batch_size=2, workers=workers))
+    for before, after in zip(expected[2:], trained_on(there, range(2, 4)), strict=True):
+        assert all(same(a, b) for a, b in zip(before, after, strict=True))
+    drawn = [batch for epoch in expected for batch in epoch]
+    assert not any(same(a, b) for a in drawn for b in drawn if a is not b)
+    lightning.seed_everything(4)
+    (other,) = trained_on(connect(folder(augmentation=EVERYTHING, batch_size=2)), range(1))
+    assert not any(same(a, b) for a, b in zip(expected[0], other, strict=True))
+
+
+def test_a_scan_is_changed_alike_whichever_process_reads_it(
+    folder: Callable[..., Folder], connect: Callable[..., ScanDataModule]
+) -> None:
+    lightning.seed_everything(0)
+    data = connect(folder(augmentation=EVERYTHING))
+    alone = {batch.cells[0]: batch for batch in trained_on(data, range(1))[0]}
+    assert len(alone) == 5
+    model = data.trainer.lightning_module
+    for process in range(2):
+        data.trainer = SimpleNamespace(lightning_module=model, world_size=2, global_rank=process)
+        (share,) = trained_on(data, range(1))
+        assert len(share) == 3
+        assert all(same(batch, alone[batch.cells[0]]) for batch in share)
