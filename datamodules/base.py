@@ -92,6 +92,7 @@ class Loading:
         batch_size: Scans in a batch.
         workers: Processes that read and view scans; 0 does it in the training process.
         columns: Names of the columns of ``.bin`` and ``.npy`` files.
+        intensity_scale: What takes the scans' intensities to the unit of the data card, e.g. 255.
         deduplicate: Whether points at one position are measured once; None does as the data card
             says. Predictions are for every row in any case.
         augmentation: What training changes about its scans.
@@ -100,6 +101,7 @@ class Loading:
     batch_size: int = 1
     workers: int = 0
     columns: tuple[str, ...] = DEFAULT_COLUMNS
+    intensity_scale: float = 1.0
     deduplicate: bool | None = None
     augmentation: Augmentation = field(default_factory=Augmentation)
 
@@ -196,6 +198,7 @@ class ScanDataModule(lightning.LightningDataModule):
             InputError: A file that cannot be read, or labels that are not in the data card.
         """
         scan = read_scan(file.scan, self.loading.columns)
+        scan = scan.with_intensity_times(self.loading.intensity_scale)
         if self._model is not None:  # to a model, the file's other columns would only cost memory
             scan = with_columns(scan, self._extra_channels)
         if file.label is None:

@@ -50,6 +50,11 @@ class Neighbourhoods:
         """M, the number of points that the network scores."""
         return len(self.points)
 
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """True for rows of the scan that some point answers for, bool (N,)."""
+        return self.inverse >= 0
+
     def inputs(self) -> dict[str, NDArray[Any]]:
         """The network's inputs, in its order: points, distances, neighbours."""
         return {

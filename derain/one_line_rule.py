@@ -30,9 +30,10 @@ class OneLineRule:
 
     def __call__(self, scan: Scan) -> NDArray[np.bool_]:
         """True for the points called rain, bool (N,); none in a scan without intensity."""
-        if scan.intensity is None:
+        intensity = scan.measured_intensity
+        if intensity is None:
             return np.zeros(len(scan), bool)
-        dim: NDArray[np.bool_] = scan.intensity <= self.intensity
+        dim: NDArray[np.bool_] = intensity <= self.intensity
         return dim & (scan.range <= self.range) & scan.valid
 
     @classmethod
@@ -46,9 +47,9 @@ class OneLineRule:
             The rule; one that finds nothing where there is no rain to learn from.
         """
         parts = [
-            (scan.intensity[scan.valid], scan.range[scan.valid], rain[scan.valid])
+            (intensity[scan.valid], scan.range[scan.valid], rain[scan.valid])
             for scan, rain in scans
-            if scan.intensity is not None
+            if (intensity := scan.measured_intensity) is not None
         ]
         if not any(rain.any() for _, _, rain in parts):
             return cls(-np.inf, -np.inf)

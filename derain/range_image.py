@@ -51,10 +51,14 @@ class RangeImage:
         return self.valid.size
 
     @property
+    def judged(self) -> NDArray[np.bool_]:
+        """True for rows of the scan that lie on the grid, bool (N,)."""
+        return self.pixel >= 0
+
+    @property
     def hidden(self) -> NDArray[np.bool_]:
         """True for points on the grid whose pixel shows a nearer return, bool (N,)."""
-        judged = self.pixel >= 0
-        return judged & (self.range > self._nearest().take(self.pixel))
+        return self.judged & (self.range > self._nearest().take(self.pixel))
 
     def inputs(self) -> dict[str, NDArray[Any]]:
         """The network's inputs, a batch of one: image (1, C, H, W) and valid (1, 1, H, W)."""
@@ -88,7 +92,7 @@ class RangeImage:
 
     def way_to_rows(self) -> WayToRows:
         """What :meth:`back` does, without the image."""
-        judged = np.flatnonzero(self.pixel >= 0)
+        judged = np.flatnonzero(self.judged)
         points = ProjectedPoints(
             self.pixel[judged],
             self.range[judged],

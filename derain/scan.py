@@ -1,5 +1,6 @@
 """One LiDAR scan, possibly fused with radar: the data everything in derain starts from."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,6 +15,11 @@ from derain.errors import InputError
 # is damaged. The bounds also keep every float32 computation downstream finite.
 LARGEST_COORDINATE = 1e6
 LARGEST_VALUE = 1e7
+
+# So many points of one intensity were not measured. Of a real scan as much as 80 % may share one
+# value, such as 0: that a hundred points share it by chance happens once in 10⁹ draws (.8¹⁰⁰), that
+# ten do once in ten. Fewer than a hundred say nothing by being alike.
+FEWEST_ALIKE = 100
 
 # SemanticKITTI-style range images mark a cell without a return by -1 in every column.
 SENTINEL = -1.0
@@ -97,13 +103,27 @@ class Scan:
             x, y, z = np.ascontiguousarray(self.xyz.T, dtype=np.float64)
             return to_float32(np.sqrt(x * x + y * y + z * z))
 
+    @cached_property  # views, filters and warnings ask for it in turn
+    def measured_intensity(self) -> NDArray[np.float32] | None:
+        """Intensity where the sensor measured it, float32 (N,), in the file's own unit.
+
+        None where the file has none, and where its column was only filled: with one value at all
+        valid points, 100 or more, or with nothing finite.
+        """
+        if self.intensity is None or not self._knows_intensity:
+            return None
+        values = self.intensity[self.valid]
+        alike = len(values) >= FEWEST_ALIKE and values.min() == values.max()
+        return None if alike else self.intensity
+
     @property
     def valid(self) -> NDArray[np.bool_]:
         """True for the points that can be judged, bool (N,).
 
         Not valid: coordinates or intensity not finite or beyond any sensor's reach, points exactly
         at the origin (no return), and cells that hold −1 in every column (no return in
-        SemanticKITTI-style range images).
+        SemanticKITTI-style range images). A column of intensity without one finite value tells
+        nothing of any point.
         """
         # Column by column, which is several times faster than along the short axis. A comparison
         # with NaN is False, so the bounds refuse NaN and infinity as well.
@@ -113,7 +133,7 @@ class Scan:
             valid &= np.abs(column) <= LARGEST_COORDINATE
             at_origin &= column == 0
             sentinel &= column == SENTINEL
-        if self.intensity is not None:
+        if self.intensity is not None and self._knows_intensity:
             valid &= np.abs(self.intensity) <= LARGEST_VALUE
             sentinel &= self.intensity == SENTINEL
         return valid & ~at_origin & ~sentinel
@@ -128,7 +148,8 @@ class Scan:
 
         Returns:
             float32 (N,), in the column's own unit; NaN where a column of ``fields`` holds nothing
-            finite or what no sensor measures. None where the scan has no such channel.
+            finite or what no sensor measures. None where the scan has no such channel, or an
+            intensity that was not measured.
         """
         match name:
             case "x" | "y" | "z":
@@ -136,7 +157,7 @@ class Scan:
             case "range":
                 return self.range
             case "intensity":
-                return self.intensity
+                return self.measured_intensity
             case "radar" if self.radar is not None:
                 return to_float32(self.radar)
         columns = {title.lower(): column for title, column in self.fields.items()}
@@ -149,6 +170,21 @@ class Scan:
     def with_label(self, label: NDArray[np.int64]) -> "Scan":
         """The same scan with semantic class ids, int64 (N,)."""
         return replace(self, label=label)
+
+    def with_intensity_times(self, factor: float) -> "Scan":
+        """The same scan with its intensities in another unit; what was read stays in `fields`.
+
+        Args:
+            factor: What takes them there, such as 255 from 0..1 to 0..255.
+
+        Raises:
+            InputError: A factor that is not a finite number above 0.
+        """
+        if not (factor > 0 and math.isfinite(factor)):
+            raise InputError("intensity_scale", f"it is {factor:g}", "Give a number above 0.")
+        if self.intensity is None or factor == 1:
+            return self
+        return replace(self, intensity=self.intensity * np.float32(factor))
 
     def take(self, rows: NDArray[Any]) -> "Scan":
         """The scan of some rows only, as an unorganised cloud.
@@ -169,6 +205,12 @@ class Scan:
             name=self.name,
             header=self.header,
         )
+
+    @cached_property
+    def _knows_intensity(self) -> bool:
+        """Whether any intensity is a number that a sensor can measure."""
+        assert self.intensity is not None
+        return bool((np.abs(self.intensity) <= LARGEST_VALUE).any())
 
 
 def to_float32(array: NDArray[Any]) -> NDArray[np.float32]:

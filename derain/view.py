@@ -29,6 +29,10 @@ class ViewedScan(Protocol):
     def size(self) -> int:
         """M, the number of cells that the network scores."""
 
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """True for rows of the scan that some cell answers for, bool (N,)."""
+
     def inputs(self) -> dict[str, NDArray[Any]]:
         """The network's inputs by name, in its order."""
 

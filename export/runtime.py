@@ -1,6 +1,7 @@
 """Runs an exported model on a CPU: NumPy, onnxruntime and the kNN library, nothing else."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,22 @@ from derain.stopwatch import Stopwatch
 
 # The one metadata key under which an exported model carries its Spec, its proof and its versions.
 METADATA_KEY = "derain"
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What a model says of a scan, in input order.
+
+    Attributes:
+        probability: That each point is rain, float32 (N,); 0 for rows that were not judged.
+        rain: True for rain, bool (N,).
+        judged: True for rows that the model saw, bool (N,): not for those that cannot be judged,
+            nor for points outside the grid of an image.
+    """
+
+    probability: NDArray[np.float32]
+    rain: NDArray[np.bool_]
+    judged: NDArray[np.bool_]
 
 
 class Derainer:
@@ -63,7 +80,7 @@ class Derainer:
         Returns:
             True for rain, bool (N,), in input order; False for rows that cannot be judged.
         """
-        return self.probability(points, stopwatch) > self.spec.threshold
+        return self.judge(points, stopwatch).rain
 
     def probability(
         self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
@@ -77,6 +94,15 @@ class Derainer:
         Returns:
             float32 (N,), in input order; 0 for rows that cannot be judged.
         """
+        return self.judge(points, stopwatch).probability
+
+    def judge(self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None) -> Judgement:
+        """Says all that the model has to say of a scan.
+
+        Args:
+            points: As for calling the model.
+            stopwatch: Takes the times of the stages view, network and back.
+        """
         stopwatch = stopwatch or Stopwatch()
         scan = Scan.of(points)
         with stopwatch.stage("view"):
@@ -84,7 +110,8 @@ class Derainer:
         with stopwatch.stage("network"):
             logits = self.session.run(None, view.inputs())[0]
         with stopwatch.stage("back"):
-            return view.back(probability_of_rain(logits))
+            probability = view.back(probability_of_rain(logits))
+            return Judgement(probability, probability > self.spec.threshold, view.judged)
 
 
 def open_session(path: Path, threads: int) -> onnxruntime.InferenceSession:

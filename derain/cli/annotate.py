@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from derain.cli.arguments import factor
 from derain.cli.outputs import refuse_clashes
+from derain.cli.scan_options import add_columns
 from derain.data_statistics import LAYOUTS
 from derain.errors import InputError
 from derain.files import find_scans, read_scan
@@ -87,11 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     for option in ("--columns", "--radar-columns"):
-        parser.add_argument(
-            option,
-            default="x,y,z,intensity",
-            help="names of the columns of .bin and .npy files (default: %(default)s)",
-        )
+        add_columns(parser, option)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -104,7 +101,7 @@ def main(arguments: argparse.Namespace) -> int:
     _refuse_their_labels(paths, arguments.out)
     frames = _radar_frames(arguments.radar, paths)
     scene = read_scene(arguments.scene).in_sequence(sequence)
-    columns = arguments.columns.split(",")
+    columns = arguments.columns
 
     plane = _road_plane(paths, scene, columns)
     points = _label_all(paths, frames, scene, plane, arguments)
@@ -155,7 +152,7 @@ def _radar_frames(folder: Path | None, scans: Sequence[Path]) -> dict[str, Path]
     return frames
 
 
-def _road_plane(paths: Sequence[Path], scene: "Scene", columns: list[str]) -> "Plane":
+def _road_plane(paths: Sequence[Path], scene: "Scene", columns: Sequence[str]) -> "Plane":
     from derain.annotation.steps import road_plane
 
     chosen = np.linspace(0, len(paths) - 1, min(len(paths), scene.plane.scans)).round().astype(int)
@@ -174,12 +171,12 @@ def _label_all(
 
     points: Counter[int] = Counter()
     for path in tqdm(paths, unit="scan", disable=None):
-        scan = read_scan(path, arguments.columns.split(","))
+        scan = read_scan(path, arguments.columns)
         label = annotate(scan, scene, plane)
         write_labels(arguments.out / f"{path.stem}.label", label)
         points.update(label.tolist())
         if path.stem in frames:
-            frame = read_scan(frames[path.stem], arguments.radar_columns.split(","))
+            frame = read_scan(frames[path.stem], arguments.radar_columns)
             transferred = transfer_labels(scan.with_label(label), frame.xyz, arguments.within)
             write_labels(arguments.out / "radar" / f"{path.stem}.label", transferred)
     return points

@@ -23,6 +23,14 @@ def factor(text: str) -> float:
     return value
 
 
+def share(text: str) -> float:
+    """A number from 0 to 1."""
+    value = float(text)
+    if not 0 <= value <= 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 to 1")
+    return value
+
+
 def command_line(arguments: argparse.Namespace, positional: str | None = None) -> str:
     """The command line that says all this, defaults included.
 
@@ -36,7 +44,9 @@ def command_line(arguments: argparse.Namespace, positional: str | None = None) -
             continue
         if name != positional:
             words.append(f"--{name.replace('_', '-')}")
-        if isinstance(value, list):
+        if isinstance(value, tuple):  # names between commas
+            words.append(",".join(value))
+        elif isinstance(value, list):
             words += map(str, value)
         elif value is not True:
             words.append(str(value))

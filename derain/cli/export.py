@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cli.arguments import count, threads
+from derain.cli.scan_options import add_columns
 
 if TYPE_CHECKING:
     from derain.scan import Scan
@@ -37,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scan", type=Path, help="time the model on this scan; by default on a made-up one"
     )
-    parser.add_argument("--columns", default="x,y,z,intensity", help="columns of .bin scans")
+    add_columns(parser)
     parser.add_argument(
         "--threads", type=threads, default=0, help="threads to time with (default all)"
     )
@@ -51,12 +52,11 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.export.onnx_file import export
     from derain.models.checkpoint import load_model
 
-    columns = arguments.columns.split(",")
     if arguments.scan is not None and not arguments.scan.is_file():
         raise InputError(arguments.scan, "there is no such file", "Check --scan.")
     model = load_model(arguments.checkpoint)
     proof = export(
-        model, arguments.out, _calibration(arguments.calibration, arguments.int8, columns)
+        model, arguments.out, _calibration(arguments.calibration, arguments.int8, arguments.columns)
     )
     print(proof)
     print(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
@@ -64,7 +64,7 @@ def main(arguments: argparse.Namespace) -> int:
         measure_latency(
             arguments.out,
             arguments.scan,
-            columns,
+            arguments.columns,
             arguments.threads,
             arguments.repeats,
         )

@@ -11,6 +11,7 @@ from tqdm import tqdm
 
 from derain.cli.arguments import factor
 from derain.cli.outputs import refuse_clashes
+from derain.cli.scan_options import add_columns
 from derain.data_layout import REHEARSE3D
 from derain.errors import InputError
 from derain.extrinsics import Extrinsics, read_extrinsics
@@ -80,11 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the sensors apart",
     )
     for sensor in ("lidar", "radar"):
-        parser.add_argument(
-            f"--{sensor}-columns",
-            default="x,y,z,intensity",
-            help=f"names of the columns of the {sensor}'s .bin and .npy (default: %(default)s)",
-        )
+        add_columns(parser, f"--{sensor}-columns", of=f"the {sensor}'s ")
     parser.add_argument(
         "--metadata-columns",
         type=_two_names,
@@ -139,7 +136,7 @@ def _fuse(
 def _read(path: Path, sensor: str, arguments: argparse.Namespace) -> Scan:
     """Reads a frame; what an error says of --columns is here the option of that sensor."""
     try:
-        return read_scan(path, getattr(arguments, f"{sensor}_columns").split(","))
+        return read_scan(path, getattr(arguments, f"{sensor}_columns"))
     except InputError as error:
         texts = str(error.subject), error.reason, error.remedy
         option = f"--{sensor}-columns"

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import yaml
 from numpy.typing import NDArray
 
 from derain.cli.info_folder import draw, facts_of_folder
+from derain.cli.scan_options import add_columns
 from derain.directions import directions
 from derain.errors import InputError
 from derain.files import find_scans, read_scan
@@ -55,27 +57,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="names of a sequence's folders of scans and labels (default: those known)",
     )
     parser.add_argument("--picture", type=Path, help="PNG to draw of a folder's statistics")
-    parser.add_argument(
-        "--columns",
-        default="x,y,z,intensity",
-        help="names of the columns of .bin and .npy files (default: %(default)s)",
-    )
+    add_columns(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    columns = arguments.columns.split(",")
     _refuse_unclear_picture(arguments)
     if arguments.grid:
         scans = find_scans(arguments.files)
-        fit = fit_grid([read_scan(path, columns) for path in scans]).as_dict()
+        fit = fit_grid([read_scan(path, arguments.columns) for path in scans]).as_dict()
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0
     for path in arguments.files:
         if path.is_dir():
             _describe_folder(path, arguments)
             continue
-        facts = _facts(path, columns)
+        facts = _facts(path, arguments.columns)
         if arguments.json:
             print(json.dumps({"file": str(path), **facts}))
         else:
@@ -99,7 +96,7 @@ def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
         draw(facts, arguments.picture)
 
 
-def _facts(path: Path, columns: list[str]) -> dict[str, Any]:
+def _facts(path: Path, columns: Sequence[str]) -> dict[str, Any]:
     if not path.exists():
         raise InputError(path, "there is no such file or folder", "Check the path.")
     match path.suffix.lower():

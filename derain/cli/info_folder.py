@@ -110,7 +110,7 @@ def facts_of_folder(folder: Path, arguments: argparse.Namespace) -> FolderFacts:
             tally = tallies[sequence.rain_rate]
             tally.sequences += 1
             for scan in sequence.scans:
-                tally.add(count_scan(scan, layout, arguments.columns.split(",")))
+                tally.add(count_scan(scan, layout, arguments.columns))
                 progress.update()
     classes = card.classes if card else {}
     return FolderFacts(folder, layout, card.name if card else None, classes, tallies)

@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from derain.cli.scan_options import add_columns, add_intensity_scale
+
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule
 
@@ -34,11 +36,8 @@ def add_data_arguments(parser: argparse.ArgumentParser, part: str) -> None:
         help="data card, which says what labels mean: wads, kitti, spray, rehearse3d, simulated, "
         "derain (of simulate --on) or a YAML file (default: as the data set's folders tell)",
     )
-    parser.add_argument(
-        "--columns",
-        default="x,y,z,intensity",
-        help="names of the columns of .bin and .npy files (default: %(default)s)",
-    )
+    add_columns(parser)
+    add_intensity_scale(parser)
 
 
 def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanDataModule":
@@ -50,5 +49,5 @@ def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanDataModul
     from derain.datamodules.base import Loading
     from derain.datamodules.labelled import card_of, labelled_scans
 
-    loading = Loading(columns=tuple(arguments.columns.split(",")))
+    loading = Loading(columns=arguments.columns, intensity_scale=arguments.intensity_scale)
     return labelled_scans(paths, card_of(paths, arguments.card), loading)

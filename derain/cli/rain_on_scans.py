@@ -86,7 +86,7 @@ def _rain_on(
     generator: np.random.Generator,
     arguments: argparse.Namespace,
 ) -> Rained:
-    clean = read_scan(path, arguments.columns.split(","))
+    clean = read_scan(path, arguments.columns)
     rainy = rain_on_scan(clean, rain, sensor, generator)
     assert rainy.label is not None  # rain comes with labels
     drops = rainy.label == TrackClass.RAIN

@@ -3,7 +3,8 @@
 import argparse
 import json
 import sys
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from derain.cli.arguments import factor, threads
-from derain.cli.odd_scans import Warnings
+from derain.cli.arguments import share, threads
 from derain.cli.outputs import refuse_clashes
+from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
 from derain.files import find_scans, read_scan, write_scan
 from derain.files.labels import write_labels
 from derain.filters import FILTERS, FilterDerainer, read_parameters
+from derain.notices import Notices
+from derain.odd_scans import Oddity, much_removed, oddities, outside_view
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
 
@@ -38,23 +41,40 @@ rain, in the input's format with every field kept.
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
 or a filter: {", ".join(FILTERS)}.
-A scan that cannot be read is reported and passed over; the exit code is then 2.
+What is odd about a scan is warned of, each fault once. One of which more than --most-removed is
+called rain is left alone. It and a scan that cannot be read are reported and passed over; the exit
+code is then 2.
 """
 
 
 @dataclass(frozen=True)
 class Cleaned:
-    """What was done to one scan; ``milliseconds`` are by stage."""
+    """What was done to one scan.
+
+    Attributes:
+        scan: Its file.
+        points: Its points.
+        valid: Those of them that can be judged.
+        rain: Those of them that were removed.
+        share_removed: Share of ``rain`` in ``valid``.
+        milliseconds: By stage.
+        warnings: What is odd about it.
+    """
 
     scan: str
     points: int
     valid: int
     rain: int
+    share_removed: float
     milliseconds: dict[str, float]
+    warnings: list[str]
 
     def __str__(self) -> str:
         total = sum(self.milliseconds.values())
-        return f"{self.scan}: {self.points:,} points, {self.rain:,} of rain, {total:.0f} ms"
+        return (
+            f"{self.scan}: {self.points:,} points, {self.rain:,} of rain "
+            f"({self.share_removed:.1%}), {total:.0f} ms"
+        )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,17 +86,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
     parser.add_argument("--json", action="store_true", help="print one JSON object a scan")
+    add_columns(parser)
+    add_intensity_scale(parser)
     parser.add_argument(
-        "--columns",
-        default="x,y,z,intensity",
-        help="names of the columns of .bin and .npy files (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--intensity-scale",
-        type=factor,
+        "--most-removed",
+        type=share,
         default=1.0,
-        metavar="FACTOR",
-        help="what takes the scans' intensities to the method's unit, e.g. 255 (default: 1)",
+        metavar="SHARE",
+        help="leave a scan alone of which a greater share is called rain, e.g. 0.5 (default: 1)",
     )
     parser.add_argument(
         "--parameters", type=Path, metavar="YAML", help="the method's parameters, as tuned"
@@ -96,34 +113,72 @@ def main(arguments: argparse.Namespace) -> int:
     method = load_method(*_named_method(arguments), arguments.threads)
     scans = find_scans(arguments.scans)
     refuse_clashes(scans, arguments.out)
-    warn = Warnings(method)
-    failed = 0
+    notices = Notices()
+    done: list[Cleaned] = []
     for path in tqdm(scans, unit="scan", disable=None):
         try:
-            cleaned = _clean(path, method, arguments, warn)
+            cleaned = _clean(path, method, arguments, notices)
         except InputError as error:
-            failed += 1
             tqdm.write(f"derain: {error}", sys.stderr)
             continue
+        done.append(cleaned)
         tqdm.write(json.dumps(asdict(cleaned)) if arguments.json else str(cleaned), sys.stdout)
-    if failed:
+    notices.tell_how_many_more()
+    if len(done) > 1:
+        print(_summary(done), file=sys.stderr if arguments.json else sys.stdout)
+    if failed := len(scans) - len(done):
         print(f"derain: {failed} of {len(scans)} scans could not be cleaned", file=sys.stderr)
     return 2 if failed else 0
 
 
 def _clean(
-    path: Path, method: Derainer | FilterDerainer, arguments: argparse.Namespace, warn: Warnings
+    path: Path, method: Derainer | FilterDerainer, arguments: argparse.Namespace, notices: Notices
 ) -> Cleaned:
     stopwatch = Stopwatch()
     with stopwatch.stage("read"):
-        scan = read_scan(path, arguments.columns.split(","))
-    seen = _in_unit_of_method(scan, arguments.intensity_scale)
-    warn(seen)
-    rain = method(seen, stopwatch)
+        scan = read_scan(path, arguments.columns)
+    rain, odd = _judge(scan.with_intensity_times(arguments.intensity_scale), method, stopwatch)
+    valid, removed = int(scan.valid.sum()), int(rain.sum())
+    share_removed = removed / max(valid, 1)
+    odd += much_removed(share_removed)
+    notices.tell(str(path), odd)
+    if share_removed > arguments.most_removed:
+        raise InputError(
+            path,
+            f"{share_removed:.1%} of its points are called rain, and nothing was written",
+            "See whether the method suits it, or raise --most-removed.",
+        )
     with stopwatch.stage("write"):
         _write(arguments.out / path.name, scan, rain)
     return Cleaned(
-        str(path), len(scan), int(scan.valid.sum()), int(rain.sum()), stopwatch.milliseconds
+        str(path),
+        len(scan),
+        valid,
+        removed,
+        share_removed,
+        stopwatch.milliseconds,
+        [oddity.detail for oddity in odd],
+    )
+
+
+def _judge(
+    scan: Scan, method: Derainer | FilterDerainer, stopwatch: Stopwatch
+) -> tuple[NDArray[np.bool_], list[Oddity]]:
+    """Which points are rain, bool (N,), and what is odd about the scan for this method."""
+    if isinstance(method, FilterDerainer):
+        return method(scan, stopwatch), list(oddities(scan, method.filter))
+    judgement = method.judge(scan, stopwatch)
+    outside = outside_view(scan, judgement.judged, method.spec)
+    return judgement.rain, [*oddities(scan, method.spec), *outside]
+
+
+def _summary(done: Sequence[Cleaned]) -> str:
+    """What was done to all scans together."""
+    valid, removed = sum(item.valid for item in done), sum(item.rain for item in done)
+    odd = sum(bool(item.warnings) for item in done)
+    return (
+        f"{len(done):,} scans: {sum(item.points for item in done):,} points, {removed:,} of rain "
+        f"({removed / max(valid, 1):.1%}); {odd:,} scans with warnings"
     )
 
 
@@ -160,9 +215,3 @@ def _write(path: Path, scan: Scan, rain: NDArray[np.bool_]) -> None:
     """Writes the cleaned scan, then its labels: where there are labels, the scan is complete."""
     write_scan(path, scan.take(~rain))
     write_labels(path.with_suffix(".label"), rain)
-
-
-def _in_unit_of_method(scan: Scan, scale: float) -> Scan:
-    if scan.intensity is None or scale == 1:
-        return scan
-    return replace(scan, intensity=scan.intensity * np.float32(scale))

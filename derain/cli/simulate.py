@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from derain.cli.arguments import count
+from derain.cli.scan_options import add_columns
 from derain.cores import usable_cores
 from derain.errors import InputError
+from derain.files import DEFAULT_COLUMNS
 
 SUMMARY = "make a data set of simulated rain, or let it rain on clean scans"
 
@@ -47,7 +49,7 @@ OF_DATA_SETS = {
     "radar": True,
     "workers": usable_cores(),
 }
-OF_SCANS = {"columns": "x,y,z,intensity", "picture": False, "json": False}
+OF_SCANS = {"columns": DEFAULT_COLUMNS, "picture": False, "json": False}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -86,10 +88,7 @@ def _add_those_of_data_sets(group: "argparse._ArgumentGroup") -> None:
 
 def _add_those_of_scans(group: "argparse._ArgumentGroup") -> None:
     group.add_argument("--on", nargs="+", type=Path, metavar="SCAN_OR_DIR", help="clean scans")
-    group.add_argument(
-        "--columns",
-        help=f"names of the columns of .bin and .npy files (default: {OF_SCANS['columns']})",
-    )
+    add_columns(group, default=None)
     group.add_argument(
         "--picture", action="store_true", default=None, help="draw <stem>.png of each scan"
     )

@@ -14,15 +14,20 @@ def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
 
     Returns:
         The method, and its parameters as the file has them: texts, finite numbers, true or false.
+        A model is sought from the file's own folder first, wherever the command runs; where it is
+        not there, its name stays as it is.
 
     Raises:
         InputError: A missing file, or one that names no method.
     """
-    document = Entry.of_yaml(Path(path))
+    path = Path(path)
+    document = Entry.of_yaml(path)
     values = document.members()
     if "method" not in values:
         raise document.fault(
             "it names no method", "Write one, such as `method: dsor`, and its parameters by name."
         )
     method = values.pop("method").text()
-    return method, {name: entry.scalar() for name, entry in values.items()}
+    beside = path.parent / method
+    named = str(beside) if Path(method).suffix and beside.is_file() else method
+    return named, {name: entry.scalar() for name, entry in values.items()}

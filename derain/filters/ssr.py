@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +23,13 @@ class SSR(PointFilter):
     Attributes:
         neighbours: k, the size of a neighbourhood, the point itself included.
         threshold: In the unit of intensity; 2.5 is for WADS, whose intensities are 0..255.
+        FULL_SCALE: Of the intensities that the threshold is for, as published.
 
     Source: 3D-UnOutDet, github.com/sporsho/3DUnOutDet, dataset/unsupervised; by Parseval's theorem
         its norm after a Fourier transform is √k times that before.
     """
+
+    FULL_SCALE: ClassVar[float] = 255.0
 
     neighbours: int = 9
     threshold: float = 2.5

@@ -38,13 +38,13 @@ def test_a_scan_gets_its_labels_and_loses_its_rain(
 ) -> None:
     scan, out = scans / "000003.bin", tmp_path / "out"
     outcome = run_derain("run", onnx_model, scan, "--out", out)
-    assert (outcome.code, outcome.err) == (0, "")
+    assert (outcome.code, outcome.said) == (0, [])
     assert names(out) == ["000003.bin", "000003.label"]
     rain = Derainer(onnx_model)(scene(300, seed=3))
     assert 0 < rain.sum() < 300
     np.testing.assert_array_equal(labels(out / "000003.label"), rain)
     assert (out / "000003.bin").read_bytes() == scene(300, seed=3)[~rain].tobytes()
-    assert outcome.out.startswith(f"{scan}: 300 points, {rain.sum()} of rain, ")
+    assert outcome.out.startswith(f"{scan}: 300 points, {rain.sum()} of rain ({rain.mean():.1%}), ")
 
 
 def test_a_folder_and_a_file_are_cleaned_together(
@@ -54,7 +54,9 @@ def test_a_folder_and_a_file_are_cleaned_together(
     np.save(single, scene(50))
     outcome = run_derain("run", onnx_model, scans, single, "--out", tmp_path / "out")
     assert outcome.code == 0
-    assert len(outcome.out.splitlines()) == 4
+    *lines, summary = outcome.out.splitlines()
+    assert len(lines) == 4
+    assert summary.startswith("4 scans: 650 points, ")
     rows = {path.stem: len(labels(path)) for path in (tmp_path / "out").glob("*.label")}
     assert rows == {"000001": 100, "000002": 200, "000003": 300, "single": 50}
 
@@ -67,13 +69,19 @@ def test_json_is_one_object_a_scan_and_nothing_else(
     points.tofile(scans / "with_nan.bin")
     out = tmp_path / "out"
     outcome = run_derain("run", onnx_model, scans, "--out", out, "--json")
-    assert (outcome.code, outcome.err) == (0, "")
+    assert outcome.code == 0
+    (summary,) = outcome.said
     objects = [json.loads(line) for line in outcome.out.splitlines()]
     assert [item["scan"] for item in objects] == [str(path) for path in sorted(scans.iterdir())]
     assert [item["points"] for item in objects] == [100, 200, 300, 80]
     assert [item["valid"] for item in objects] == [100, 200, 300, 73]
+    rain, odd = sum(item["rain"] for item in objects), sum(bool(i["warnings"]) for i in objects)
+    assert summary == (
+        f"4 scans: 680 points, {rain} of rain ({rain / 673:.1%}); {odd} scans with warnings"
+    )
     for item in objects:
         assert item["rain"] == labels(out / Path(item["scan"]).with_suffix(".label").name).sum()
+        assert item["share_removed"] == item["rain"] / item["valid"]
         assert list(item["milliseconds"]) == ["read", "view", "network", "back", "write"]
         assert all(time >= 0 for time in item["milliseconds"].values())
 
@@ -85,7 +93,7 @@ def test_one_bad_scan_is_reported_and_the_rest_are_done(
     bad.write_bytes(bad.read_bytes()[:-5])
     outcome = run_derain("run", onnx_model, scans, "--out", tmp_path / "out", "--json")
     assert outcome.code == 2
-    first, last = outcome.err.splitlines()
+    first, summary, last = outcome.said
     assert first.startswith(f"derain: {bad}: 3195 bytes are not whole rows of 16 bytes")
     assert last == "derain: 1 of 3 scans could not be cleaned"
     assert [json.loads(line)["points"] for line in outcome.out.splitlines()] == [100, 300]
@@ -134,7 +142,7 @@ def test_the_intensity_scale_reaches_the_model_but_not_the_file(
     out = tmp_path / "out"
     arguments = ["run", onnx_model, tmp_path / "small.bin", "--out", out]
     outcome = run_derain(*arguments, "--intensity-scale", "256")
-    assert (outcome.code, outcome.err) == (0, "")
+    assert (outcome.code, outcome.said) == (0, [])
     rain = labels(out / "small.label").astype(bool)
     np.testing.assert_array_equal(rain, Derainer(onnx_model)(scene(300)))
     assert (out / "small.bin").read_bytes() == small[~rain].tobytes()
@@ -151,13 +159,14 @@ def test_intensities_of_another_unit_are_warned_of_once(
         points.tofile(tmp_path / f"{name}.bin")
     outcome = run_derain("run", onnx_model, tmp_path, "--out", tmp_path / "out")
     assert outcome.code == 0
-    (warning,) = outcome.err.splitlines()
-    assert warning.startswith("derain: warning: mean intensity 0.0")
+    warning, more = outcome.said
+    assert warning.startswith(f"derain: warning: {tmp_path / 'a.bin'}: mean intensity 0.0")
     assert "where the model was trained (unit 0..255): see --intensity-scale" in warning
+    assert more == "derain: warning: 2 more scans: intensity of another unit"
     scaled = run_derain(
         "run", onnx_model, tmp_path, "--out", tmp_path / "out", "--intensity-scale", "1000"
     )
-    assert scaled.err == ""
+    assert scaled.said == []
 
 
 def test_a_missing_intensity_is_warned_of_once(
@@ -167,7 +176,10 @@ def test_a_missing_intensity_is_warned_of_once(
         write_scan(tmp_path / f"{name}.pcd", Scan(scene(100)[:, :3].copy()))
     outcome = run_derain("run", onnx_model, tmp_path, "--out", tmp_path / "out")
     assert outcome.code == 0
-    assert outcome.err == "derain: warning: no intensity: the mean of WADS, 9.88, stands in\n"
+    assert outcome.said == [
+        f"derain: warning: {tmp_path / 'a.pcd'}: no intensity: the mean of WADS, 9.88, stands in",
+        "derain: warning: 1 more scan: no intensity",
+    ]
 
 
 def test_a_model_that_was_trained_without_intensity_warns_of_none(
@@ -176,7 +188,7 @@ def test_a_model_that_was_trained_without_intensity_warns_of_none(
     spec = Derainer(onnx_model).metadata["spec"]
     model = saying({"spec": {**spec, "mean": [0.0] * 4}})
     outcome = run_derain("run", model, scans, "--out", tmp_path / "out")
-    assert (outcome.code, outcome.err) == (0, "")
+    assert (outcome.code, outcome.said) == (0, [])
 
 
 @pytest.mark.parametrize("out", ["file", "file/below"])
@@ -187,7 +199,7 @@ def test_nothing_is_left_where_the_output_cannot_be_written(
     before = names(tmp_path)
     outcome = run_derain("run", onnx_model, scans, "--out", tmp_path / out)
     assert outcome.code == 2
-    *reports, last = outcome.err.splitlines()
+    *reports, last = outcome.said
     assert len(reports) == 3
     for number, report in enumerate(reports, start=1):
         assert f"{tmp_path / out / f'{number:06d}.bin'}: cannot be written" in report

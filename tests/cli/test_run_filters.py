@@ -29,7 +29,7 @@ def test_a_scan_gets_its_labels_and_loses_its_rain(
 ) -> None:
     out = tmp_path / "out"
     outcome = run_derain("run", name, scan, "--out", out, "--json", "--threads", "2")
-    assert (outcome.code, outcome.err) == (0, "")
+    assert (outcome.code, outcome.said) == (0, [])
     rain = FilterDerainer(filter_from(name, {}))(scene(400))
     assert rain_in(out) == rain.tolist()
     assert (out / "scan.bin").read_bytes() == scene(400)[~rain].tobytes()
@@ -82,8 +82,11 @@ def test_a_missing_intensity_is_warned_of_once_and_only_where_it_is_needed(
     arguments = [tmp_path / "scans", "--out", tmp_path / "out"]
     outcome = run_derain("run", "ssr", *arguments)
     assert outcome.code == 0
-    assert outcome.err == "derain: warning: no intensity: ssr finds nothing without\n"
-    assert run_derain("run", "dror", *arguments).err == ""
+    assert outcome.said == [
+        f"derain: warning: {tmp_path / 'scans/a.pcd'}: no intensity: nothing can be found without",
+        "derain: warning: 1 more scan: no intensity",
+    ]
+    assert run_derain("run", "dror", *arguments).said == []
 
 
 def test_the_intensity_scale_reaches_the_filter(run_derain, scan: Path, tmp_path: Path) -> None:

@@ -1,0 +1,46 @@
+"""Options that say how scans are read, the same in every command."""
+
+import argparse
+
+from derain.cli.arguments import factor
+from derain.files import DEFAULT_COLUMNS
+
+
+def column_names(text: str) -> tuple[str, ...]:
+    """Names of columns, between commas."""
+    return tuple(text.split(","))
+
+
+def add_columns(
+    parser: argparse._ActionsContainer,
+    option: str = "--columns",
+    of: str = "",
+    default: tuple[str, ...] | None = DEFAULT_COLUMNS,
+) -> None:
+    """Declares the names of the columns of files that do not name them.
+
+    Args:
+        parser: The command's parser, or a group of its arguments.
+        option: What the option is called.
+        of: Whose files they are, where a command reads several kinds.
+        default: What it is where it is not given; None leaves that to the command.
+    """
+    parser.add_argument(
+        option,
+        type=column_names,
+        metavar="NAMES",
+        default=default,
+        help=f"names of the columns of {of}.bin and .npy files "
+        f"(default: {','.join(DEFAULT_COLUMNS)})",
+    )
+
+
+def add_intensity_scale(parser: argparse.ArgumentParser) -> None:
+    """Declares what takes the scans' intensities to the unit of the methods."""
+    parser.add_argument(
+        "--intensity-scale",
+        type=factor,
+        default=1.0,
+        metavar="FACTOR",
+        help="what takes the scans' intensities to the method's unit, e.g. 255 (default: 1)",
+    )
