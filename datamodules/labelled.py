@@ -10,7 +10,7 @@ from derain.datamodules.sequences import SequenceDataModule
 from derain.documents import Entry
 from derain.errors import InputError
 from derain.files import find_scans
-from derain.files.labels import label_beside
+from derain.files.labels import label_of
 from derain.simulation.manifest import RAIN_RATE, rates_of_sequences, read_manifest
 
 
@@ -106,13 +106,6 @@ def full_name(card: DataCard) -> str:
 def sequence_of(scan: Path) -> str:
     """Name of the sequence that a scan lies in: ``<sequence>/<folder of scans>/<frame>.bin``."""
     return scan.absolute().parent.parent.name
-
-
-def label_of(scan: Path) -> Path:
-    """Where a scan's labels lie: beside it, or in the folder that its layout has for them."""
-    if scan.parent.name == REHEARSE3D.scans:
-        return scan.parent.parent / REHEARSE3D.labels / f"{scan.stem}.label"
-    return label_beside(scan)
 
 
 def _layout_of(root: Path) -> Layout:

@@ -1,5 +1,6 @@
 """One scan as several methods clean it, side by side."""
 
+import textwrap
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -12,6 +13,9 @@ from derain.scan import Scan
 
 # Columns that a screen shows at once; further panels go below.
 MOST_COLUMNS = 5
+
+# Letters of a title that stay within their panel.
+TITLE_WIDTH = 44
 
 
 def comparison_figure(
@@ -30,15 +34,15 @@ def comparison_figure(
         title: Heading.
     """
     panels = dict(_panels(predicted, rain))
-    columns = min(len(panels), MOST_COLUMNS)
-    blocks = -(-len(panels) // columns)
+    blocks = -(-len(panels) // MOST_COLUMNS)
+    columns = -(-len(panels) // blocks)  # as many in each, so that none stands alone below
     figure = Figure(figsize=(4 * columns, 6 * blocks + 1), layout="constrained")
     figure.suptitle(title)
     axes = figure.subplots(2 * blocks, columns, squeeze=False, height_ratios=[3, 2] * blocks)
     # Panels from left to right, block by block, each a pair of axes one above the other.
     pairs = axes.reshape(blocks, 2, columns).transpose(0, 2, 1).reshape(-1, 2)
     for (above, ahead), (name, outcome) in zip(pairs, panels.items(), strict=False):
-        above.set_title(name, fontsize=10)
+        above.set_title(textwrap.fill(name, TITLE_WIDTH), fontsize=10)
         draw_from_above(above, scan, outcome)
         draw_as_seen(ahead, scan, outcome)
     for unused in pairs[len(panels) :].flat:

@@ -93,7 +93,7 @@ class Search:
         seed: Of the sampler.
         storage: SQLite file that keeps the study; None forgets it.
         data: Names of the scans: a study goes on only with the same ones, labelled alike.
-        done: Called after each trial.
+        done: Called after each trial, those of an earlier run included.
     """
 
     trials: int
@@ -106,7 +106,9 @@ class Search:
 def tune_filter(name: str, scans: Sequence[ViewedScan], search: Search) -> Tuned:
     """Tunes a filter with Optuna's tree-structured Parzen estimator.
 
-    The first trial is that of the filter's default parameters.
+    The first trial is that of the filter's default parameters. A search that was broken off, in
+    the midst of a trial even, goes on as if it had not been: the sampler draws all trials anew,
+    and those that the storage holds are not weighed again.
 
     Args:
         name: One of ``SPACES``.
@@ -125,19 +127,25 @@ def tune_filter(name: str, scans: Sequence[ViewedScan], search: Search) -> Tuned
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     default = filter_from(name, {})
 
-    def objective(trial: "optuna.Trial") -> float:
-        return pooled_iou(filter_from(name, _suggested(trial, SPACES[name])), scans)
+    def objective(parameters: Mapping[str, Any]) -> float:
+        return pooled_iou(filter_from(name, parameters), scans)
 
-    def done(study: "optuna.Study", trial: "optuna.trial.FrozenTrial") -> None:
-        search.done()
-
+    # What is stored is never less than a whole trial, whenever the process is killed.
+    study = optuna.create_study(
+        direction="maximize", sampler=optuna.samplers.TPESampler(seed=search.seed)
+    )
+    study.enqueue_trial({key: getattr(default, key) for key in SPACES[name]})
     try:
-        study = _study(name, scans, search)
-        complete = study.get_trials(states=[optuna.trial.TrialState.COMPLETE])
-        if not complete:
-            study.enqueue_trial({key: getattr(default, key) for key in SPACES[name]})
-        remaining = max(search.trials - len(complete), 0)
-        study.optimize(objective, remaining, callbacks=[done])
+        stored = _stored(name, scans, search)
+        known = stored.get_trials(states=[optuna.trial.TrialState.COMPLETE])
+        for number in range(max(search.trials, len(known))):
+            if number < len(known):
+                _repeat(study, known[number])
+            else:
+                trial = study.ask(_distributions(SPACES[name]))
+                study.tell(trial, objective(trial.params))
+                stored.add_trial(study.trials[-1])
+            search.done()
     except (optuna.exceptions.OptunaError, SQLAlchemyError) as error:
         raise _unusable(search.storage, error) from error
     best = filter_from(name, study.best_params)
@@ -182,8 +190,8 @@ def pooled_iou(filter: PointFilter, scans: Sequence[ViewedScan]) -> float:
     return total.iou
 
 
-def _study(name: str, scans: Sequence[ViewedScan], search: Search) -> "optuna.Study":
-    """A new study, or the one of the same filter that the storage holds."""
+def _stored(name: str, scans: Sequence[ViewedScan], search: Search) -> "optuna.Study":
+    """The study that keeps the trials: a new one, or that of the same filter in the storage."""
     import optuna
 
     study = optuna.create_study(
@@ -205,16 +213,30 @@ def _study(name: str, scans: Sequence[ViewedScan], search: Search) -> "optuna.St
         )
     for key, fact in facts.items():
         study.set_user_attr(key, fact)
-    # A study that goes on must not draw again what it began with.
-    study.sampler = optuna.samplers.TPESampler(seed=search.seed + len(study.trials))
     return study
 
 
-def _suggested(trial: "optuna.Trial", space: Mapping[str, Bounds]) -> dict[str, int | float]:
+def _repeat(study: "optuna.Study", known: "optuna.trial.FrozenTrial") -> None:
+    """Draws a trial whose value is known, so that the sampler comes to where it was."""
+    import optuna
+
+    trial = study.ask(known.distributions)
+    if trial.params == known.params:
+        study.tell(trial, known.value)
+    else:  # drawn by another seed
+        study.tell(trial, state=optuna.trial.TrialState.FAIL)
+        study.add_trial(known)
+
+
+def _distributions(
+    space: Mapping[str, Bounds],
+) -> "dict[str, optuna.distributions.BaseDistribution]":
+    from optuna.distributions import FloatDistribution, IntDistribution
+
     return {
-        name: trial.suggest_int(name, low, high)
+        name: IntDistribution(low, high)
         if isinstance(low, int) and isinstance(high, int)
-        else trial.suggest_float(name, low, high, log=True)
+        else FloatDistribution(low, high, log=True)
         for name, (low, high) in space.items()
     }
 

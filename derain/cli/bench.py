@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +11,14 @@ from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable
 from derain.errors import InputError
 from derain.files.atomic import replacing
+from derain.notices import Notices
+from derain.odd_scans import oddities
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule, ScanFile
     from derain.export.bench.contestants import Contestant
     from derain.export.bench.rows import Row
+    from derain.scan import Scan
 
 SUMMARY = "compare methods on labelled scans: error, time and memory"
 
@@ -121,13 +125,14 @@ def _bench(
     from derain.export.bench.scores import Labelled
     from derain.export.bench.speed_error import draw_speed_error
 
+    notices = Notices()
     files = evenly_spaced(files, arguments.limit or len(files))
     by_scan = {file.scan: file for file in files}
     known_rates = {scan: rates[sequence_of(scan)] for scan in by_scan if sequence_of(scan) in rates}
     scans = Labelled(
         data.card,
         list(by_scan),
-        lambda scan: data.read(by_scan[scan]),
+        partial(_read, data, by_scan, methods, notices),
         known_rates,
         arguments.distinct,
     )
@@ -136,12 +141,28 @@ def _bench(
         data.loading.columns,
         arguments.threads,
         arguments.repeats,
+        data.loading.intensity_scale,
     )
     rows = run_bench(methods, scans, timing, arguments.seed)
+    notices.tell_how_many_more()
     facts = provenance(command_line(arguments), data, files, timing, arguments.seed)
     write_report(rows, facts, out)
     draw_speed_error(rows, facts, out / "speed_error.png")
     return rows
+
+
+def _read(
+    data: "ScanDataModule",
+    files: Mapping[Path, "ScanFile"],
+    methods: Sequence["Contestant"],
+    notices: Notices,
+    scan: Path,
+) -> "Scan":
+    """Reads a scan, and warns of what is odd about it for each method."""
+    read = data.read(files[scan])
+    for method in methods:
+        notices.tell(str(scan), oddities(read, method.judge), method.title)
+    return read
 
 
 def _learn_from(arguments: argparse.Namespace, data: "ScanDataModule") -> Any:

@@ -13,6 +13,7 @@ from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCL
 from derain.datamodules.base import ScanDataModule
 from derain.datamodules.folder import Folder
 from derain.datamodules.rehearse3d import Rehearse3D
+from derain.datamodules.scan_check import ScanCheck
 from derain.datamodules.simulated import Simulated
 from derain.datamodules.wads import Wads
 from derain.errors import InputError
@@ -86,6 +87,7 @@ class DerainCLI(LightningCLI):
         parser.add_lightning_class_args(ScanPanels, "panels")
         parser.add_lightning_class_args(PredictionWriter, "predictions")
         parser.add_lightning_class_args(TestReport, "report")
+        parser.add_lightning_class_args(ScanCheck, "scan_check")
         parser.set_defaults(
             {
                 "checkpoint.monitor": MERIT,

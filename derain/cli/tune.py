@@ -1,7 +1,9 @@
 """``derain tune``: the best parameters of a method, on labelled scans."""
 
 import argparse
+import os
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +17,14 @@ from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable
 from derain.errors import InputError
 from derain.files.atomic import replacing
+from derain.filters import FILTERS, filter_from
+from derain.notices import Notices
+from derain.odd_scans import Judge, oddities
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule, ScanFile
     from derain.export.tuning import Tuned
+    from derain.scan import Scan
 
 SUMMARY = "find a method's best parameters on labelled scans"
 
@@ -59,11 +65,13 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     from derain.export.tuning import SPACES
 
+    notices = Notices()
     data = labelled(arguments, arguments.data)
     files = _drawn(data.files(arguments.part), arguments.scans, arguments.seed)
     refuse_unwritable(arguments.out)
     tune = _tuned_filter if arguments.method in SPACES else _tuned_model
-    tuned = tune(arguments, data, files)
+    tuned = tune(arguments, data, files, notices)
+    notices.tell_how_many_more()
     facts = (
         f"IoU {tuned.iou:.4f} on {len(files)} scans of {data.card.name}, "
         f"{tuned.default_iou:.4f} with the defaults"
@@ -76,12 +84,16 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _tuned_filter(
-    arguments: argparse.Namespace, data: "ScanDataModule", files: list["ScanFile"]
+    arguments: argparse.Namespace,
+    data: "ScanDataModule",
+    files: list["ScanFile"],
+    notices: Notices,
 ) -> "Tuned":
     from derain.export.tuning import Search, ViewedScan, tune_filter
 
+    read = partial(_read, data, filter_from(arguments.method, {}), notices)
     scans = [
-        ViewedScan.of(data.read(file), data.card, arguments.threads)
+        ViewedScan.of(read(file), data.card, arguments.threads)
         for file in tqdm(files, desc="finding neighbours", unit="scan", disable=None)
     ]
     if not any(scan.rain.any() for scan in scans):
@@ -98,7 +110,10 @@ def _tuned_filter(
 
 
 def _tuned_model(
-    arguments: argparse.Namespace, data: "ScanDataModule", files: list["ScanFile"]
+    arguments: argparse.Namespace,
+    data: "ScanDataModule",
+    files: list["ScanFile"],
+    notices: Notices,
 ) -> "Tuned":
     from derain.export.methods import load_method
     from derain.export.runtime import Derainer
@@ -109,7 +124,7 @@ def _tuned_model(
 
     def judged() -> Iterator[tuple[Any, Any]]:
         for file in tqdm(files, desc="judging", unit="scan", disable=None):
-            scan = data.read(file)
+            scan = _read(data, derainer.spec, notices, file)
             known = scan.valid & ~data.card.unknown_of(scan)
             yield derainer.probability(scan)[known], data.card.rain_of(scan)[known]
 
@@ -117,6 +132,13 @@ def _tuned_model(
     if not any(rain.any() for _, rain in scans):
         raise _no_rain(data)
     return tune_threshold(scans, derainer.spec.threshold)
+
+
+def _read(data: "ScanDataModule", judge: Judge, notices: Notices, file: "ScanFile") -> "Scan":
+    """Reads a scan, and warns of what is odd about it for the method."""
+    scan = data.read(file)
+    notices.tell(str(file.scan), oddities(scan, judge))
+    return scan
 
 
 def _drawn(files: list["ScanFile"], most: int, seed: int) -> list["ScanFile"]:
@@ -134,10 +156,17 @@ def _no_rain(data: "ScanDataModule") -> InputError:
 
 
 def _write(arguments: argparse.Namespace, tuned: "Tuned", facts: str) -> None:
-    content = {"method": arguments.method, **tuned.parameters}
+    content = {"method": _seen_from(arguments.out.parent, arguments.method), **tuned.parameters}
     with replacing(arguments.out) as temporary:
         temporary.write_text(
             f"# derain {__version__}: {command_line(arguments, 'method')}\n"
             f"# {facts}\n{yaml.safe_dump(content, sort_keys=False)}",
             "utf-8",
         )
+
+
+def _seen_from(folder: Path, method: str) -> str:
+    """The method as a file in a folder names it: a model by the way from there to it."""
+    if method in FILTERS:
+        return method
+    return Path(os.path.relpath(Path(method).resolve(), folder.resolve())).as_posix()

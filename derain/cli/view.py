@@ -5,8 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cli.arguments import threads
+from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError
 from derain.files import read_scan
+from derain.notices import Notices
+from derain.odd_scans import oddities
 
 if TYPE_CHECKING:
     import numpy as np
@@ -39,11 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--card", help="data card of the scan's labels (beside it or in ../labels), such as wads"
     )
-    parser.add_argument(
-        "--columns",
-        default="x,y,z,intensity",
-        help="names of the columns of .bin and .npy files (default: %(default)s)",
-    )
+    add_columns(parser)
+    add_intensity_scale(parser)
     parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
 
 
@@ -55,7 +55,11 @@ def main(arguments: argparse.Namespace) -> int:
     if not (arguments.out or arguments.window):
         raise InputError(arguments.scan, "nothing is to be done with it", "Give --out or --window.")
     methods = contestants(arguments.methods)
-    scan = read_scan(arguments.scan, arguments.columns.split(","))
+    scan = read_scan(arguments.scan, arguments.columns)
+    scan = scan.with_intensity_times(arguments.intensity_scale)
+    notices = Notices()
+    for method in methods:
+        notices.tell(str(arguments.scan), oddities(scan, method.judge), method.title)
     truth = _truth(scan, arguments)
     predicted = {
         method.title: method.ready(arguments.threads)(scan, Stopwatch()) for method in methods
@@ -83,8 +87,7 @@ def _truth(
 ) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]] | None":
     """Which points are rain, and of which it is known; None where no card says what labels mean."""
     from derain.cards import load_card
-    from derain.datamodules.labelled import label_of
-    from derain.files.labels import read_labels, semantic
+    from derain.files.labels import label_of, read_labels, semantic
 
     if arguments.card is None:
         return None

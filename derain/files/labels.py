@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.data_layout import REHEARSE3D
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.files.reading import reading
@@ -20,6 +21,13 @@ def label_beside(scan: Path) -> Path:
     """Where a scan's labels lie: beside it if they are there, else in the sibling `labels`."""
     beside = scan.with_suffix(".label")
     return beside if beside.is_file() else scan.parent.parent / "labels" / beside.name
+
+
+def label_of(scan: Path) -> Path:
+    """Where a scan's labels lie: beside it, or in the folder that its layout has for them."""
+    if scan.parent.name == REHEARSE3D.scans:
+        return scan.parent.parent / REHEARSE3D.labels / f"{scan.stem}.label"
+    return label_beside(scan)
 
 
 def read_labels(path: Path, points: int) -> NDArray[np.uint32]:

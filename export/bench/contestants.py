@@ -19,6 +19,7 @@ from derain.errors import InputError
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
 from derain.filters import FilterDerainer, PointFilter
+from derain.odd_scans import Judge
 from derain.one_line_rule import OneLineRule
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
@@ -45,6 +46,7 @@ class Contestant:
             measured in a process of its own.
         facts: What the method is, for whoever repeats the bench: file or parameters.
         filter: The filter, where it is one: filters share one search for neighbours.
+        judge: What it judges by, as far as a scan may not suit it.
     """
 
     title: str
@@ -52,6 +54,7 @@ class Contestant:
     ready: Callable[[int], Method]
     facts: dict[str, Any] = field(default_factory=dict)
     filter: PointFilter | None = None
+    judge: Judge = None
 
 
 def contestants(texts: Sequence[str], learn_from: LearnFrom | None = None) -> list[Contestant]:
@@ -92,7 +95,7 @@ def _deployable(title: str, name: str, parameters: dict[str, Any]) -> Contestant
     ready = partial(load_method, name, parameters)
     match ready(1):
         case FilterDerainer(filter=filter):
-            return Contestant(title, name, ready, {"parameters": filter.as_dict()}, filter)
+            return Contestant(title, name, ready, {"parameters": filter.as_dict()}, filter, filter)
         case Derainer(spec=spec):
             facts = {
                 "model": name,
@@ -101,7 +104,7 @@ def _deployable(title: str, name: str, parameters: dict[str, Any]) -> Contestant
                 "trained_on": spec.data,
                 "threshold": spec.threshold,
             }
-            return Contestant(title, spec.network, ready, facts)
+            return Contestant(title, spec.network, ready, facts, judge=spec)
 
 
 def _weights(path: Path) -> int:
@@ -121,7 +124,7 @@ def _learnt(title: str, name: str, learn_from: LearnFrom | None) -> Contestant:
         return Contestant(title, name, partial(_timed_rule, prior), {"voxel": prior.voxel})
     rule = OneLineRule.best(learn_from())
     limits = f"intensity <= {rule.intensity:.4g} and range <= {rule.range:.4g} m"
-    return Contestant(title, name, partial(_timed_rule, rule), {"rule": limits})
+    return Contestant(title, name, partial(_timed_rule, rule), {"rule": limits}, judge=rule)
 
 
 def _timed_rule(rule: Callable[[Scan], NDArray[np.bool_]], threads: int) -> Method:

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from derain.export.bench.contestants import Contestant
 from derain.export.timing import STAGES, timed_runs
 from derain.files import DEFAULT_COLUMNS
+from derain.scan import Scan
+from derain.stopwatch import Stopwatch
 from derain.workers import worker_pool
 
 WARM_UP = 2
@@ -28,12 +30,14 @@ class Timing:
         columns: Names of the columns of ``.bin`` and ``.npy`` scans.
         threads: Threads of view and network; 0 takes every core this process may use.
         repeats: Timed runs on each scan.
+        intensity_scale: What takes the scans' intensities to the unit of the methods.
     """
 
     scans: Sequence[Path]
     columns: Sequence[str] = DEFAULT_COLUMNS
     threads: int = 0
     repeats: int = 3
+    intensity_scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,11 @@ def measure_cost(contestant: Contestant, timing: Timing) -> Cost:
 def run_alone(contestant: Contestant, timing: Timing) -> Cost:
     """Runs a method on every scan, in turns, in this process; see :func:`measure_cost`."""
     method = contestant.ready(timing.threads)
-    times = timed_runs(method, timing.scans, timing.columns, WARM_UP, timing.repeats)
+
+    def judge(scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
+        return method(scan.with_intensity_times(timing.intensity_scale), stopwatch)
+
+    times = timed_runs(judge, timing.scans, timing.columns, WARM_UP, timing.repeats)
     return Cost(times, _peak_memory())
 
 

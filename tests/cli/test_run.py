@@ -93,7 +93,7 @@ def test_one_bad_scan_is_reported_and_the_rest_are_done(
     bad.write_bytes(bad.read_bytes()[:-5])
     outcome = run_derain("run", onnx_model, scans, "--out", tmp_path / "out", "--json")
     assert outcome.code == 2
-    first, summary, last = outcome.said
+    first, _, last = outcome.said
     assert first.startswith(f"derain: {bad}: 3195 bytes are not whole rows of 16 bytes")
     assert last == "derain: 1 of 3 scans could not be cleaned"
     assert [json.loads(line)["points"] for line in outcome.out.splitlines()] == [100, 300]

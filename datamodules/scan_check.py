@@ -1,0 +1,57 @@
+"""Says before a run which of its scans do not suit the model."""
+
+from dataclasses import replace
+from typing import Any
+
+import lightning
+from lightning.pytorch.trainer.states import TrainerFn
+
+from derain.datamodules.base import Part, ScanDataModule
+from derain.datamodules.statistics import evenly_spaced
+from derain.notices import Notices
+from derain.odd_scans import oddities
+
+
+class ScanCheck(lightning.Callback):
+    """Warns where scans lack what the model judges by, or have intensities of another unit.
+
+    It looks before the first batch, since hours of training on a wrong unit are lost.
+
+    Args:
+        scans: How many of a part's scans are looked at, spread over all of them.
+    """
+
+    def __init__(self, scans: int = 10) -> None:
+        self.scans = scans
+
+    def on_fit_start(self, trainer: lightning.Trainer, model: Any) -> None:
+        """Looks at training scans."""
+        self._look(trainer, model, "train")
+
+    def on_validation_start(self, trainer: lightning.Trainer, model: Any) -> None:
+        """Looks at validation scans, where nothing is trained."""
+        if trainer.state.fn == TrainerFn.VALIDATING:
+            self._look(trainer, model, "validation")
+
+    def on_test_start(self, trainer: lightning.Trainer, model: Any) -> None:
+        """Looks at test scans."""
+        self._look(trainer, model, "test")
+
+    def on_predict_start(self, trainer: lightning.Trainer, model: Any) -> None:
+        """Looks at scans to be judged."""
+        self._look(trainer, model, "predict")
+
+    def _look(self, trainer: lightning.Trainer, model: Any, part: Part) -> None:
+        if not trainer.is_global_zero:
+            return
+        data: ScanDataModule = trainer.datamodule  # type: ignore[attr-defined]
+        notices = Notices()
+        for file in evenly_spaced(data.files(part), self.scans):
+            found = oddities(data.read(file), model.spec)
+            notices.tell(str(file.scan), [replace(o, detail=_here(o.detail)) for o in found])
+        notices.tell_how_many_more()
+
+
+def _here(detail: str) -> str:
+    """The same, with the option as it is called here."""
+    return detail.replace("--intensity-scale", "--data.loading.intensity_scale")
