@@ -32,10 +32,11 @@ def rain_on_scan(
     same row stay.
 
     Reflectivity is the intensity as a share of its full scale (1, 255 or 65,535), or a tenth where
-    the scan has none. What should have been too dark for ``sensor`` was seen nevertheless. How far
-    above the threshold it was nobody knows: it is taken to be above twice the threshold with
-    probability 1/2, above ten times with 1/10, and so on, so that it is lost with the share of the
-    light that the rain takes.
+    the scan has none. One intensity throughout was not measured either: every return keeps it, and
+    drops get it, too, or else it would give them away. What should have been too dark for
+    ``sensor`` was seen nevertheless. How far above the threshold it was nobody knows: it is taken
+    to be above twice the threshold with probability 1/2, above ten times with 1/10, and so on, so
+    that it is lost with the share of the light that the rain takes.
 
     Args:
         scan: The scan. Its file's columns of coordinates, intensity, and range or distance follow
@@ -55,13 +56,18 @@ def rain_on_scan(
     beams = find_beams(scan, generator)
     exposed = _exposed(scan, beams, sensor)
     row, direction = beams.row[exposed], beams.direction[exposed]
-    clear = _clear_air(scan, row, beams.returned[exposed], sensor, generator)
+    measured = _with_measured_intensity(scan, beams)
+    clear = _clear_air(measured, row, beams.returned[exposed], sensor, generator)
     one_return = replace(sensor, returns="last" if sensor.returns == "last" else "strongest")
     detected = rain_on_beams(clear, direction, rain, one_return, generator)
 
     rained = _with_drops(scan.take(beams.row), exposed, direction, detected, sensor, generator)
     if scan.intensity is not None:
-        intensity = _intensity(scan, row, clear, detected, sensor, generator)
+        if measured.intensity is not None:
+            intensity = _intensity(scan, row, clear, detected, sensor, generator)
+        else:
+            anywhere = beams.row[beams.returned][:1]
+            intensity = np.resize(scan.intensity[anywhere].astype(np.float64), len(row))
         rained = with_intensity(rained, exposed[detected.returned], intensity[detected.returned])
     if scan.shape is None:
         return rained.take(np.delete(np.arange(len(rained)), exposed[~detected.returned]))
@@ -73,6 +79,14 @@ def _exposed(scan: Scan, beams: RecordedBeams, sensor: Sensor) -> NDArray[np.int
     """Numbers of the beams that it rains on, int64 (E,)."""
     too_near = beams.returned & (scan.range[beams.row] < sensor.minimum_range)
     return np.flatnonzero(np.isfinite(beams.direction[:, 0]) & ~too_near)
+
+
+def _with_measured_intensity(scan: Scan, beams: RecordedBeams) -> Scan:
+    """The scan, without intensities where all returns have the same."""
+    if scan.intensity is None:
+        return scan
+    of_returns = scan.intensity[beams.row[beams.returned]]
+    return scan if (of_returns != of_returns[:1]).any() else replace(scan, intensity=None)
 
 
 def _clear_air(

@@ -9,9 +9,15 @@ from numpy.typing import NDArray
 from derain.directions import directions
 from derain.grid_fit import GridFit, fit_grid
 from derain.scan import Scan
+from derain.simulation.footprint import in_hull
+from derain.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
 # Rounds of the median polish: as many as sensors take whose lasers point to a few distinct sides.
 ROUNDS = 3
+
+# Rows and columns tell where the beams of an organised scan point if half of its returns are no
+# farther than this from where they should be, degrees. Spinning sensors stay within a tenth.
+FARTHEST_STRAY = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +43,13 @@ def find_beams(scan: Scan, generator: np.random.Generator) -> RecordedBeams:
     cell of a grid. What returned nothing is told from where nothing is:
 
     - An organised scan has a cell for each beam. The direction of an empty one is the sum of what
-      is usual of its row and of its column; cells in rows or columns without any return have none.
+      is usual of its row and of its column; cells in rows or columns without any return have none,
+      nor has any where this says little of the returns, as of a rosette's.
     - For any other scan a grid is fitted, see :func:`derain.grid_fit.fit_grid`. Its empty pixels
       are beams, except for as many as there are returns that share a pixel with another: those left
       their own pixels empty, chance says which. The grid is in ascending order by construction, and
-      its azimuths wrap around.
+      its azimuths wrap around. A sensor that looks one way, and whose returns are in no rows, may
+      look through a circle: only pixels in the convex hull of its returns are beams.
 
     Args:
         scan: The scan. Rows that are not valid, or of a radar, are empty cells or no beams.
@@ -55,8 +63,11 @@ def find_beams(scan: Scan, generator: np.random.Generator) -> RecordedBeams:
     own[valid] = xyz / np.linalg.norm(xyz, axis=1, keepdims=True)
     rows = np.arange(len(scan))
     if scan.shape is not None:
-        direction = np.where(valid[:, None], own, _cell_directions(scan, valid))
-        return RecordedBeams(rows, direction, valid)
+        usual = _cell_directions(scan, valid)
+        stray = np.linalg.norm(usual - own, axis=1)[valid]
+        if len(stray) and np.median(stray) > np.radians(FARTHEST_STRAY):
+            usual = np.full_like(usual, np.nan)
+        return RecordedBeams(rows, np.where(valid[:, None], own, usual), valid)
     if not valid.any():
         return RecordedBeams(rows, own, valid)
     before, direction = _unreturned(scan, valid, generator)
@@ -106,21 +117,37 @@ def _unreturned(
     pixels = fit.grid.rows * fit.grid.columns
     pixel = fit.grid.pixel(scan.xyz[seen])
     empty = np.setdiff1d(np.arange(pixels), pixel)
-    count = np.clip(pixels - len(seen), 0, len(empty))
+    doubled = len(seen) - (pixels - len(empty))
+    if not fit.beams and fit.grid.azimuth != ALL_AROUND:
+        empty = empty[_looked_at(fit, scan.xyz[seen[pixel >= 0]], empty)]
+    count = np.clip(len(empty) - doubled, 0, len(empty))
     chosen = np.sort(generator.choice(empty, count, replace=False))
     by_pixel = np.argsort(pixel, kind="stable")
     before = np.searchsorted(pixel[by_pixel], chosen) - 1
-    return seen[by_pixel[np.maximum(before, 0)]], _pixel_directions(fit, chosen)
+    return seen[by_pixel[np.maximum(before, 0)]], _unit_vectors(*_pixel_angles(fit, chosen))
 
 
-def _pixel_directions(fit: GridFit, pixel: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Direction of the beam of each pixel, or of the pixel's middle, float64 (P, 3)."""
+def _looked_at(
+    fit: GridFit, xyz: NDArray[np.float32], pixel: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Whether pixels lie in the convex hull of the returns, bool (P,)."""
+    azimuth, inclination = directions(xyz)
+    across, up = _pixel_angles(fit, pixel)
+    right = fit.grid.azimuth[0]  # from where azimuths rise without a jump
+    from_right = (azimuth - right) % FULL_CIRCLE
+    return in_hull((from_right, inclination), (across - right, up))
+
+
+def _pixel_angles(
+    fit: GridFit, pixel: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Azimuth and inclination of the beam of each pixel, or of its middle, float64 (P,) each."""
     row, column = np.divmod(pixel, fit.grid.columns)
     edges = np.array(fit.grid.edges)
     inclination = np.array(fit.beams) if fit.beams else (edges[:-1] + edges[1:]) / 2
     right, left = fit.grid.azimuth
     azimuth = left - (column + 0.5) * (left - right) / fit.grid.columns
-    return _unit_vectors(azimuth, inclination[row])
+    return azimuth, inclination[row]
 
 
 def _unit_vectors(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from derain.directions import directions
 from derain.files import read_scan, write_scan
 from derain.hard_cases import hard_cases, scene
 from derain.scan import Scan
@@ -27,6 +28,8 @@ FILES = (
     "pandaset_pandar64.pcd",
     "velodyne_vlp16_dual.pcd",
 )
+# Half a pixel of a grid that is fitted to one of these scans is less, degrees.
+HALF_A_PIXEL = 0.5
 # Beyond this a measured distance is off in one of a million drops.
 NOISE = 6 * SENSOR.range_noise
 
@@ -92,6 +95,13 @@ def test_drops_on_a_real_scan_lie_on_its_beams_in_front_of_what_was_there(
     assert (after.range < before.range + NOISE).all()
     cosine = (after.xyz * before.xyz).sum(axis=1) / (after.range * before.range)
     assert cosine == pytest.approx(1, abs=1e-5)
+
+
+def test_no_drop_lies_where_a_real_sensor_does_not_look(clear: Scan, wet: Scan) -> None:
+    seen = np.stack(directions(clear.xyz[clear.valid]), axis=1)
+    drops = np.stack(directions(wet.xyz[is_rain(wet)]), axis=1)
+    assert (drops > seen.min(axis=0) - HALF_A_PIXEL).all()
+    assert (drops < seen.max(axis=0) + HALF_A_PIXEL).all()
 
 
 def test_what_rain_leaves_of_a_real_scan_stays_to_the_bit_and_in_order(
@@ -164,10 +174,58 @@ def wall(distance: float, intensity: float, shape: tuple[int, int] | None = (40,
     return Scan(xyz, np.full(len(xyz), intensity, np.float32), shape=shape)
 
 
+def uneven_wall(
+    distance: float, intensity: float, shape: tuple[int, int] | None = (40, 200)
+) -> Scan:
+    """A wall whose first return is of another brightness, so that intensity tells something."""
+    scan = wall(distance, intensity, shape)
+    assert scan.intensity is not None
+    scan.intensity[0] = intensity / 2 if intensity else 255
+    return scan
+
+
+def distinguishable(first: NDArray[Any], second: NDArray[Any]) -> bool:
+    """Whether any rule on a number tells two samples of it apart, better than chance."""
+    values = np.union1d(first, second)
+    return any((first == value).mean() != (second == value).mean() for value in values)
+
+
+@pytest.mark.parametrize("shape", [None, (40, 200)])
+@pytest.mark.parametrize("intensity", [0.0, 0.5, 100.0])
+def test_no_rule_on_intensity_finds_drops_where_the_scan_has_one_throughout(
+    intensity: float, shape: tuple[int, int] | None
+) -> None:
+    clear = wall(40.0, intensity, shape)
+    # Sky, whose cells hold another intensity than the returns.
+    sky = np.arange(len(clear)) % 3 == 0
+    clear.xyz[sky], clear.intensity[sky] = (0, 0)
+    wet = rained(clear if shape else clear.take(~sky), 50)
+    drops = is_rain(wet)
+    solid = wet.valid & ~drops
+    assert wet.intensity is not None
+    assert min(drops.sum(), solid.sum()) > 100
+    assert not distinguishable(wet.intensity[drops], wet.intensity[solid])
+    assert (wet.intensity[solid] == np.float32(intensity)).all()
+
+
+def test_one_intensity_throughout_is_as_good_as_none() -> None:
+    constant = wall(40.0, 0.0)
+    without = replace(constant, intensity=None)
+    wet, wet_without = rained(constant, 50), rained(without, 50)
+    assert wet_without.intensity is None
+    assert equal(wet.xyz, wet_without.xyz)
+    assert equal(wet.label, wet_without.label)
+
+
+def test_the_column_of_the_file_holds_the_one_intensity_of_all_returns_as_well() -> None:
+    clear = wall(40.0, 7.0, shape=None)
+    column = np.full(len(clear), 7, np.uint8)
+    wet = rained(replace(clear, fields={"reflectivity": column}), 50)
+    assert equal(wet.fields["reflectivity"], np.full(len(wet), 7, np.uint8))
+
+
 def test_a_dark_return_is_lost_with_the_share_of_light_that_rain_takes() -> None:
-    clear = wall(60.0, 0.0, shape=None)
-    assert clear.intensity is not None
-    clear.intensity[0] = 255  # the full scale
+    clear = uneven_wall(60.0, 0.0, shape=None)
     sensor = Sensor(minimum_range=59.0, maximum_range=61.0)  # too far off to see a drop
     wet = rain_on_scan(clear, UniformRain(10), sensor, np.random.default_rng(1))
     share = np.exp(-2 * 1.556e-3 * 60)
@@ -176,9 +234,10 @@ def test_a_dark_return_is_lost_with_the_share_of_light_that_rain_takes() -> None
 
 
 def test_a_bright_return_is_kept_and_dimmed_by_the_light_that_rain_takes() -> None:
-    clear = wall(40.0, 200.0)
+    clear = uneven_wall(40.0, 200.0)
     wet = rained(clear, 25)
     kept = ~is_rain(wet)
+    kept[0] = False
     assert wet.valid.all()
     assert kept.sum() > 0.8 * len(kept)
     assert wet.intensity is not None
@@ -187,7 +246,7 @@ def test_a_bright_return_is_kept_and_dimmed_by_the_light_that_rain_takes() -> No
 
 @pytest.mark.parametrize("full_scale", [1.0, 255.0, 65_535.0])
 def test_drops_are_as_bright_as_water_on_the_scale_of_the_scan(full_scale: float) -> None:
-    clear = wall(40.0, full_scale)
+    clear = uneven_wall(40.0, full_scale)
     wet = rained(clear, 50)
     drops = is_rain(wet)
     assert wet.intensity is not None
@@ -199,7 +258,7 @@ def test_drops_are_as_bright_as_water_on_the_scale_of_the_scan(full_scale: float
 def test_a_lost_return_looks_like_an_empty_cell_or_is_not_a_number(
     gaps: int, nothing: float
 ) -> None:
-    clear = wall(110.0, 0.0)
+    clear = uneven_wall(110.0, 0.0)
     clear.xyz[:gaps] = nothing
     wet = rained(clear, 50)
     lost = wet.xyz[~wet.valid]
@@ -208,7 +267,7 @@ def test_a_lost_return_looks_like_an_empty_cell_or_is_not_a_number(
 
 
 def test_labels_are_kept_where_nothing_happens() -> None:
-    clear = wall(110.0, 0.0)
+    clear = uneven_wall(110.0, 0.0)
     wet = rained(clear.with_label(np.full(len(clear), 5)), 50)
     assert wet.label is not None
     assert set(wet.label[wet.valid]) == {5, TrackClass.RAIN}
@@ -216,7 +275,7 @@ def test_labels_are_kept_where_nothing_happens() -> None:
 
 
 def test_points_of_a_radar_stay_and_no_drop_is_one() -> None:
-    clear = wall(110.0, 0.0, shape=None)
+    clear = uneven_wall(110.0, 0.0, shape=None)
     radar = np.arange(len(clear)) % 2 == 0
     wet = rained(replace(clear, radar=radar), 50)
     assert wet.radar is not None

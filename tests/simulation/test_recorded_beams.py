@@ -17,6 +17,9 @@ HALF_STEP = 180 / 512
 SENSOR = Sensor(
     azimuth=(-180 - HALF_STEP, 180 - HALF_STEP), inclination=(-20, 10), rows=32, columns=512
 )
+# Across the circle that a rosette fills, degrees.
+FIELD_OF_VIEW = 70.0
+
 ORGANISED = ("ouster_os1_128.npz", "ouster_os0_32_dual.npz", "pandaset_pandar64.pcd")
 
 
@@ -101,6 +104,58 @@ def test_an_unreturned_beam_takes_after_a_return_of_its_own_row() -> None:
         ].mean()
         < 2
     )
+
+
+def rosette(shots: int, about: float = 0.0) -> NDArray[np.float64]:
+    """Unit vectors of a sensor that looks through two turning prisms, as Livox's do.
+
+    Each prism bends the beam by as much, in a direction that turns with it, so that the beams draw
+    a rosette in a circle of FIELD_OF_VIEW around the azimuth ``about``, degrees.
+    """
+    first, second = (2 * np.pi * turns * np.arange(shots) / shots for turns in (12.157, -7.773))
+    left = FIELD_OF_VIEW / 4 * (np.cos(first) + np.cos(second))
+    up = FIELD_OF_VIEW / 4 * (np.sin(first) + np.sin(second))
+    off_axis = np.radians(np.hypot(left, up))
+    side = np.arctan2(up, left)
+    forward, across = np.cos(off_axis), np.sin(off_axis) * np.cos(side)
+    turn = np.radians(about)
+    return np.stack(
+        [
+            forward * np.cos(turn) - across * np.sin(turn),
+            forward * np.sin(turn) + across * np.cos(turn),
+            np.sin(off_axis) * np.sin(side),
+        ],
+        axis=1,
+    )
+
+
+def off_axis(direction: NDArray[np.float64], about: float) -> NDArray[np.float64]:
+    """How far unit vectors point from the axis of a rosette, float64 (N,), degrees."""
+    axis = np.radians(about)
+    cosine = direction @ [np.cos(axis), np.sin(axis), 0]
+    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+
+
+@pytest.mark.parametrize("about", [0.0, 90.0, 180.0])
+def test_a_rosette_has_no_beams_outside_its_circle(about: float) -> None:
+    direction = rosette(24_000, about)
+    rng = np.random.default_rng(8)
+    returned = rng.random(len(direction)) < 0.8
+    distance = rng.uniform(3, 60, len(direction))[:, None]
+    beams = beams_of(Scan((direction * distance)[returned].astype(np.float32)))
+    unreturned = beams.direction[~beams.returned]
+    # All over the circle, out to its edge and no farther.
+    assert len(unreturned) >= np.count_nonzero(~returned)
+    assert FIELD_OF_VIEW / 2 - 1 < off_axis(unreturned, about).max() <= FIELD_OF_VIEW / 2
+    for corner in (unreturned[:, 2] > 0.4, unreturned[:, 2] < -0.4):
+        assert corner.sum() > 100
+
+
+def test_cells_tell_nothing_of_beams_that_are_not_in_rows_and_columns() -> None:
+    returned = np.random.default_rng(9).random(24_000) < 0.8
+    xyz = np.where(returned[:, None], rosette(24_000) * 20, np.nan).astype(np.float32)
+    beams = beams_of(Scan(xyz, shape=(100, 240)))
+    assert (np.isfinite(beams.direction).all(axis=1) == returned).all()
 
 
 @pytest.mark.parametrize(("name", "scan"), list(hard_cases(5000)))

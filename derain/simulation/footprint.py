@@ -1,0 +1,46 @@
+"""Where a sensor looked, as its returns tell."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def in_hull(
+    points: tuple[NDArray[np.float64], NDArray[np.float64]],
+    places: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> NDArray[np.bool_]:
+    """Whether places lie in the convex hull of points, or on its edge.
+
+    A convex field of view holds the hull of whatever was seen in it, however the sensor scans: a
+    circle as well as a rectangle. What was seen of the sky, nothing, adds nothing to the hull.
+
+    Args:
+        points: Azimuth and inclination of the returns, float64 (N,) each, N > 0, degrees, the
+            azimuth without a jump inside the field of view.
+        places: Azimuth and inclination of the places, float64 (M,) each, likewise.
+
+    Returns:
+        True for the places inside, bool (M,).
+    """
+    (azimuth, inclination), (across, up) = points, places
+    inside: NDArray[np.bool_] = (across >= azimuth.min()) & (across <= azimuth.max())
+    inside &= up <= np.interp(across, *_upper_hull(azimuth, inclination))
+    inside &= -up <= np.interp(across, *_upper_hull(azimuth, -inclination))
+    return inside
+
+
+def _upper_hull(
+    x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners of the upper side of the convex hull, from left to right."""
+    order = np.lexsort((y, x))
+    x, y = x[order], y[order]
+    highest = np.append(x[1:] > x[:-1], True)  # of those one above the other
+    x, y = x[highest], y[highest]
+    while True:
+        run, rise = np.diff(x), np.diff(y)
+        # What lies on or below the line between its neighbours is no corner, whatever else is.
+        corner = np.ones(len(x), bool)
+        corner[1:-1] = rise[1:] * run[:-1] < rise[:-1] * run[1:]
+        if corner.all():
+            return x, y
+        x, y = x[corner], y[corner]
