@@ -8,12 +8,12 @@ from pathlib import Path
 import lightning
 
 from derain.errors import InputError
-from derain.files.atomic import replacing
 from derain.models.base import DerainingModule
 from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
 from derain.models.published import read_checkpoint
 from derain.models.salsanext import SalsaNext
+from derain.models.whole_checkpoints import save_whole
 from derain.spec import Spec
 
 MODELS: dict[str, type[DerainingModule]] = {
@@ -68,8 +68,7 @@ def save_model(model: DerainingModule, path: Path) -> None:
             accelerator="cpu", logger=False, enable_checkpointing=False, enable_model_summary=False
         )
     trainer.strategy.connect(model)
-    with replacing(path) as temporary:
-        trainer.save_checkpoint(temporary, weights_only=True)
+    save_whole(trainer).save_checkpoint(path, weights_only=True)
 
 
 @contextmanager

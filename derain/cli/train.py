@@ -4,10 +4,16 @@ import argparse
 import warnings
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
+import torch
 from jsonargparse import DefaultHelpFormatter
+from lightning.pytorch import Trainer
 from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
 from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
+
+from derain.cli.run_folder import WholeConfig, writing_to_the_run_folder
+from derain.cores import usable_cores
 
 # Imported so that a configuration may name them without their modules.
 from derain.datamodules.base import ScanDataModule
@@ -25,7 +31,9 @@ from derain.models.panels import ScanPanels
 from derain.models.prediction import PredictionWriter
 from derain.models.report import TestReport
 from derain.models.salsanext import SalsaNext
+from derain.models.whole_checkpoints import save_whole
 from derain.open3d_import import make_open3d_loadable
+from derain.workers import end_with_launcher
 
 EXAMPLES = {
     "fit": """\
@@ -110,6 +118,10 @@ class DerainCLI(LightningCLI):
             raise InputError(path, "is an address", "Download it and give the file.")
         load_model(Path(path))
 
+    def instantiate_trainer(self, **kwargs: Any) -> Trainer:
+        """Makes the trainer, which writes its checkpoints whole or not at all."""
+        return save_whole(super().instantiate_trainer(**kwargs))
+
     def instantiate_classes(self) -> None:
         """Instantiates data, model and trainer; what they find wrong is not the parser's error."""
         try:
@@ -128,28 +140,33 @@ def train(arguments: list[str]) -> None:
             packaged configuration.
 
     Raises:
-        InputError: A configuration that does not exist, or what data and model raise.
+        InputError: A configuration that does not exist, a folder that cannot be written, or what
+            data and model raise.
     """
     make_open3d_loadable()  # TensorBoard is to start, and show what this run logs
     # Lightning means the mixing of both; arguments of the command line are all that we pass on.
     warnings.filterwarnings("ignore", message="LightningCLI's args parameter")
     # Lightning 2.6 uses a name that torch 2.13 deprecates.
     warnings.filterwarnings("ignore", message=".*LeafSpec")
-    DerainCLI(
-        DerainingModule,
-        ScanDataModule,
-        subclass_mode_model=True,
-        subclass_mode_data=True,
-        seed_everything_default=0,
-        auto_configure_optimizers=False,
-        # Every run has a folder of its own; only one without a logger meets its last configuration.
-        save_config_kwargs={"overwrite": True},
-        parser_kwargs={
-            "formatter_class": ExamplesFormatter,
-            **{name: {"description": text} for name, text in EXAMPLES.items()},
-        },
-        args=with_packaged_configs(arguments),
-    )
+    end_with_launcher()
+    torch.set_num_threads(min(torch.get_num_threads(), usable_cores()))
+    with writing_to_the_run_folder():
+        DerainCLI(
+            DerainingModule,
+            ScanDataModule,
+            subclass_mode_model=True,
+            subclass_mode_data=True,
+            seed_everything_default=0,
+            auto_configure_optimizers=False,
+            save_config_callback=WholeConfig,
+            # Every run has a folder of its own; only one without a logger meets its last one.
+            save_config_kwargs={"overwrite": True},
+            parser_kwargs={
+                "formatter_class": ExamplesFormatter,
+                **{name: {"description": text} for name, text in EXAMPLES.items()},
+            },
+            args=with_packaged_configs(arguments),
+        )
 
 
 def packaged_configs() -> dict[str, Path]:

@@ -1,0 +1,47 @@
+"""Checkpoints of a training run, each written whole or not at all."""
+
+import io
+from pathlib import Path
+from typing import Any
+
+import lightning
+import torch
+from lightning.pytorch.plugins.io import TorchCheckpointIO
+
+from derain.files.atomic import replacing
+
+
+class WholeCheckpoints(TorchCheckpointIO):
+    """Writes checkpoints as Lightning does, but beside their place, and then into it.
+
+    Lightning writes to the system's folder of temporary files. Between file systems the move from
+    there is a copy, which a full disk or a kill cuts short under the checkpoint's own name, when
+    the one before it is lost already.
+    """
+
+    def save_checkpoint(
+        self, checkpoint: dict[str, Any], path: str | Path, storage_options: Any | None = None
+    ) -> None:
+        """Writes a checkpoint; one that is there is replaced at the end.
+
+        Raises:
+            InputError: It cannot be written; what was there stays.
+        """
+        if "://" in str(path):  # not a file of this system's
+            super().save_checkpoint(checkpoint, path, storage_options)
+            return
+        content = io.BytesIO()  # torch hides what goes wrong where it writes itself
+        torch.save(checkpoint, content)
+        with replacing(Path(path)) as temporary:
+            temporary.write_bytes(content.getbuffer())
+
+
+def save_whole(trainer: lightning.Trainer) -> lightning.Trainer:
+    """Has a trainer write its checkpoints whole, unless it was told how to write them.
+
+    Returns:
+        The same trainer.
+    """
+    if type(trainer.strategy.checkpoint_io) is TorchCheckpointIO:
+        trainer.strategy.checkpoint_io = WholeCheckpoints()
+    return trainer
