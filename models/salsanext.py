@@ -5,6 +5,7 @@ Segmentation of LiDAR Point Clouds for Autonomous Driving", ISVC 2020; TiagoCort
 (MIT).
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
@@ -165,8 +166,9 @@ class SalsaNext(SupervisedModule):
             momentum=self.hparams["momentum"],
             weight_decay=self.hparams["weight_decay"],
         )
-        self.trainer.fit_loop.setup_data()  # so that the number of steps is known
-        steps = self.trainer.num_training_batches
+        self.trainer.fit_loop.setup_data()  # so that the number of batches is known
+        # Of the optimiser, as the schedule counts them; the last of an epoch takes what is left.
+        steps = math.ceil(self.trainer.num_training_batches / self.trainer.accumulate_grad_batches)
         warm_up = self.hparams["warm_up"] * steps
 
         def factor(step: int) -> float:

@@ -208,24 +208,30 @@ def scenes(tmp_path: Path) -> Callable[..., Folder]:
 
 
 class LearningRates(lightning.Callback):
-    """Keeps the learning rate of every step."""
+    """Keeps the learning rate of every step of the optimiser."""
 
     def __init__(self) -> None:
         self.values: list[float] = []
 
-    def on_train_batch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
-        self.values.append(trainer.optimizers[0].param_groups[0]["lr"])
+    def on_before_optimizer_step(
+        self, trainer: lightning.Trainer, model: SalsaNext, optimizer: torch.optim.Optimizer
+    ) -> None:
+        self.values.append(optimizer.param_groups[0]["lr"])
 
 
 @pytest.mark.parametrize("warm_up", [1, 2])
+@pytest.mark.parametrize(("batches_a_step", "steps"), [(1, 3), (2, 2), (3, 1)])
 def test_the_learning_rate_rises_and_falls_at_every_step_as_published(
     make_trainer: MakeTrainer,
     scenes: Callable[..., Folder],
     small_grid: dict[str, Any],
     warm_up: int,
+    batches_a_step: int,
+    steps: int,
 ) -> None:
-    rates, steps, decay = LearningRates(), 3, 0.5
-    trainer = make_trainer(epochs=4, callbacks=[rates], limit_val_batches=0)
+    rates, decay = LearningRates(), 0.5
+    accumulating = {"accumulate_grad_batches": batches_a_step, "limit_val_batches": 0}
+    trainer = make_trainer(epochs=4, callbacks=[rates], **accumulating)
     trainer.fit(SalsaNext(small_grid, width=4, warm_up=warm_up, decay=decay), scenes())
     # Source: TiagoCortinhal/SalsaNext, warmupLR.py: a CyclicLR, then an exponential decay.
     rising = [0.01 * (step + 1) / (warm_up * steps) for step in range(warm_up * steps)]
