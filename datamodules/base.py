@@ -1,6 +1,6 @@
 """From a data set's files to batches of views."""
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -106,7 +106,7 @@ class Loading:
     augmentation: Augmentation = field(default_factory=Augmentation)
 
 
-class ScanDataModule(lightning.LightningDataModule):
+class ScanDataModule(lightning.LightningDataModule, ABC):
     """Batches of views of scans, for training, validation, test and prediction.
 
     Which view is the model's to say: its loaders ask the model that the trainer holds.
@@ -174,6 +174,14 @@ class ScanDataModule(lightning.LightningDataModule):
             InputError: A scan that cannot be read.
         """
         return map(self.read, evenly_spaced(self.files("train"), most))
+
+    def validation_scans(self, most: int) -> Iterator[Scan]:
+        """Reads some of the validation scans, as :meth:`training_scans` those of the training.
+
+        Raises:
+            InputError: A scan that cannot be read.
+        """
+        return map(self.read, evenly_spaced(self.files("validation"), most))
 
     def train_dataloader(self) -> DataLoader[Sample | InputError]:
         """Training scans, in another order and augmented anew every epoch."""

@@ -1,6 +1,6 @@
 """What every derainer shares: its Spec, its metrics, and what it logs."""
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Protocol, Self
 
@@ -25,7 +25,7 @@ from derain.spec import Spec
 # where a network learns from labels, and minus the loss where it does not.
 MERIT = "val/merit"
 
-# Training scans that a view is fitted to; more change its grid by nothing.
+# Scans that a view or a rule is fitted to; more change its grid by nothing.
 EXAMPLES = 20
 
 
@@ -37,8 +37,11 @@ class TrainingData(Protocol):
     def training_scans(self, most: int) -> Iterator[Scan]:
         """Some of the training scans."""
 
+    def validation_scans(self, most: int) -> Iterator[Scan]:
+        """Some of the validation scans."""
 
-class DerainingModule(lightning.LightningModule):
+
+class DerainingModule(lightning.LightningModule, ABC):
     """A network with its loss, metrics and Spec.
 
     The Spec comes from the first data the model is trained on and from then on travels in its

@@ -11,14 +11,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Self
 
+import numpy as np
 import torch
 from lightning.pytorch.utilities.types import OptimizerLRScheduler
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from derain.batch import Batch
 from derain.cards import DataCard
 from derain.errors import InputError
-from derain.models.base import DerainingModule
+from derain.models.base import EXAMPLES, DerainingModule, TrainingData
 from derain.models.lisnownet_network import LiSnowNetwork
 from derain.models.range_module import FITTED, per_pixel, range_view, stated
 from derain.scan import Scan
@@ -116,8 +118,8 @@ class LiSnowNet(DerainingModule):
         learning_rate: Of Adam.
         decay: Factor by which the learning rate falls per epoch.
         rule: Constants of the :class:`SelectionRule` that are stated, by name. Of the others,
-            ground and full scale are fitted to the training scans, and the residual to what the
-            network changes in the validation scans.
+            ground and full scale are fitted to the training scans, and the residual, after every
+            epoch, to what the network changes in the validation scans, or in twenty of them.
         threshold: A point is rain where its probability is greater.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 
@@ -155,7 +157,6 @@ class LiSnowNet(DerainingModule):
         self.save_hyperparameters()
         self.network = LiSnowNetwork(width=width, dropout=dropout)
         self.selection = SelectionRule.fitted(rule, [])
-        self._changes: list[Tensor] = []  # of the validation scans of an epoch
         self.adopt(spec)
 
     @classmethod
@@ -211,9 +212,6 @@ class LiSnowNet(DerainingModule):
         image, valid = batch.inputs["image"], batch.inputs["valid"]
         seen = cube_roots(image, self.selection)
         denoised = self.network(seen, valid)
-        if not self.training:
-            judged = valid & possible(image, self.selection)
-            self._changes.append(change(seen, denoised)[judged])
         loss = sparsity_loss(denoised, seen, valid, self.hparams["alpha"], self.hparams["beta"])
         return {
             "loss": loss.total,
@@ -222,19 +220,32 @@ class LiSnowNet(DerainingModule):
             "residual": loss.residual,
         }, select(image, valid, seen, denoised, self.selection)
 
-    def on_validation_epoch_end(self) -> None:
-        """Logs the scores, and fits the rule's residual to what changed where not stated."""
-        super().on_validation_epoch_end()
-        changes = torch.cat([part.float() for part in self._changes])
-        self._changes.clear()
-        if "residual" in self.hparams["rule"] or self.trainer.state.fn != "fit":
+    def on_validation_epoch_start(self) -> None:
+        """Fits the rule's residual, where it is not stated, to what the network changes by now.
+
+        Before anything is scored: the epoch's scores are those of the checkpoint that it leaves.
+        """
+        super().on_validation_epoch_start()
+        training = self.trainer.state.fn == "fit" and not self.trainer.sanity_checking
+        if not training or "residual" in self.hparams["rule"]:
             return
-        rule = self.selection.with_residual_of(changes.cpu().numpy())
-        # Every process has seen other scans; they go on with one rule.
-        residual = float(torch.as_tensor(self.all_gather(torch.tensor(rule.residual))).mean())
-        self.log("val/rule_residual", residual)
-        rule = replace(rule, residual=residual)
+        data: TrainingData = self.trainer.datamodule  # type: ignore[attr-defined]
+        changes = [self._changes(scan) for scan in data.validation_scans(EXAMPLES)]
+        rule = self.selection.with_residual_of(np.concatenate(changes))
+        # Several processes go on with one rule, however each has rounded.
+        rule = replace(rule, residual=self.trainer.strategy.broadcast(rule.residual))
+        self.log("val/rule_residual", rule.residual)
         self.adopt(replace(self.spec, rule=rule.as_dict()))
+
+    def _changes(self, scan: Scan) -> NDArray[np.float32]:
+        """What the network changes of the returns that the rule's limits leave, float32 (M,)."""
+        inputs = self.spec.make_view()(scan).inputs()
+        image, valid = (
+            torch.from_numpy(inputs[name]).to(self.device) for name in ("image", "valid")
+        )
+        seen = cube_roots(image, self.selection)
+        changes = change(seen, self.network(seen, valid))
+        return changes[valid & possible(image, self.selection)].cpu().numpy()
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
         """Adam with a learning rate that falls after every epoch."""

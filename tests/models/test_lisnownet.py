@@ -27,7 +27,7 @@ from derain.models.lisnownet import LiSnowNet, cube_roots, select
 from derain.models.lisnownet_network import LiSnowNetwork, published_key
 from derain.probability import probability_of_rain
 from derain.scan import Scan
-from derain.selection_rule import SelectionRule
+from derain.selection_rule import FEWEST, SelectionRule
 from derain.sparsity import sparsity_loss
 from derain.spherical_grid import grid_of
 
@@ -350,11 +350,22 @@ def test_a_run_needs_no_labels_at_all(train: Callable[..., Run], tmp_path: Path)
     assert_same(run.best["state_dict"], labelled.best["state_dict"])
 
 
+@pytest.fixture
+def dense(train: Callable[..., Run], tmp_path: Path) -> None:
+    """Gives the validation scan so many points that a residual can be fitted to them."""
+    scene(3000, seed=3).tofile(tmp_path / "3.bin")
+    write_labels(tmp_path / "3.label", 110 * (np.arange(3000) >= 2700))
+
+
+# The constants that leave every return to the residual.
+UNSTATED = {"ground": -10.0, "intensity": 1.0}
+
+
+@pytest.mark.usefixtures("dense")
 def test_the_residual_is_fitted_to_what_the_network_changes_in_the_validation_scans(
     train: Callable[..., Run], tmp_path: Path
 ) -> None:
-    unstated = {"ground": -10.0, "intensity": 1.0}
-    run = train(rule=unstated)
+    run = train(rule=UNSTATED)
     best = LiSnowNet(**run.best["hyper_parameters"]).eval()
     best.load_state_dict(run.best["state_dict"])
     scan = Scan.of(np.fromfile(tmp_path / "3.bin", np.float32).reshape(-1, 4))
@@ -364,13 +375,31 @@ def test_the_residual_is_fitted_to_what_the_network_changes_in_the_validation_sc
         seen = cube_roots(image, best.selection)
         of_range, of_intensity = (best.network(seen, valid) - seen)[0].numpy()
     products = (of_range * of_intensity**3)[view.valid]
+    assert np.count_nonzero(products > 0) > FEWEST
     expected = SelectionRule(**best.spec.rule).with_residual_of(products).residual
     assert best.selection.residual == pytest.approx(expected, rel=1e-3)
     assert best.selection.residual != SelectionRule().residual
     label = np.fromfile(tmp_path / "3.label", "<u4")
     write_labels(tmp_path / "3.label", np.where(label == 110, 0, 110))
-    again = train(rule=unstated)
+    again = train(rule=UNSTATED)
     assert again.best["hyper_parameters"]["spec"] == run.best["hyper_parameters"]["spec"]
+
+
+@pytest.mark.usefixtures("dense")
+def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(
+    train: Callable[..., Run], tmp_path: Path
+) -> None:
+    run = train(rule=UNSTATED)
+    best = LiSnowNet(**run.best["hyper_parameters"]).eval()
+    best.load_state_dict(run.best["state_dict"])
+    view = best.spec.make_view()(Scan.of(np.fromfile(tmp_path / "3.bin", "<f4").reshape(-1, 4)))
+    with torch.no_grad():
+        logits = best(**{name: torch.from_numpy(array) for name, array in view.inputs().items()})
+    found = view.back(probability_of_rain(logits.numpy())) > best.spec.threshold
+    rain = np.fromfile(tmp_path / "3.label", "<u4") == 110
+    iou = (found & rain).sum() / (found | rain).sum()
+    assert 0 < iou < 1
+    assert run.progress.iou[run.best["epoch"]] == pytest.approx(iou)
 
 
 def test_a_stated_residual_is_not_fitted(train: Callable[..., Run]) -> None:
