@@ -202,6 +202,38 @@ def test_a_second_run_waits_for_the_first(
     assert capsys.readouterr().err.startswith("derain: waits for another run")
 
 
+def test_where_there_are_no_locks_a_run_is_as_good_as_alone(
+    open3d: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    root, small = tmp_path / "track", replace(TINY, train=1, scans=1)
+    ensure_track(root, small)
+    assert read_manifest(root)["files"].items() <= checksums(root).items()
+
+
+def test_a_run_that_was_killed_at_its_first_file_is_taken_up_again(
+    track: Path, tmp_path: Path
+) -> None:
+    root = tmp_path / "track"
+    root.mkdir()
+    (root / ".derain-0.json").write_bytes(b"half a manifest")
+    simulate_track(root, TINY)
+    assert checksums(root) == checksums(track)
+
+
+def test_what_stopped_workers_leave_is_cleared_away(
+    open3d: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(*_: object) -> None:
+        (tmp_path / "track/sequences/.001/innoviz").mkdir(parents=True)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("derain.simulation.dataset.worker_pool", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        simulate_track(tmp_path / "track", TINY, workers=2)
+    assert list((tmp_path / "track/sequences").iterdir()) == []
+
+
 def test_nothing_half_written_stays(
     open3d: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
