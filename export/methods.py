@@ -7,9 +7,11 @@ from typing import Any
 
 from derain.errors import InputError
 from derain.export.runtime import Derainer
+from derain.files.presence import is_there
 from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
 
 PARAMETER_SUFFIXES = (".yaml", ".yml")
+CHECKPOINT_SUFFIX = ".ckpt"
 
 
 def named_method(text: str) -> tuple[str, dict[str, Any]]:
@@ -40,11 +42,17 @@ def load_method(
     """
     if name in FILTERS:
         return FilterDerainer(filter_from(name, parameters), threads)
-    if not Path(name).is_file():
+    if not is_there(Path(name)):
         raise InputError(
             name,
             "no such file",
             f"Give a model written by `derain export`, or one of {', '.join(FILTERS)}.",
+        )
+    if Path(name).suffix == CHECKPOINT_SUFFIX:
+        raise InputError(
+            name,
+            "a checkpoint, which only torch can run",
+            f"Export it first: `derain export {name} --out {Path(name).with_suffix('.onnx')}`.",
         )
     return _with_threshold(Derainer(name, threads), name, parameters)
 

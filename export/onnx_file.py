@@ -4,7 +4,7 @@ import json
 import logging
 import platform
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,9 +16,9 @@ import torch
 import derain
 from derain.channels import extra_channels
 from derain.errors import InputError
+from derain.export.model_file import CHECKSUM_KEY, METADATA_KEY, NO_CHECKSUM, sealed
 from derain.export.proof import FINITE, FLOAT32, INT8, Proof, prove
 from derain.export.quantisation import quantised
-from derain.export.runtime import METADATA_KEY
 from derain.files.atomic import replacing
 from derain.hard_cases import hard_cases, scene
 from derain.models.base import DerainingModule
@@ -29,15 +29,19 @@ from derain.spec import Spec
 # 18 is the oldest opset that torch 2.13's exporter writes without converting.
 OPSET = 18
 
+# What a weight or a statistic may be without counting as 0. A processor computes several times more
+# slowly with subnormal numbers, less than 1e-38, and a product of two such small ones is subnormal.
+NEGLIGIBLE = 1e-20
 
-def export(model: DerainingModule, path: Path, calibration: Sequence[Scan] = ()) -> Proof:
+
+def export(model: DerainingModule, path: Path, calibration: Collection[Scan] = ()) -> Proof:
     """Exports a model, proves it, and only then puts the file in its place.
 
     Args:
         model: A trained model.
         path: The ONNX file to write.
         calibration: Scans like those that the model will see, to export it in eight bits; none
-            exports it in float32.
+            exports it in float32. They are gone through twice, one at a time.
 
     Returns:
         The proof, which the file's metadata holds as well.
@@ -49,6 +53,7 @@ def export(model: DerainingModule, path: Path, calibration: Sequence[Scan] = ())
     model = model.eval().cpu()
     with replacing(path) as temporary:
         proto = _traced(model, model.spec)
+        flushed = flush(proto)
         if calibration:
             proto = quantised(proto, model.spec.make_view(), calibration)
         _describe(proto, model.spec, {})
@@ -56,19 +61,44 @@ def export(model: DerainingModule, path: Path, calibration: Sequence[Scan] = ())
         proof = _proof(model, temporary, calibration)
         if not proof.holds:
             raise InputError(path, f"the exported model differs:\n{proof}", "No file was left.")
-        _describe(proto, model.spec, proof.as_dict())
+        known = {"proof": proof.as_dict(), "flushed": flushed, CHECKSUM_KEY: NO_CHECKSUM}
+        _describe(proto, model.spec, known)
         onnx.checker.check_model(proto, full_check=True)
-        onnx.save(proto, temporary)
+        temporary.write_bytes(sealed(proto.SerializeToString()))
     return proof
 
 
-def _proof(model: DerainingModule, path: Path, calibration: Sequence[Scan]) -> Proof:
+def flush(proto: onnx.ModelProto) -> int:
+    """Sets to 0 what a graph holds of numbers below NEGLIGIBLE.
+
+    Returns:
+        How many it has set to 0.
+    """
+    flushed = 0
+    for tensor in proto.graph.initializer:
+        values = onnx.numpy_helper.to_array(tensor)
+        if values.dtype.kind != "f":
+            continue
+        negligible = (values != 0) & (np.abs(values) < NEGLIGIBLE)
+        if negligible.any():
+            flushed += int(negligible.sum())
+            kept = np.where(negligible, values.dtype.type(0), values)
+            tensor.CopyFrom(onnx.numpy_helper.from_array(kept, tensor.name))
+    return flushed
+
+
+def _proof(model: DerainingModule, path: Path, calibration: Collection[Scan]) -> Proof:
     if not calibration:
         assert FLOAT32.difference is not None
         bounds = replace(FLOAT32, difference=FLOAT32.difference * model.AMPLIFIES)
         return prove(model, path, _hard_cases(model.spec), bounds)
-    seen = prove(model, path, [(scan.name, scan) for scan in calibration], INT8)
+    # Mapped, not looped over: a loop would hold on to one scan while the next is read.
+    seen = prove(model, path, map(_named, calibration), INT8)
     return Proof(seen.cases + prove(model, path, _hard_cases(model.spec), FINITE).cases)
+
+
+def _named(scan: Scan) -> tuple[str, Scan]:
+    return scan.name, scan
 
 
 def _hard_cases(spec: Spec) -> Iterator[tuple[str, Scan]]:
@@ -116,7 +146,7 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
     return proto
 
 
-def _describe(proto: onnx.ModelProto, spec: Spec, proof: dict[str, object]) -> None:
+def _describe(proto: onnx.ModelProto, spec: Spec, known: dict[str, object]) -> None:
     """Writes into the file what a user needs besides its graph."""
     versions = {
         "derain": derain.__version__,
@@ -132,9 +162,7 @@ def _describe(proto: onnx.ModelProto, spec: Spec, proof: dict[str, object]) -> N
     onnx.helper.set_model_props(
         proto,
         {
-            METADATA_KEY: json.dumps(
-                {"spec": spec.as_dict(), "proof": proof, "versions": versions}
-            ),
+            METADATA_KEY: json.dumps({"spec": spec.as_dict(), "versions": versions, **known}),
             "description": description,
             "license": f"network: MIT; training data: {spec.licence}",
             "version": derain.__version__,

@@ -1,7 +1,9 @@
 """Proves an exported model against the network it was exported from."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from torch import Tensor
 from derain.export.runtime import Derainer
 from derain.probability import probability_of_rain
 from derain.scan import Scan
-from derain.spec import Spec
+from derain.view import ViewedScan
 
 THREADS = (1, 2)
 
@@ -25,22 +27,26 @@ class Bounds:
     Attributes:
         difference: Largest difference of a logit, as a share of the scan's largest logit where
             that is above 1; None where any may be.
-        flipped: Share of the cells that may change sides. One always may: it is no share of a
-            small scan.
+        flipped: Share of the cells that may change sides; None where any may. One always may: it is
+            no share of a small scan.
+        rain_iou: What the two must have in common: the cells with a return that both call rain, as
+            a share of those that either does, over all scans of these bounds; None where it may be
+            anything.
     """
 
     difference: float | None
-    flipped: float
+    flipped: float | None
+    rain_iou: float | None = None
 
 
 # float32 keeps seven digits, and a sum of a thousand products may lose three of them.
 FLOAT32 = Bounds(difference=1e-4, flipped=1e-4)
 
-# Eight bits keep two digits of every activation: what counts is how many labels change.
-INT8 = Bounds(difference=None, flipped=0.05)
+# Eight bits keep two digits of every activation: what counts is what becomes of the rain.
+INT8 = Bounds(difference=None, flipped=None, rain_iou=0.9)
 
 # On scans unlike any that the eight bits were scaled for, the answer has to be one.
-FINITE = Bounds(difference=None, flipped=1.0)
+FINITE = Bounds(difference=None, flipped=None)
 
 
 @dataclass(frozen=True)
@@ -54,7 +60,9 @@ class Case:
         difference: Largest difference of a logit from PyTorch's, as a share of the scan's largest
             logit where that is above 1.
         flipped: Cells on the other side of the threshold.
-        finite: Whether every probability is finite.
+        finite: Whether every logit is finite.
+        both: Cells with a return that both call rain.
+        either: Cells with a return that one or both call rain.
         bounds: What it may differ by.
     """
 
@@ -64,13 +72,17 @@ class Case:
     difference: float
     flipped: int
     finite: bool
+    both: int = 0
+    either: int = 0
     bounds: Bounds = FLOAT32
 
     @property
     def holds(self) -> bool:
         """Whether the exported model may be trusted on this scan."""
         near = self.bounds.difference is None or self.difference <= self.bounds.difference
-        return self.finite and near and self.flipped <= max(1, self.bounds.flipped * self.points)
+        share = self.bounds.flipped
+        alike = share is None or self.flipped <= max(1, share * self.points)
+        return self.finite and near and alike
 
 
 @dataclass(frozen=True)
@@ -81,8 +93,23 @@ class Proof:
 
     @property
     def holds(self) -> bool:
-        """Whether every case does."""
-        return all(case.holds for case in self.cases)
+        """Whether every case does, and both find enough of the same rain."""
+        return all(case.holds for case in self.cases) and self.rain_iou >= self.least_rain_iou
+
+    @property
+    def least_rain_iou(self) -> float:
+        """What the IoU of the rain must be; 0 where no case bounds it."""
+        return max((case.bounds.rain_iou or 0.0 for case in self.cases), default=0.0)
+
+    @property
+    def rain_iou(self) -> float:
+        """IoU of what the two call rain, over the scans that it is bounded on, or over all.
+
+        Where there is no rain it is 0: nothing has been shown to be found.
+        """
+        bounded = [case for case in self.cases if case.bounds.rain_iou is not None] or self.cases
+        either = sum(case.either for case in bounded)
+        return sum(case.both for case in bounded) / either if either else 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """The proof as JSON-able primitives."""
@@ -90,6 +117,7 @@ class Proof:
             "largest_difference": max(case.difference for case in self.cases),
             "flipped": sum(case.flipped for case in self.cases),
             "points": sum(case.points for case in self.cases),
+            "rain_iou": self.rain_iou,
             "cases": [asdict(case) for case in self.cases],
         }
 
@@ -106,8 +134,10 @@ class Proof:
         flipped = sum(case.flipped for case in self.cases)
         lines.append(
             f"{len(self.cases)} cases, {points:,} points or pixels: largest logit difference "
-            f"{worst.difference:.1e}, {flipped} labels flipped"
+            f"{worst.difference:.1e}, {flipped} labels flipped, IoU of the rain {self.rain_iou:.4f}"
         )
+        if self.rain_iou < self.least_rain_iou:
+            lines.append(f"FAILED: the IoU of the rain must be {self.least_rain_iou:g}")
         return "\n".join(lines)
 
 
@@ -126,34 +156,50 @@ def prove(
         bounds: What the two may differ by.
     """
     derainers = [Derainer(model, threads) for threads in THREADS]
-    cases = []
-    for name, scan in scans:
-        view = derainers[0].view(scan)
-        tensors = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
-        with torch.inference_mode():
-            expected = forward(**tensors).numpy()
-        cases += [_compare(expected, derainer, name, scan, bounds) for derainer in derainers]
-    return Proof(tuple(cases))
+    # Mapped, not looped over: a loop would hold on to one scan while the next is read.
+    cases = map(partial(_compared, forward, derainers, bounds), scans)
+    return Proof(tuple(chain.from_iterable(cases)))
 
 
-def _compare(
-    expected: NDArray[np.float32], derainer: Derainer, name: str, scan: Scan, bounds: Bounds
+def _compared(
+    forward: Callable[..., Tensor],
+    derainers: Sequence[Derainer],
+    bounds: Bounds,
+    named: tuple[str, Scan],
+) -> list[Case]:
+    """One scan, by PyTorch and by the same model on different numbers of threads."""
+    name, scan = named
+    view = derainers[0].view(scan)
+    tensors = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
+    with torch.inference_mode():
+        expected = forward(**tensors).numpy()
+    # What would be rain if every point of the scan were.
+    returned = view.target(np.ones(len(scan), bool)) == 1
+    return [_case(name, view, returned, expected, derainer, bounds) for derainer in derainers]
+
+
+def _case(
+    name: str,
+    view: ViewedScan,
+    returned: NDArray[np.bool_],
+    expected: NDArray[np.float32],
+    derainer: Derainer,
+    bounds: Bounds,
 ) -> Case:
-    view = derainer.view(scan)
-    logits = derainer.session.run(None, view.inputs())[0]
+    logits = derainer.logits(view)
     magnitude = max(1.0, float(np.abs(expected).max(initial=0)))
     # What is not a number differs as much as can be, and must not be lost in a maximum.
     difference = np.nan_to_num(np.abs(logits - expected) / magnitude, nan=np.inf, posinf=np.inf)
+    threshold = derainer.spec.threshold
+    rain, expected_rain = (probability_of_rain(one) > threshold for one in (logits, expected))
     return Case(
         name=name,
         points=len(expected),
         threads=derainer.threads,
         difference=float(difference.max(initial=0)),
-        flipped=int((_is_rain(logits, derainer.spec) != _is_rain(expected, derainer.spec)).sum()),
-        finite=bool(np.isfinite(derainer.probability(scan)).all()),
+        flipped=int((rain != expected_rain).sum()),
+        finite=bool(np.isfinite(logits).all()),
+        both=int((rain & expected_rain & returned).sum()),
+        either=int(((rain | expected_rain) & returned).sum()),
         bounds=bounds,
     )
-
-
-def _is_rain(logits: NDArray[np.float32], spec: Spec) -> NDArray[np.bool_]:
-    return probability_of_rain(logits) > spec.threshold

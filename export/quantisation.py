@@ -1,9 +1,8 @@
 """Eight-bit models: smaller, faster on processors with integer dot products, not quite the same."""
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import onnx
@@ -17,11 +16,34 @@ from onnxruntime.quantization import (
 )
 
 from derain.errors import InputError
+from derain.files import read_scan
 from derain.scan import Scan
-from derain.view import View
+from derain.view import View, ViewedScan
 
 # Scans that the ranges of activations are taken from; they are held in memory one at a time.
 CALIBRATION_SCANS = 16
+
+
+class CalibrationScans(Collection[Scan]):
+    """Scans that are read one at a time, anew whenever they are gone through.
+
+    Args:
+        paths: Their files.
+        columns: Names of the columns of ``.bin`` and ``.npy`` files.
+    """
+
+    def __init__(self, paths: Sequence[Path], columns: Sequence[str]) -> None:
+        self.paths = paths
+        self.columns = columns
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def __contains__(self, scan: object) -> bool:
+        return isinstance(scan, Scan) and scan.name in map(str, self.paths)
+
+    def __iter__(self) -> Iterator[Scan]:
+        return (read_scan(path, self.columns) for path in self.paths)
 
 
 class ScanReader(CalibrationDataReader):  # type: ignore[misc]
@@ -32,15 +54,17 @@ class ScanReader(CalibrationDataReader):  # type: ignore[misc]
         scans: Scans like those that the model will see.
     """
 
-    def __init__(self, view: View, scans: Sequence[Scan]) -> None:
-        self._inputs: Iterator[dict[str, NDArray[Any]]] = (view(scan).inputs() for scan in scans)
+    def __init__(self, view: View, scans: Iterable[Scan]) -> None:
+        # Mapped, not looped over: a loop would hold on to one scan while the next is read.
+        self._views: Iterator[ViewedScan] = map(view, scans)
 
     def get_next(self) -> dict[str, NDArray[np.generic]] | None:
         """Inputs of the next scan; None after the last."""
-        return next(self._inputs, None)
+        view = next(self._views, None)
+        return None if view is None else view.inputs()
 
 
-def quantised(proto: onnx.ModelProto, view: View, scans: Sequence[Scan]) -> onnx.ModelProto:
+def quantised(proto: onnx.ModelProto, view: View, scans: Iterable[Scan]) -> onnx.ModelProto:
     """The same model with convolutions that compute in eight bits.
 
     Weights are int8 with a scale per output channel, activations uint8, as the integer dot products

@@ -1,6 +1,5 @@
 """Runs an exported model on a CPU: NumPy, onnxruntime and the kNN library, nothing else."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,13 +10,16 @@ from numpy.typing import NDArray
 
 from derain.cores import usable_cores
 from derain.errors import InputError
+from derain.export.model_file import METADATA_KEY, ModelFile
 from derain.probability import probability_of_rain
 from derain.scan import Scan
-from derain.spec import Spec
 from derain.stopwatch import Stopwatch
+from derain.view import View, ViewedScan
 
-# The one metadata key under which an exported model carries its Spec, its proof and its versions.
-METADATA_KEY = "derain"
+__all__ = ["METADATA_KEY", "Derainer", "open_session"]
+
+# What onnxruntime calls the types of a view's inputs.
+TYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,23 +50,25 @@ class Derainer:
         threads: Threads for view and network; 0 takes every core this process may use.
 
     Attributes:
+        path: Its file.
         spec: How the model sees a scan and what it was trained on.
         metadata: Everything else the file says of itself: proof, versions, licence.
 
     Raises:
-        InputError: A missing file, one that is not ONNX, or one that derain did not export; a
-            negative number of threads.
+        InputError: A missing file, one that is not ONNX, one that derain did not export or that
+            has changed since; a negative number of threads.
     """
 
     def __init__(self, model: str | Path, threads: int = 0) -> None:
         if threads < 0:
             raise InputError("threads", f"{threads} is negative", "Give 0 for every core.")
-        path = Path(model)
+        file = ModelFile.read(Path(model))
+        self.path = file.path
         self.threads = threads or usable_cores()
-        self.session = open_session(path, self.threads)
-        self.metadata = read_metadata(self.session, path)
-        self.spec = Spec.from_dict(self.metadata["spec"], path)
+        self.metadata, self.spec = file.metadata, file.spec
         self.view = self.spec.make_view(self.threads)
+        self.session = open_session(file, self.threads)
+        _refuse_other_network(self.session, self.view, self.path)
 
     def __call__(
         self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
@@ -93,6 +97,9 @@ class Derainer:
 
         Returns:
             float32 (N,), in input order; 0 for rows that cannot be judged.
+
+        Raises:
+            InputError: A network that fails, or whose scores are not finite.
         """
         return self.judge(points, stopwatch).probability
 
@@ -102,26 +109,51 @@ class Derainer:
         Args:
             points: As for calling the model.
             stopwatch: Takes the times of the stages view, network and back.
+
+        Raises:
+            InputError: A network that fails, or whose scores are not finite.
         """
         stopwatch = stopwatch or Stopwatch()
         scan = Scan.of(points)
         with stopwatch.stage("view"):
             view = self.view(scan)
         with stopwatch.stage("network"):
-            logits = self.session.run(None, view.inputs())[0]
+            logits = self.logits(view)
+            self._refuse_senseless(logits, view, scan)
         with stopwatch.stage("back"):
             probability = view.back(probability_of_rain(logits))
             return Judgement(probability, probability > self.spec.threshold, view.judged)
 
+    def logits(self, view: ViewedScan) -> NDArray[np.float32]:
+        """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).
 
-def open_session(path: Path, threads: int) -> onnxruntime.InferenceSession:
-    """Opens an ONNX file for the CPU.
+        Raises:
+            InputError: A network that fails.
+        """
+        try:
+            return self.session.run(None, view.inputs())[0]  # type: ignore[no-any-return]
+        except Exception as error:  # onnxruntime's exceptions share no base of their own
+            raise InputError(
+                self.path, f"its network fails ({error})", "Export it with `derain export`."
+            ) from error
+
+    def _refuse_senseless(self, logits: NDArray[np.float32], view: ViewedScan, scan: Scan) -> None:
+        """Refuses scores that would count as "not rain" because nothing compares with them."""
+        if logits.shape != (view.size, 2) or not np.isfinite(logits).all():
+            raise InputError(
+                self.path,
+                f"its scores of {scan.name or 'a scan'} are not one finite pair for each of "
+                f"{view.size:,} cells",
+                "Export the model again; if others judge the scan neither, look at its values.",
+            )
+
+
+def open_session(file: ModelFile, threads: int) -> onnxruntime.InferenceSession:
+    """Opens a model for the CPU.
 
     Raises:
-        InputError: A missing file, or one that onnxruntime cannot read.
+        InputError: A graph that onnxruntime cannot run.
     """
-    if not path.is_file():
-        raise InputError(path, "no such file", "Give a model written by `derain export`.")
     options = onnxruntime.SessionOptions()
     # Always stated: the default counts the host's cores, not those a container may use.
     options.intra_op_num_threads = threads
@@ -131,29 +163,36 @@ def open_session(path: Path, threads: int) -> onnxruntime.InferenceSession:
     options.add_session_config_entry("session.force_spinning_stop", "1")
     try:
         return onnxruntime.InferenceSession(
-            path.read_bytes(), options, providers=["CPUExecutionProvider"]
+            file.content, options, providers=["CPUExecutionProvider"]
         )
     except Exception as error:  # onnxruntime's exceptions share no base of their own
         raise InputError(
-            path,
+            file.path,
             f"not an ONNX model that onnxruntime can run ({str(error).splitlines()[0]})",
             "Give a model written by `derain export`.",
         ) from error
 
 
-def read_metadata(session: onnxruntime.InferenceSession, path: Path) -> dict[str, Any]:
-    """What an exported model says of itself.
+def _refuse_other_network(session: onnxruntime.InferenceSession, view: View, path: Path) -> None:
+    """Refuses a graph that takes or gives anything but what its Spec's view does.
 
     Raises:
-        InputError: A model without derain's metadata.
+        InputError: Other names, types or shapes.
     """
-    text = session.get_modelmeta().custom_metadata_map.get(METADATA_KEY)
-    try:
-        metadata = json.loads(text or "")
-        if not isinstance(metadata.get("spec"), dict):
-            raise ValueError("no Spec")
-    except (ValueError, AttributeError) as error:
+    empty = view(Scan.of(np.zeros((0, 4))))
+    varying = empty.VARYING is not None
+    wanted = {
+        name: (TYPES[array.dtype.name], array.shape[varying:])
+        for name, array in empty.inputs().items()
+    }
+    found = {
+        value.name: (value.type, tuple(value.shape[varying:])) for value in session.get_inputs()
+    }
+    scores = [(value.type, tuple(value.shape[1:])) for value in session.get_outputs()]
+    if found != wanted or scores != [("tensor(float)", (2,))]:
         raise InputError(
-            path, "it has no Spec: derain did not export it", "Export it with `derain export`."
-        ) from error
-    return metadata  # type: ignore[no-any-return]
+            path,
+            f"its network takes {found} and gives {scores}, not as its Spec says {wanted} and "
+            "two scores",
+            "Export it with `derain export`.",
+        )

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from derain.batch import Batch
 from derain.cards import DataCard
+from derain.documents import shown
 from derain.errors import InputError
 from derain.mean_losses import MeanLosses
 from derain.metrics import RainMetrics
@@ -103,6 +104,10 @@ class DerainingModule(lightning.LightningModule, ABC):
             InputError: A view that needs scans to be fitted to, and none given.
         """
 
+    @abstractmethod
+    def sees_through(self, view: Mapping[str, Any]) -> bool:
+        """Whether the network can take what a Spec's view gives."""
+
     def rule(self, scans: Sequence[Scan]) -> dict[str, float]:
         """Constants of the network's own rule for rain, fitted to training scans."""
         return {}
@@ -150,6 +155,10 @@ class DerainingModule(lightning.LightningModule, ABC):
                 "checkpoint",
                 f"a model of {spec.network} on {', '.join(spec.channels)}",
                 f"Give one of {self.NAME} on {', '.join(self.channels)}.",
+            )
+        if not self.sees_through(spec.view):
+            raise InputError(
+                "checkpoint", f"its view is {shown(spec.view)}", f"Give a model of {self.NAME}."
             )
         self._spec = spec
         self.hparams["spec"] = spec.as_dict()

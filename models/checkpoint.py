@@ -7,11 +7,12 @@ from pathlib import Path
 
 import lightning
 
+from derain.documents import shown
 from derain.errors import InputError
 from derain.models.base import DerainingModule
 from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
-from derain.models.published import read_checkpoint
+from derain.models.published import MISFITS, read_checkpoint, with_tensors
 from derain.models.salsanext import SalsaNext
 from derain.models.whole_checkpoints import save_whole
 from derain.spec import Spec
@@ -28,25 +29,27 @@ def load_model(path: Path) -> DerainingModule:
         InputError: A missing or damaged file, or a checkpoint of something else.
     """
     content = read_checkpoint(path)
-    try:
-        parameters = content["hyper_parameters"]
-        spec = Spec.from_dict(parameters["spec"], path)
-        weights = content["state_dict"]
-    except (KeyError, TypeError, AttributeError) as error:
+    parameters, weights = content.get("hyper_parameters"), content.get("state_dict")
+    if not (
+        isinstance(parameters, dict)
+        and isinstance(parameters.get("spec"), dict)
+        and isinstance(weights, dict)
+    ):
         raise InputError(
             path,
             "not a checkpoint of derain",
             "Published weights become one through `derain import-weights`.",
-        ) from error
+        )
+    spec = Spec.from_dict(parameters["spec"], path)
     if spec.network not in MODELS:
         raise InputError(
-            path, f"a checkpoint of {spec.network!r}", f"Known are {', '.join(MODELS)}."
+            path, f"a checkpoint of {shown(spec.network)}", f"Known are {', '.join(MODELS)}."
         )
-    model_class = MODELS[spec.network]
+    # Lightning's own entries begin with an underscore.
+    arguments = {k: v for k, v in parameters.items() if not str(k).startswith("_")}
     try:
-        model = model_class(**{k: v for k, v in parameters.items() if not k.startswith("_")})
-        model.load_state_dict(weights)
-    except (TypeError, RuntimeError) as error:
+        model = with_tensors(lambda: MODELS[spec.network](**arguments), weights)
+    except MISFITS as error:
         raise InputError(
             path,
             f"its weights do not fit {spec.network} ({error})",

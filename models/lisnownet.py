@@ -23,6 +23,7 @@ from derain.errors import InputError
 from derain.models.base import EXAMPLES, DerainingModule, TrainingData
 from derain.models.lisnownet_network import LiSnowNetwork
 from derain.models.range_module import FITTED, per_pixel, range_view, stated
+from derain.range_image import RangeView
 from derain.scan import Scan
 from derain.selection_rule import SelectionRule
 from derain.sparsity import sparsity_loss
@@ -189,6 +190,10 @@ class LiSnowNet(DerainingModule):
     def view_parameters(self, scans: Sequence[Scan]) -> dict[str, Any]:
         """Kind and parameters of the view that the network sees."""
         return range_view(self.hparams["grid"], self.hparams["way_back"], scans)
+
+    def sees_through(self, view: Mapping[str, Any]) -> bool:
+        """Whether the network can take what a Spec's view gives: range images of any size."""
+        return view["kind"] == RangeView.KIND
 
     def rule(self, scans: Sequence[Scan]) -> dict[str, float]:
         """Constants of the selection rule, fitted to training scans where they are not stated."""

@@ -19,7 +19,7 @@ from derain.models.batch_norm import PixelBatchNorm
 from derain.models.hole_filling import fill_holes
 from derain.models.image_size import pad_to_multiple
 from derain.models.padding import pad_around
-from derain.models.published import load_tensors, published_tensors
+from derain.models.published import network_of, published_tensors
 
 HALVINGS = 4
 
@@ -148,9 +148,7 @@ class LiSnowNetwork(nn.Module):
         tensors = published_tensors(state_dict, keys, "LiSnowNet")
         channels = tensors["decoder.0.2.bias"].numel()
         width = tensors["decoder.0.0.path.0.norm.bias"].numel()
-        network = cls(channels, width)
-        load_tensors(network, tensors, "LiSnowNet")
-        return network
+        return network_of(lambda: cls(channels, width), tensors, "LiSnowNet")
 
     def forward(self, image: Tensor, valid: Tensor) -> Tensor:
         """Denoises range images.

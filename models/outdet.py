@@ -16,7 +16,7 @@ from torch.nn import functional
 from derain.cards import DataCard
 from derain.errors import InputError
 from derain.models.batch_norm import PointBatchNorm
-from derain.models.published import load_tensors, published_tensors
+from derain.models.published import network_of, published_tensors
 from derain.models.supervised import SupervisedModule
 from derain.neighbours import NeighbourView
 from derain.scan import Scan
@@ -84,9 +84,8 @@ class OutDetNetwork(nn.Module):
             InputError: A state_dict of another network.
         """
         tensors = published_tensors(state_dict, PUBLISHED_KEYS, "3D-OutDet")
-        network = cls(neighbours=tensors["distance_weight"].numel())
-        load_tensors(network, tensors, "3D-OutDet")
-        return network
+        neighbours = tensors["distance_weight"].numel()
+        return network_of(lambda: cls(neighbours), tensors, "3D-OutDet")
 
     def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
         """Scores every point.
@@ -252,6 +251,10 @@ class OutDet(SupervisedModule):
     def view_parameters(self, scans: Sequence[Scan]) -> dict[str, Any]:
         """Kind and parameters of the view that the network sees, whatever the scans."""
         return {"kind": NeighbourView.KIND, "neighbours": self.hparams["neighbours"]}
+
+    def sees_through(self, view: Mapping[str, Any]) -> bool:
+        """Whether the network can take what a Spec's view gives: as many neighbours as it has."""
+        return view == self.view_parameters([])
 
     def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
         """Logits, float (M, 2), of raw points; arguments as for :class:`FoldedOutDet`."""

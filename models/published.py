@@ -1,15 +1,23 @@
 """Reading the weights that others published."""
 
+import warnings
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, BinaryIO, Self, TypeVar
+from zipfile import ZipFile, is_zipfile
 
 import torch
 from torch import Tensor, nn
 from torch.serialization import safe_globals
 
 from derain.errors import InputError
+from derain.files.reading import reading
+
+Network = TypeVar("Network", bound=nn.Module)
+
+# What torch lets out where a network cannot be made with some arguments, or not with some tensors.
+MISFITS = (TypeError, ValueError, AttributeError, RuntimeError, ArithmeticError)
 
 
 class Inert:
@@ -54,18 +62,18 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     Raises:
         InputError: A missing file, or one that holds anything else.
     """
-    if not path.is_file():
-        raise InputError(path, "no such file", "Check the path.")
-    try:
-        with safe_globals([dict, defaultdict, *((Inert, name) for name in TRAINER_STATE)]):
-            content = torch.load(path, map_location="cpu", weights_only=True)
-    except Exception as error:  # torch.load raises what its parts raise, from EOFError to zip's own
-        # Not in torch's words, which advise to load it all the same.
-        raise InputError(
-            path,
-            "damaged, or holds more than tensors and plain values",
-            "Give a checkpoint or a state_dict.",
-        ) from error
+    with reading(path), path.open("rb") as file:
+        try:
+            _refuse_compressed(file)
+            with safe_globals([dict, defaultdict, *((Inert, name) for name in TRAINER_STATE)]):
+                content = torch.load(file, map_location="cpu", weights_only=True)
+        except Exception as error:  # torch.load raises what its parts raise, zip's own included
+            # Not in torch's words, which advise to load it all the same.
+            raise InputError(
+                path,
+                "damaged, or holds more than tensors and plain values",
+                "Give a checkpoint or a state_dict.",
+            ) from error
     if not isinstance(content, dict):
         raise InputError(path, f"holds a {type(content).__name__}", "Give a checkpoint.")
     return content
@@ -96,11 +104,34 @@ def published_tensors(
     return {ours: tensors[published] for ours, published in keys.items()}
 
 
-def load_tensors(network: nn.Module, tensors: Mapping[str, Tensor], name: str) -> None:
-    """Gives a network its tensors.
+def with_tensors(make: Callable[[], Network], tensors: Mapping[str, Tensor]) -> Network:
+    """A network with tensors from a file that is not trusted, which also says how large it is.
 
     Args:
-        network: The network.
+        make: Makes the network.
+        tensors: Its state_dict.
+
+    Raises:
+        One of MISFITS: A network that cannot be made, or tensors that are not its own.
+    """
+    with torch.device("meta"), warnings.catch_warnings():
+        # Here tensors have a shape and no memory: none is taken for a network of another size.
+        warnings.simplefilter("ignore")
+        shapes = make()
+        shapes.load_state_dict(tensors)
+    for name, ours in shapes.state_dict().items():
+        if tensors[name].is_floating_point() != ours.is_floating_point():
+            raise TypeError(f"{name} is of {tensors[name].dtype}")
+    network = make()
+    network.load_state_dict(tensors)
+    return network
+
+
+def network_of(make: Callable[[], Network], tensors: Mapping[str, Tensor], name: str) -> Network:
+    """A network with published tensors.
+
+    Args:
+        make: Makes the network.
         tensors: What :func:`published_tensors` gave.
         name: Name of the network, for messages.
 
@@ -108,9 +139,18 @@ def load_tensors(network: nn.Module, tensors: Mapping[str, Tensor], name: str) -
         InputError: Tensors of other shapes.
     """
     try:
-        network.load_state_dict(tensors)
-    except RuntimeError as error:
+        return with_tensors(make, tensors)
+    except MISFITS as error:
         raise _of_another_network(name, str(error)) from error
+
+
+def _refuse_compressed(file: BinaryIO) -> None:
+    """Refuses an archive that may hold far more than its size, which torch writes none of."""
+    if is_zipfile(file):
+        with ZipFile(file) as archive:
+            if any(part.compress_size != part.file_size for part in archive.infolist()):
+                raise ValueError("compressed")
+    file.seek(0)
 
 
 def _of_another_network(name: str, difference: str) -> InputError:

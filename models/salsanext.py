@@ -19,6 +19,7 @@ from derain.losses import SegmentationLoss, lovasz_softmax, weighted_cross_entro
 from derain.models.range_module import FITTED, per_pixel, range_view, stated
 from derain.models.salsanext_network import SalsaNextNetwork
 from derain.models.supervised import SupervisedModule
+from derain.range_image import RangeView
 from derain.scan import Scan
 
 __all__ = ["DeployedSalsaNext", "SalsaNext", "SalsaNextNetwork"]
@@ -137,6 +138,10 @@ class SalsaNext(SupervisedModule):
     def view_parameters(self, scans: Sequence[Scan]) -> dict[str, Any]:
         """Kind and parameters of the view that the network sees."""
         return range_view(self.hparams["grid"], self.hparams["way_back"], scans)
+
+    def sees_through(self, view: Mapping[str, Any]) -> bool:
+        """Whether the network can take what a Spec's view gives: range images of any size."""
+        return view["kind"] == RangeView.KIND
 
     def forward(self, image: Tensor, valid: Tensor) -> Tensor:
         """Logits of every pixel, float (B · H · W, 2); arguments as for :func:`score_pixels`."""

@@ -16,7 +16,7 @@ from torch.nn import functional
 from derain.errors import InputError
 from derain.models.batch_norm import PixelBatchNorm
 from derain.models.image_size import pad_to_multiple
-from derain.models.published import load_tensors, published_tensors
+from derain.models.published import network_of, published_tensors
 
 # The image is halved four times.
 STRIDE = 16
@@ -208,9 +208,8 @@ class SalsaNextNetwork(nn.Module):
         tensors = published_tensors(state_dict, PUBLISHED_KEYS, "SalsaNext")
         width = tensors["context.0.shortcut.bias"].numel()
         channels = tensors["context.0.shortcut.weight"].numel() // max(width, 1)
-        network = cls(channels, width, classes=tensors["head.bias"].numel())
-        load_tensors(network, tensors, "SalsaNext")
-        return network
+        classes = tensors["head.bias"].numel()
+        return network_of(lambda: cls(channels, width, classes), tensors, "SalsaNext")
 
     def forward(self, image: Tensor) -> Tensor:
         """Scores every pixel.

@@ -1,7 +1,7 @@
 """``derain export``: an ONNX file from a checkpoint, proved and timed."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,8 @@ Exports a checkpoint as one ONNX file, proves it against PyTorch, and times it.
   derain export salsanext.ckpt --out salsanext.onnx --int8 --calibration scans/
 
 Where the proof fails, no file is left. With --int8, convolutions compute in eight bits, scaled by
-what they see in scans of the calibration folder, on which the proof is made, too.
+what they see in scans of the calibration folder. They must find the rain there that the network
+finds: so the scans have to hold some.
 """
 
 
@@ -50,9 +51,10 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.errors import InputError
     from derain.export.latency import measure_latency
     from derain.export.onnx_file import export
+    from derain.files.presence import is_there
     from derain.models.checkpoint import load_model
 
-    if arguments.scan is not None and not arguments.scan.is_file():
+    if arguments.scan is not None and not is_there(arguments.scan):
         raise InputError(arguments.scan, "there is no such file", "Check --scan.")
     model = load_model(arguments.checkpoint)
     proof = export(
@@ -72,16 +74,18 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _calibration(paths: Sequence[Path] | None, int8: bool, columns: Sequence[str]) -> list["Scan"]:
+def _calibration(
+    paths: Sequence[Path] | None, int8: bool, columns: Sequence[str]
+) -> Collection["Scan"]:
     """Scans that an eight-bit model is scaled by; none for one in float32."""
     from derain.datamodules.statistics import evenly_spaced
     from derain.errors import InputError
-    from derain.export.quantisation import CALIBRATION_SCANS
-    from derain.files import find_scans, read_scan
+    from derain.export.quantisation import CALIBRATION_SCANS, CalibrationScans
+    from derain.files import find_scans
 
     if int8 != bool(paths):
         raise InputError(
             "--int8", "needs --calibration, and that needs it", "Give both or neither."
         )
     found = evenly_spaced(find_scans(paths or []), CALIBRATION_SCANS)
-    return [read_scan(path, columns) for path in found]
+    return CalibrationScans(found, columns)

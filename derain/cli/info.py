@@ -103,9 +103,9 @@ def _facts(path: Path, columns: Sequence[str]) -> dict[str, Any]:
         case ".label":
             return _of_labels(path)
         case ".onnx":
-            from derain.export.runtime import open_session, read_metadata
+            from derain.export.runtime import Derainer
 
-            return read_metadata(open_session(path, threads=1), path)
+            return Derainer(path, threads=1).metadata
         case ".ckpt":
             from derain.models.checkpoint import load_model
 

@@ -18,6 +18,7 @@ from derain.baselines import PositionPrior, all_points, no_points
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
+from derain.files.presence import is_there
 from derain.filters import FilterDerainer, PointFilter
 from derain.odd_scans import Judge
 from derain.one_line_rule import OneLineRule
@@ -81,7 +82,7 @@ def contestants(texts: Sequence[str], learn_from: LearnFrom | None = None) -> li
 
 def _contestant(text: str, learn_from: LearnFrom | None) -> Contestant:
     title, equals, name = text.partition("=")
-    if not equals or Path(text).is_file():  # files may well have an equals sign in their names
+    if not equals or is_there(Path(text)):  # files may well have an equals sign in their names
         title, name = Path(text).stem, text
     if name in TRIVIAL:
         return Contestant(title, name, partial(_timed_rule, TRIVIAL[name]))

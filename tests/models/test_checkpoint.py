@@ -1,11 +1,14 @@
 """Checkpoints give back what was saved, and nothing that is not a checkpoint of derain."""
 
+import io
 import json
 import pickle
+import resource
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import pytest
 import torch
@@ -14,7 +17,7 @@ from derain.batch import Batch, Sample
 from derain.errors import InputError
 from derain.hard_cases import scene
 from derain.models.checkpoint import load_model, save_model
-from derain.models.outdet import OutDet
+from derain.models.outdet import PUBLISHED_KEYS, OutDet, OutDetNetwork
 from derain.models.published import read_checkpoint, read_state_dict
 from derain.spec import SCHEMA
 
@@ -114,16 +117,17 @@ def test_a_checkpoint_of_an_unknown_network_is_refused(content: dict[str, Any], 
 
 def test_a_newer_spec_asks_for_an_upgrade(content: dict[str, Any], path: Path) -> None:
     torch.save(with_spec(content, schema=SCHEMA + 1), path)
-    with pytest.raises(InputError, match=r"model\.ckpt: its Spec has schema .*Upgrade derain\."):
+    with pytest.raises(InputError, match=r"model\.ckpt: its Spec: schema .*Upgrade derain"):
         load_model(path)
 
 
-@pytest.mark.parametrize("damage", [{"classes": None}, {"mean": [1.0, 2.0]}], ids=str)
+@pytest.mark.parametrize("damage", [{"classes": None}, {"mean": [1.0, 2.0, 3.0, "4"]}], ids=str)
 def test_a_damaged_spec_is_refused(
     content: dict[str, Any], path: Path, damage: dict[str, Any]
 ) -> None:
     torch.save(with_spec(content, **damage), path)
-    with pytest.raises(InputError, match=r"model\.ckpt: its Spec is damaged"):
+    (key,) = damage
+    with pytest.raises(InputError, match=rf"model\.ckpt: its Spec: {key}"):
         load_model(path)
 
 
@@ -139,6 +143,85 @@ def test_weights_that_do_not_fit_are_refused_in_one_line(
     with pytest.raises(InputError, match=r"model\.ckpt: its weights do not fit outdet") as refusal:
         load_model(path)
     assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *({"neighbours": wrong} for wrong in (-1, 0, 6, 10**7, 10**400, 5.5, "5", None)),
+        *({"channels": wrong} for wrong in ((), ("x",) * 4, "xyzi", 4, None, ("x", "y", "z"))),
+        {"threshold": 0.5, "neighbours": [5]},
+    ],
+    ids=str,
+)
+def test_hyper_parameters_that_cannot_be_take_no_memory(
+    content: dict[str, Any], path: Path, change: dict[str, Any]
+) -> None:
+    content["hyper_parameters"].update(change)
+    torch.save(content, path)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(InputError, match=r"model\.ckpt: its weights do not fit outdet"):
+        load_model(path)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000  # KiB
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        torch.zeros(2, dtype=torch.int64),
+        torch.zeros(2, dtype=torch.complex64),
+        torch.zeros(3),
+        torch.zeros(1).expand(2**40),
+        [0.0, 0.0],
+        "weights",
+    ],
+    ids=["integers", "complex", "another shape", "very many", "a list", "a text"],
+)
+def test_tensors_of_another_kind_are_refused(
+    content: dict[str, Any], path: Path, wrong: Any
+) -> None:
+    content["state_dict"]["network.head.bias"] = wrong
+    torch.save(content, path)
+    with pytest.raises(InputError, match=r"model\.ckpt: its weights do not fit outdet"):
+        load_model(path)
+
+
+@pytest.mark.parametrize(
+    "view",
+    [
+        {"kind": "neighbours", "neighbours": 7},
+        {"kind": "range", "grid": "semantickitti", "way_back": "copy"},
+    ],
+    ids=lambda view: view["kind"],
+)
+def test_a_view_that_the_network_cannot_take_is_refused(
+    content: dict[str, Any], path: Path, view: dict[str, Any]
+) -> None:
+    torch.save(with_spec(content, view=view), path)
+    with pytest.raises(InputError, match=r"model\.ckpt: .*its view is"):
+        load_model(path)
+
+
+@pytest.mark.parametrize("read", [load_model, read_state_dict])
+def test_a_compressed_checkpoint_is_refused(
+    content: dict[str, Any], path: Path, read: Callable[[Path], Any]
+) -> None:
+    parts = ZipFile(io.BytesIO(path.read_bytes()))
+    with ZipFile(path, "w", ZIP_DEFLATED) as bomb:
+        for name in parts.namelist():
+            bomb.writestr(name, parts.read(name))
+    assert torch.load(path, weights_only=True).keys() == content.keys()
+    with pytest.raises(InputError, match=rf"model\.ckpt: {DAMAGED}"):
+        read(path)
+
+
+def test_published_weights_do_not_say_how_much_memory_to_take() -> None:
+    tensors = {name: torch.zeros(1) for name in PUBLISHED_KEYS.values()}
+    tensors["convs.0.conv1.dw"] = torch.zeros(1).expand(10**7)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(InputError, match="the state_dict is of another network"):
+        OutDetNetwork.from_published(tensors)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000  # KiB
 
 
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.9999])
@@ -178,7 +261,7 @@ def test_code_in_a_file_does_not_run(
 
 @pytest.mark.parametrize("read", [load_model, read_state_dict, read_checkpoint])
 def test_a_file_that_is_not_there_is_named(tmp_path: Path, read: Callable[[Path], Any]) -> None:
-    with pytest.raises(InputError, match=r"nowhere\.pt: no such file"):
+    with pytest.raises(InputError, match=r"nowhere\.pt: there is no such file"):
         read(tmp_path / "nowhere.pt")
 
 

@@ -1,0 +1,262 @@
+"""A model file is opened as it was exported and proved, or not at all."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper
+
+from derain.errors import InputError
+from derain.export import model_file
+from derain.export.model_file import (
+    CHECKSUM_KEY,
+    METADATA_KEY,
+    PARTS,
+    ModelFile,
+    sealed,
+)
+from derain.export.runtime import Derainer
+from derain.hard_cases import scene
+
+KEPT = Path(__file__).parent / "kept/outdet.onnx"
+SPEC = ModelFile.read(KEPT).metadata["spec"]
+DESCRIPTORS = {
+    "model": onnx.ModelProto,
+    "training": onnx.TrainingInfoProto,
+    "function": onnx.FunctionProto,
+    "graph": onnx.GraphProto,
+    "node": onnx.NodeProto,
+    "attribute": onnx.AttributeProto,
+    "sparse tensor": onnx.SparseTensorProto,
+    "tensor": onnx.TensorProto,
+}
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "model.onnx"
+
+
+@pytest.fixture
+def exported(path: Path) -> bytes:
+    """The kept model as it is exported today: with a checksum, beside the proof."""
+    proto = onnx.load(KEPT)
+    metadata = ModelFile.read(KEPT).metadata | {CHECKSUM_KEY: "0" * 64}
+    helper.set_model_props(proto, {METADATA_KEY: json.dumps(metadata), "version": "0.1.0"})
+    path.write_bytes(sealed(proto.SerializeToString()))
+    return path.read_bytes()
+
+
+def test_a_flipped_bit_is_refused_or_changes_no_answer(exported: bytes, path: Path) -> None:
+    points = scene(50)
+    answer = Derainer(path, threads=1).probability(points)
+    rng = np.random.default_rng(0)
+    # Anywhere, and then in the metadata, of which the file has less than of weights.
+    start = exported.index(b'"spec"')
+    bits = [
+        *rng.integers(8 * len(exported), size=600),
+        *rng.integers(8 * start, 8 * len(exported), size=200),
+    ]
+    refused = 0
+    for bit in bits:
+        flipped = bytearray(exported)
+        flipped[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(flipped)
+        try:
+            derainer = Derainer(path, threads=1)
+        except InputError:
+            refused += 1
+        else:
+            np.testing.assert_array_equal(derainer.probability(points), answer, strict=True)
+    assert refused > 0.98 * len(bits)
+
+
+@pytest.mark.parametrize("part", ["a weight", "the threshold", "the checksum", "a byte more"])
+def test_a_file_that_is_not_as_it_was_exported_says_so(
+    exported: bytes, path: Path, part: str
+) -> None:
+    weights = max(onnx.load(KEPT).graph.initializer, key=lambda tensor: len(tensor.raw_data))
+    changed = {
+        "a weight": exported.replace(weights.raw_data[:64], weights.raw_data[1:65]),
+        "the threshold": exported.replace(b'"threshold": 0.5', b'"threshold": 0.9'),
+        "the checksum": exported.replace(json_checksum(exported), b"f" * 64),
+        "a byte more": exported + b"\x0a\x00",
+    }[part]
+    assert changed != exported
+    path.write_bytes(changed)
+    with pytest.raises(InputError, match=r"model\.onnx: it is not as it was exported"):
+        Derainer(path)
+
+
+def json_checksum(content: bytes) -> bytes:
+    place = content.index(f'"{CHECKSUM_KEY}": "'.encode()) + len(CHECKSUM_KEY) + 5
+    return content[place : place + 64]
+
+
+def holds_tensors(message: Any, seen: frozenset[str] = frozenset()) -> bool:
+    name = message.full_name
+    inner = [field.message_type for field in message.fields if field.message_type]
+    return name == "onnx.TensorProto" or (
+        name not in seen and any(holds_tensors(part, seen | {name}) for part in inner)
+    )
+
+
+@pytest.mark.parametrize("kind", DESCRIPTORS)
+def test_the_table_of_parts_names_every_place_that_a_tensor_can_have(kind: str) -> None:
+    kinds = {proto.DESCRIPTOR.full_name: kind for kind, proto in DESCRIPTORS.items()}
+    holding = {
+        field.number: kinds[field.message_type.full_name]
+        for field in DESCRIPTORS[kind].DESCRIPTOR.fields
+        if field.message_type and holds_tensors(field.message_type)
+    }
+    assert PARTS[kind] == holding
+
+
+def elsewhere(name: str, location: Path) -> TensorProto:
+    tensor = helper.make_tensor(name, TensorProto.FLOAT, [2], [1.0, 2.0])
+    del tensor.float_data[:]
+    tensor.data_location = TensorProto.EXTERNAL
+    entry = tensor.external_data.add()
+    entry.key, entry.value = "location", str(location)
+    return tensor
+
+
+def in_an_initializer(proto: onnx.ModelProto, tensor: TensorProto) -> None:
+    proto.graph.initializer.append(tensor)
+
+
+def in_an_attribute(proto: onnx.ModelProto, tensor: TensorProto) -> None:
+    proto.graph.node.append(helper.make_node("Constant", [], ["outside"], value=tensor))
+
+
+def in_a_branch(proto: onnx.ModelProto, tensor: TensorProto) -> None:
+    branch = helper.make_graph([], "branch", [], [], initializer=[tensor])
+    node = helper.make_node("If", ["logits"], ["either"], then_branch=branch, else_branch=branch)
+    proto.graph.node.append(node)
+
+
+@pytest.mark.parametrize("put", [in_an_initializer, in_an_attribute, in_a_branch])
+def test_weights_in_another_file_are_refused_and_not_looked_for(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, put: Callable[..., None]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "secret").write_bytes(bytes(8))
+    proto = onnx.load(KEPT)
+    put(proto, elsewhere("outside", Path("secret")))
+    path.write_bytes(proto.SerializeToString())
+    with pytest.raises(InputError, match=r"model\.onnx: its weights are in another file"):
+        Derainer(path)
+
+
+def with_text(text: bytes) -> bytes:
+    """The kept model with other bytes for its metadata, which need be no text."""
+    proto = onnx.load(KEPT)
+    del proto.metadata_props[:]
+    key = METADATA_KEY.encode()
+    prop = b"\x0a" + bytes([len(key)]) + key + b"\x12" + varint(len(text)) + text
+    return proto.SerializeToString() + b"\x72" + varint(len(prop)) + prop
+
+
+def varint(number: int) -> bytes:
+    most = [number >> shift & 0x7F | 0x80 for shift in range(0, 28, 7)]
+    return bytes([*most, number >> 28])
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (b'{"spec": "\xff\xfe"}', "not an ONNX model .*utf-8"),
+        (b"[" * 100_000, "not JSON"),
+        (b'{"a": ' * 50 + b"1" + b"}" * 50, "not JSON .*nested more than"),
+        (b"{" + b" " * 2**20 + b"}", "not JSON .*characters"),
+        (b"3", "it has no Spec"),
+        (b"{}", "it has no Spec"),
+        (json.dumps({"spec": SPEC, CHECKSUM_KEY: 3}).encode(), "it is not as it was exported"),
+        (json.dumps({"spec": SPEC, CHECKSUM_KEY: "abc"}).encode(), "it is not as it was exported"),
+        (json.dumps({"spec": SPEC | {"threshold": float("nan")}}).encode(), "threshold: nan"),
+    ],
+    ids=["bytes", "brackets", "nested", "long", "number", "empty", "whole", "short", "nan"],
+)
+def test_metadata_that_cannot_be_read_are_one_line(path: Path, text: bytes, reason: str) -> None:
+    path.write_bytes(with_text(text))
+    with pytest.raises(InputError, match=rf"model\.onnx: .*{reason}") as refusal:
+        Derainer(path)
+    assert str(refusal.value).isprintable()
+    assert len(str(refusal.value)) < 1500
+
+
+def test_the_metadata_of_these_tests_are_found(path: Path) -> None:
+    path.write_bytes(with_text(json.dumps({"spec": SPEC}).encode()))
+    np.testing.assert_array_equal(
+        Derainer(path, 1).probability(scene(50)), Derainer(KEPT, 1).probability(scene(50))
+    )
+
+
+def network(inputs: dict[str, tuple[int, list[Any]]], cells: Any = "points") -> onnx.ModelProto:
+    """A graph of those inputs, which it does not look at, whose scores are a constant."""
+    given = [helper.make_tensor_value_info(name, *kind) for name, kind in inputs.items()]
+    score = helper.make_tensor("score", TensorProto.FLOAT, [3, 2], [float(n) for n in range(6)])
+    logits = helper.make_tensor_value_info("logits", TensorProto.FLOAT, [cells, 2])
+    nodes = [helper.make_node("Identity", ["score"], ["logits"])]
+    graph = helper.make_graph(nodes, "constant", given, [logits], [score])
+    proto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
+    helper.set_model_props(proto, {METADATA_KEY: json.dumps({"spec": SPEC})})
+    return proto
+
+
+INPUTS: dict[str, tuple[int, list[Any]]] = {
+    "points": (TensorProto.FLOAT, ["points", 4]),
+    "distances": (TensorProto.FLOAT, ["points", 3]),
+    "neighbours": (TensorProto.INT64, ["points", 3]),
+}
+
+
+@pytest.mark.parametrize(
+    "inputs",
+    [
+        {**INPUTS, "more": INPUTS["points"]},
+        {name: kind for name, kind in INPUTS.items() if name != "points"},
+        {**INPUTS, "points": (TensorProto.DOUBLE, ["points", 4])},
+        {**INPUTS, "points": (TensorProto.FLOAT, ["points", 5])},
+        {**INPUTS, "points": (TensorProto.FLOAT, ["points", 4, 1])},
+        {**INPUTS, "neighbours": (TensorProto.FLOAT, ["points", 3])},
+        {"image": (TensorProto.FLOAT, [1, 5, 64, 2048])},
+    ],
+    ids=["more", "fewer", "type", "width", "rank", "float rows", "image"],
+)
+def test_a_network_that_takes_other_inputs_than_its_view_gives_is_refused(
+    path: Path, inputs: dict[str, tuple[int, list[Any]]]
+) -> None:
+    onnx.save(network(inputs), path)
+    with pytest.raises(InputError, match=r"model\.onnx: its network takes"):
+        Derainer(path)
+
+
+def test_scores_of_another_number_of_cells_are_refused(path: Path) -> None:
+    onnx.save(network(INPUTS), path)
+    derainer = Derainer(path)
+    assert derainer.probability(scene(3)).shape == (3,)
+    with pytest.raises(InputError, match=r"model\.onnx: its scores of .* 50 cells"):
+        derainer.probability(scene(50))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_scores_that_are_not_finite_are_an_error_and_not_no_rain(path: Path, value: float) -> None:
+    proto = onnx.load(KEPT)
+    weights = max(proto.graph.initializer, key=lambda tensor: len(tensor.raw_data))
+    values = onnx.numpy_helper.to_array(weights).copy()
+    values[0] = value
+    weights.CopyFrom(onnx.numpy_helper.from_array(values, weights.name))
+    onnx.save(proto, path)
+    with pytest.raises(InputError, match=r"model\.onnx: its scores of .* not one finite pair"):
+        Derainer(path)(scene(50))
+
+
+def test_a_file_of_any_size_is_not_read_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_file, "LARGEST_MODEL", KEPT.stat().st_size - 1)
+    with pytest.raises(InputError, match=r"outdet\.onnx: not an ONNX model \(more than 35,000"):
+        Derainer(KEPT)
