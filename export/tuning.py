@@ -93,7 +93,7 @@ class Search:
         seed: Of the sampler.
         storage: SQLite file that keeps the study; None forgets it.
         data: Names of the scans: a study goes on only with the same ones, labelled alike.
-        done: Called after each trial, those of an earlier run included.
+        done: Called after each trial.
     """
 
     trials: int
@@ -145,7 +145,7 @@ def tune_filter(name: str, scans: Sequence[ViewedScan], search: Search) -> Tuned
                 trial = study.ask(_distributions(SPACES[name]))
                 study.tell(trial, objective(trial.params))
                 stored.add_trial(study.trials[-1])
-            search.done()
+                search.done()
     except (optuna.exceptions.OptunaError, SQLAlchemyError) as error:
         raise _unusable(search.storage, error) from error
     best = filter_from(name, study.best_params)

@@ -2,6 +2,7 @@
 
 import sys
 import warnings
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -61,6 +62,24 @@ def test_panels_that_do_not_fit_side_by_side_go_below() -> None:
     assert [title.split(":")[0] for title in titles(figure)] == ["input", *names]
     drawn = [axes for axes in figure.axes if axes.collections]
     assert len(drawn) == 2 * (MOST_COLUMNS + 1)
+
+
+@pytest.mark.parametrize("methods", [4, 5, 7])
+def test_no_row_of_panels_is_left_with_one_and_no_title_runs_into_another(methods: int) -> None:
+    names = ["a method with a name so long that nobody would ever type it", "short"]
+    called = {f"{names[n % 2]} {n}": np.zeros(50, bool) for n in range(methods)}
+    figure = comparison_figure(Scan.of(scene(50)), called, np.zeros(50, bool), "many")
+    figure.draw_without_rendering()
+    above = [axes for axes in figure.axes if axes.get_title()]
+    assert len(above) == methods + 2
+    rows = Counter(round(axes.get_position().y0, 3) for axes in above)
+    assert min(rows.values()) >= max(rows.values()) - 1
+    boxes = [axes.title.get_window_extent() for axes in above]
+    boxes += [axes.get_window_extent() for axes in figure.axes if axes.axison]
+    for number, box in enumerate(boxes[: len(above)]):
+        assert box.x0 >= 0
+        assert box.x1 <= figure.bbox.x1
+        assert not any(box.overlaps(other) for other in boxes[:number] + boxes[number + 1 :])
 
 
 @pytest.mark.parametrize(

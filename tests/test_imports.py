@@ -5,8 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from derain.files.labels import write_labels
 from derain.hard_cases import scene
 
 HEAVY = {
@@ -99,6 +101,15 @@ def test_networks_on_range_images_load_nothing_heavy(
     assert not loaded_by(COMMAND, "info", image_onnx) & HEAVY
     assert not loaded_by(COMMAND, "run", image_onnx, scan, "--out", out) & HEAVY
     assert (out / "scan.label").stat().st_size == 400
+
+
+def test_a_picture_loads_no_more_than_the_drawing_and_the_method_need(
+    scan: Path, onnx_model: Path, tmp_path: Path
+) -> None:
+    write_labels(scan.with_suffix(".label"), np.repeat([0, 110], 50))
+    methods = ["--methods", onnx_model, "dror", "all", "--card", "wads"]
+    loaded = loaded_by(COMMAND, "view", scan, *methods, "--out", tmp_path / "out.png")
+    assert loaded & HEAVY == {"matplotlib"}
 
 
 def test_heavy_packages_are_seen_where_they_are_loaded() -> None:

@@ -3,12 +3,17 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
+from numpy.typing import NDArray
 
 from derain.export.bench import bench
-from derain.export.bench.cost import run_alone
+from derain.export.bench.contestants import Contestant
+from derain.export.bench.cost import Timing, run_alone
+from derain.scan import Scan
 from derain.simulation.campaign import MAKER
+from derain.stopwatch import Stopwatch
 
 FILES = ["bench.csv", "bench.json", "bench.md", "speed_error.png"]
 
@@ -62,6 +67,46 @@ def test_every_method_and_baseline_stands_in_one_table(
     assert "Simulated data" in (out / "bench.md").read_text()
     assert [Path(file["scan"]).parts[-3] for file in content["files"]] == ["002", "003", "004"]
     assert all(f"| {name} " in outcome.out for name in rows)
+
+
+def test_intensities_of_another_unit_are_warned_of_and_scaled(
+    run_derain, root: Path, tmp_path: Path, onnx_model: Path
+) -> None:
+    methods = ["--methods", f"net={onnx_model}", "ssr", "intensity", "dror"]
+    arguments = ["bench", "--data", root, *methods, "--timed", "1", "--repeats", "1", "--out"]
+    assert run_derain(*arguments, tmp_path / "whole").said == []
+    for path in root.rglob("*.bin"):
+        points = np.fromfile(path, np.float32).reshape(-1, 4)
+        (points / np.array([1, 1, 1, 256], np.float32)).tofile(path)
+    first = root / "sequences/002/lidar_radar_pcd/0.bin"
+    outcome = run_derain(*arguments, tmp_path / "small")
+    net, ssr, *more = outcome.said
+    assert net.startswith(f"derain: warning: {first}: net: mean intensity 0.")
+    assert ssr.startswith(f"derain: warning: {first}: ssr: intensities of 0..1, but 0..255")
+    assert more == [
+        f"derain: warning: 2 more scans: {title}: intensity of another unit"
+        for title in ("net", "ssr")
+    ]
+    scaled = run_derain(*arguments, tmp_path / "scaled", "--intensity-scale", "256")
+    assert scaled.said == []
+
+    def counts(name: str) -> list[dict]:
+        content = json.loads((tmp_path / name / "bench.json").read_text())
+        return [row["counts"] for row in content["rows"]]
+
+    assert counts("scaled") == counts("whole") != counts("small")
+
+
+def test_methods_are_timed_on_scaled_intensities(root: Path) -> None:
+    scan = root / "sequences/002/lidar_radar_pcd/0.bin"
+    seen: list[float] = []
+
+    def judge(scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
+        seen.append(float(scan.intensity.max()))
+        return scan.valid
+
+    run_alone(Contestant("t", "t", lambda threads: judge), Timing([scan], intensity_scale=2.0))
+    assert set(seen) == {2 * np.fromfile(scan, np.float32).reshape(-1, 4)[:, 3].max()}
 
 
 def test_the_command_in_the_report_makes_the_same_figures_again(

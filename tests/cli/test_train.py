@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -163,6 +164,38 @@ def test_predictions_need_no_labels(
     options = ["--ckpt_path", checkpoint, "--predictions.folder", "found"]
     assert run_derain("predict", *wads, *options).code == 0
     assert np.fromfile("found/0.label", "<u4").shape == (300,)
+
+
+def test_intensities_of_another_unit_are_warned_of_and_scaled(
+    run_derain, wads: list[str], checkpoint: Path, tmp_path: Path
+) -> None:
+    predict = ["predict", *wads, "--ckpt_path", checkpoint, "--predictions.folder"]
+    assert not scan_warnings(run_derain(*predict, "whole"))
+    for scan in tmp_path.rglob("*.bin"):
+        points = np.fromfile(scan, np.float32).reshape(-1, 4)
+        (points / np.array([1, 1, 1, 256], np.float32)).tofile(scan)
+    (warning,) = scan_warnings(run_derain(*predict, "small"))
+    scan = tmp_path / "WADS/sequences/02/velodyne/0.bin"
+    assert warning.startswith(f"derain: warning: {scan}: mean intensity 0.")
+    assert warning.endswith("see --data.loading.intensity_scale")
+    scaled = ["--data.loading.intensity_scale", "256"]
+    assert not scan_warnings(run_derain(*predict, "scaled", *scaled))
+    whole, small, again = (
+        np.fromfile(f"{folder}/0.label", "<u4") for folder in ("whole", "small", "scaled")
+    )
+    np.testing.assert_array_equal(again, whole)
+    assert (small != whole).any()
+    quick = ["--panels.scans", "0", "--trainer.fast_dev_run", "true"]
+    for command, sequence in {"fit": "00", "validate": "01", "test": "02"}.items():
+        options = quick if command == "fit" else ["--ckpt_path", checkpoint]
+        (warning,) = scan_warnings(run_derain(command, *wads, *options))
+        assert f"sequences/{sequence}/velodyne/0.bin: mean intensity 0." in warning
+
+
+def scan_warnings(outcome: Any) -> list[str]:
+    """What was said of scans before the first batch."""
+    assert outcome.code == 0, outcome.err
+    return [line for line in outcome.err.splitlines() if line.startswith("derain: warning: ")]
 
 
 def test_predictions_that_cannot_be_written_are_reported(

@@ -1,12 +1,14 @@
 """``derain tune``: parameters that run and bench take, and a study that goes on."""
 
 import shlex
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
+from derain.export.bench.contestants import contestants
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.filters import filter_from, read_parameters
@@ -45,7 +47,7 @@ def test_the_threshold_of_a_model_is_tuned(
     best = tmp_path / "best.yaml"
     assert run_derain("tune", onnx_model, *data, "--out", best).code == 0
     method, parameters = read_parameters(best)
-    assert method == str(onnx_model)
+    assert Path(method).samefile(onnx_model)
     derainer = Derainer(onnx_model, 1)
     scans = [read_scan(path) for path in sorted((tmp_path / "velodyne").iterdir())]
     probability = np.concatenate([derainer.probability(scan) for scan in scans])
@@ -56,6 +58,67 @@ def test_the_threshold_of_a_model_is_tuned(
         return np.count_nonzero(called & rain) / np.count_nonzero(called | rain)
 
     assert iou(parameters["threshold"]) == max(map(iou, [0, *probability]))
+
+
+def test_a_tuned_model_is_found_from_any_folder(
+    run_derain,
+    data: list[str | Path],
+    tmp_path: Path,
+    onnx_model: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / "models/tuned").mkdir(parents=True)
+    shutil.copy(onnx_model, tmp_path / "models/outdet.onnx")
+    monkeypatch.chdir(tmp_path)
+    best = "models/tuned/best.yaml"
+    assert run_derain("tune", "models/outdet.onnx", *data, "--out", best).code == 0
+    assert yaml.safe_load(Path(best).read_text())["method"] == "../outdet.onnx"
+    # With its model it may go wherever it likes.
+    Path("models").rename("elsewhere")
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir("here")
+    best = "../elsewhere/tuned/best.yaml"
+    scan = tmp_path / "velodyne/0.bin"
+    assert run_derain("run", best, scan, "--out", "out").code == 0
+    _, parameters = read_parameters(best)
+    probability = Derainer(onnx_model).probability(read_scan(scan))
+    rain = np.fromfile("out/0.label", "<u4") == 1
+    np.testing.assert_array_equal(rain, probability > parameters["threshold"])
+    model = "../elsewhere/outdet.onnx"
+    assert not run_derain("run", model, scan, "--out", "too", "--parameters", best).code
+    (contestant,) = contestants([best])
+    assert contestant.facts["threshold"] == parameters["threshold"]
+
+
+def test_a_model_that_is_not_beside_its_parameters_is_sought_as_written(
+    tmp_path: Path, onnx_model: Path
+) -> None:
+    parameters = tmp_path / "best.yaml"
+    parameters.write_text(f"method: {onnx_model}\nthreshold: 0.5\n")
+    assert read_parameters(parameters)[0] == str(onnx_model)
+    (tmp_path / "dsor").touch()  # no model, though it lies there
+    parameters.write_text("method: dsor\n")
+    assert read_parameters(parameters)[0] == "dsor"
+
+
+def test_intensities_of_another_unit_are_warned_of_and_scaled(
+    run_derain, data: list[str | Path], tmp_path: Path
+) -> None:
+    options = ["--trials", "12", "--out", tmp_path / "best.yaml"]
+    whole = run_derain("tune", "ssr", *data, *options)
+    assert whole.said == []
+    for path in (tmp_path / "velodyne").iterdir():
+        points = np.fromfile(path, np.float32).reshape(-1, 4)
+        (points / np.array([1, 1, 1, 256], np.float32)).tofile(path)
+    outcome = run_derain("tune", "ssr", *data, *options)
+    assert outcome.said == [
+        f"derain: warning: {tmp_path / 'velodyne/0.bin'}: intensities of 0..1, but 0..255 for "
+        "ssr: see --intensity-scale",
+        "derain: warning: 2 more scans: intensity of another unit",
+    ]
+    scaled = run_derain("tune", "ssr", *data, *options, "--intensity-scale", "256")
+    assert scaled.said == []
+    assert scaled.out == whole.out != outcome.out
 
 
 def test_a_second_call_goes_on_and_comes_to_the_same(

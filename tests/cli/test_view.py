@@ -5,9 +5,13 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from derain import comparison_pictures
+from derain import comparison_pictures, pictures
+from derain.export.runtime import Derainer
+from derain.files import read_scan
 from derain.files.labels import write_labels
+from derain.filters import DROR, FilterDerainer
 from derain.hard_cases import scene
 
 
@@ -17,15 +21,66 @@ def scan(tmp_path: Path, write_labelled) -> Path:
     return tmp_path / "velodyne/7.bin"
 
 
+@pytest.fixture
+def saved(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """The figures that are drawn from here on, and not written."""
+    figures: list[Figure] = []
+    monkeypatch.setattr(pictures, "save", lambda figure, path: figures.append(figure))
+    return figures
+
+
+def panels(figure: Figure) -> dict[str, int]:
+    """Points that are drawn from above in each panel, by its title."""
+    return {
+        axes.get_title(): sum(len(drawn.get_offsets()) for drawn in axes.collections)
+        for axes in figure.axes
+        if axes.get_title()
+    }
+
+
 def test_methods_are_drawn_with_and_without_truth(
-    run_derain, scan: Path, tmp_path: Path, onnx_model: Path
+    run_derain, scan: Path, tmp_path: Path, onnx_model: Path, saved: list[Figure]
 ) -> None:
-    methods = ["--methods", onnx_model, "dror", "all"]
+    rain = np.arange(300) >= 270
+    called = {
+        "net": Derainer(onnx_model)(read_scan(scan)),
+        "dror": FilterDerainer(DROR())(read_scan(scan)),
+        "all": np.ones(300, bool),
+    }
+    methods = ["--methods", f"net={onnx_model}", "dror", "all"]
     for name, card in {"truth.png": ["--card", "wads"], "none.png": []}.items():
         outcome = run_derain("view", scan, *methods, *card, "--out", tmp_path / name)
         assert outcome.code == 0, outcome.err
-        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "truth.png").read_bytes() != (tmp_path / "none.png").read_bytes()
+    truth, bare = saved
+    ious = {
+        name: np.count_nonzero(found & rain) / np.count_nonzero(found | rain)
+        for name, found in called.items()
+    }
+    assert panels(truth) == {
+        "input: intensity": 300,
+        "truth: 30 points of rain": 300,
+        **{f"{name}: IoU {iou:.3f}": 300 for name, iou in ious.items()},
+    }
+    assert panels(bare) == {
+        "input: intensity": 300,
+        **{f"{name}: {found.sum()} points removed": 300 for name, found in called.items()},
+    }
+    assert truth.get_suptitle() == bare.get_suptitle() == "7.bin: 300 points"
+
+
+def test_intensities_of_another_unit_are_warned_of_and_scaled(
+    run_derain, scan: Path, tmp_path: Path, onnx_model: Path, saved: list[Figure]
+) -> None:
+    arguments = ["--methods", f"net={onnx_model}", "ssr", "--out", tmp_path / "out.png"]
+    assert run_derain("view", scan, *arguments).said == []
+    points = np.fromfile(scan, np.float32).reshape(-1, 4)
+    (points / np.array([1, 1, 1, 256], np.float32)).tofile(scan)
+    net, ssr = run_derain("view", scan, *arguments).said
+    assert net.startswith(f"derain: warning: {scan}: net: mean intensity 0.")
+    assert ssr.startswith(f"derain: warning: {scan}: ssr: intensities of 0..1, but 0..255")
+    assert run_derain("view", scan, *arguments, "--intensity-scale", "256").said == []
+    whole, small, scaled = saved
+    assert panels(scaled) == panels(whole) != panels(small)
 
 
 def test_nothing_to_do_is_refused(run_derain, scan: Path) -> None:
@@ -54,3 +109,4 @@ def test_points_that_nobody_knows_are_not_judged(
     shown, predicted, rain, title = drawn.call_args.args
     assert (len(shown), len(predicted["all"]), rain.sum()) == (200, 200, 30)
     assert title == "7.bin: 300 points"
+    assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")

@@ -1,10 +1,13 @@
 """Tuning finds what is there to be found, and goes on where it stopped."""
 
+import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from unittest.mock import Mock
+from typing import Any
 
 import numpy as np
+import optuna
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -122,16 +125,55 @@ def test_a_study_goes_on_only_with_the_same_labels(
         tune_filter("dsor", relabelled, search(2, storage)[0])
 
 
-def test_a_study_stopped_in_its_first_trial_starts_from_the_defaults_again(
+def trials_in(storage: Path) -> list[tuple[dict[str, float], float]]:
+    """Parameters and values of the trials of DSOR's study, all of which are complete."""
+    study = optuna.load_study(study_name="dsor", storage=f"sqlite:///{storage}")
+    assert all(trial.state == optuna.trial.TrialState.COMPLETE for trial in study.trials)
+    return [(trial.params, trial.value) for trial in study.trials]
+
+
+def test_a_search_broken_off_in_the_midst_of_a_trial_ends_as_an_unbroken_one(
     viewed: list[ViewedScan], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    unbroken = tune_filter("dsor", viewed, search(14, tmp_path / "unbroken.db")[0])
+    for whole in (0, 12):  # none, and more than are drawn at random
+        storage = tmp_path / f"{whole}.db"
+        weighed = itertools.count()
+
+        def broken_off(*arguments: Any, whole: int = whole, weighed: Any = weighed) -> float:
+            if next(weighed) == whole:
+                raise KeyboardInterrupt
+            return pooled_iou(*arguments)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(tuning, "pooled_iou", broken_off)
+            with pytest.raises(KeyboardInterrupt):
+                tune_filter("dsor", viewed, search(14, storage)[0])
+        assert len(trials_in(storage)) == whole
+        assert tune_filter("dsor", viewed, search(14, storage)[0]) == unbroken
+        assert trials_in(storage) == trials_in(tmp_path / "unbroken.db")
+
+
+def test_a_running_trial_that_nobody_runs_is_no_trial(
+    viewed: list[ViewedScan], tmp_path: Path
+) -> None:
     storage = tmp_path / "study.db"
-    with monkeypatch.context() as patch:
-        patch.setattr(tuning, "pooled_iou", Mock(side_effect=KeyboardInterrupt))
-        with pytest.raises(KeyboardInterrupt):
-            tune_filter("dsor", viewed, search(3, storage)[0])
-    tuned = tune_filter("dsor", viewed, search(1, storage)[0])
-    assert tuned.parameters == filter_from("dsor", {}).as_dict()
+    tune_filter("dsor", viewed, search(5, storage)[0])
+    optuna.load_study(study_name="dsor", storage=f"sqlite:///{storage}").ask()
+    assert tune_filter("dsor", viewed, search(14, storage)[0]) == (
+        tune_filter("dsor", viewed, search(14)[0])
+    )
+
+
+def test_trials_of_another_seed_count(viewed: list[ViewedScan], tmp_path: Path) -> None:
+    storage = tmp_path / "study.db"
+    first = replace(search(12, storage)[0], seed=7)
+    best = tune_filter("dsor", viewed, first)
+    how, told = search(12, storage)
+    assert tune_filter("dsor", viewed, how) == best
+    assert told == []
+    assert tune_filter("dsor", viewed, search(20, storage)[0]).iou >= best.iou
+    assert len(trials_in(storage)) == 20
 
 
 @pytest.mark.parametrize("make", [Path.mkdir, lambda path: path.write_text("no database" * 99)])

@@ -1,0 +1,120 @@
+"""``derain run`` on scans that do not suit the method: told, counted, left alone if so asked."""
+
+import json
+from pathlib import Path
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+
+from derain.export.runtime import Derainer
+from derain.files import write_scan
+from derain.hard_cases import scene
+from derain.scan import Scan
+from derain.spherical_grid import SphericalGrid
+
+
+@pytest.fixture
+def scans(tmp_path: Path) -> Path:
+    """A folder of scans: ordinary, without intensity (two), and with one value of it (two)."""
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    constant = scene(200) * np.array([1, 1, 1, 0], np.float32)
+    scene(200).tofile(folder / "a.bin")
+    for name in "bc":
+        write_scan(folder / f"{name}.pcd", Scan(scene(200)[:, :3].copy()))
+    for name in "de":
+        constant.tofile(folder / f"{name}.bin")
+    return folder
+
+
+def test_every_fault_is_told_with_its_first_file_and_counted(
+    run_derain, scans: Path, onnx_model: Path, tmp_path: Path
+) -> None:
+    outcome = run_derain("run", onnx_model, scans, "--out", tmp_path / "out", "--json")
+    assert outcome.code == 0
+    *told, summary = outcome.said
+    assert told == [
+        f"derain: warning: {scans / 'b.pcd'}: no intensity: the mean of WADS, 9.88, stands in",
+        f"derain: warning: {scans / 'd.bin'}: intensity 0 at every point, so that it was not "
+        "measured: the mean of WADS, 9.88, stands in",
+        "derain: warning: 1 more scan: no intensity",
+        "derain: warning: 1 more scan: intensity not measured",
+    ]
+    assert summary.startswith("5 scans: 1,000 points, ")
+    odd = [json.loads(line)["warnings"] for line in outcome.out.splitlines()]
+    assert [any("stands in" in text for text in texts) for texts in odd] == [False, *4 * [True]]
+
+
+def test_a_constant_intensity_is_judged_as_none(
+    run_derain, scans: Path, onnx_model: Path, tmp_path: Path
+) -> None:
+    run_derain("run", onnx_model, scans, "--out", tmp_path / "out")
+    first, second = (np.fromfile(tmp_path / f"out/{name}.label", "<u4") for name in "bd")
+    np.testing.assert_array_equal(first, second)
+    mean = scene(200)
+    mean[:, 3] = Derainer(onnx_model).spec.mean_intensity
+    mean[0, 3] += 1e-6  # measured, as it seems
+    assert (Derainer(onnx_model)(mean) == second).all()
+
+
+def test_a_method_that_takes_nearly_all_says_so(run_derain, scans: Path, tmp_path: Path) -> None:
+    options = ["--set", "radius=1e-6", "--out", tmp_path / "out"]
+    outcome = run_derain("run", "ror", scans, *options)
+    assert outcome.code == 0
+    assert outcome.err.splitlines() == [
+        f"derain: warning: {scans / 'a.bin'}: 100% of the points are called rain, where the "
+        "heaviest rain has 17%: the method may not suit the sensor",
+        "derain: warning: 4 more scans: more than 34% called rain",
+    ]
+    *lines, summary = outcome.out.splitlines()
+    assert all("200 points, 200 of rain (100.0%), " in line for line in lines)
+    assert summary == ("5 scans: 1,000 points, 1,000 of rain (100.0%); 5 scans with warnings")
+
+
+def test_a_scan_that_would_lose_too_much_is_left_alone(
+    run_derain, tmp_path: Path, scans: Path
+) -> None:
+    spread = scene(200) * np.array([1e3, 1e3, 1e3, 1], np.float32)
+    spread.tofile(scans / "c.bin")
+    (scans / "c.pcd").unlink()
+    out = tmp_path / "out"
+    options = ["--set", "radius=20", "--most-removed", "0.5", "--out", out]
+    outcome = run_derain("run", "ror", scans, *options)
+    assert outcome.code == 2
+    assert outcome.err.splitlines()[1:] == [
+        f"derain: {scans / 'c.bin'}: 100.0% of its points are called rain, and nothing was "
+        "written. See whether the method suits it, or raise --most-removed.",
+        "derain: 1 of 5 scans could not be cleaned",
+    ]
+    assert sorted(path.stem for path in out.glob("*.label")) == ["a", "b", "d", "e"]
+    assert not list(out.glob("c.*"))
+
+
+@pytest.mark.parametrize("share", ["1.01", "-0.1", "nan"])
+def test_a_share_that_is_none_is_refused(
+    run_derain, scans: Path, tmp_path: Path, share: str
+) -> None:
+    outcome = run_derain("run", "ror", scans, "--out", tmp_path / "out", f"--most-removed={share}")
+    assert outcome.code == 2
+    assert f"--most-removed: {share} is not a number from 0 to 1" in outcome.err
+
+
+def test_a_scan_is_projected_once_and_in_the_time_that_is_told(
+    run_derain, image_onnx: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    points = scene(400)
+    points[:100, 2] = 80.0  # above the grid
+    points.tofile(tmp_path / "scan.bin")
+    pixel = Mock(wraps=SphericalGrid.pixel, side_effect=SphericalGrid.pixel)
+    monkeypatch.setattr(SphericalGrid, "pixel", lambda *arguments: pixel(*arguments))
+    outcome = run_derain("run", image_onnx, tmp_path / "scan.bin", "--out", tmp_path / "out")
+    assert outcome.code == 0
+    assert pixel.call_count == 1
+    grid = Derainer(image_onnx).view.grid
+    outside = (grid.pixel(points[:, :3]) < 0).mean()
+    assert outside > 0.2
+    assert outcome.said == [
+        f"derain: warning: {tmp_path / 'scan.bin'}: {outside:.0%} of the points lie outside the "
+        "grid of WADS, and stay"
+    ]
