@@ -21,6 +21,7 @@ from derain.hard_cases import scene
 from derain.scan import Scan
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from torch import nn
 
     from derain.models.base import DerainingModule
@@ -70,6 +71,22 @@ def run_derain(capsys: pytest.CaptureFixture[str]) -> RunDerain:
         return Outcome(code, *capsys.readouterr())
 
     return run
+
+
+@pytest.fixture
+def saved_figures(monkeypatch: pytest.MonkeyPatch) -> "list[Figure]":
+    """Every figure that was written to a file, in order."""
+    from matplotlib.figure import Figure
+
+    figures: list[Figure] = []
+    savefig = Figure.savefig
+
+    def noted(figure: Figure, *arguments: Any, **options: Any) -> None:
+        savefig(figure, *arguments, **options)
+        figures.append(figure)
+
+    monkeypatch.setattr(Figure, "savefig", noted)
+    return figures
 
 
 @pytest.fixture(scope="session")

@@ -89,7 +89,11 @@ def test_a_scan_with_nothing_to_see_is_drawn(name: str, scan: Scan) -> None:
     nothing = np.zeros(len(scan), bool)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        comparison_figure(scan, {"none": nothing}, nothing, name).draw_without_rendering()
+        figure = comparison_figure(scan, {"none": nothing}, nothing, name)
+        figure.draw_without_rendering()
+    # Nothing was there to be got wrong.
+    assert titles(figure) == ["input: intensity", "truth: 0 points of rain", "none: IoU 1.000"]
+    assert [len(panel.collections[0].get_offsets()) for panel in figure.axes] == [0] * 6
 
 
 @pytest.mark.skipif(

@@ -115,8 +115,20 @@ def test_a_hard_case_is_drawn_without_a_warning(name: str, scan: Scan) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         # Matplotlib's word for what it does about points that all lie in one direction.
-        before_after_figure(scan, found, name).draw_without_rendering()
-        judgement_figure(scan, found, scan.valid, name).draw_without_rendering()
+        change = before_after_figure(scan, found, name)
+        judgement = judgement_figure(scan, found, scan.valid, name)
+        change.draw_without_rendering()
+        judgement.draw_without_rendering()
+    judged, left = int(scan.valid.sum()), int((scan.valid & ~found).sum())
+    for axes, drawn in zip(
+        [*change.axes, *judgement.axes], [judged, left, judged, left, *[judged] * 8], strict=True
+    ):
+        (collection,) = axes.collections
+        places = np.array(collection.get_offsets())
+        assert len(places) == drawn
+        # Something of what is there is in sight.
+        (low, high) = np.transpose([axes.get_xlim(), axes.get_ylim()])
+        assert ((low <= places) & (places <= high)).all(axis=1).any() == bool(drawn)
 
 
 def test_a_picture_is_saved_as_png(

@@ -50,4 +50,11 @@ def test_a_hard_case_is_drawn_without_a_warning(name: str, scan: Scan) -> None:
     label = np.full(len(scan), UNKNOWN)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        annotation_figure(scan, label, Scene(SCENE.road), name).draw_without_rendering()
+        figure = annotation_figure(scan, label, Scene(SCENE.road), name)
+        figure.draw_without_rendering()
+    judged = np.count_nonzero(scan.valid)
+    assert [len(panel.collections[0].get_offsets()) for panel in figure.axes] == [judged] * 2
+    explained = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert explained == ([f"unknown {judged:,}"] if judged else [])
+    # The road alone is outlined.
+    assert [len(panel.patches) for panel in figure.axes] == [1, 0]

@@ -6,6 +6,8 @@ from shutil import copytree
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.image import imread
 
 from derain.cards import load_card
 from derain.files.labels import write_labels
@@ -108,10 +110,24 @@ def test_scans_without_labels_and_card_are_counted(
     assert (whole["points"], whole["labelled_points"]) == (600, 500)
 
 
-def test_the_statistics_are_drawn(run_derain, data_set: Path, tmp_path: Path) -> None:
+def test_the_statistics_are_drawn(
+    run_derain, data_set: Path, tmp_path: Path, saved_figures: list[Figure]
+) -> None:
     picture = tmp_path / "statistics.png"
     assert run_derain("info", data_set, "--picture", picture).code == 0
-    assert picture.read_bytes()[:4] == b"\x89PNG"
+    (figure,) = saved_figures
+    assert figure.get_suptitle() == "data: 6 scans, 600 points"
+    shares, points = figure.axes
+    slices = [wedge.theta2 - wedge.theta1 for wedge in shares.patches]
+    assert slices == pytest.approx([120, 120, 120])
+    assert [text.get_text() for text in shares.texts if text.get_text()] == [
+        *("clean: 33%", "25 mm/h: 33%", "rain unknown: 33%")
+    ]
+    assert [label.get_text() for label in points.get_xticklabels()] == ["rain", "road"]
+    bars = {bar.get_label(): bar.datavalues.tolist() for bar in points.containers}
+    assert bars == {"clean": [0, 200], "25 mm/h": [20, 180], "rain unknown": [20, 180]}
+    height, width, _ = imread(picture).shape
+    assert width > height > 500
 
 
 def test_a_picture_shows_one_folder_alone(run_derain, data_set: Path, tmp_path: Path) -> None:

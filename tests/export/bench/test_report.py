@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.image import imread
 
 from derain.export.bench.contestants import Contestant, contestants
 from derain.export.bench.cost import Cost
@@ -92,6 +94,16 @@ def test_one_scan_has_no_interval(labelled: Labelled) -> None:
     assert row.as_dict()["iou_behind_best_interval"] is None
 
 
-def test_the_picture_leaves_out_what_could_not_be_timed(rows: list[Row], tmp_path: Path) -> None:
+def test_the_picture_leaves_out_what_could_not_be_timed(
+    rows: list[Row], tmp_path: Path, saved_figures: list[Figure]
+) -> None:
     draw_speed_error(rows, FACTS, tmp_path / "speed_error.png")
-    assert (tmp_path / "speed_error.png").read_bytes().startswith(b"\x89PNG")
+    ((axes,),) = [figure.axes for figure in saved_figures]
+    assert [text.get_text() for text in axes.texts] == ["dror", "all"]
+    assert axes.get_title() == "made up, 3 scans, abacus"
+    shown = {dots.get_label(): dots.get_offsets().tolist() for dots in axes.collections}
+    dror, everything, _ = (1 - row.scores.pooled.iou for row in rows)
+    assert 0 < dror < 1
+    assert shown == {"filter": [[40, dror]], "baseline": [[4, everything]]}
+    height, width, _ = imread(tmp_path / "speed_error.png").shape
+    assert width > height > 500
