@@ -1,14 +1,9 @@
 """Published tables hold together under our definitions of the scores, misprints and all."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
+from derain.counts import SCORES, Counts
 from derain.export.bench.paper import TABLES, paper_table
-from derain.metrics import Counts
-
-counts = st.integers(0, 2**40)
-any_counts = st.builds(Counts, counts, counts, counts, counts)
 
 ROWS = [row for name in TABLES for row in paper_table(name).rows]
 POOLED_ROWS = {
@@ -53,11 +48,21 @@ def test_lisnownets_published_rows_are_means_over_scans(
     assert iou > 100 * f1 / (200 - f1) + 1
 
 
-@given(st.lists(any_counts, min_size=1, max_size=6))
-def test_the_mean_iou_over_scans_is_at_least_the_iou_of_the_mean_f1(scans: list[Counts]) -> None:
-    f1 = sum(counts.f1 for counts in scans) / len(scans)
-    iou = sum(counts.iou for counts in scans) / len(scans)
-    assert iou >= f1 / (2 - f1) - 1e-12
+# Scans by how many there are of a kind, and what became of the points of one: rain found, others
+# called rain, rain left. Found by integer programming; any such mixture would do.
+MIXTURE = (
+    *((30, Counts(1, 160, 9)), (7, Counts(2, 20, 8)), (4, Counts(3, 20, 7)), (7, Counts(3, 40, 7))),
+    *((1, Counts(4, 20, 6)), (37, Counts(5, 10, 5)), (1, Counts(6, 80, 4)), (6, Counts(7, 5, 3))),
+    (7, Counts(9, 10, 1)),
+)
+
+
+def test_scans_can_have_the_mean_scores_that_no_points_have() -> None:
+    scans = [counts for times, counts in MIXTURE for _ in range(times)]
+    means = [100 * sum(getattr(c, score) for c in scans) / len(scans) for score in SCORES]
+    assert means == pytest.approx(PER_SCAN_ROWS["LiSnowNet-L1, test"], abs=0.005)
+    pooled = sum(scans, Counts())
+    assert 100 * pooled.iou < means[SCORES.index("iou")] - 5
 
 
 def test_two_published_rows_hold_a_misprint_each() -> None:
