@@ -101,5 +101,6 @@ def _draw_scene(axes: Axes, scene: Scene) -> None:
     (left, bottom), (right, top) = road.min(axis=0), road.max(axis=0)
     axes.set_xlim(left - SURROUNDINGS, right + SURROUNDINGS)
     axes.set_ylim(bottom - SURROUNDINGS, top + SURROUNDINGS)
+    axes.set_aspect("equal")
     axes.set_xlabel("forward / m")
     axes.set_ylabel("left / m")

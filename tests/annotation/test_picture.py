@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 
 from derain.annotation.boxes import Box
-from derain.annotation.picture import COLOURS, UNKNOWN_COLOUR, annotation_figure
+from derain.annotation.picture import COLOURS, SURROUNDINGS, UNKNOWN_COLOUR, annotation_figure
 from derain.annotation.scene import Scene
 from derain.hard_cases import hard_cases, scene
 from derain.label_transfer import UNKNOWN
@@ -40,6 +41,33 @@ def test_both_panels_show_every_valid_point_in_the_colour_of_its_class(tmp_path:
     assert outlines == [to_rgba(colour) for colour in colours]
     save(figure, tmp_path / "picture.png")
     assert (tmp_path / "picture.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["long road", "wide road"])
+def test_a_metre_is_as_long_in_both_directions_from_above(turned: bool) -> None:
+    road = [(y, x) if turned else (x, y) for x, y in SCENE.road]
+    figure = annotation_figure(
+        Scan.of(scene(300)), np.full(300, TrackClass.ROAD), Scene(tuple(road)), "a road"
+    )
+    figure.draw_without_rendering()
+    above = figure.axes[0]
+    metres = above.transData.transform([(0, 0), (1, 0), (0, 1)])
+    assert metres[1, 0] - metres[0, 0] == pytest.approx(metres[2, 1] - metres[0, 1])
+    low, high = np.transpose([above.get_xlim(), above.get_ylim()])
+    assert low == pytest.approx(np.min(road, axis=0) - SURROUNDINGS)
+    assert high == pytest.approx(np.max(road, axis=0) + SURROUNDINGS)
+
+
+def test_the_legend_hides_no_point() -> None:
+    label = np.resize([*TrackClass, UNKNOWN], 900)
+    figure = annotation_figure(Scan.of(scene(900)), label, SCENE, "a scan")
+    FigureCanvasAgg(figure).draw()
+    (legend,) = figure.legends
+    assert len(legend.get_texts()) == len(TrackClass) + 1
+    box = legend.get_window_extent()
+    assert not any(box.overlaps(panel.get_window_extent()) for panel in figure.axes)
+    assert figure.bbox.containsx(box.x0)
+    assert figure.bbox.containsx(box.x1)
 
 
 @pytest.mark.parametrize(
