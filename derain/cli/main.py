@@ -20,7 +20,9 @@ from derain.cli import (
     tune,
     view,
 )
+from derain.cli.configurations import require_configuration
 from derain.cli.signals import interrupting
+from derain.cli.training_help import short_help
 from derain.errors import InputError
 
 DESCRIPTION = """\
@@ -97,6 +99,10 @@ def _interrupted(interruption: KeyboardInterrupt) -> int:
 
 def _run(arguments: list[str]) -> int:
     if arguments and arguments[0] in TRAINING:
+        if {"-h", "--help"} & {*arguments}:
+            print(short_help(arguments[0]))
+            return 0
+        require_configuration(arguments)
         from derain.cli.train import train
 
         train(arguments)

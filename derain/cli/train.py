@@ -2,7 +2,6 @@
 
 import argparse
 import warnings
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +10,19 @@ from jsonargparse import DefaultHelpFormatter
 from lightning.pytorch import Trainer
 from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
 from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
+from lightning.pytorch.loggers import TensorBoardLogger
+from lightning.pytorch.utilities.exceptions import MisconfigurationException
 
+from derain.cli.configurations import (
+    own_configurations,
+    packaged_configs,
+    with_packaged_configs,
+)
+from derain.cli.lightning_silence import silence_advertisements
 from derain.cli.run_folder import WholeConfig, writing_to_the_run_folder
+from derain.cli.training_errors import as_input_error, read_configuration
+from derain.cli.training_help import ALL, EXAMPLES
+from derain.cli.training_options import known_options
 from derain.cores import usable_cores
 
 # Imported so that a configuration may name them without their modules.
@@ -35,35 +45,6 @@ from derain.models.whole_checkpoints import save_whole
 from derain.open3d_import import make_open3d_loadable
 from derain.workers import end_with_launcher
 
-EXAMPLES = {
-    "fit": """\
-Trains a derainer. The best and the last checkpoint, the TensorBoard log and the configuration go
-to runs/<name>/version_<n>.
-
-  derain fit --config outdet_wads.yaml --data.root WADS
-  derain fit --config outdet_wads.yaml --data.root WADS --trainer.logger.name my_run
-  derain fit --config outdet_wads.yaml --data.root WADS --ckpt_path .../last.ckpt   (goes on)
-  tensorboard --logdir runs
-""",
-    "validate": """\
-Measures a checkpoint on the validation scans.
-
-  derain validate --config outdet_wads.yaml --data.root WADS --ckpt_path outdet.ckpt
-""",
-    "test": """\
-Measures a checkpoint on the test scans: scores by average, class and range.
-
-  derain test --config outdet_wads.yaml --data.root WADS --ckpt_path outdet.ckpt
-""",
-    "predict": """\
-Writes the labels that a checkpoint gives the test scans, which need none of their own.
-
-  derain predict --config outdet_wads.yaml --data.root WADS --ckpt_path outdet.ckpt \\
-      --predictions.folder labels
-""",
-}
-
-
 # What `--ckpt_path` may be besides a file: checkpoints that Lightning looks for itself.
 FOUND_BY_LIGHTNING = ("last", "hpc")
 
@@ -80,8 +61,17 @@ __all__ = [
     "SalsaNext",
     "Simulated",
     "Wads",
+    "packaged_configs",
     "train",
 ]
+
+
+# What has options of its own, by the option that chooses it.
+CLASSES = {
+    "data": (Folder, Rehearse3D, Simulated, Wads),
+    "model": (LiSnowNet, OutDet, SalsaNext),
+    "trainer.logger": (TensorBoardLogger,),
+}
 
 
 class DerainCLI(LightningCLI):
@@ -107,10 +97,17 @@ class DerainCLI(LightningCLI):
                 "last.enable_version_counter": False,
             }
         )
+        self.last_added = parser  # the subcommands have nearly the same options
 
     def parse_arguments(self, parser: LightningArgumentParser, args: ArgsType) -> None:
-        """Refuses a checkpoint that is none of ours before Lightning reads it."""
-        super().parse_arguments(parser, args)
+        """Refuses what cannot be used: options, and checkpoints before Lightning reads them."""
+        known = known_options(self.last_added, CLASSES)
+        files = [read_configuration(path, known) for path in own_configurations(args)]
+        parser.set_defaults({"test.verbose": False})  # the table is in our report
+        try:
+            super().parse_arguments(parser, args)
+        except argparse.ArgumentError as error:
+            raise as_input_error(error.message, known, files) from error
         path = self.config[self.config.subcommand].get("ckpt_path")
         if path in (None, *FOUND_BY_LIGHTNING):
             return
@@ -126,6 +123,10 @@ class DerainCLI(LightningCLI):
         """Instantiates data, model and trainer; what they find wrong is not the parser's error."""
         try:
             super().instantiate_classes()
+        except MisconfigurationException as error:
+            raise InputError(
+                "--trainer", str(error), "Correct the option that it names."
+            ) from error
         except ValueError as error:
             if isinstance(error.__cause__, InputError):
                 raise error.__cause__ from None
@@ -143,6 +144,8 @@ def train(arguments: list[str]) -> None:
         InputError: A configuration that does not exist, a folder that cannot be written, or what
             data and model raise.
     """
+    arguments = ["--help" if argument == ALL else argument for argument in arguments]
+    silence_advertisements()
     make_open3d_loadable()  # TensorBoard is to start, and show what this run logs
     # Lightning means the mixing of both; arguments of the command line are all that we pass on.
     warnings.filterwarnings("ignore", message="LightningCLI's args parameter")
@@ -150,6 +153,11 @@ def train(arguments: list[str]) -> None:
     warnings.filterwarnings("ignore", message=".*LeafSpec")
     end_with_launcher()
     torch.set_num_threads(min(torch.get_num_threads(), usable_cores()))
+    of_parsers = {
+        "formatter_class": ExamplesFormatter,
+        "allow_abbrev": False,  # a misspelling is no abbreviation
+        "exit_on_error": False,  # what is wrong we say ourselves
+    }
     with writing_to_the_run_folder():
         DerainCLI(
             DerainingModule,
@@ -161,40 +169,10 @@ def train(arguments: list[str]) -> None:
             save_config_callback=WholeConfig,
             # Every run has a folder of its own; only one without a logger meets its last one.
             save_config_kwargs={"overwrite": True},
+            trainer_defaults={"enable_model_summary": False},
             parser_kwargs={
-                "formatter_class": ExamplesFormatter,
-                **{name: {"description": text} for name, text in EXAMPLES.items()},
+                **of_parsers,
+                **{name: {**of_parsers, "description": text} for name, text in EXAMPLES.items()},
             },
             args=with_packaged_configs(arguments),
         )
-
-
-def packaged_configs() -> dict[str, Path]:
-    """Files of the configurations that come with derain, by file name."""
-    folder = Path(str(resources.files("derain.configs")))
-    return {file.name: file for file in sorted(folder.glob("*.yaml"))}
-
-
-def with_packaged_configs(arguments: list[str]) -> list[str]:
-    """Replaces the name of a packaged configuration by its file.
-
-    Raises:
-        InputError: A name that is neither a file nor packaged.
-    """
-    return [
-        _config(argument.removeprefix("--config="), "--config=")
-        if argument.startswith("--config=")
-        else _config(argument)
-        if previous in ("--config", "-c")
-        else argument
-        for previous, argument in zip(["", *arguments], arguments, strict=False)
-    ]
-
-
-def _config(name: str, prefix: str = "") -> str:
-    packaged = packaged_configs()
-    if Path(name).is_file():
-        return prefix + name
-    if name in packaged:
-        return prefix + str(packaged[name])
-    raise InputError(name, "no such configuration", f"Packaged are {', '.join(packaged)}.")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from derain.cli.train import packaged_configs
+from derain.cli.configurations import packaged_configs
 from derain.errors import InputError
 from derain.export import onnx_file
 from derain.export.runtime import Derainer
