@@ -8,6 +8,8 @@ from derain.data_layout import Layout
 from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile
 from derain.errors import InputError
 from derain.files import find_scans
+from derain.files.labels import LABEL
+from derain.files.names import scan_stem
 
 
 class SequenceDataModule(ScanDataModule):
@@ -55,6 +57,6 @@ class SequenceDataModule(ScanDataModule):
                 "--data.split, and other commands the folders of scans.",
             )
         return [
-            ScanFile(scan, folder / self.layout.labels / f"{scan.stem}.label")
+            ScanFile(scan, folder / self.layout.labels / f"{scan_stem(scan)}{LABEL}")
             for scan in find_scans([folder / self.layout.scans])
         ]

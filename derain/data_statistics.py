@@ -15,7 +15,9 @@ import numpy as np
 from derain.data_layout import REHEARSE3D, SEMANTIC_KITTI
 from derain.errors import InputError
 from derain.files import find_scans, read_scan
-from derain.files.labels import label_beside, read_labels, semantic
+from derain.files.binary import count_rows
+from derain.files.labels import LABEL, label_beside, read_labels, semantic
+from derain.files.names import scan_stem
 from derain.files.reading import reading
 from derain.simulation.manifest import RAIN_RATE, read_manifest
 
@@ -147,7 +149,7 @@ def count_scan(path: Path, layout: tuple[str, str] | None, columns: Sequence[str
     labels = (
         label_beside(path)
         if layout is None
-        else path.parent.parent / layout[1] / f"{path.stem}.label"
+        else path.parent.parent / layout[1] / f"{scan_stem(path)}{LABEL}"
     )
     if labels.is_file():
         counts = np.bincount(semantic(read_labels(labels, points)))
@@ -168,11 +170,8 @@ def _scan_folders(root: Path, layout: tuple[str, str]) -> list[Path]:
 
 def _points(path: Path, columns: Sequence[str]) -> int:
     """Number of points of a scan; the size of a file of plain rows tells it."""
-    if path.suffix.lower() == ".bin":
-        rows, rest = divmod(path.stat().st_size, 4 * len(columns))
-        if not rest:
-            return rows
-    return len(read_scan(path, columns))
+    counted = count_rows(path, columns) if path.suffix.lower() == ".bin" else None
+    return len(read_scan(path, columns)) if counted is None else counted
 
 
 def _recorded_rate(weather: Path) -> float | None:

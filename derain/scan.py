@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,14 @@ FEWEST_ALIKE = 100
 SENTINEL = -1.0
 
 
+@runtime_checkable
+class PointHeader(Protocol):
+    """What a file says of single points besides its columns, such as the faces of a mesh."""
+
+    def take(self, rows: NDArray[Any]) -> "PointHeader":
+        """The same of some points only, by their row numbers or a bool mask of shape (N,)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Scan:
     """One point cloud, in the order of its file; rows are never dropped or reordered.
@@ -40,7 +48,8 @@ class Scan:
         shape: (height, width) of an organised cloud, rows in row-major order; else None.
         name: Where the scan came from, for messages.
         header: What the file says besides its columns, such as the encoding of a PCD. Only the
-            writer of the same format looks into it.
+            writer of the same format looks into it. One that speaks of single points is a
+            PointHeader.
 
     Raises:
         InputError: Columns of different lengths.
@@ -196,6 +205,7 @@ class Scan:
         def pick(column: NDArray[Any] | None) -> NDArray[Any] | None:
             return None if column is None else column[rows]
 
+        header = self.header
         return Scan(
             self.xyz[rows],
             pick(self.intensity),
@@ -203,7 +213,7 @@ class Scan:
             pick(self.radar),
             {title: column[rows] for title, column in self.fields.items()},
             name=self.name,
-            header=self.header,
+            header=header.take(rows) if isinstance(header, PointHeader) else header,
         )
 
     @cached_property

@@ -12,7 +12,8 @@ from lightning.pytorch.callbacks import BasePredictionWriter
 from numpy.typing import NDArray
 
 from derain.batch import Batch
-from derain.files.labels import write_labels
+from derain.files.labels import LABEL, write_labels
+from derain.files.names import beside
 from derain.models.base import DerainingModule
 
 
@@ -53,7 +54,7 @@ class PredictionWriter(BasePredictionWriter):
         """
         for measured, probability in zip(batch.measured, prediction, strict=True):
             path = self.folder / os.path.relpath(measured.scan.name, self.root)
-            write_labels(path.with_suffix(".label"), probability > model.spec.threshold)
+            write_labels(beside(path, LABEL), probability > model.spec.threshold)
             self.written += 1
 
     def on_predict_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:

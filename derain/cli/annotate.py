@@ -17,7 +17,8 @@ from derain.cli.scan_options import add_columns
 from derain.data_statistics import LAYOUTS
 from derain.errors import InputError
 from derain.files import find_scans, read_scan
-from derain.files.labels import write_labels
+from derain.files.labels import LABEL, write_labels
+from derain.files.names import scan_stem
 from derain.label_transfer import LABEL_WITHIN, UNKNOWN, transfer_labels
 from derain.simulation.classes import TrackClass
 
@@ -142,8 +143,8 @@ def _refuse_their_labels(scans: Sequence[Path], out: Path) -> None:
 
 def _radar_frames(folder: Path | None, scans: Sequence[Path]) -> dict[str, Path]:
     """Radar frames by the stem of the scan that each belongs to."""
-    frames = {} if folder is None else {frame.stem: frame for frame in find_scans([folder])}
-    stems = {scan.stem for scan in scans}
+    frames = {} if folder is None else {scan_stem(frame): frame for frame in find_scans([folder])}
+    stems = set(map(scan_stem, scans))
     for stem, frame in frames.items():
         if stem not in stems:
             raise InputError(
@@ -173,12 +174,12 @@ def _label_all(
     for path in tqdm(paths, unit="scan", disable=None):
         scan = read_scan(path, arguments.columns)
         label = annotate(scan, scene, plane)
-        write_labels(arguments.out / f"{path.stem}.label", label)
+        write_labels(arguments.out / f"{scan_stem(path)}{LABEL}", label)
         points.update(label.tolist())
-        if path.stem in frames:
-            frame = read_scan(frames[path.stem], arguments.radar_columns)
+        if scan_stem(path) in frames:
+            frame = read_scan(frames[scan_stem(path)], arguments.radar_columns)
             transferred = transfer_labels(scan.with_label(label), frame.xyz, arguments.within)
-            write_labels(arguments.out / "radar" / f"{path.stem}.label", transferred)
+            write_labels(arguments.out / "radar" / f"{scan_stem(path)}{LABEL}", transferred)
     return points
 
 

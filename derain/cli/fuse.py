@@ -18,7 +18,8 @@ from derain.extrinsics import Extrinsics, read_extrinsics
 from derain.files import find_scans, read_scan, write_scan
 from derain.files.atomic import replacing
 from derain.files.frame_times import FRAME_COLUMNS, METADATA, read_frame_times
-from derain.files.labels import instance, read_labels, semantic, write_labels
+from derain.files.labels import LABEL, instance, read_labels, semantic, write_labels
+from derain.files.names import scan_stem
 from derain.fusion import NO_DETECTIONS, fuse, nearest_in_time
 from derain.label_transfer import LABEL_WITHIN, UNKNOWN
 from derain.scan import Scan
@@ -120,17 +121,17 @@ def _fuse(
     lidar = _read(scan, "lidar", arguments)
     raw = None
     if arguments.labels is not None:
-        raw = read_labels(arguments.labels / f"{scan.stem}.label", len(lidar))
+        raw = read_labels(arguments.labels / f"{scan_stem(scan)}{LABEL}", len(lidar))
         lidar = lidar.with_label(semantic(raw))
     radar = NO_DETECTIONS
     if frame is not None:
         radar = _read(frame, "radar", arguments)
     extra = list(filter(None, arguments.extra.split(",")))
     fused = fuse(lidar, radar, extrinsics, arguments.label_within, extra)
-    write_scan(arguments.out / SCANS / f"{scan.stem}{'.npz' if extra else '.bin'}", fused)
+    write_scan(arguments.out / SCANS / f"{scan_stem(scan)}{'.npz' if extra else '.bin'}", fused)
     if fused.label is not None and raw is not None:
         instances = np.pad(instance(raw), (0, len(radar)))  # the radar's points are of none
-        write_labels(arguments.out / LABELS / f"{scan.stem}.label", fused.label, instances)
+        write_labels(arguments.out / LABELS / f"{scan_stem(scan)}{LABEL}", fused.label, instances)
 
 
 def _read(path: Path, sensor: str, arguments: argparse.Namespace) -> Scan:
@@ -158,7 +159,7 @@ def _write_metadata(
         writer = csv.writer(file)
         writer.writerow([*FRAME_COLUMNS, "radar_frame"])
         for scan, time, frame in zip(scans, times.tolist(), partners, strict=True):
-            writer.writerow([scan.stem, time, frame.stem if frame else ""])
+            writer.writerow([scan_stem(scan), time, scan_stem(frame) if frame else ""])
 
 
 def _two_names(text: str) -> list[str]:

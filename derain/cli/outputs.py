@@ -8,6 +8,7 @@ from pathlib import Path
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.files.labels import label_beside
+from derain.files.names import scan_stem
 
 
 def refuse_clashes(scans: Sequence[Path], out: Path) -> None:
@@ -20,13 +21,13 @@ def refuse_clashes(scans: Sequence[Path], out: Path) -> None:
     Raises:
         InputError: It holds a scan or its labels, or two scans have one name.
     """
-    stems = Counter(scan.stem for scan in scans)
+    stems = Counter(map(scan_stem, scans))
     for scan in scans:
         if (out / scan.name).resolve() == scan.resolve():
             raise InputError(out, f"would overwrite {scan}", "Give --out another folder.")
         if out.resolve() == label_beside(scan).parent.resolve():
             raise InputError(out, f"holds the labels of {scan}", "Give --out another folder.")
-        if stems[scan.stem] > 1:
+        if stems[scan_stem(scan)] > 1:
             raise InputError(
                 scan, "another scan has the same name", "Take them in two runs, each to its --out."
             )

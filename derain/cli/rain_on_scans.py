@@ -13,7 +13,8 @@ from tqdm import tqdm
 from derain.cli.outputs import refuse_clashes
 from derain.errors import InputError
 from derain.files import find_scans, read_scan, write_scan
-from derain.files.labels import write_labels
+from derain.files.labels import LABEL, write_labels
+from derain.files.names import beside, scan_stem
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain_field import UniformRain
@@ -92,7 +93,7 @@ def _rain_on(
     drops = rainy.label == TrackClass.RAIN
     _write(arguments.out / path.name, rainy, drops)
     if arguments.picture:
-        _draw((arguments.out / path.name).with_suffix(".png"), rainy, drops, rain)
+        _draw(beside(arguments.out / path.name, ".png"), rainy, drops, rain)
     before, after, new = (int(rows.sum()) for rows in (clean.valid, rainy.valid, drops))
     return Rained(str(path), before, after, new, before - (after - new))
 
@@ -100,11 +101,11 @@ def _rain_on(
 def _write(path: Path, rainy: Scan, drops: NDArray[np.bool_]) -> None:
     """Writes the scan, then its labels: where there are labels, the scan is complete."""
     write_scan(path, rainy)
-    write_labels(path.with_suffix(".label"), drops)
+    write_labels(beside(path, LABEL), drops)
 
 
 def _draw(path: Path, rainy: Scan, drops: NDArray[np.bool_], rain: UniformRain) -> None:
     from derain.pictures import before_after_figure, save
 
-    title = f"{path.stem} in {rain.heaviest:g} mm/h of simulated rain, and without its drops"
+    title = f"{scan_stem(path)} in {rain.heaviest:g} mm/h of simulated rain, and without its drops"
     save(before_after_figure(rainy, drops, title), path)

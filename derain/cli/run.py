@@ -19,7 +19,8 @@ from derain.errors import InputError
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
 from derain.files import find_scans, read_scan, write_scan
-from derain.files.labels import write_labels
+from derain.files.labels import LABEL, write_labels
+from derain.files.names import beside
 from derain.filters import FILTERS, FilterDerainer, read_parameters
 from derain.notices import Notices
 from derain.odd_scans import Oddity, much_removed, oddities, outside_view
@@ -214,4 +215,4 @@ def _assignment(text: str) -> tuple[str, int | float | str]:
 def _write(path: Path, scan: Scan, rain: NDArray[np.bool_]) -> None:
     """Writes the cleaned scan, then its labels: where there are labels, the scan is complete."""
     write_scan(path, scan.take(~rain))
-    write_labels(path.with_suffix(".label"), rain)
+    write_labels(beside(path, LABEL), rain)

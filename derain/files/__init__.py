@@ -4,47 +4,33 @@ Every column of a file comes back in `Scan.fields`, in its own dtype, and is wri
 `write_scan(path, scan.take(~rain))` is the file without its rain and otherwise the same.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from derain.errors import InputError
-from derain.files.binary import read_binary, write_binary
+from derain.files.atomic import replacing
 from derain.files.columns import DEFAULT_COLUMNS
-from derain.files.csv_table import read_csv, write_csv
+from derain.files.content import compressed, read_content
+from derain.files.formats import FORMATS, format_of
 from derain.files.frame_times import METADATA
-from derain.files.numpy_arrays import read_npy, read_npz, write_npy, write_npz
-from derain.files.pcd import read_pcd, write_pcd
-from derain.files.ply import read_ply, write_ply
+from derain.files.names import is_compressed, scan_suffix
 from derain.files.reading import reading
 from derain.scan import Scan
 
 __all__ = ["DEFAULT_COLUMNS", "find_scans", "read_scan", "write_scan"]
 
-# Files that leave the names of their columns to the user, and files that have them.
-_STATED: dict[str, Callable[[Path, Sequence[str]], Scan]] = {".bin": read_binary, ".npy": read_npy}
-_NAMED: dict[str, Callable[[Path], Scan]] = {
-    ".npz": read_npz,
-    ".pcd": read_pcd,
-    ".ply": read_ply,
-    ".csv": read_csv,
-}
-_WRITERS: dict[str, Callable[[Path, Scan], None]] = {
-    ".bin": write_binary,
-    ".npy": write_npy,
-    ".npz": write_npz,
-    ".pcd": write_pcd,
-    ".ply": write_ply,
-    ".csv": write_csv,
-}
+# What lies in folders of scans and is none: when they were taken, and KITTI's poses, times and
+# calibration.
+RECORDS = (METADATA, "calib.txt", "poses.txt", "times.txt", "timestamps.txt")
 
 
 def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Scan:
     """Reads one scan.
 
     Args:
-        path: The file: .bin, .npy, .npz, .pcd, .ply or .csv.
-        columns: Names of the columns of a file that does not name them itself (.bin, and .npy
-            unless structured).
+        path: The file, in any of FORMATS; compressed as a whole if its name ends in .gz.
+        columns: Names of the columns of a file that does not name them itself: .bin, .npy unless
+            structured, .npz of one array, and text without a line of names.
 
     Returns:
         The scan, one point per row of the file, in its order. `xyz` and `intensity` (the first of
@@ -52,18 +38,20 @@ def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Sca
         it is in the file.
 
     Raises:
-        InputError: A file that is missing, damaged, of an unknown format, or without coordinates.
+        InputError: A file that is missing, damaged, of an unknown format, or without coordinates;
+            that is larger than any scan (derain.files.content), or needs more memory than there is.
     """
     path = Path(path)
-    suffix = _known_suffix(path)
-    return _STATED[suffix](path, columns) if suffix in _STATED else _NAMED[suffix](path)
+    format_ = format_of(path)
+    with reading(path):
+        return format_.decode(read_content(path), columns)
 
 
 def write_scan(path: Path | str, scan: Scan) -> None:
     """Writes one scan: every column of the file it came from, else coordinates and intensity.
 
     Args:
-        path: The file: .bin, .npy, .npz, .pcd, .ply or .csv.
+        path: The file, in any of FORMATS; compressed as a whole if its name ends in .gz.
         scan: The scan.
 
     Raises:
@@ -71,7 +59,9 @@ def write_scan(path: Path | str, scan: Scan) -> None:
             be written.
     """
     path = Path(path)
-    _WRITERS[_known_suffix(path)](path, scan)
+    content = format_of(path).encode(path, scan)
+    with replacing(path) as temporary:
+        temporary.write_bytes(compressed(content) if is_compressed(path) else content)
 
 
 def find_scans(paths: Iterable[Path | str]) -> list[Path]:
@@ -79,8 +69,8 @@ def find_scans(paths: Iterable[Path | str]) -> list[Path]:
 
     Args:
         paths: Files, which are taken as they are, and folders, which stand for the scans directly
-            in them, sorted by name. Passed over are hidden files, metadata.csv, which says when
-            scans were taken, and any .csv beside scans of other formats.
+            in them, sorted by name. Passed over are hidden files, RECORDS, and any .csv and .txt
+            beside scans of other formats.
 
     Raises:
         InputError: A path that does not exist or may not be read, or a folder without scans.
@@ -96,16 +86,15 @@ def _scans_in(folder: Path) -> list[Path]:
     scans = sorted(
         path
         for path in folder.iterdir()
-        if path.suffix.lower() in _WRITERS
-        and path.name != METADATA
+        if scan_suffix(path) in FORMATS
+        and path.name not in RECORDS
         and not path.name.startswith(".")
         and path.is_file()
     )
-    # Beside scans of other formats a table is a record of something else, such as of poses.
-    scans = [path for path in scans if path.suffix.lower() != ".csv"] or scans
+    scans = [path for path in scans if not FORMATS[scan_suffix(path)].record] or scans
     if not scans:
         raise InputError(
-            folder, f"holds no scans ({', '.join(_WRITERS)})", "Name a folder with scans in it."
+            folder, f"holds no scans ({', '.join(FORMATS)})", "Name a folder with scans in it."
         )
     return scans
 
@@ -114,12 +103,3 @@ def _existing(path: Path) -> Path:
     if not path.exists():
         raise InputError(path, "there is no such file or folder", "Check the path.")
     return path
-
-
-def _known_suffix(path: Path) -> str:
-    suffix = path.suffix.lower()
-    if suffix not in _WRITERS:
-        raise InputError(
-            path, f"'{suffix}' is not the suffix of a scan", f"Known are {', '.join(_WRITERS)}."
-        )
-    return suffix

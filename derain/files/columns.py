@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
+from derain.files.names import scan_suffix
 from derain.files.text import encode
 from derain.scan import Scan, to_float32
 
@@ -19,31 +20,31 @@ INTENSITY_NAMES = ("intensity", "i", "reflectivity", "remission", "signal")
 
 
 def name_columns(
-    path: Path, table: NDArray[Any], columns: Sequence[str]
+    path: Path, columns: Sequence[NDArray[Any]], names: Sequence[str]
 ) -> dict[str, NDArray[Any]]:
-    """Gives the columns of a table without names the names stated by the user.
+    """Gives the columns of a file without names the names stated by the user.
 
     Args:
         path: The file, for messages.
-        table: Numbers, (N, C).
-        columns: C names.
+        columns: C columns (N,).
+        names: C names.
 
     Returns:
-        Name → column (N,), in the table's order and dtype.
+        Name → column, in the same order.
 
     Raises:
         InputError: Another number of names than columns, or a name given twice.
     """
-    stated = ",".join(columns)
-    if table.shape[1] != len(columns):
+    stated = ",".join(names)
+    if len(columns) != len(names):
         raise InputError(
             path,
-            f"has {table.shape[1]} columns, but {len(columns)} are stated ({stated})",
+            f"has {len(columns)} columns, but {len(names)} are stated ({stated})",
             "Name every column of the file with --columns, x, y and z among them.",
         )
-    if len(set(columns)) < len(columns):
+    if len(set(names)) < len(names):
         raise InputError("--columns", f"a name comes twice in {stated}", "Name each column once.")
-    return {name: table[:, place] for place, name in enumerate(columns)}
+    return dict(zip(names, columns, strict=True))
 
 
 def scan_of(
@@ -71,19 +72,21 @@ def scan_of(
     }
     flat = {name: column for name, column in numbers.items() if column.ndim == 1}
     if "xyz" in numbers:
-        xyz = to_float32(numbers["xyz"])
+        # A copy, for what is done to a scan's numbers must not reach the columns of its file.
+        xyz = to_float32(numbers["xyz"]).copy()
     elif {"x", "y", "z"} <= flat.keys():
-        xyz = np.stack([to_float32(flat[axis]) for axis in "xyz"], axis=1)
+        xyz = np.empty((len(flat["x"]), 3), np.float32)
+        for place, axis in enumerate("xyz"):
+            xyz[:, place] = to_float32(flat[axis])
     else:
         raise InputError(
             path,
             f"has no x, y and z among its columns ({', '.join(fields)})",
-            "Name the coordinates x, y and z, for .bin and .npy with --columns.",
+            "Name the coordinates x, y and z, where the file has no names with --columns.",
         )
     intensity = next((to_float32(flat[name]) for name in INTENSITY_NAMES if name in flat), None)
     return Scan(
-        # Copies, for what is done to a scan's numbers must not reach the columns of its file.
-        xyz.copy(),
+        xyz,
         None if intensity is None else intensity.copy(),
         radar=flat["radar"] != 0 if "radar" in flat else None,
         fields=dict(fields),
@@ -139,7 +142,7 @@ def describable_columns(path: Path, scan: Scan, types: Collection[str]) -> dict[
         if not one_word or column.dtype.str[1:] not in types or 0 in column.shape[1:]:
             raise InputError(
                 path,
-                f"{path.suffix} has no place for the column '{name}' ({column.dtype})",
+                f"{scan_suffix(path)} has no place for the column '{name}' ({column.dtype})",
                 "Write .npz.",
             )
     return columns

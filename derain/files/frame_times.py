@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
+from derain.files.names import COMPRESSED
 from derain.files.reading import reading
 
 METADATA = "metadata.csv"
@@ -86,7 +87,7 @@ def _lines(path: Path, *columns: str) -> Iterator[list[str | None]]:
 
 
 def _key(name: str) -> str:
-    stem, dot, suffix = name.rpartition(".")
+    stem, dot, suffix = name.removesuffix(COMPRESSED).rpartition(".")
     # Digits after a point are no suffix: scans may be named by the time of the frame.
     return (stem if dot and not suffix.isdigit() else name).lstrip("0")
 

@@ -12,21 +12,24 @@ from numpy.typing import NDArray
 from derain.data_layout import REHEARSE3D
 from derain.errors import InputError
 from derain.files.atomic import replacing
-from derain.files.reading import reading
+from derain.files.names import beside
+from derain.files.reading import file_size, read_bytes, reading
+
+LABEL = ".label"
 
 LARGEST_ID = 0xFFFF
 
 
 def label_beside(scan: Path) -> Path:
     """Where a scan's labels lie: beside it if they are there, else in the sibling `labels`."""
-    beside = scan.with_suffix(".label")
-    return beside if beside.is_file() else scan.parent.parent / "labels" / beside.name
+    label = beside(scan, LABEL)
+    return label if label.is_file() else scan.parent.parent / "labels" / label.name
 
 
 def label_of(scan: Path) -> Path:
     """Where a scan's labels lie: beside it, or in the folder that its layout has for them."""
     if scan.parent.name == REHEARSE3D.scans:
-        return scan.parent.parent / REHEARSE3D.labels / f"{scan.stem}.label"
+        return scan.parent.parent / REHEARSE3D.labels / f"{scan_stem(scan)}{LABEL}"
     return label_beside(scan)
 
 
@@ -44,14 +47,15 @@ def read_labels(path: Path, points: int) -> NDArray[np.uint32]:
         InputError: A file that cannot be read, or that does not hold one label per point.
     """
     with reading(path):
-        content = path.read_bytes()
-    if len(content) != 4 * points:
+        size = file_size(path)
+    if size != 4 * points:
         raise InputError(
             path,
-            f"holds {len(content) / 4:g} labels of 4 bytes for a scan of {points} points",
+            f"holds {size / 4:g} labels of 4 bytes for a scan of {points} points",
             "Give the label file that belongs to the scan, and all of the scan's --columns.",
         )
-    return np.frombuffer(content, "<u4").astype(np.uint32)
+    with reading(path, ValueError):
+        return np.frombuffer(read_bytes(path, size), "<u4", points).astype(np.uint32)
 
 
 def semantic(raw: NDArray[np.uint32]) -> NDArray[np.int64]:

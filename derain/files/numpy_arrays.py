@@ -1,5 +1,6 @@
 """Point clouds in NumPy's own files: one array (`.npy`) or several named ones (`.npz`)."""
 
+import io
 import math
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -12,13 +13,16 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files.atomic import replacing
-from derain.files.columns import DEFAULT_COLUMNS, columns_of, name_columns, records, scan_of
+from derain.files.columns import columns_of, name_columns, records, scan_of
+from derain.files.content import Content, check_columns
 from derain.files.reading import reading
 from derain.scan import Scan
 
 # NumPy parses an array's header as Python code, and lets out whatever that raises on damaged bytes.
 _DAMAGE = Exception
+
+# What stands before each member in the directory of a ZIP file.
+_MEMBER = b"PK\x01\x02"
 
 
 @dataclass(frozen=True)
@@ -30,108 +34,180 @@ class NpyHeader:
 
 @dataclass(frozen=True)
 class NpzHeader:
-    """Arrays of an .npz file that are not one value per point, e.g. the angles of the beams."""
+    """How an .npz file holds its columns.
+
+    Attributes:
+        constants: Arrays that are not one value per point, e.g. the angles of the beams.
+        table: Name of the array that holds several columns, if there is one.
+        columns: Their names.
+        structured: Whether they are named fields of that array.
+    """
 
     constants: Mapping[str, NDArray[Any]]
+    table: str | None = None
+    columns: tuple[str, ...] = ()
+    structured: bool = False
 
 
-def read_npy(path: Path, columns: Sequence[str] = DEFAULT_COLUMNS) -> Scan:
+def decode_npy(content: Content, columns: Sequence[str]) -> Scan:
     """Reads one array of points.
 
     Args:
-        path: The file: numbers (N, C), or (H, W, C) of an organised cloud; or a structured array
+        content: The file: numbers (N, C), or (H, W, C) of an organised cloud; or a structured array
             (N,) or (H, W).
         columns: Names of the C columns; a structured array has its own.
 
     Raises:
-        InputError: A file that cannot be read, or an array of another shape.
+        InputError: A file that is damaged, or an array of another shape.
     """
-    with reading(path, _DAMAGE), path.open("rb") as file:
-        array = npy_format.read_array(file, allow_pickle=False)
-    names = array.dtype.names
-    grid = array.shape if names else array.shape[:-1]
-    shape = _organised(path, grid)
-    if names:
-        flat = array.reshape(-1)
-        fields = {name: flat[name] for name in names}
-    else:
-        fields = name_columns(path, array.reshape(math.prod(grid), array.shape[-1]), columns)
-    return scan_of(path, fields, shape, NpyHeader(structured=bool(names)))
+    with reading(content.path, _DAMAGE):
+        array = _array(content.data)
+    shape = _organised(content.path, _grid_of_table(array))
+    fields = _columns_of_table(content.path, array, columns)
+    return scan_of(content.path, fields, shape, NpyHeader(structured=bool(array.dtype.names)))
 
 
-def write_npy(path: Path, scan: Scan) -> None:
-    """Writes a scan's columns as one array.
+def encode_npy(_: Path, scan: Scan) -> bytes:
+    """A scan's columns as one array.
 
     Columns of one dtype become an array (N, C), unless the scan comes from a structured one;
     columns of several become a structured array. Organised clouds stay organised.
-
-    Raises:
-        InputError: The file cannot be written.
     """
     named = isinstance(scan.header, NpyHeader) and scan.header.structured
     columns = scan.fields if named else columns_of(scan)
-    dtypes = {column.dtype for column in columns.values()}
-    flat = all(column.ndim == 1 for column in columns.values())
-    if len(dtypes) == 1 and flat and not named:
-        array = np.stack(list(columns.values()), axis=1, dtype=dtypes.pop())
-    else:
-        row = [(name, column.dtype, column.shape[1:]) for name, column in columns.items()]
-        array = records(columns, np.dtype(row))
-    with replacing(path) as temporary, temporary.open("wb") as file:
-        npy_format.write_array(file, _gridded(scan, array), allow_pickle=False)
+    return _to_bytes(_gridded(scan, _table(columns, named)))
 
 
-def read_npz(path: Path) -> Scan:
+def decode_npz(content: Content, columns: Sequence[str]) -> Scan:
     """Reads named arrays.
 
     Args:
-        path: The file. Coordinates are `xyz` (N, 3) or `x`, `y` and `z` (N,); in an organised
-            cloud `xyz` (H, W, 3) or `x`, `y` and `z` (H, W). Every array that begins with the same
-            (N,) or (H, W) is a column of the scan, flattened row-major. An array (W,) in an
-            organised cloud, such as a spinning sensor's timestamps, is repeated for each of the H
-            rows.
+        content: The file. Coordinates are `xyz` (N, 3) or `x`, `y` and `z` (N,); in an organised
+            cloud `xyz` (H, W, 3) or `x`, `y` and `z` (H, W). Without them, `points` or the only
+            array is a table as in a .npy. Every array that begins with the same (N,) or (H, W) is a
+            column of the scan, flattened row-major. An array (W,) in an organised cloud, such as a
+            spinning sensor's timestamps, is repeated for each of the H rows.
+        columns: Names of the columns of such a table, unless it is structured.
 
     Raises:
-        InputError: A file that cannot be read, or that has no coordinates.
+        InputError: A file that is damaged, or that has no coordinates.
     """
-    arrays: dict[str, NDArray[Any]] = {}
-    with reading(path, _DAMAGE), zipfile.ZipFile(path) as archive:
-        for member in archive.namelist():
-            with archive.open(member) as file:
-                arrays[member.removesuffix(".npy")] = npy_format.read_array(
-                    file, allow_pickle=False
-                )
-    grid = _grid(path, arrays)
+    path = content.path
+    with reading(path, _DAMAGE):
+        arrays = _arrays(content)
+    table = _name_of_table(arrays)
+    grid = _grid(path, arrays) if table is None else _grid_of_table(arrays[table])
     shape = _organised(path, grid)
-    fields, constants = {}, {}
+    fields, constants, structured = dict[str, NDArray[Any]](), {}, False
+    if table is not None:
+        structured = bool(arrays[table].dtype.names)
+        fields = _columns_of_table(path, arrays.pop(table), columns)
+    stated = tuple(fields)
     for name, array in arrays.items():
+        if name in stated:
+            raise InputError(path, f"has an array {name} beside a column {name}", "Rename one.")
         if array.shape[: len(grid)] == grid:
             fields[name] = array.reshape(math.prod(grid), *array.shape[len(grid) :])
         elif shape and array.shape == shape[1:]:
+            with reading(path, ValueError):
+                content.room.take(shape[0] * array.nbytes)
             fields[name] = np.tile(array, shape[0])
         else:
             constants[name] = array
-    return scan_of(path, fields, shape, NpzHeader(constants))
+    return scan_of(path, fields, shape, NpzHeader(constants, table, stated, structured))
 
 
-def write_npz(path: Path, scan: Scan) -> None:
-    """Writes a scan's columns as named arrays, compressed. Organised clouds stay organised.
-
-    Raises:
-        InputError: The file cannot be written.
-    """
-    columns = scan.fields or columns_of(scan)
-    arrays = {name: _gridded(scan, column) for name, column in columns.items()}
-    if isinstance(scan.header, NpzHeader):
-        arrays |= scan.header.constants
+def encode_npz(_: Path, scan: Scan) -> bytes:
+    """A scan's columns as named arrays, compressed. Organised clouds stay organised."""
+    columns = dict(scan.fields or columns_of(scan))
+    header = scan.header if isinstance(scan.header, NpzHeader) else NpzHeader({})
+    arrays: dict[str, NDArray[Any]] = {}
+    if header.table is not None and columns.keys() >= set(header.columns):
+        table = {name: columns.pop(name) for name in header.columns}
+        arrays[header.table] = _gridded(scan, _table(table, header.structured))
+    arrays |= {name: _gridded(scan, column) for name, column in columns.items()}
+    arrays |= header.constants
+    file = io.BytesIO()
     # Not numpy.savez, which cannot write an array named "file".
-    with (
-        replacing(path) as temporary,
-        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
-    ):
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
-                npy_format.write_array(file, array, allow_pickle=False)
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                member.write(_to_bytes(array))
+    return file.getvalue()
+
+
+def _array(data: bytes) -> NDArray[Any]:
+    """The array of a .npy file, if the file is as long as its header says."""
+    file = io.BytesIO(data)
+    # The third version differs from the second in the encoding of names alone.
+    read_header = (
+        npy_format.read_array_header_1_0
+        if npy_format.read_magic(file) == (1, 0)
+        else npy_format.read_array_header_2_0
+    )
+    shape, _, dtype = read_header(file)
+    size = math.prod(shape) * dtype.itemsize
+    if size > len(data) - file.tell() and not dtype.hasobject:
+        raise ValueError(f"{size:,} bytes in the header, {len(data) - file.tell():,} behind it")
+    file.seek(0)
+    array: NDArray[Any] = npy_format.read_array(file, allow_pickle=False)
+    return array
+
+
+def _to_bytes(array: NDArray[Any]) -> bytes:
+    """The array as a .npy file."""
+    file = io.BytesIO()
+    npy_format.write_array(file, array, allow_pickle=False)
+    return file.getvalue()
+
+
+def _arrays(content: Content) -> dict[str, NDArray[Any]]:
+    """The arrays of an .npz file by their names."""
+    check_columns(content.data.count(_MEMBER))
+    arrays = {}
+    with zipfile.ZipFile(io.BytesIO(content.data)) as archive:
+        for member in archive.infolist():
+            if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                raise ValueError(f"{member.filename} is compressed as NumPy never does")
+            content.room.take(member.file_size)
+            with archive.open(member) as file:
+                # So many bytes, not all: what a member states is not what it may expand to.
+                data = file.read(member.file_size)
+            arrays[member.filename.removesuffix(".npy")] = _array(data)
+    return arrays
+
+
+def _table(columns: Mapping[str, NDArray[Any]], structured: bool) -> NDArray[Any]:
+    """Columns as one array: numbers (N, C) if all are of one dtype, else structured (N,)."""
+    dtypes = {column.dtype for column in columns.values()}
+    flat = all(column.ndim == 1 for column in columns.values())
+    if len(dtypes) == 1 and flat and not structured:
+        return np.stack(list(columns.values()), axis=1, dtype=dtypes.pop())
+    row = [(name, column.dtype, column.shape[1:]) for name, column in columns.items()]
+    return records(columns, np.dtype(row))
+
+
+def _columns_of_table(
+    path: Path, array: NDArray[Any], columns: Sequence[str]
+) -> dict[str, NDArray[Any]]:
+    """The columns of an array of numbers or a structured one, each (N,)."""
+    if names := array.dtype.names:
+        flat = array.reshape(-1)
+        return {name: flat[name] for name in names}
+    points = math.prod(array.shape[:-1])
+    return name_columns(path, array.reshape(points, array.shape[-1]).T, columns)
+
+
+def _name_of_table(arrays: Mapping[str, NDArray[Any]]) -> str | None:
+    """Name of the array that holds all columns; None where each column has its own."""
+    names = {name.lower(): name for name in arrays}
+    if "xyz" in names or "x" in names:
+        return None
+    return names.get("points", next(iter(arrays)) if len(arrays) == 1 else None)
+
+
+def _grid_of_table(array: NDArray[Any]) -> tuple[int, ...]:
+    return array.shape if array.dtype.names else array.shape[:-1]
 
 
 def _grid(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[int, ...]:

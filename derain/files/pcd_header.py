@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from derain.files.text import decode, encode
+from derain.files.content import LARGEST_SCAN, MOST_COLUMNS, check_columns
+from derain.files.text import LARGEST_HEADER, decode, encode
 
 ENCODINGS = ("ascii", "binary", "binary_compressed")
 # TYPE and SIZE of every kind of value, in NumPy's spelling.
@@ -77,7 +78,7 @@ def parse_header(content: bytes) -> tuple[PcdHeader, bytes]:
     Raises:
         ValueError: A header that is missing, incomplete or says what no PCD can mean.
     """
-    end = _DATA_LINE.search(content)
+    end = _DATA_LINE.search(content, 0, LARGEST_HEADER)
     if end is None:
         raise ValueError("the header has no DATA line")
     lines = (line.split() for line in content[: end.start()].splitlines())
@@ -95,6 +96,7 @@ def parse_header(content: bytes) -> tuple[PcdHeader, bytes]:
 
 def _columns(entries: dict[str, list[str]]) -> tuple[tuple[str, np.dtype[Any]], ...]:
     names = entries.get("FIELDS", [])
+    check_columns(len(names))
     named = [name for name in names if name != PADDING]
     if not named or len(set(named)) < len(named):
         raise ValueError(f"the header says FIELDS {_join(names)}")
@@ -106,7 +108,7 @@ def _columns(entries: dict[str, list[str]]) -> tuple[tuple[str, np.dtype[Any]], 
     columns = []
     for name, kind, size, count in zip(names, types, sizes, counts, strict=True):
         value = f"{kind.lower()}{size}"
-        if value not in VALUE_TYPES or count == 0:
+        if value not in VALUE_TYPES or not 0 < count <= LARGEST_SCAN // MOST_COLUMNS // size:
             raise ValueError(f"the header says TYPE {kind} SIZE {size} COUNT {count} for {name}")
         columns.append((name, np.dtype((f"<{value}", () if count == 1 else (count,)))))
     return tuple(columns)

@@ -1,10 +1,12 @@
 """Reading a file, with one error for whatever is wrong with it."""
 
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from derain.errors import InputError
+from derain.files.names import scan_suffix
 
 
 @contextmanager
@@ -16,10 +18,20 @@ def reading(path: Path, *damage: type[Exception]) -> Iterator[None]:
         damage: What the format's library raises on content that it cannot read.
 
     Raises:
-        InputError: The file is missing, cannot be opened or is damaged.
+        InputError: The file is missing, cannot be opened, is damaged, or needs more memory than
+            there is.
     """
     try:
         yield
+    except InputError:
+        raise
+    except damage as error:
+        reason = " ".join(str(error).split())
+        raise InputError(
+            path,
+            f"cannot be read as {scan_suffix(path)} ({reason})",
+            "The file is damaged or of another format; write it again.",
+        ) from error
     except FileNotFoundError as error:
         raise InputError(path, "there is no such file", "Check the path.") from error
     except IsADirectoryError as error:
@@ -30,10 +42,41 @@ def reading(path: Path, *damage: type[Exception]) -> Iterator[None]:
             f"cannot be read ({error.strerror or error})",
             "Check the file and its permissions.",
         ) from error
-    except damage as error:
-        reason = " ".join(str(error).split())
+    except MemoryError as error:
         raise InputError(
-            path,
-            f"cannot be read as {path.suffix} ({reason})",
-            "The file is damaged or of another format; write it again.",
+            path, "needs more memory than there is", "Cut it into smaller scans."
         ) from error
+
+
+def read_bytes(path: Path, largest: int) -> bytes:
+    """The content of a regular file; nothing else is opened, for a pipe or a device may never end.
+
+    Args:
+        path: The file.
+        largest: Bytes that it may have.
+
+    Raises:
+        InputError: No regular file.
+        OSError: The file cannot be read.
+        ValueError: It is larger.
+    """
+    size = file_size(path)
+    if size > largest:
+        raise ValueError(f"{size:,} bytes, more than {largest:,}")
+    with path.open("rb") as file:
+        return file.read(largest)
+
+
+def file_size(path: Path) -> int:
+    """Bytes of a regular file.
+
+    Raises:
+        InputError: No regular file.
+        OSError: There is no file, or its folder may not be searched.
+    """
+    status = path.stat()
+    if stat.S_ISDIR(status.st_mode):
+        raise IsADirectoryError
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError(path, "is a pipe or a device", "Name a file.")
+    return status.st_size

@@ -2,10 +2,16 @@
 
 import io
 import math
+import sys
+from collections.abc import Iterator
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+# Bytes of a header, which has a line or a word for each column.
+LARGEST_HEADER = 2**20
 
 # Enough digits for every float32 and every float64 to come back as it was.
 _DECIMALS = {"f4": "%.9g", "f8": "%.17g"}
@@ -21,21 +27,35 @@ def encode(text: str) -> bytes:
     return text.encode("utf-8", "surrogateescape")
 
 
-def parse_rows(data: bytes, row: np.dtype[Any], lines: slice = slice(None)) -> NDArray[Any]:
+def filled_lines(data: bytes, start: int = 0, count: int = sys.maxsize) -> Iterator[bytes]:
+    """The lines of a text that are not empty: so many of them, after so many that come before."""
+    filled = (line for line in io.BytesIO(data) if line.strip())
+    return islice(filled, *(min(place, sys.maxsize) for place in (start, start + count)))
+
+
+def parse_rows(
+    data: bytes, row: np.dtype[Any], start: int = 0, count: int = sys.maxsize
+) -> NDArray[Any]:
     """Reads one structured value per line of numbers; empty lines are passed over.
 
     Args:
         data: The text.
         row: Dtype of a line; its fields may be sub-arrays.
-        lines: Which of the lines to read.
+        start: Number of lines that come before.
+        count: Number of lines to read, if there are as many.
 
     Raises:
         ValueError: A line that is not of this dtype.
     """
-    text = data.splitlines()[lines]
-    if not any(map(bytes.strip, text)):
+    lines = filled_lines(data, start, count)
+    first = next(lines, None)
+    if first is None:
         return np.empty(0, row)
-    return np.loadtxt(text, row, comments=None, ndmin=1, encoding="latin-1")
+    values, stated = len(first.split()), sum(math.prod(row[name].shape) for name in row.names or ())
+    # Before anything is allocated: a header of a few bytes may state any number of values.
+    if values != stated:
+        raise ValueError(f"a line of {values} values where the header states {stated}")
+    return np.loadtxt(chain([first], lines), row, comments=None, ndmin=1, encoding="latin-1")
 
 
 def format_rows(table: NDArray[Any]) -> bytes:

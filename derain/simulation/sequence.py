@@ -23,8 +23,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from derain.data_layout import REHEARSE3D
 from derain.extrinsics import POSE, Extrinsics
+from derain.files import write_scan
 from derain.files.atomic import replacing
-from derain.files.binary import write_binary
 from derain.files.frame_times import FRAME_COLUMNS, METADATA
 from derain.files.labels import write_labels
 from derain.fusion import NO_DETECTIONS, fuse, nearest_in_time
@@ -88,8 +88,8 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
         scan = sensor.measure(detected, of_lidar)
         joined = fuse(scan, frame, mounting)
         assert joined.label is not None  # as both of its parts are labelled
-        write_binary(folder / "innoviz" / f"{stem}.bin", scan)
-        write_binary(folder / REHEARSE3D.scans / f"{stem}.bin", joined)
+        write_scan(folder / "innoviz" / f"{stem}.bin", scan)
+        write_scan(folder / REHEARSE3D.scans / f"{stem}.bin", joined)
         write_labels(folder / REHEARSE3D.labels / f"{stem}.label", joined.label)
         _write_table(folder / "weather" / f"{stem}.csv", asdict(scene.weather))
     for kind in ("innoviz", REHEARSE3D.scans, REHEARSE3D.labels, "weather"):
@@ -118,7 +118,7 @@ def _record_radar(
     mean = mean_echoes(scene.track, scene.rain, radar)
     frames = [_with_intensity(detect(mean, radar, generator), radar) for _ in times]
     for stem, frame in zip(_stems(len(times)), frames, strict=True):
-        write_binary(folder / "radar_pcd" / f"{stem}.bin", replace(frame, fields={}))
+        write_scan(folder / "radar_pcd" / f"{stem}.bin", replace(frame, fields={}))
         _write_table(folder / "ext_radar" / f"{stem}.csv", _extended(frame))
     for kind in ("radar_pcd", "ext_radar"):
         _write_times(folder / kind, times)

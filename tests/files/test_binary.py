@@ -7,8 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from derain import InputError, Scan
-from derain.files import DEFAULT_COLUMNS
-from derain.files.binary import read_binary, write_binary
+from derain.files import DEFAULT_COLUMNS, read_scan, write_scan
 
 FIVE = (*DEFAULT_COLUMNS, "ring")
 SIX = (*FIVE, "time")
@@ -34,7 +33,7 @@ def street(points: int, width: int, azimuth: float = np.pi) -> NDArray[np.float3
 def test_columns_are_read_in_the_stated_order(file: Path) -> None:
     rows = np.arange(12, dtype="<f4").reshape(3, 4)
     file.write_bytes(rows.tobytes())
-    scan = read_binary(file, ("intensity", "z", "y", "x"))
+    scan = read_scan(file, ("intensity", "z", "y", "x"))
     np.testing.assert_array_equal(scan.xyz, rows[:, [3, 2, 1]])
     np.testing.assert_array_equal(scan.intensity, rows[:, 0])
     assert list(scan.fields) == ["intensity", "z", "y", "x"]
@@ -42,14 +41,14 @@ def test_columns_are_read_in_the_stated_order(file: Path) -> None:
 
 def test_a_file_without_intensity_is_a_scan_without(file: Path) -> None:
     file.write_bytes(np.ones((3, 3), "<f4").tobytes())
-    assert read_binary(file, ("x", "y", "z")).intensity is None
+    assert read_scan(file, ("x", "y", "z")).intensity is None
 
 
 def test_an_empty_file_is_a_scan_of_no_points(file: Path) -> None:
     file.touch()
-    scan = read_binary(file)
+    scan = read_scan(file)
     assert len(scan) == 0
-    write_binary(file, scan)
+    write_scan(file, scan)
     assert file.read_bytes() == b""
 
 
@@ -58,7 +57,7 @@ def test_a_size_that_is_no_multiple_of_a_row_is_refused_with_numbers_and_remedy(
 ) -> None:
     file.write_bytes(bytes(50))
     with pytest.raises(InputError, match=r"50 bytes are not whole rows of 16 bytes.*--columns"):
-        read_binary(file)
+        read_scan(file)
 
 
 @pytest.mark.parametrize("width", [5, 6, 7])
@@ -68,7 +67,7 @@ def test_wider_rows_read_as_four_columns_are_refused(
 ) -> None:
     file.write_bytes(street(2000, width, azimuth).tobytes())
     with pytest.raises(InputError, match=r"more columns than stated.*--columns x,y,z,intensity"):
-        read_binary(file)
+        read_scan(file)
 
 
 @pytest.mark.parametrize("columns", [FIVE, SIX])
@@ -77,13 +76,13 @@ def test_wider_rows_with_their_columns_stated_are_read(
 ) -> None:
     rows = street(2000, len(columns))
     file.write_bytes(rows.tobytes())
-    np.testing.assert_array_equal(read_binary(file, columns).intensity, rows[:, 3])
+    np.testing.assert_array_equal(read_scan(file, columns).intensity, rows[:, 3])
 
 
 def test_four_columns_read_as_five_are_refused(file: Path) -> None:
     file.write_bytes(street(2000, 4).tobytes())
     with pytest.raises(InputError, match="of the intensities are negative"):
-        read_binary(file, FIVE)
+        read_scan(file, FIVE)
 
 
 @pytest.mark.parametrize("width", [5, 6])
@@ -93,13 +92,13 @@ def test_four_columns_read_as_five_are_refused(file: Path) -> None:
 def test_real_scans_pass_and_are_refused_once_widened(
     file: Path, shared: Path, name: str, width: int
 ) -> None:
-    scan = read_binary(shared / "data" / f"{name}.bin")
+    scan = read_scan(shared / "data" / f"{name}.bin")
     assert scan.intensity is not None
     further = street(len(scan), 6)[:, 4:width]
     rows = np.column_stack([scan.xyz, scan.intensity, further])[: len(scan) // 4 * 4]
     file.write_bytes(rows.astype("<f4").tobytes())
     with pytest.raises(InputError, match="more columns than stated"):
-        read_binary(file)
+        read_scan(file)
 
 
 def test_sentinel_cells_damaged_rows_and_a_few_negative_values_are_no_reason_to_refuse(
@@ -110,14 +109,14 @@ def test_sentinel_cells_damaged_rows_and_a_few_negative_values_are_no_reason_to_
     rows[400:700, 3] = -np.inf
     rows[700:720, 3] = -12.5
     file.write_bytes(rows.tobytes())
-    assert len(read_binary(file)) == 1000
+    assert len(read_scan(file)) == 1000
 
 
 def test_a_negative_column_that_is_not_called_intensity_is_read(file: Path) -> None:
     rows = street(100, 4)
     rows[:, 3] = -30
     file.write_bytes(rows.tobytes())
-    assert read_binary(file, ("x", "y", "z", "rcs")).intensity is None
+    assert read_scan(file, ("x", "y", "z", "rcs")).intensity is None
 
 
 @pytest.mark.parametrize(
@@ -133,18 +132,19 @@ def test_columns_that_make_no_scan_are_refused(
 ) -> None:
     file.write_bytes(bytes(64))
     with pytest.raises(InputError, match=reason):
-        read_binary(file, columns)
+        read_scan(file, columns)
 
 
 def test_a_missing_file_and_a_folder_are_refused(file: Path) -> None:
     with pytest.raises(InputError, match=r"scan\.bin: there is no such file\. Check the path\."):
-        read_binary(file)
+        read_scan(file)
+    file.mkdir()
     with pytest.raises(InputError, match=r"is a folder\. Name a file\."):
-        read_binary(file.parent)
+        read_scan(file)
 
 
 def test_a_column_that_would_lose_digits_is_not_written(file: Path) -> None:
     fields = {axis: np.ones(2, np.float32) for axis in "xyz"} | {"time": np.array([1, 2**24 + 1])}
     with pytest.raises(InputError, match=r"float32 cannot hold the column time \(int64\)"):
-        write_binary(file, Scan(np.ones((2, 3), np.float32), fields=fields))
+        write_scan(file, Scan(np.ones((2, 3), np.float32), fields=fields))
     assert not file.exists()

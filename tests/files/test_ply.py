@@ -10,7 +10,8 @@ import pytest
 
 from derain import InputError, Scan
 from derain.files import read_scan, write_scan
-from derain.files.ply import BYTE_ORDERS, PlyHeader
+from derain.files.ply import PlyHeader
+from derain.files.ply_header import BYTE_ORDERS
 
 HEADER = """\
 ply

@@ -13,7 +13,8 @@ from derain import Scan
 from derain.files import DEFAULT_COLUMNS, read_scan, write_scan
 from derain.files.columns import scan_of
 from derain.files.pcd_header import ENCODINGS, VALUE_TYPES, PcdHeader
-from derain.files.ply import BYTE_ORDERS, PlyHeader
+from derain.files.ply import PlyHeader
+from derain.files.ply_header import BYTE_ORDERS
 
 FLOATS = ("f4", "f8")
 NAMES = st.text("abcdefgh_0123456789-.äλ", min_size=2, max_size=6)

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from derain.errors import InputError
-from derain.files.binary import read_binary
+from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.scan import Scan
 from derain.simulation import dataset, sequence
@@ -53,7 +53,7 @@ def scans(root: Path, name: str) -> list[Scan]:
     folder = root / "sequences" / name
     found = []
     for file in sorted((folder / "lidar_radar_pcd").glob("*.bin")):
-        scan = read_binary(file)
+        scan = read_scan(file)
         labels = read_labels(folder / "lidar_radar_labels" / f"{file.stem}.label", len(scan))
         found.append(scan.with_label(labels.astype(np.int64)))
     return found

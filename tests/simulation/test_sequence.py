@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from derain.extrinsics import read_extrinsics
-from derain.files.binary import read_binary
+from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
@@ -91,7 +91,7 @@ def test_a_merged_cloud_is_the_scan_and_the_radar_frame_nearest_in_time(folder: 
 
 def test_the_radar_sees_what_the_lidar_sees(folder: Path) -> None:
     # Masts are tall and echo well: what the radar calls a mast is beside one of the LiDAR's.
-    scan = read_binary(folder / "lidar_radar_pcd/000000.bin")
+    scan = read_scan(folder / "lidar_radar_pcd/000000.bin")
     label = read_labels(folder / "lidar_radar_labels/000000.label", len(scan))
     first = len(points(folder / "innoviz/000000.bin"))
     mast = label == TrackClass.SPRINKLER

@@ -1,0 +1,100 @@
+"""The content of a scan file, and the one bound on what it may expand to.
+
+A small file can claim or hold far more than any scan: counts in a header, zeros that compress a
+thousandfold. Whatever a reader makes room for, it takes from the file's `Room` first.
+"""
+
+import gzip
+import io
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from derain.files.names import is_compressed
+from derain.files.reading import read_bytes, reading
+
+# Bytes that a scan may take, in its file or decoded: 30 million points of an aerial LAS.
+LARGEST_SCAN = 2**30
+
+# Bytes that every file may expand to: 400,000 points of twenty columns. A frame that is nearly
+# empty, or constant in most of its columns, compresses to next to nothing.
+ALWAYS_ROOM = 2**26
+
+# Any further expansion is bounded by the file's own size. Real scans compress to a half or a tenth.
+LARGEST_EXPANSION = 32
+
+# Columns of a scan. The widest known, of an Ouster frame with two returns, has some twenty.
+MOST_COLUMNS = 1024
+
+
+class Room:
+    """Bytes that a file may still expand to.
+
+    Args:
+        size: Bytes of the file.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.left = min(LARGEST_SCAN, max(ALWAYS_ROOM, LARGEST_EXPANSION * size))
+
+    def take(self, size: int) -> None:
+        """Sets bytes aside, before they are allocated.
+
+        Raises:
+            ValueError: There is no room for them.
+        """
+        if size > self.left:
+            raise ValueError(f"it would expand by {size:,} bytes, with room for {self.left:,}")
+        self.left -= size
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a scan file holds.
+
+    Attributes:
+        path: The file.
+        data: Its bytes, decompressed where the file is compressed as a whole.
+        room: What they may expand to.
+    """
+
+    path: Path
+    data: bytes
+    room: Room
+
+
+def read_content(path: Path) -> Content:
+    """Reads a file, and decompresses it if its name ends in .gz.
+
+    Raises:
+        InputError: No regular file, or one that cannot be read, is larger than any scan, or is
+            damaged.
+    """
+    with reading(path, gzip.BadGzipFile, EOFError, zlib.error, ValueError):
+        data = read_bytes(path, LARGEST_SCAN)
+        room = Room(len(data))
+        if is_compressed(path):
+            data = _decompressed(data, room)
+        return Content(path, data, room)
+
+
+def compressed(data: bytes) -> bytes:
+    """The same bytes as a .gz file, which is the same whenever it is written."""
+    return gzip.compress(data, mtime=0)
+
+
+def check_columns(count: int) -> None:
+    """Refuses more columns than a scan has.
+
+    Raises:
+        ValueError: There are.
+    """
+    if count > MOST_COLUMNS:
+        raise ValueError(f"{count:,} columns, more than {MOST_COLUMNS:,}")
+
+
+def _decompressed(data: bytes, room: Room) -> bytes:
+    with gzip.GzipFile(fileobj=io.BytesIO(data)) as file:
+        plain = file.read(room.left + 1)
+    room.take(len(plain))
+    return plain

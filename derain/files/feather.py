@@ -1,0 +1,109 @@
+"""Columns in Arrow's file format (`.feather`, version 2), read and written by PyArrow; Argoverse 2.
+
+Source: Apache Arrow, "Arrow Columnar Format", version 1.5, section on IPC.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.columns import columns_of, scan_of
+from derain.files.content import Content, check_columns
+from derain.files.extras import import_extra
+from derain.files.reading import reading
+from derain.scan import Scan
+
+# What the file begins with; what follows is a stream of messages.
+_MAGIC = b"ARROW1\0\0"
+
+
+@dataclass(frozen=True, eq=False)
+class FeatherHeader:
+    """What a Feather file holds besides numbers: text, missing values, what the schema says.
+
+    Attributes:
+        table: The file, a pyarrow.Table with a row for each point.
+        compression: How it is compressed: "uncompressed", "lz4" or "zstd".
+    """
+
+    table: Any
+    compression: str
+
+    def take(self, rows: NDArray[Any]) -> "FeatherHeader":
+        """The table of some of the points only."""
+        return replace(self, table=self.table.take(np.arange(self.table.num_rows)[rows]))
+
+
+def decode_feather(content: Content) -> Scan:
+    """Reads a Feather file.
+
+    Args:
+        content: The file, version 2.
+
+    Returns:
+        The scan. Its fields are the columns of numbers; a missing number is NaN, which makes a
+        column of whole numbers float64.
+
+    Raises:
+        InputError: A file that is damaged, or has no coordinates; PyArrow is not installed.
+    """
+    arrow = import_extra("pyarrow", "feather", content.path)
+    from derain.files.arrow_messages import check_messages
+
+    with reading(content.path, Exception):
+        if not content.data.startswith(_MAGIC):
+            raise ValueError("it does not begin as Feather version 2 does")
+        # As a stream, so that what is read are the messages that were checked.
+        stream = content.data[len(_MAGIC) :]
+        compression = check_messages(arrow, stream, content.room)
+        with arrow.ipc.open_stream(stream) as messages:
+            table = messages.read_all()
+        table.validate(full=True)
+        check_columns(table.num_columns)
+        content.room.take(table.nbytes)
+        if len(set(table.column_names)) < table.num_columns:
+            raise ValueError("two columns have one name")
+        numbers = [name for name in table.column_names if _has_numbers(arrow, table[name])]
+        fields = {name: table[name].to_numpy() for name in numbers}
+    return scan_of(content.path, fields, header=FeatherHeader(table, compression))
+
+
+def encode_feather(path: Path, scan: Scan) -> bytes:
+    """A scan's columns in the order, the types and the compression of the file that it came from.
+
+    Raises:
+        InputError: A column that no table can hold; PyArrow is not installed.
+    """
+    arrow = import_extra("pyarrow", "feather", path)
+    feather = import_extra("pyarrow.feather", "feather", path)
+    columns = columns_of(scan)
+    header = scan.header if isinstance(scan.header, FeatherHeader) else None
+    if header is None or header.table.num_rows != len(scan):
+        header = FeatherHeader(arrow.table({}), "lz4")
+    table = header.table
+    for name, column in columns.items():
+        if column.ndim > 1 or column.dtype.kind not in "biuf" or column.dtype.itemsize > 8:
+            raise InputError(path, f".feather has no place for the column '{name}'", "Write .npz.")
+        if name not in table.column_names:
+            table = table.append_column(name, arrow.array(_native(column)))
+        elif not np.array_equal(table[name].to_numpy(), column, equal_nan=column.dtype.kind == "f"):
+            place = table.column_names.index(name)
+            table = table.set_column(place, name, arrow.array(_native(column)))
+    sink = arrow.BufferOutputStream()
+    feather.write_feather(table, sink, header.compression)
+    return bytes(sink.getvalue())
+
+
+def _has_numbers(arrow: ModuleType, column: Any) -> bool:
+    kinds = arrow.types
+    return bool(kinds.is_integer(column.type) or kinds.is_floating(column.type))
+
+
+def _native(column: NDArray[Any]) -> NDArray[Any]:
+    """The same numbers in the machine's byte order, which Arrow's is too."""
+    return column.astype(column.dtype.newbyteorder("="))

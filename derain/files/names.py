@@ -1,0 +1,32 @@
+"""What the name of a scan's file says: its format, and the stem that its labels share."""
+
+from pathlib import Path
+
+COMPRESSED = ".gz"
+
+
+def scan_stem(scan: Path) -> str:
+    """The name of a scan without the suffix of its format, compressed or not.
+
+    Both scan.bin and scan.bin.gz are ``scan``: what is made of a scan is named by it.
+    """
+    return Path(_uncompressed(scan.name)).stem
+
+
+def scan_suffix(scan: Path) -> str:
+    """The suffix of a scan's format in lower case, such as .bin of SCAN.BIN.gz; may be empty."""
+    return Path(_uncompressed(scan.name)).suffix.lower()
+
+
+def beside(scan: Path, suffix: str) -> Path:
+    """The file in a scan's folder that has its stem and another suffix."""
+    return scan.with_name(scan_stem(scan) + suffix)
+
+
+def is_compressed(scan: Path) -> bool:
+    """Whether the file is compressed as a whole."""
+    return scan.suffix.lower() == COMPRESSED
+
+
+def _uncompressed(name: str) -> str:
+    return name[: -len(COMPRESSED)] if name.lower().endswith(COMPRESSED) else name
