@@ -81,29 +81,23 @@ def encode_feather(path: Path, scan: Scan) -> bytes:
     """
     arrow = import_extra("pyarrow", "feather", path)
     feather = import_extra("pyarrow.feather", "feather", path)
-    columns = columns_of(scan)
     header = scan.header if isinstance(scan.header, FeatherHeader) else None
-    if header is None or header.table.num_rows != len(scan):
-        header = FeatherHeader(arrow.table({}), "lz4")
-    table = header.table
-    for name, column in columns.items():
+    same = header is not None and header.table.num_rows == len(scan)
+    held = {name: header.table[name] for name in header.table.column_names} if same else {}
+    for name, column in columns_of(scan).items():
         if column.ndim > 1 or column.dtype.kind not in "biuf" or column.dtype.itemsize > 8:
             raise InputError(path, f".feather has no place for the column '{name}'", "Write .npz.")
-        if name not in table.column_names:
-            table = table.append_column(name, arrow.array(_native(column)))
-        elif not np.array_equal(table[name].to_numpy(), column, equal_nan=column.dtype.kind == "f"):
-            place = table.column_names.index(name)
-            table = table.set_column(place, name, arrow.array(_native(column)))
+        exact = column.dtype.kind == "f"
+        if name not in held or not np.array_equal(held[name].to_numpy(), column, equal_nan=exact):
+            held[name] = arrow.array(column.astype(column.dtype.newbyteorder("=")))
+    table = arrow.table(held)
+    if header is not None and same:
+        table = table.replace_schema_metadata(header.table.schema.metadata)
     sink = arrow.BufferOutputStream()
-    feather.write_feather(table, sink, header.compression)
+    feather.write_feather(table, sink, header.compression if header else "lz4")
     return bytes(sink.getvalue())
 
 
 def _has_numbers(arrow: ModuleType, column: Any) -> bool:
     kinds = arrow.types
     return bool(kinds.is_integer(column.type) or kinds.is_floating(column.type))
-
-
-def _native(column: NDArray[Any]) -> NDArray[Any]:
-    """The same numbers in the machine's byte order, which Arrow's is too."""
-    return column.astype(column.dtype.newbyteorder("="))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from derain.data_layout import REHEARSE3D
 from derain.errors import InputError
 from derain.files.atomic import replacing
-from derain.files.names import beside
+from derain.files.names import beside, scan_stem
 from derain.files.reading import file_size, read_bytes, reading
 
 LABEL = ".label"

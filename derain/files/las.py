@@ -5,6 +5,8 @@ Source: ASPRS, "LAS Specification", version 1.4 R15.
 
 import io
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -17,9 +19,13 @@ from derain.errors import InputError
 from derain.files.columns import columns_of, scan_of
 from derain.files.content import Content
 from derain.files.extras import import_extra
+from derain.files.laz_chunks import check_chunks
 from derain.files.names import scan_suffix
 from derain.files.reading import reading
 from derain.scan import LARGEST_COORDINATE, Scan
+
+# Sizes of the header, up to version 1.3 and from 1.4 on.
+_HEADER, _HEADER_1_4 = 227, 375
 
 # Sizes of the fixed part of a variable-length record, and of an extended one.
 _RECORD, _EXTENDED_RECORD = 54, 60
@@ -62,7 +68,7 @@ def decode_las(content: Content) -> Scan:
         InputError: A file that is damaged, or laspy is not installed.
     """
     laspy = import_extra("laspy", "las", content.path)
-    with reading(content.path, Exception):
+    with reading(content.path, Exception), _panics_as_errors():
         header, raw = _points(laspy, content)
         whole = np.stack([raw[axis] for axis in "XYZ"], axis=1).astype(np.int64)
         origin = _origin(whole, header.scales)
@@ -95,10 +101,21 @@ def encode_las(path: Path, scan: Scan) -> bytes:
             points.array[name.upper()] = _stored(path, numbers)
         else:
             points.array[name] = column
-    las = laspy.LasData(header.copy(), points)
-    file = io.BytesIO()
-    las.write(file, do_compress=scan_suffix(path) == ".laz", laz_backend=laspy.LazBackend.Lazrs)
-    return file.getvalue()
+    try:
+        return _to_bytes(laspy, header, points, scan_suffix(path) == ".laz")
+    except laspy.errors.LaspyException as error:
+        raise InputError(path, f"laspy cannot write it ({error})", "Write .npz.") from error
+
+
+@contextmanager
+def _panics_as_errors() -> Iterator[None]:
+    """What laspy's library in Rust raises on some damaged data is not even an Exception."""
+    try:
+        yield
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":
+            raise
+        raise ValueError(str(error)) from error
 
 
 def _refused(path: Path) -> InputError:
@@ -110,11 +127,15 @@ def _refused(path: Path) -> InputError:
 def _points(laspy: ModuleType, content: Content) -> tuple[Any, NDArray[Any]]:
     """Laspy's header of a file, and the file's points as they are stored, structured (N,)."""
     _check_counts(content)
-    # One thread, so that what is written does not depend on the machine either.
     with laspy.open(io.BytesIO(content.data), laz_backend=laspy.LazBackend.Lazrs) as file:
         header = file.header
-        _check_compression(content, header)
+        if header.are_points_compressed:
+            (record,) = header.vlrs.get("LasZipVlr")
+            begin = header.offset_to_point_data
+            check_chunks(content, record.record_data, header.point_format.size, begin)
         raw = file.read().points.array
+    if not np.isfinite(header.offsets).all():
+        raise ValueError(f"the offsets of the coordinates are {header.offsets}")
     if {"x", "y", "z"} & set(raw.dtype.names):
         raise ValueError("a further column is called x, y or z")
     if len(raw) < header.point_count:
@@ -122,27 +143,35 @@ def _points(laspy: ModuleType, content: Content) -> tuple[Any, NDArray[Any]]:
     return header, raw
 
 
+def _to_bytes(laspy: ModuleType, header: Any, points: Any, compress: bool) -> bytes:
+    """A file of laspy's header and points."""
+    file = io.BytesIO()
+    with laspy.LasWriter(
+        file,
+        header.copy(),
+        do_compress=compress,
+        laz_backend=laspy.LazBackend.Lazrs,  # one thread, so that every machine writes the same
+        closefd=False,
+        encoding_errors="ignore",  # the header's texts should be ASCII, and not all are
+    ) as writer:
+        writer.write_points(points)
+        if header.evlrs:
+            writer.write_evlrs(header.evlrs)
+    return file.getvalue()
+
+
 def _check_counts(content: Content) -> None:
     """Refuses a header that states more records or points than the file can hold."""
     data = content.data
-    if len(data) < 227 or data[:4] != b"LASF":
+    if data[:4] != b"LASF" or len(data) < (_HEADER_1_4 if data[25:26] >= b"\4" else _HEADER):
         raise ValueError("no LAS header")
     (records,), extended = struct.unpack_from("<I", data, 100), 0
     size, points = struct.unpack_from("<HI", data, 105)
-    if data[25] >= 4 and len(data) >= 375:  # the minor version
+    if data[25] >= 4:  # the minor version
         extended, points = struct.unpack_from("<IQ", data, 243)
     if records * _RECORD + extended * _EXTENDED_RECORD > len(data):
         raise ValueError(f"{records + extended:,} records in the header")
     content.room.take(points * size)
-
-
-def _check_compression(content: Content, header: Any) -> None:
-    """Refuses compressed points that are not of the header's size."""
-    if header.are_points_compressed:
-        lazrs = import_extra("lazrs", "las", content.path)
-        (record,) = header.vlrs.get("LasZipVlr")
-        if lazrs.LazVlr(record.record_data).item_size() != header.point_format.size:
-            raise ValueError("compressed points of another size than the header's")
 
 
 def _origin(whole: NDArray[np.int64], scales: NDArray[np.float64]) -> NDArray[np.int64]:
