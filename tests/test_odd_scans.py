@@ -1,11 +1,13 @@
 """What is odd about a scan: missing, constant and mistaken intensities, and what lies outside."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from derain.cards import load_card
+from derain.files import read_scan
 from derain.filters import DROR, SSR, FilterDerainer
 from derain.hard_cases import scene
 from derain.models.outdet import OutDet
@@ -85,6 +87,24 @@ def test_intensities_of_another_unit_are_told_from_those_of_a_bright_scene(
     for judge in (spec, SSR()):
         assert kinds(scan, judge) == ["intensity of another unit"]
         assert kinds(scan.with_intensity_times(255 / full_scale), judge) == []
+
+
+def test_real_scans_are_odd_only_where_their_intensities_are_shares(
+    spec: Spec, shared: Path
+) -> None:
+    units = {
+        "clean/kitti_hdl64.bin": ["intensity of another unit"],
+        "clean/kitti_front.bin": ["intensity of another unit"],
+        "clean/hesai_at128_front.pcd": ["no intensity"],
+        "clean/ouster_os1_128.npz": [],
+        "clean/pandaset_pandar64.pcd": [],
+        "clean/velodyne_vlp16_dual.pcd": [],
+        "snowykitti/velodyne/000000.bin": [],
+        "wads/sample.bin": [],
+    }
+    scans = {name: read_scan(shared / "data" / name) for name in units}
+    for judge in (spec, SSR()):
+        assert {name: kinds(scan, judge) for name, scan in scans.items()} == units
 
 
 def test_a_unit_that_is_not_stated_is_told_by_the_mean_alone(spec: Spec) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.hard_cases import hard_cases
-from derain.scan import Scan
+from derain.scan import FEWEST_ALIKE, Scan
 
 HARD_CASES = dict(hard_cases())
 
@@ -56,8 +56,44 @@ def can_be_judged(point: list[float], intensity: float | None) -> bool:
 @given(rows_of_four)
 def test_valid_is_what_a_look_at_each_row_says(points: NDArray[np.float32]) -> None:
     rows = points.tolist()
-    assert Scan.of(points).valid.tolist() == [can_be_judged(row[:3], row[3]) for row in rows]
+    # Where not one intensity is a number, the column tells nothing of any point.
+    known = any(abs(row[3]) <= 1e7 for row in rows)
+    expected = [can_be_judged(row[:3], row[3] if known else None) for row in rows]
+    assert Scan.of(points).valid.tolist() == expected
     assert Scan.of(points[:, :3]).valid.tolist() == [can_be_judged(row[:3], None) for row in rows]
+
+
+@given(
+    st.lists(special | st.just(7.0), min_size=1, max_size=4),
+    st.integers(1, 2 * FEWEST_ALIKE),
+    st.sampled_from([0, 1, FEWEST_ALIKE - 1, FEWEST_ALIKE]),
+)
+def test_intensity_was_measured_where_it_differs_or_the_points_are_few(
+    values: list[float], points: int, blank: int
+) -> None:
+    xyz = np.ones((points, 3), np.float32)
+    xyz[:blank] = np.nan
+    scan = Scan(xyz, np.resize(np.array(values, np.float32), points))
+    known = [value for value in scan.intensity.tolist() if abs(value) <= 1e7]
+    seen = [
+        value for value, valid in zip(scan.intensity.tolist(), scan.valid, strict=True) if valid
+    ]
+    measured = known and (len(seen) < FEWEST_ALIKE or len(set(seen)) > 1)
+    assert (scan.measured_intensity is not None) == bool(measured)
+    assert (scan.channel("intensity") is None) == (scan.measured_intensity is None)
+    if measured:
+        assert scan.measured_intensity is scan.intensity
+
+
+def test_intensities_of_another_unit_leave_the_columns_of_the_file() -> None:
+    scan = full_scan()
+    scaled = scan.with_intensity_times(255)
+    np.testing.assert_array_equal(scaled.intensity, 255 * scan.intensity)
+    assert scaled.fields is scan.fields
+    assert scan.with_intensity_times(1) is scan
+    for factor in (0, -1, math.nan, math.inf):
+        with pytest.raises(InputError, match="Give a number above 0"):
+            scan.with_intensity_times(factor)
 
 
 def test_a_cell_is_empty_only_if_every_column_says_so() -> None:
