@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ SOLID = "#7d8a99"
 RAIN = "#39c5ff"
 MISSED = "#ffd23f"
 LOST = "#ff5d5d"
+
+# Steps of brightness that intensity is shown in.
+SHADES = 64
 
 # What a point is and what it was called, as a number and a colour.
 OUTCOMES = {
@@ -125,7 +128,7 @@ def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -
     """
     seen = scan.valid
     x, y, _ = scan.xyz[seen].T
-    _scatter(axes, -y, x, _colours(scan, outcome, seen))
+    _scatter(axes, -y, x, *_colours(scan, outcome, seen))
     axes.set_aspect("equal")
     if len(x):
         nearest, farthest = np.percentile(x, [1, 97])
@@ -147,7 +150,7 @@ def draw_as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> N
     x, y, z = scan.xyz[seen].astype(np.float64).T
     azimuth = np.degrees(np.arctan2(y, x))
     inclination = np.degrees(np.arctan2(z, np.hypot(x, y)))
-    _scatter(axes, -azimuth, inclination, _colours(scan, outcome, seen))
+    _scatter(axes, -azimuth, inclination, *_colours(scan, outcome, seen))
     # Points in one direction leave the limits to matplotlib.
     if len(azimuth) and np.ptp(azimuth) and np.ptp(inclination):
         axes.set_xlim(*np.percentile(-azimuth, [0, 100]))
@@ -156,25 +159,35 @@ def draw_as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> N
 
 def _colours(
     scan: Scan, outcome: NDArray[np.int64] | None, rows: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """RGBA of each row: its outcome's colour, or its intensity from dark to bright."""
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Colours, RGBA (K, 4), and the number of each row's own: its outcome, or its intensity."""
     if outcome is not None:
-        return ListedColormap(list(OUTCOMES.values()))(outcome[rows])
+        return to_rgba_array(list(OUTCOMES.values())), outcome[rows]
     if scan.intensity is None or not rows.any():
-        return ListedColormap([SOLID])(np.zeros(rows.sum(), int))
+        return to_rgba_array(SOLID), np.zeros(np.count_nonzero(rows), np.int64)
     intensity = np.maximum(scan.intensity[rows], 0)
     brightness = intensity / max(float(np.percentile(intensity, 98)), 1e-6)
-    shade = 0.25 + 0.75 * np.sqrt(np.clip(brightness, 0, 1))
-    return np.stack([shade, shade, shade, np.ones_like(shade)], axis=1)
+    share = np.sqrt(np.clip(brightness, 0, 1))
+    shades = np.linspace(0.25, 1, SHADES)  # from dark to bright
+    return to_rgba_array([str(shade) for shade in shades]), (share * (SHADES - 1)).astype(np.int64)
 
 
 def _scatter(
-    axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colours: NDArray[np.float64]
+    axes: Axes,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    colours: NDArray[np.float64],
+    number: NDArray[np.int64],
 ) -> None:
-    # Grey points first, so that the few coloured ones lie on top; small where there are many.
-    order = np.argsort(np.ptp(colours[:, :3], axis=1), kind="stable")
-    size = np.clip(60_000 / max(len(x), 1), 0.3, 3)
-    axes.scatter(x[order], y[order], s=size, c=colours[order], linewidths=0, rasterized=True)
+    size = np.clip(60_000 / max(len(x), 1), 0.3, 3)  # small where there are many
+    # Colour by colour, which matplotlib draws several times as fast; grey first, so that the few
+    # coloured points lie on top.
+    for chosen in np.argsort(np.ptp(colours[:, :3], axis=1), kind="stable"):
+        rows = number == chosen
+        if rows.any():
+            axes.scatter(
+                x[rows], y[rows], s=size, color=colours[chosen], linewidths=0, rasterized=True
+            )
     axes.set_facecolor(BACKGROUND)
     axes.tick_params(labelsize=8)
 

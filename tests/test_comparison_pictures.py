@@ -19,9 +19,11 @@ from derain.scan import Scan
 
 def coloured(figure: Figure, panel: int, outcome: str) -> int:
     """How many dots of a panel have an outcome's colour."""
-    (collection,) = figure.axes[panel].collections
-    colours = collection.get_facecolors()
-    return int(np.isclose(colours, to_rgba(OUTCOMES[outcome])).all(axis=1).sum())
+    return sum(
+        len(drawn.get_offsets())
+        for drawn in figure.axes[panel].collections  # each of one colour
+        if np.allclose(drawn.get_facecolors(), to_rgba(OUTCOMES[outcome]))
+    )
 
 
 def titles(figure: Figure) -> list[str]:

@@ -17,8 +17,10 @@ from derain.scan import Scan
 
 def dots(figure: Figure, panel: int) -> np.ndarray:
     """Places and colours, (N, 2 + 4), of the dots in a panel."""
-    (collection,) = figure.axes[panel].collections
-    return np.column_stack([collection.get_offsets(), collection.get_facecolors()])
+    drawn = figure.axes[panel].collections  # each of one colour
+    places = [np.asarray(part.get_offsets()) for part in drawn]
+    colours = [np.repeat(part.get_facecolors(), len(part.get_offsets()), axis=0) for part in drawn]
+    return np.column_stack([np.concatenate(places), np.concatenate(colours)])
 
 
 def dots_of(figure: Figure, panel: int, outcome: str) -> int:
