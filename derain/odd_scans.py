@@ -114,10 +114,10 @@ def _lack(scan: Scan) -> str:
 def _lack_in_detail(scan: Scan) -> str:
     if scan.intensity is None:
         return "no intensity"
-    finite = scan.intensity[scan.valid & np.isfinite(scan.intensity)]
-    if not len(finite):
-        return "no intensity is a number"
-    return f"intensity {finite[0]:g} at every point, so that it was not measured"
+    values = scan.intensity[scan.valid]
+    if values.min() == values.max():
+        return f"intensity {values[0]:g} at every point, so that it was not measured"
+    return "no intensity is a number that sensors measure"
 
 
 def _intensity_unlike_training(scan: Scan, spec: Spec) -> Iterator[Oddity]:
@@ -128,7 +128,7 @@ def _intensity_unlike_training(scan: Scan, spec: Spec) -> Iterator[Oddity]:
     mean = float(intensity[scan.valid].mean(dtype="float64"))
     if mean > 0 and not 1 / INTENSITY_MISMATCH < mean / expected < INTENSITY_MISMATCH:
         yield Oddity(
-            "intensity of another unit",
+            _other_unit(mean < expected),
             f"mean intensity {mean:.3g}, but {expected:.3g} where the model was trained "
             f"(unit {spec.intensity_unit}): see --intensity-scale",
         )
@@ -146,6 +146,10 @@ def _of_another_scale(scan: Scan, expected: float, whose: str) -> Iterator[Oddit
     scale = next((scale for scale in FULL_SCALES if bright <= scale), FULL_SCALES[-1])
     if scale != expected:
         yield Oddity(
-            "intensity of another unit",
+            _other_unit(scale < expected),
             f"intensities of 0..{scale:g}, but 0..{expected:g} for {whose}: see --intensity-scale",
         )
+
+
+def _other_unit(smaller: bool) -> str:
+    return f"intensity of a {'smaller' if smaller else 'larger'} unit"

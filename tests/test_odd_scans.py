@@ -62,8 +62,9 @@ def test_one_intensity_everywhere_was_not_measured(spec: Spec, value: float) -> 
 
 
 def test_intensities_that_are_no_numbers_were_not_measured(spec: Spec) -> None:
-    (oddity,) = oddities(with_intensity(np.nan), spec)
-    assert oddity.detail.startswith("no intensity is a number: the mean of WADS")
+    for values in (np.nan, np.resize([np.nan, np.inf, 1e9], 300)):
+        (oddity,) = oddities(with_intensity(values), spec)
+        assert oddity.detail.startswith("no intensity is a number that sensors measure: the mean")
 
 
 def test_every_channel_that_is_missing_is_an_oddity_of_its_own(spec: Spec) -> None:
@@ -77,15 +78,15 @@ def test_every_channel_that_is_missing_is_an_oddity_of_its_own(spec: Spec) -> No
     assert kinds(Scan(scene(300)[:, :3].copy()), seeing) == ["no intensity", "no doppler"]
 
 
-@pytest.mark.parametrize("full_scale", [1.0, 65_535.0])
+@pytest.mark.parametrize(("full_scale", "unit"), [(1.0, "smaller"), (65_535.0, "larger")])
 def test_intensities_of_another_unit_are_told_from_those_of_a_bright_scene(
-    spec: Spec, full_scale: float
+    spec: Spec, full_scale: float, unit: str
 ) -> None:
     # Bright enough for the means to be no farther apart than those of two scenes may be.
     shares = np.random.default_rng(0).beta(*((8, 4) if full_scale == 1 else (0.05, 20)), 3000)
     scan = with_intensity(np.maximum(shares, 0.01) * full_scale, 3000)
     for judge in (spec, SSR()):
-        assert kinds(scan, judge) == ["intensity of another unit"]
+        assert kinds(scan, judge) == [f"intensity of a {unit} unit"]
         assert kinds(scan.with_intensity_times(255 / full_scale), judge) == []
 
 
@@ -93,8 +94,8 @@ def test_real_scans_are_odd_only_where_their_intensities_are_shares(
     spec: Spec, shared: Path
 ) -> None:
     units = {
-        "clean/kitti_hdl64.bin": ["intensity of another unit"],
-        "clean/kitti_front.bin": ["intensity of another unit"],
+        "clean/kitti_hdl64.bin": ["intensity of a smaller unit"],
+        "clean/kitti_front.bin": ["intensity of a smaller unit"],
         "clean/hesai_at128_front.pcd": ["no intensity"],
         "clean/ouster_os1_128.npz": [],
         "clean/pandaset_pandar64.pcd": [],
@@ -109,7 +110,7 @@ def test_real_scans_are_odd_only_where_their_intensities_are_shares(
 
 def test_a_unit_that_is_not_stated_is_told_by_the_mean_alone(spec: Spec) -> None:
     unknown = replace(spec, units=("m", "m", "m", "not stated"))
-    assert kinds(with_intensity(scene(300)[:, 3] / 255), unknown) == ["intensity of another unit"]
+    assert kinds(with_intensity(scene(300)[:, 3] / 255), unknown) == ["intensity of a smaller unit"]
     assert kinds(with_intensity(scene(300)[:, 3] * 2), unknown) == []
 
 

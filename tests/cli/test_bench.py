@@ -84,7 +84,7 @@ def test_intensities_of_another_unit_are_warned_of_and_scaled(
     assert net.startswith(f"derain: warning: {first}: net: mean intensity 0.")
     assert ssr.startswith(f"derain: warning: {first}: ssr: intensities of 0..1, but 0..255")
     assert more == [
-        f"derain: warning: 2 more scans: {title}: intensity of another unit"
+        f"derain: warning: 2 more scans: {title}: intensity of a smaller unit"
         for title in ("net", "ssr")
     ]
     scaled = run_derain(*arguments, tmp_path / "scaled", "--intensity-scale", "256")

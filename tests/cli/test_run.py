@@ -162,7 +162,7 @@ def test_intensities_of_another_unit_are_warned_of_once(
     warning, more = outcome.said
     assert warning.startswith(f"derain: warning: {tmp_path / 'a.bin'}: mean intensity 0.0")
     assert "where the model was trained (unit 0..255): see --intensity-scale" in warning
-    assert more == "derain: warning: 2 more scans: intensity of another unit"
+    assert more == "derain: warning: 2 more scans: intensity of a smaller unit"
     scaled = run_derain(
         "run", onnx_model, tmp_path, "--out", tmp_path / "out", "--intensity-scale", "1000"
     )

@@ -114,7 +114,7 @@ def test_intensities_of_another_unit_are_warned_of_and_scaled(
     assert outcome.said == [
         f"derain: warning: {tmp_path / 'velodyne/0.bin'}: intensities of 0..1, but 0..255 for "
         "ssr: see --intensity-scale",
-        "derain: warning: 2 more scans: intensity of another unit",
+        "derain: warning: 2 more scans: intensity of a smaller unit",
     ]
     scaled = run_derain("tune", "ssr", *data, *options, "--intensity-scale", "256")
     assert scaled.said == []
