@@ -84,6 +84,17 @@ class ScanDataset(Dataset[Sample | InputError]):
         return Sample.of(scan, self.view(scan), self.card, pick.measured)
 
 
+class LateLoader(DataLoader[Sample | InputError]):
+    """Starts to read when the first batch is asked for.
+
+    Lightning makes the iterators of a run that goes on from a checkpoint before it tells the epoch,
+    and workers read ahead as soon as there is an iterator.
+    """
+
+    def __iter__(self) -> Any:
+        yield from super().__iter__()
+
+
 @dataclass(frozen=True)
 class Loading:
     """How scans are read and batched.
@@ -247,7 +258,7 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
             self.loading.augmentation if part == "train" else None,
             run_seed(),
         )
-        return DataLoader(
+        return LateLoader(
             dataset,
             batch_size=self.loading.batch_size,
             sampler=self._order(part, dataset),

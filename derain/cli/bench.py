@@ -60,8 +60,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--limit", type=count, help="scans, spread over all (default: all)")
     parser.add_argument(
         "--distinct",
-        action="store_true",
-        help="count points at one position once, as results on WADS are published",
+        action=argparse.BooleanOptionalAction,
+        help="count points at one position once, as results on WADS are published "
+        "(default: as the data card says)",
     )
     parser.add_argument(
         "--rain-rates",
@@ -134,7 +135,7 @@ def _bench(
         list(by_scan),
         partial(_read, data, by_scan, methods, notices),
         known_rates,
-        arguments.distinct,
+        data.distinct if arguments.distinct is None else arguments.distinct,
     )
     timing = Timing(
         evenly_spaced(scans.scans, arguments.timed),
@@ -167,6 +168,7 @@ def _read(
 
 def _learn_from(arguments: argparse.Namespace, data: "ScanDataModule") -> Any:
     """What gives the training scans; None where none are named."""
+    from derain.baselines import known_truth
     from derain.datamodules.sequences import SequenceDataModule
     from derain.datamodules.statistics import evenly_spaced
 
@@ -176,8 +178,7 @@ def _learn_from(arguments: argparse.Namespace, data: "ScanDataModule") -> Any:
 
     def scans() -> Iterator[Any]:
         for file in evenly_spaced(training.files("train"), MOST_TRAINING_SCANS):
-            scan = training.read(file)
-            yield scan, training.card.rain_of(scan)
+            yield known_truth(training.read(file), training.card)
 
     return scans
 

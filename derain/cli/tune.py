@@ -136,7 +136,7 @@ def _tuned_model(
 
 def _read(data: "ScanDataModule", judge: Judge, notices: Notices, file: "ScanFile") -> "Scan":
     """Reads a scan, and warns of what is odd about it for the method."""
-    scan = data.read(file)
+    scan = data.read_measured(file)
     notices.tell(str(file.scan), oddities(scan, judge))
     return scan
 

@@ -28,7 +28,8 @@ from derain.stopwatch import Stopwatch
 # Judges a scan, bool (N,), and gives the stopwatch its stages.
 Method = Callable[[Scan, Stopwatch], NDArray[np.bool_]]
 
-# Gives labelled scans and their rain, bool (N,), to whatever is learnt from them.
+# Gives scans and their rain, bool (N,), to whatever is learnt from them; points of which it is not
+# known whether they are rain are left out.
 LearnFrom = Callable[[], Iterable[tuple[Scan, NDArray[np.bool_]]]]
 
 # The baselines that look at nothing, and those that are learnt from labelled scans.

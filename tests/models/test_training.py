@@ -168,8 +168,9 @@ def networks() -> dict[str, Callable[[], DerainingModule]]:
     }
 
 
-@pytest.mark.parametrize("workers", [0, 2])
-@pytest.mark.parametrize("network", networks())
+@pytest.mark.parametrize(
+    ("network", "workers"), [("outdet", 2), ("salsanext", 0), ("lisnownet", 0)]
+)
 def test_a_run_goes_on_from_its_last_checkpoint_as_if_it_had_not_stopped(
     make_trainer: MakeTrainer,
     scenes: Callable[..., Folder],
@@ -182,11 +183,12 @@ def test_a_run_goes_on_from_its_last_checkpoint_as_if_it_had_not_stopped(
 
     def fit(epochs: int, checkpoint: Path | None = None) -> lightning.Trainer:
         lightning.seed_everything(0)
+        model = networks()[network]()
         torch.rand(epochs)  # what else draws is not to matter
         last = ModelCheckpoint(tmp_path, filename=f"last{epochs}", enable_version_counter=False)
         trainer = make_trainer(epochs=epochs, callbacks=[last], enable_checkpointing=True)
         data = scenes(augmentation=changed, batch_size=2, workers=workers)
-        trainer.fit(networks()[network](), data, ckpt_path=checkpoint)
+        trainer.fit(model, data, ckpt_path=checkpoint)
         return trainer
 
     straight, stopped = fit(epochs=4), fit(epochs=2)

@@ -1,0 +1,61 @@
+"""Several processes measure and predict every scan once: what one process finds, to the bit."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.files.labels import write_labels
+from derain.hard_cases import scene
+from derain.models.base import MERIT
+
+from . import two_processes
+
+# Three batches of two for two processes, the last of one scan: one process has a batch less.
+POINTS = (300, 40, 500, 120, 260)
+SNOW = 110
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Labelled scenes of many sizes."""
+    for number, points in enumerate(POINTS):
+        scene(points, seed=number).tofile(tmp_path / f"{number}.bin")
+        drops = np.arange(points) >= 0.8 * points
+        write_labels(tmp_path / f"{number}.label", np.where(drops, SNOW, 0))
+    return tmp_path
+
+
+def test_two_processes_find_what_one_finds(folder: Path) -> None:
+    finished = subprocess.run(
+        [sys.executable, two_processes.__file__, folder],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+        start_new_session=True,
+    )
+    assert finished.returncode == 0, finished.stderr
+    for network in two_processes.NETWORKS:
+        found = json.loads((folder / network / "found.json").read_text())
+        alone = two_processes.measure(folder, folder / network, 1)
+        assert found["scores"] == alone
+        assert alone["report"]["scans"] == len(POINTS)
+        counted = alone["report"]["classes"].values()
+        assert sum(counts["points"] for counts in counted) == sum(POINTS)
+        # Each process trained on scans of its own; what chose the checkpoint is what one finds.
+        assert found["merit"] == alone["validated"][MERIT]
+        one, two = (
+            {path.name: path.read_bytes() for path in (folder / network / labels).iterdir()}
+            for labels in ("labels1", "labels2")
+        )
+        assert one == two
+        assert len(one) == len(POINTS)
+    # The first process tells what all of them did, and no other says it again.
+    assert finished.stdout.count("mean over scans") == len(two_processes.NETWORKS)
+    said = f"Wrote {len(POINTS)} label files to "
+    assert finished.stdout.count(said) == len(two_processes.NETWORKS)
