@@ -1,17 +1,20 @@
 """``derain demo``: the whole story on simulated rain."""
 
 import argparse
-import shlex
-import sys
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-SUMMARY = "the whole story on simulated rain, in under ten minutes"
+from derain.cli.narration import Narrator, Transcript
+
+SUMMARY = "the whole story on simulated rain, in about six minutes"
 
 DESCRIPTION = """\
-Simulates rain on a test track; trains 3D-OutDet, SalsaNext and LiSnowNet-L1 on it, the last without
-labels; tests them, exports them, proves and times the exports; tunes a filter; cleans scans; and
-compares the networks with the filters and with what every derainer has to beat. Every step is a
-command of derain, printed before it runs.
+Lets it rain on simulated streets, and draws a scan of them; trains 3D-OutDet, SalsaNext and
+LiSnowNet-L1 on them, the last without labels; exports, proves and times each; cleans scans; and
+compares the networks with filters and with what every derainer has to beat. Every step is a command
+of derain, printed before it runs; what it prints goes to log.txt.
 
   derain demo
   derain demo --out somewhere
@@ -21,7 +24,34 @@ command of derain, printed before it runs.
 NETWORKS = {"3D-OutDet": "outdet", "SalsaNext": "salsanext", "LiSnowNet-L1": "lisnownet"}
 
 # What learns nothing, and what nothing worth having is worse than.
-OTHERS = ("dror", "dsor", "ssr", "position", "intensity", "all", "none")
+OTHERS = ("dror", "position", "intensity", "all", "none")
+
+# 16 streets to train on, 5 to choose by, 5 to test on.
+STREETS = (
+    *("--layout", "street", "--sequences", "26", "--scans", "3"),
+    *("--rain", "0", "10", "25", "50", "--sensor", "mems_64", "--no-radar"),
+)
+
+
+@dataclass(frozen=True)
+class Story:
+    """What is told, and how long it takes.
+
+    Attributes:
+        out: Folder that everything is written to.
+        streets: Options of ``derain simulate``.
+        networks: Networks that are trained: what they are called, and their configurations.
+        others: Methods beside them.
+        fit: Options of every training.
+        bench: Options of the comparison.
+    """
+
+    out: Path
+    streets: Sequence[str] = STREETS
+    networks: Sequence[str] = tuple(NETWORKS)
+    others: Sequence[str] = OTHERS
+    fit: Sequence[str] = ()
+    bench: Sequence[str] = ()
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,69 +62,113 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    out: Path = arguments.out
-    models = {title: _model(name, out, arguments.epochs) for title, name in NETWORKS.items()}
-
-    from derain.datamodules.simulated import Simulated
-
-    data = out / "simulated"
-    rainiest = Simulated(str(data)).files("test")[-1].scan
-    _derain("run", str(models["3D-OutDet"]), str(rainiest.parent), "--out", str(out / "cleaned"))
-    picture = out / "before_after.png"
-    _draw(models["3D-OutDet"], rainiest, picture)
-
-    tuned = out / "dsor.yaml"
-    _derain("tune", "dsor", "--data", str(data), "--out", str(tuned))
-    methods = [*(f"{title}={model}" for title, model in models.items()), *OTHERS]
-    bench = out / "bench"
-    _derain(
-        *("bench", "--data", str(data), "--out", str(bench)),
-        *("--methods", *methods, f"dsor, tuned={tuned}"),
-    )
-    print("\nSimulated rain on tracks not trained on: it is easy, and says nothing of real rain.\n")
-    for path, meaning in {
-        out / "*.ckpt": "the trained networks",
-        out / "*.onnx": "the same, for a CPU without torch",
-        out / "cleaned": "scans without their rain, and labels",
-        picture: "one of them, before and after",
-        bench: "the table above, in full, and its picture speed_error.png",
-        out / "runs": f"for TensorBoard: tensorboard --logdir {out / 'runs'}",
-    }.items():
-        print(f"{path!s:24} {meaning}")
+    epochs = ("--trainer.max_epochs", str(arguments.epochs)) if arguments.epochs else ()
+    tell(Story(arguments.out, fit=epochs))
     return 0
 
 
-def _model(name: str, out: Path, epochs: int | None) -> Path:
-    """Trains a network, tests it and exports it."""
-    checkpoint, model = out / f"{name}.ckpt", out / f"{name}.onnx"
-    data = ["--config", f"{name}_simulated.yaml", "--data.root", str(out / "simulated")]
-    quiet = [] if sys.stderr.isatty() else ["--trainer.enable_progress_bar", "false"]
-    log = ["--trainer.logger.save_dir", str(out / "runs")]
-    saving = ["--checkpoint.dirpath", str(out), "--checkpoint.filename", name]
-    length = ["--trainer.max_epochs", str(epochs)] if epochs else []
+def tell(story: Story) -> None:
+    """Runs every step, and prints what came of it.
 
-    checkpoint.unlink(missing_ok=True)
-    _derain("fit", *data, *log, *saving, *length, *quiet)
-    _derain("test", *data, *log, "--ckpt_path", str(checkpoint), *quiet)
-    _derain("export", str(checkpoint), "--out", str(model))
-    return model
-
-
-def _derain(*arguments: str) -> None:
-    """Runs a command of derain, and ends the demo where it fails."""
+    Raises:
+        SystemExit: A step failed.
+    """
     from derain.cli.main import main as derain
 
-    print(f"\n$ derain {shlex.join(arguments)}", flush=True)
-    if code := derain(list(arguments)):
-        raise SystemExit(code)
+    out = story.out
+    narrator = Narrator(derain, out / "log.txt")
+    print(f"Simulated rain, from streets to a table. Everything goes to {out}/\n")
+    data, tuned = out / "simulated", out / "dsor.yaml"
+    narrator.step("simulate", "--out", str(data), *story.streets, result=_last_line)
+    narrator.step("tune", "dsor", "--data", str(data), "--out", str(tuned), result=_first_line)
+    scan = _rainiest(data)
+    narrator.step(
+        *("view", str(scan), "--card", "simulated", "--methods", "dror", f"dsor, tuned={tuned}"),
+        *("--out", str(out / "filters.png")),
+        result=lambda _: f"a first picture: {out / 'filters.png'}",
+    )
+    for title in story.networks:
+        _network(narrator, story, title, scan)
+        if title == story.networks[0]:
+            _clean(narrator, out, title, scan)
+    networks = [f"{title}={out / NETWORKS[title]}.onnx" for title in story.networks]
+    table = narrator.step(
+        *("bench", "--data", str(data), "--out", str(out / "bench"), *story.bench),
+        *("--methods", *networks, f"dsor, tuned={tuned}", *story.others),
+        result=lambda _: f"every method on the same scans: {out / 'bench' / 'bench.md'}",
+    )
+    print("", *map(_narrowed, table), "", sep="\n")
+    print("Simulated rain on streets not trained on is easy, and says nothing of real rain.")
+    print(f"Pictures: {out}/filters.png, before_after.png, bench/speed_error.png")
+    print(f"Training: tensorboard --logdir {out / 'runs'}")
+    print(f"Done in {narrator.elapsed}; what the commands said: {out / 'log.txt'}")
 
 
-def _draw(model: Path, scan: Path, picture: Path) -> None:
-    """Draws one scan before and after."""
+def _network(narrator: Narrator, story: Story, title: str, scan: Path) -> None:
+    """Trains a network and exports it, timed on one scan."""
+    out, name = story.out, NETWORKS[title]
+    checkpoint = out / f"{name}.ckpt"
+    checkpoint.unlink(missing_ok=True)
+    narrator.step(
+        *("fit", "--config", f"{name}_simulated.yaml", "--data.root", str(out / "simulated")),
+        *("--data.make", "false", "--trainer.logger.save_dir", str(out / "runs")),
+        *("--checkpoint.dirpath", str(out), "--checkpoint.filename", name, *story.fit),
+        result=lambda printed: f"{title} trained{_last_score(printed)}",
+    )
+    model = checkpoint.with_suffix(".onnx")
+    narrator.step(
+        *("export", str(checkpoint), "--out", str(model), "--scan", str(scan)),
+        result=lambda printed: f"{model.stat().st_size:,} bytes; {_proof(printed)}",
+    )
+
+
+def _clean(narrator: Narrator, out: Path, title: str, scan: Path) -> None:
+    """Cleans the scans beside one, and draws that one before and after."""
     from derain.export.runtime import Derainer
     from derain.files import read_scan
     from derain.pictures import before_after_figure, save
 
+    model, picture = out / f"{NETWORKS[title]}.onnx", out / "before_after.png"
+    narrator.step(
+        *("run", str(model), str(scan.parent), "--out", str(out / "cleaned")), result=_last_line
+    )
     before = read_scan(scan)
-    title = "Simulated rain, 50 mm/h, cleaned by 3D-OutDet"
-    save(before_after_figure(before, Derainer(model)(before), title), picture)
+    heading = f"Simulated rain, cleaned by {title}"
+    save(before_after_figure(before, Derainer(model)(before), heading), picture)
+    print(f"  one of them before and after: {picture}")
+
+
+def _rainiest(data: Path) -> Path:
+    """The last test scan of the sequence where it rains most."""
+    from derain.datamodules.labelled import rain_rates, sequence_of
+    from derain.datamodules.simulated import Simulated
+
+    rates = rain_rates([data], None)
+    scans = [file.scan for file in Simulated(str(data), make=False).files("test")]
+    return max(scans, key=lambda scan: (rates[sequence_of(scan)], scan))
+
+
+def _first_line(printed: Transcript) -> str:
+    return printed.said[0]
+
+
+def _last_line(printed: Transcript) -> str:
+    return printed.said[-1]
+
+
+def _last_score(printed: Transcript) -> str:
+    """IoU on the validation scans, as the bar of the last epoch shows it."""
+    found = re.search(r"val_iou=([\d.]+)", printed.bar)
+    return f": IoU {found[1]} on streets kept back" if found else ""
+
+
+def _proof(printed: Transcript) -> str:
+    """The largest difference to PyTorch in all cases."""
+    proof = next(line for line in printed.said if "largest logit difference" in line)
+    return f"beside PyTorch {proof.partition(': ')[2]}"
+
+
+def _narrowed(row: str) -> str:
+    """The columns of a row that say how good and how fast a method is."""
+    cells = row.split("|")
+    return "|".join([*cells[:7], cells[10], ""])

@@ -1,0 +1,147 @@
+"""Runs commands of derain one after another, and tells on a few lines how they get on."""
+
+import io
+import re
+import shlex
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+
+# How often one learns how far a command is, in seconds: on a terminal, and in a file.
+PERIODS = {True: 0.5, False: 15.0}
+
+# A progress bar, be it Lightning's or tqdm's: what is counted, and how far it is.
+_BAR = re.compile(r"(?P<what>[^|\r\n]*?):?\s*(?P<share>\d+%)?\|.*\|\s*\d+/")
+_MOVES_OF_CURSOR = re.compile(r"\x1b\[[A-Z]")
+
+
+class Transcript(io.TextIOBase):
+    """Takes what a command prints: whole lines go to a file, bars of progress are looked at.
+
+    Whoever keeps it, as a logger may, can go on writing to it when the command is over.
+
+    Args:
+        log: The file.
+
+    Attributes:
+        said: The lines.
+        progress: How far the command is, as its last bar says; empty without one.
+        bar: The whole of that bar.
+    """
+
+    def __init__(self, log: Path) -> None:
+        self._log = log
+        self._unfinished = ""
+        self.said: list[str] = []
+        self.progress = self.bar = ""
+
+    def write(self, text: str) -> int:
+        """Takes some more of it."""
+        for part in _MOVES_OF_CURSOR.sub("", text).splitlines(keepends=True):
+            self._unfinished += part
+            if found := _BAR.search(self._unfinished):
+                self.bar = self._unfinished.strip()
+                self.progress = f"{found['what'].strip()} {found['share'] or ''}"
+            if self._unfinished.endswith(("\n", "\r")):
+                self._end_line(is_bar=found is not None)
+        return len(text)
+
+    def isatty(self) -> bool:
+        """Bars are wanted: they are how a command says how far it is."""
+        return True
+
+    def _end_line(self, *, is_bar: bool) -> None:
+        line, self._unfinished = self._unfinished.rstrip(), ""
+        if line and not is_bar:
+            self.said.append(line)
+            with self._log.open("a", encoding="utf-8") as file:
+                file.write(line + "\n")
+
+
+class Narrator:
+    """Runs commands, and prints each with its result and the time that it took.
+
+    Args:
+        run: Runs a command of derain, and returns its exit code.
+        log: File that everything the commands print goes to.
+    """
+
+    def __init__(self, run: Callable[[list[str]], int], log: Path) -> None:
+        self._run = run
+        self._log = log
+        self._begun = time.monotonic()
+        log.parent.mkdir(parents=True, exist_ok=True)
+        log.write_text("")
+
+    def step(self, *command: str, result: Callable[[Transcript], str]) -> list[str]:
+        """Runs one command.
+
+        Args:
+            command: Its arguments.
+            result: What is to be told of it, from what it printed.
+
+        Returns:
+            The lines that it printed.
+
+        Raises:
+            SystemExit: It failed; why has been printed.
+        """
+        line = f"$ derain {shlex.join(command)}"
+        print(line, flush=True)
+        begun = time.monotonic()
+        with self._log.open("a", encoding="utf-8") as file:
+            file.write(f"\n{line}\n")
+        printed, warned = Transcript(self._log), Transcript(self._log)
+        with (
+            _told_how_far((printed, warned), begun),
+            redirect_stdout(printed),
+            redirect_stderr(warned),
+        ):
+            code = self._run(list(command))
+        if code:
+            print(*warned.said[-1:], f"All it said: {self._log}", sep="\n", file=sys.stderr)
+            raise SystemExit(code)
+        print(f"  {_clock(time.monotonic() - begun)}  {result(printed)}", flush=True)
+        return printed.said
+
+    @property
+    def elapsed(self) -> str:
+        """Time since the beginning."""
+        return _clock(time.monotonic() - self._begun)
+
+
+@contextmanager
+def _told_how_far(transcripts: Sequence[Transcript], begun: float) -> Iterator[None]:
+    """Shows how far a command is while it runs: on one line of a terminal, or a line at times."""
+    out, done = sys.stdout, threading.Event()
+    live = out.isatty()
+
+    def tell() -> None:
+        while not done.wait(PERIODS[live]):
+            progress = " ".join(filter(None, (each.progress for each in transcripts)))
+            text = f"  {_clock(time.monotonic() - begun)}  {progress}"
+            if live:
+                width = shutil.get_terminal_size().columns - 1
+                out.write(f"\r\x1b[K{text[:width]}")
+            else:
+                out.write(f"{text}\n")
+            out.flush()
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield
+    finally:
+        done.set()
+        teller.join()
+        if live:
+            out.write("\r\x1b[K")
+            out.flush()
+
+
+def _clock(seconds: float) -> str:
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"

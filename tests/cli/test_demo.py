@@ -1,0 +1,154 @@
+"""The demo tells its story on a screen, and leaves what it names."""
+
+import re
+import shlex
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from matplotlib.image import imread
+
+from derain.cli import demo
+from derain.cli.demo import STREETS, Story, tell
+from derain.cli.main import main
+from derain.cli.narration import Narrator, Transcript
+from derain.errors import InputError
+from derain.export import onnx_file
+from derain.files import read_scan
+from derain.hard_cases import scene
+from derain.open3d_import import import_open3d
+from derain.scan import Scan
+
+
+@pytest.fixture
+def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Story:
+    """Three streets of one scan each, one network for one epoch, and one method beside it."""
+    try:
+        import_open3d()
+    except InputError as error:
+        pytest.skip(str(error))
+    monkeypatch.chdir(tmp_path)
+    # The whole proof has tests of its own.
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
+    Path("sensor.yaml").write_text(yaml.safe_dump({"rows": 16, "columns": 60}))
+    return Story(
+        Path("demo"),
+        streets=(
+            *("--layout", "street", "--sequences", "3", "--scans", "1", "--rain", "50"),
+            *("--sensor", "sensor.yaml", "--no-radar", "--workers", "1"),
+        ),
+        networks=("3D-OutDet",),
+        others=("none",),
+        fit=("--trainer.max_epochs", "1", "--panels.scans", "0"),
+        bench=("--timed", "1", "--repeats", "1"),
+    )
+
+
+@pytest.mark.usefixtures("one_block")
+def test_every_step_is_told_and_leaves_what_it_says(
+    small: Story, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tell(small)
+    lines = capsys.readouterr().out.splitlines()
+    commands = [line for line in lines if line.startswith("$ ")]
+    steps = ["simulate", "tune", "view", "fit", "export", "run", "bench"]
+    assert [shlex.split(command)[2] for command in commands] == steps
+    times = [line for line in lines if re.fullmatch(r"  \d+:\d\d  \S.*", line)]
+    assert len(times) == len(steps)
+    assert any("3D-OutDet trained: IoU 0." in line for line in times)
+    table = [line.split("|")[1].strip() for line in lines if line.startswith("| ")]
+    assert table == ["method", "3D-OutDet", "dsor, tuned", "none"]
+    assert len(lines) <= 40
+
+    out = small.out
+    for picture in ("filters.png", "before_after.png", "bench/speed_error.png"):
+        assert imread(out / picture)[..., :3].std() > 0
+    (scan,) = (out / "simulated/sequences/002/lidar_radar_pcd").glob("*.bin")
+    rain = np.fromfile(out / "cleaned" / f"{scan.stem}.label", "<u4") == 1
+    kept = read_scan(out / "cleaned" / scan.name)
+    np.testing.assert_array_equal(kept.xyz, read_scan(scan).xyz[~rain])
+    assert list(out.glob("runs/outdet_simulated/version_0/events.out.tfevents.*"))
+    log = (out / "log.txt").read_text()
+    assert all(command in log for command in commands)
+    assert "it/s" not in log
+
+
+@pytest.mark.usefixtures("small")
+def test_a_step_that_fails_says_why_and_ends_the_story(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("demo/simulated").mkdir(parents=True)
+    Path("demo/simulated/mine.txt").touch()
+    with pytest.raises(SystemExit) as leaving:
+        main(["demo"])
+    assert leaving.value.code == 2
+    outcome = capsys.readouterr()
+    assert [line.split()[2] for line in outcome.out.splitlines() if "$ " in line] == ["simulate"]
+    reason, where = outcome.err.splitlines()
+    assert reason.startswith("derain: demo/simulated: holds something other than")
+    assert where == "All it said: demo/log.txt"
+
+
+def test_the_streets_of_the_demo_have_rain_to_choose_by_and_to_test_on() -> None:
+    from derain.simulation.campaign import Campaign, partition
+
+    options = dict(pairwise(STREETS))
+    rates = tuple(map(float, STREETS[STREETS.index("--rain") + 1 :][:4]))
+    campaign = Campaign(*partition(int(options["--sequences"])), rain_rates=rates)
+    for part in ("validation", "test"):
+        assert max(campaign.rain_rate[name] for name in campaign.split[part]) == max(rates)
+    assert set(demo.NETWORKS.values()) == {"outdet", "salsanext", "lisnownet"}
+
+
+@pytest.fixture
+def narrate(tmp_path: Path) -> Callable[..., list[str]]:
+    """Has something told that prints what it is given."""
+
+    def narrate(*texts: str) -> list[str]:
+        transcript = Transcript(tmp_path / "log.txt")
+        for text in texts:
+            print(text, end="", file=transcript)
+        return [transcript.progress, *transcript.said]
+
+    return narrate
+
+
+def test_bars_are_progress_and_lines_are_kept(narrate: Callable[..., list[str]]) -> None:
+    bar = "Epoch {0}: {1:3}%|####  | 4/9 [00:01<00:02, 4.1it/s, val_iou=0.8]"
+    texts = ["\rTraining: |    | 0/? [00:00<?, ?it/s]", "\r" + bar.format(0, 40), "\nbegins\n"]
+    assert narrate(*texts, "\r" + bar.format(1, 80), "\x1b[A", "ends\n") == [
+        "Epoch 1 80%",
+        "begins",
+    ]
+    assert narrate("one\ntwo", " and\n", "three") == ["", "one", "two and"]
+
+
+def test_a_long_step_says_now_and_then_how_far_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import sys
+    import threading
+
+    monkeypatch.setattr("derain.cli.narration.PERIODS", {True: 0.001, False: 0.001})
+    told = threading.Event()
+    out = sys.stdout
+    write = out.write
+
+    def watched(text: str) -> int:
+        if "judging 40%" in text:
+            told.set()
+        return write(text)
+
+    monkeypatch.setattr(out, "write", watched)
+
+    def slow(command: list[str]) -> int:
+        print("\rjudging:  40%|## | 4/10 [00:01<00:01]", end="", file=sys.stderr)
+        assert told.wait(timeout=30)
+        return 0
+
+    Narrator(slow, tmp_path / "log.txt").step("tune", result=lambda _: "tuned")
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "$ derain tune"
+    assert "  0:00  judging 40%" in lines
+    assert lines[-1].endswith("  tuned")
