@@ -11,6 +11,7 @@ import pytest
 
 from derain import InputError, Scan
 from derain.files import DEFAULT_COLUMNS, find_scans, read_scan, write_scan
+from derain.files.formats import FORMATS
 from derain.files.pcd_header import PcdHeader
 
 RADAR = (
@@ -136,18 +137,26 @@ def test_names_in_upper_case_and_names_as_text_are_understood(tmp_path: Path) ->
 def test_an_unknown_suffix_is_refused_with_the_known_ones(
     tmp_path: Path, use: Callable[[Path], object]
 ) -> None:
-    known = r"Known are \.bin, \.npy, \.npz, \.pcd, \.ply, \.csv\."
-    for name in ("scan.las", "scan"):
+    known = r"Known are \.bin, \.npy, \.npz, \.pcd, \.ply, .*\.laz, and each of them with \.gz\."
+    for name in ("scan.e57", "scan", "scan.e57.gz", "scan.gz"):
         with pytest.raises(InputError, match=known):
             use(tmp_path / name)
 
 
 def test_tables_are_scans_where_there_are_no_others(tmp_path: Path) -> None:
-    for name in ("0.csv", "1.csv", "metadata.csv"):
+    for name in ("0.csv", "1.txt", "metadata.csv", "times.txt"):
         (tmp_path / name).touch()
-    assert [path.name for path in find_scans([tmp_path])] == ["0.csv", "1.csv"]
-    (tmp_path / "2.bin").touch()
-    assert [path.name for path in find_scans([tmp_path])] == ["2.bin"]
+    assert [path.name for path in find_scans([tmp_path])] == ["0.csv", "1.txt"]
+    (tmp_path / "2.xyz").touch()
+    assert [path.name for path in find_scans([tmp_path])] == ["2.xyz"]
+
+
+def test_scans_of_every_format_are_found_compressed_or_not(tmp_path: Path) -> None:
+    names = {f"scan{suffix}{compressed}" for suffix in FORMATS for compressed in ("", ".gz")}
+    for name in (*names, "scan.label.gz", "scan.gz", "scan.e57.gz"):
+        (tmp_path / name).touch()
+    records = {"scan.csv", "scan.txt", "scan.csv.gz", "scan.txt.gz"}
+    assert {path.name for path in find_scans([tmp_path])} == names - records
 
 
 def test_folders_stand_for_their_scans_in_order_and_files_for_themselves(tmp_path: Path) -> None:
@@ -163,7 +172,8 @@ def test_folders_stand_for_their_scans_in_order_and_files_for_themselves(tmp_pat
 
 
 def test_a_missing_path_and_a_folder_without_scans_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").touch()
+    for name in ("notes.md", "times.txt", "poses.txt", "calib.txt", "timestamps.txt"):
+        (tmp_path / name).touch()
     with pytest.raises(InputError, match=r"holds no scans \(\.bin, \.npy"):
         find_scans([tmp_path])
     with pytest.raises(InputError, match="there is no such file or folder"):

@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -90,8 +91,6 @@ def test_names_alone_are_a_scan_of_no_points(file: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", r"cannot be read as \.csv \(no names of columns\)"),
-        (" \n\n", r"cannot be read as \.csv \(no names of columns\)"),
         ("x,y,z\n1,2,3\n\n1,2\n", "line 4 has 2 values for 3 columns"),
         ("x,y,z\n1,2,3,4\n", "line 2 has 4 values for 3 columns"),
         ("x,y,z\n\n1,2,3\n1,tree,3\n", "line 4: y is 'tree', not a number"),
@@ -100,7 +99,10 @@ def test_names_alone_are_a_scan_of_no_points(file: Path) -> None:
         ("x,y,z,x \n1,2,3,4\n", "line 1 names two columns alike: x, y, z, x"),
         ('x,y,z\n1,"2,3\n', "cannot be read as .csv"),
         ("x,y\n1,2\n", r"has no x, y and z among its columns \(x, y\)"),
-        ("1,2,3\n4,5,6\n", r"has no x, y and z among its columns \(1, 2, 3\)"),
+        ("1,2,3\n4,5,6\n", r"has 3 columns, but 4 are stated .*--columns"),
+        ("1,2,3,4\n5,6,tree,8\n", "line 2: column 3 is 'tree', not a number"),
+        ("1 2 3 4\n5 6 7\n", "line 2 has 3 values for 4 columns"),
+        ("1 2 3 4 5 6 7" * 200, "1,201 columns, more than 1,024"),
         (bytes(range(256)), "has no x, y and z among its columns|cannot be read as .csv"),
     ],
 )
@@ -108,6 +110,60 @@ def test_what_is_no_table_of_points_is_refused(file: Path, text: str | bytes, re
     with pytest.raises(InputError, match=reason) as refusal:
         read(file, text)
     assert refusal.value.subject in (file, str(file))
+
+
+@pytest.mark.parametrize("text", ["", " \n\n"])
+def test_an_empty_file_is_a_scan_of_no_points_as_an_empty_bin_is(file: Path, text: str) -> None:
+    scan = read(file, text)
+    assert (len(scan), list(scan.fields)) == (0, ["x", "y", "z", "intensity"])
+
+
+ROWS = [["1", "2.5", "-3", "4"], ["nan", "1e-3", ".5", "+1"]]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".txt", ".xyz", ".asc"])
+@pytest.mark.parametrize("separator", [",", " ; ", " ", "\t", "   "])
+@pytest.mark.parametrize("names", ["", "y x z ring", "# y x z ring", "//y x z ring"])
+def test_text_is_read_with_names_or_with_columns_stated(
+    tmp_path: Path, suffix: str, separator: str, names: str
+) -> None:
+    file = tmp_path / f"scan{suffix}"
+    lines = [separator.join(names.replace("# ", "#").split())] if names else []
+    file.write_text("\n".join(lines + [separator.join(row) for row in ROWS]) + "\n")
+    scan = read_scan(file, ("y", "x", "z", "ring"))
+    expected = np.array([[2.5, 1, -3], [1e-3, np.nan, 0.5]], np.float32)
+    np.testing.assert_array_equal(scan.xyz, expected, strict=True)
+    np.testing.assert_array_equal(scan.fields["ring"], np.array([4, 1]), strict=True)
+    write_scan(file, scan.take(np.array([False, True])))
+    assert file.read_text().splitlines() == [*lines, separator.join(ROWS[1])]
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        ["0", "-0", "+1", "1e-3", ".5", "007", "1.50", '"2"', " 3 ", ""],
+        ["0", "1", "+2", "-0", "18446744073709551615"],
+    ],
+)
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_lines_that_stay_are_written_as_they_were(file: Path, values: list[str], end: str) -> None:
+    lines = ["\ufeffx,y,z, a b ", *(f"{value},{value},{value},{value}" for value in values)]
+    scan = read(file, end.join(lines).encode())
+    stay = np.arange(len(values)) % 3 != 1
+    write_scan(file, scan.take(stay))
+    kept = [line for line, stays in zip(lines[1:], stay, strict=True) if stays]
+    assert file.read_bytes().decode() == "".join(line + end for line in [lines[0], *kept])
+    write_scan(file, scan.take(np.array([2, 0])))
+    assert file.read_bytes().decode().split(end) == [lines[0], lines[3], lines[1], ""]
+
+
+def test_lines_whose_numbers_were_changed_are_written_anew(file: Path) -> None:
+    scan = read(file, "0.50 1 2 7\n3 4 5 8\n")
+    fields = {**scan.fields, "intensity": np.array([7, 9])}
+    write_scan(file, replace(scan, fields=fields))
+    assert file.read_text() == "0.5 1 2 7\n3.0 4 5 9\n"
+    write_scan(file, replace(scan, fields={**scan.fields, "ring": np.array([1, 2])}))
+    assert file.read_text() == "x y z intensity ring\n0.5 1 2 7 1\n3.0 4 5 8 2\n"
 
 
 @st.composite
@@ -131,8 +187,9 @@ def scans(draw: st.DrawFn) -> Scan:
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],  # one file serves all examples
 )
-@given(scan=scans())
-def test_every_value_comes_back(file: Path, scan: Scan) -> None:
+@given(scan=scans(), suffix=st.sampled_from((".csv", ".csv.gz")))
+def test_every_value_comes_back(tmp_path: Path, scan: Scan, suffix: str) -> None:
+    file = tmp_path / f"scan{suffix}"
     write_scan(file, scan)
     copy = read_scan(file)
     assert list(copy.fields) == list(scan.fields)
@@ -173,6 +230,7 @@ def test_a_cleaned_table_holds_the_other_lines_as_they_were(file: Path, separato
         ("normal", np.ones((2, 3), np.float32)),
         ("name", np.array(["car", "tree"])),
         ("complex", np.ones(2, np.complex64)),
+        ("#comment", np.ones(2)),
         (" padded", np.ones(2)),
         ("two\nlines", np.ones(2)),
     ],
