@@ -5,6 +5,9 @@ from pathlib import Path
 # A reason longer than this hides what it says; what made it so long may be millions of characters.
 LONGEST_REASON = 1000
 
+# The longest path of Linux has 4,096 bytes, and what stands in the file is named after it.
+LONGEST_SUBJECT = 5000
+
 
 class InputError(ValueError):
     """Something the user gave cannot be used.
@@ -19,9 +22,8 @@ class InputError(ValueError):
 
     def __init__(self, subject: str | Path, reason: str, remedy: str) -> None:
         reason = " ".join(reason.split())  # what other libraries say may run over several lines
-        if len(reason) > LONGEST_REASON:
-            reason = f"{reason[:LONGEST_REASON]} ..."
-        super().__init__(printable(f"{subject}: {reason}. {remedy}"))
+        reason, remedy = _cut(reason, LONGEST_REASON), _cut(remedy, LONGEST_REASON)
+        super().__init__(printable(f"{_cut(str(subject), LONGEST_SUBJECT)}: {reason}. {remedy}"))
         self.subject = subject
         self.reason = reason
         self.remedy = remedy
@@ -29,6 +31,10 @@ class InputError(ValueError):
     def __reduce__(self) -> tuple[type["InputError"], tuple[str | Path, str, str]]:
         # An error crosses the process boundary of a data loader's worker by pickling.
         return type(self), (self.subject, self.reason, self.remedy)
+
+
+def _cut(text: str, longest: int) -> str:
+    return text if len(text) <= longest else f"{text[:longest]} ..."
 
 
 def printable(text: str) -> str:

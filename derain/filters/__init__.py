@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
+from derain.documents import short
 from derain.errors import InputError
 from derain.filters.derainer import FilterDerainer, filter_view
 from derain.filters.dror import DROR
@@ -57,7 +58,7 @@ def filter_from(name: str, parameters: Mapping[str, Any]) -> PointFilter:
         InputError: No such filter, no such parameter, or a value that it cannot have.
     """
     if name not in FILTERS:
-        raise InputError(name, "no such filter", f"Give one of {', '.join(FILTERS)}.")
+        raise InputError(short(name), "no such filter", f"Give one of {', '.join(FILTERS)}.")
     known = [field.name for field in fields(FILTERS[name])]
     if unknown := sorted(set(parameters) - set(known)):
         raise InputError(

@@ -1,0 +1,188 @@
+"""Small documents of every kind that a user gives."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import astuple
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import yaml
+
+from benchmarks.fuzzing.mutations import as_json, changed
+from benchmarks.fuzzing.reader import Reader
+from derain.annotation.scene_file import read_scene, write_scene
+from derain.cards import load_card, packaged_cards
+from derain.data_statistics import find_sequences
+from derain.documents import Entry
+from derain.extrinsics import read_extrinsics
+from derain.files.frame_times import read_frame_times
+from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
+from derain.hard_cases import scene
+from derain.simulation.campaign import Campaign
+from derain.simulation.manifest import MANIFEST, rates_of_sequences, read_manifest
+from derain.simulation.sensor import load_sensor, packaged_sensors
+
+SCENE = """
+height: 0.1
+road: [[2, -4], [60, -4], [60, 4], [2, 4]]
+rain_area: [[2, -9], [60, -9], [60, 9], [2, 9]]
+boxes:
+  car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
+  mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
+plane: {distance: 0.1, points: 9, iterations: 1000, scans: 10, seed: 0}
+corrections:
+  "003": {boxes: {car_1: {shift: [0.2, 0, 0]}}}
+"""
+CARD = """
+name: yard
+classes: {0: ground, 3: rain, 4: spray, 255: unknown}
+rain: [3, 4]
+unknown: [255]
+mean: [1, 2, 3, 4]
+std: [5.0, 6.0, 7.0, 8.0]
+range: [9, 10]
+extra: {doppler: [-0.5, 2]}
+rain_share: 0.25
+simulated: true
+split: {train: ["00", "010"], validation: [], test: ["008"]}
+"""
+EXTRINSICS = (
+    "{x: 0.5, y: 0.0, z: -0.7, roll: 0, pitch: 0, yaw: 1.5}",
+    "matrix: [[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, -0.7], [0, 0, 0, 1]]",
+)
+TIMES = "frame,timestamp,other\n000000,1.5,a\n000001.bin,1.6,b\n000002,1.7,\n"
+WEATHER = "time,rain_rate_mm_h,wind\n0,25.0,1\n1,nan,1\n2,10,2\n"
+
+
+def readers() -> list[Reader]:
+    """One for each kind of document."""
+    sensors = [path.read_text() for path in packaged_sensors().values()]
+    filters = [
+        yaml.safe_dump({"method": name, **filter_from(name, {}).as_dict()}) for name in FILTERS
+    ]
+    files = {"sequences/000/lidar_radar_pcd/000000.bin": 64 * "0"}
+    manifest = {**Campaign().description, "keep": True, "files": files}
+    return [
+        _of_yaml("card", _read_card, [CARD, packaged_cards()["wads"].read_text()]),
+        _of_yaml("scene", _read_scene, [SCENE]),
+        _of_yaml("extrinsics", _read_extrinsics, EXTRINSICS),
+        _of_yaml("parameters", _read_parameters, filters),
+        _of_yaml("rates", _read_rates, ['"005": 25\n"010": 10.5\n']),
+        _of_yaml("sensor", _read_sensor, sensors),
+        Reader(
+            "manifest",
+            MANIFEST,
+            _read_manifest,
+            lambda: [as_json(manifest)],
+            [lambda: b"[" * 100_000, lambda: b'{"made_by": ' + b"9" * 5000],
+            lambda draw: as_json(changed(manifest, draw)),
+        ),
+        Reader("times", "metadata.csv", _read_times, lambda: [TIMES.encode()]),
+        Reader("weather", "weather.csv", _read_weather, lambda: [WEATHER.encode()]),
+    ]
+
+
+def _of_yaml(name: str, read: Callable[[Path], object], texts: Sequence[str]) -> Reader:
+    def change(draw: Random) -> bytes:
+        content = changed(yaml.safe_load(draw.choice(texts)), draw)
+        if draw.random() < 0.5:
+            return as_json(content)
+        return str(yaml.safe_dump(content, allow_unicode=True)).encode("utf-8", "surrogatepass")
+
+    return Reader(
+        name, f"{name}.yaml", read, lambda: [text.encode() for text in texts], _HOSTILE, change
+    )
+
+
+def _aliases() -> bytes:
+    """Nine aliases of nine aliases of nine: half a gigabyte, were it written out."""
+    lines = ["a: &a [x, x, x, x, x, x, x, x, x]"]
+    for before, name in zip("abcdefgh", "bcdefghi", strict=True):
+        lines.append(f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]")
+    return "\n".join(lines).encode()
+
+
+_HOSTILE: Sequence[Callable[[], bytes]] = (
+    _aliases,
+    lambda: b"&a [*a]",
+    lambda: b"[" * 10_000,
+    lambda: b"{a: " * 500 + b"1" + b"}" * 500,
+    lambda: b"!!python/object/apply:os.system [true]",
+    lambda: b"!!int ''",
+    lambda: b"2001-13-45",
+    lambda: b"a: " + b"9" * 5000,
+    lambda: b"a: 0x" + b"f" * 5000,
+    lambda: b"[" + b"[]," * 300_000 + b"0]",
+)
+
+
+def _read_card(path: Path) -> None:
+    card = load_card(path)
+    assert set(card.rain) <= set(card.classes)
+    assert card.rain
+    assert not set(card.unknown) & set(card.rain)
+    numbers = [*(card.mean or ()), *(card.std or ()), *(card.range or ()), card.rain_share or 0]
+    assert all(map(math.isfinite, numbers)), numbers
+    for channel in card.extra:
+        mean, std = card.statistics(channel)
+        assert math.isfinite(mean)
+        assert std > 0
+
+
+def _read_scene(path: Path) -> None:
+    read = read_scene(path)
+    write_scene(path.with_name("again.yaml"), read)
+    assert read_scene(path.with_name("again.yaml")) == read
+    points = scene(40).astype(np.float64)
+    for sequence in ("", *read.corrections):
+        for box in read.in_sequence(sequence).boxes.values():
+            assert box.contains(points[:, :3]).shape == (40,)
+
+
+def _read_extrinsics(path: Path) -> None:
+    extrinsics = read_extrinsics(path)
+    rotation = extrinsics.matrix[:3, :3]
+    assert np.abs(rotation @ rotation.T - np.eye(3)).max() < 0.01
+    assert not np.isnan(extrinsics(scene(40)[:, :3])).any()
+
+
+def _read_parameters(path: Path) -> None:
+    method, parameters = read_parameters(path)
+    rain = FilterDerainer(filter_from(method, parameters), threads=1)(scene(40))
+    assert rain.dtype == bool
+    assert rain.shape == (40,)
+
+
+def _read_rates(path: Path) -> None:
+    assert all(map(math.isfinite, rates_of_sequences(Entry.of_yaml(path)).values()))
+
+
+def _read_sensor(path: Path) -> None:
+    sensor = load_sensor(path)
+    numbers = np.hstack(astuple(sensor)[:3])
+    assert np.isfinite(numbers).all(), numbers
+    if sensor.rows * sensor.columns < 10**5:
+        assert np.isfinite(sensor.beams()).all()
+
+
+def _read_manifest(path: Path) -> None:
+    manifest = read_manifest(path.parent)
+    assert all(map(math.isfinite, manifest.get("rain_rate_mm_h", {}).values()))
+    for sequences in manifest.get("split", {}).values():
+        assert all(isinstance(name, str) for name in sequences)
+
+
+def _read_times(path: Path) -> None:
+    names = ("000000.bin", "000001.bin", "000002.bin")
+    assert np.isfinite(read_frame_times([path.with_name(name) for name in names])).all()
+
+
+def _read_weather(path: Path) -> None:
+    sequence = path.parent / "sequences" / "000"
+    for folder in ("velodyne", "weather"):
+        (sequence / folder).mkdir(parents=True, exist_ok=True)
+    (sequence / "velodyne" / "0.bin").write_bytes(b"")
+    (sequence / "weather" / "0.csv").write_bytes(path.read_bytes())
+    (found,) = find_sequences(path.parent, ("velodyne", "labels"))
+    assert found.rain_rate is None or math.isfinite(found.rain_rate)

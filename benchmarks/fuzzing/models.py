@@ -1,0 +1,133 @@
+"""Exported models and checkpoints; torch is imported where it must be."""
+
+import io
+import json
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from benchmarks.fuzzing.mutations import as_json, changed
+from benchmarks.fuzzing.reader import Reader
+from derain.hard_cases import scene
+from derain.scan import Scan
+
+POINTS = 60
+
+GRID = {"rows": 18, "columns": 60, "inclination": [-30.0, 20.0]}
+
+
+# Values of a Spec that stop or fill a process where they are believed.
+HOSTILE: Sequence[dict[str, Any]] = (
+    {"view": {"kind": "neighbours", "neighbours": -1}},
+    {"view": {"kind": "neighbours", "neighbours": 10**9}},
+    {"view": None},
+    {"threshold": math.nan},
+    {"channels": ["x"]},
+    {"mean": [1e308] * 4},
+)
+
+
+def write_models(folder: Path) -> None:
+    """Writes untrained networks that are quick to export, as models and as checkpoints."""
+    import torch
+
+    from derain.cards import load_card
+    from derain.export.onnx_file import export
+    from derain.models import outdet
+    from derain.models.checkpoint import save_model
+    from derain.models.salsanext import SalsaNext
+
+    outdet.BLOCKS = 1  # the same network, traced several times as quickly
+    torch.manual_seed(0)
+    for model in (outdet.OutDet(), SalsaNext(grid=GRID, width=4)):
+        model.adopt(model.spec_for(load_card("wads")))
+        export(model.eval(), folder / f"{model.NAME}.onnx")
+        save_model(model, folder / f"{model.NAME}.ckpt")
+
+
+def readers(folder: Path) -> list[Reader]:
+    """One for exported models and one for checkpoints.
+
+    Args:
+        folder: Holds undamaged ones.
+    """
+    models = sorted(folder.glob("*.onnx"))
+    checkpoints = sorted(folder.glob("*.ckpt"))
+    return [
+        Reader(
+            "onnx",
+            "model.onnx",
+            _read_model,
+            lambda: [path.read_bytes() for path in models],
+            [partial(_saying, models[0], partial(_with_spec, spec)) for spec in HOSTILE],
+            change=lambda draw: _with_metadata(draw.choice(models), draw),
+        ),
+        Reader(
+            "ckpt",
+            "model.ckpt",
+            _read_checkpoint,
+            lambda: [path.read_bytes() for path in checkpoints],
+            change=lambda draw: _with_content(draw.choice(checkpoints), draw),
+        ),
+    ]
+
+
+def _read_model(path: Path) -> None:
+    from derain.export.runtime import Derainer
+
+    probability = Derainer(path, threads=1).probability(scene(POINTS))
+    assert probability.shape == (POINTS,), probability.shape
+    assert np.isfinite(probability).all(), "a probability that is not finite"
+    assert 0 <= probability.min() <= probability.max() <= 1, "a probability out of 0..1"
+
+
+def _read_checkpoint(path: Path) -> None:
+    from derain.models.checkpoint import load_model
+
+    model = load_model(path)
+    model.spec.make_view(1)(Scan.of(scene(POINTS)))
+
+
+def _with_metadata(path: Path, draw: Random) -> bytes:
+    def say(metadata: dict[str, Any]) -> Any:
+        if draw.random() < 0.5:
+            return changed(metadata, draw)
+        return {**metadata, "spec": changed(metadata["spec"], draw)}
+
+    return _saying(path, say)
+
+
+def _with_spec(values: dict[str, Any], metadata: dict[str, Any]) -> Any:
+    return {**metadata, "spec": {**metadata["spec"], **values}}
+
+
+def _saying(path: Path, say: Callable[[dict[str, Any]], Any]) -> bytes:
+    """A sound graph that says odd things of itself."""
+    import onnx
+
+    from derain.export.runtime import METADATA_KEY
+
+    proto = onnx.load(path)
+    (entry,) = (entry for entry in proto.metadata_props if entry.key == METADATA_KEY)
+    entry.value = as_json(say(json.loads(entry.value))).decode("utf-8", "replace")
+    return bytes(proto.SerializeToString())
+
+
+def _with_content(path: Path, draw: Random) -> bytes:
+    """A sound archive of odd values."""
+    import torch
+
+    content = torch.load(path, map_location="cpu", weights_only=True)
+    part = draw.choice(("hyper_parameters", "hyper_parameters", "state_dict", "all"))
+    if part == "all":
+        content = changed(content, draw)
+    else:
+        content[part] = changed(dict(content[part]), draw)
+    file = io.BytesIO()
+    torch.save(content, file)
+    return file.getvalue()

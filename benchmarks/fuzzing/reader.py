@@ -1,0 +1,57 @@
+"""What is fuzzed: a reader, the inputs made for it, and what counts as a right result."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from random import Random
+
+from benchmarks.fuzzing.mutations import damaged
+
+Make = Callable[[Random], bytes]
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader of one kind of file.
+
+    Attributes:
+        name: What it is called.
+        file: Name that its files have.
+        read: Reads a file as derain does. It returns where the result is right, and raises
+            InputError where the file is refused; anything else is a finding.
+        seeds: Makes files that are right, and must be read.
+        hostile: Files that somebody thought out; they come first.
+        change: Makes a damaged file in a way of its own, knowing what is in it; half of the inputs.
+    """
+
+    name: str
+    file: str
+    read: Callable[[Path], object]
+    seeds: Callable[[], Sequence[bytes]]
+    hostile: Sequence[Callable[[], bytes]] = ()
+    change: Make | None = None
+
+    @cached_property
+    def _seeds(self) -> Sequence[bytes]:
+        return self.seeds()
+
+    def must_read(self, number: int) -> bool:
+        """Whether an input is undamaged."""
+        return 0 <= number - len(self.hostile) < len(self._seeds)
+
+    def content(self, seed: int, number: int) -> bytes:
+        """An input: the hostile ones, then those that are right, then damaged ones without end.
+
+        Args:
+            seed: Of the whole run.
+            number: Which one; it does not depend on those before it.
+        """
+        if number < len(self.hostile):
+            return self.hostile[number]()
+        if self.must_read(number):
+            return self._seeds[number - len(self.hostile)]
+        draw = Random(f"{seed} {self.name} {number}")
+        if self.change is not None and draw.random() < 0.5:
+            return self.change(draw)
+        return damaged(draw.choice(self._seeds), draw.choice(self._seeds), draw)
