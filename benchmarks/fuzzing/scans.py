@@ -16,6 +16,7 @@ from benchmarks.fuzzing.mutations import damaged
 from benchmarks.fuzzing.reader import Reader
 from derain import files
 from derain.errors import InputError
+from derain.files.formats import FORMATS
 from derain.files.labels import read_labels, semantic
 from derain.hard_cases import scene
 from derain.scan import Scan
@@ -28,7 +29,7 @@ BOMB = 1500
 
 def readers() -> list[Reader]:
     """One for each format, those of compressed files included, and one for labels."""
-    formats = [_reader(suffix) for suffix in files.SUFFIXES]
+    formats = [_reader(suffix) for suffix in FORMATS]
     packed = [_packed(reader) for reader in formats if reader.file in ("scan.bin", "scan.ply")]
     labels = Reader("label", "scan.label", _read_labels, lambda: [bytes(range(4 * POINTS))])
     return [*formats, *packed, labels]

@@ -17,14 +17,11 @@ from derain.files.names import is_compressed, scan_suffix
 from derain.files.reading import reading
 from derain.scan import Scan
 
-__all__ = ["DEFAULT_COLUMNS", "SUFFIXES", "find_scans", "read_scan", "write_scan"]
+__all__ = ["DEFAULT_COLUMNS", "find_scans", "read_scan", "write_scan"]
 
 # What lies in folders of scans and is none: when they were taken, and KITTI's poses, times and
 # calibration.
 RECORDS = (METADATA, "calib.txt", "poses.txt", "times.txt", "timestamps.txt")
-
-# Suffixes of the formats that are read.
-SUFFIXES = tuple(_STATED | _NAMED)
 
 
 def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Scan:
