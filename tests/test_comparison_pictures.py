@@ -95,7 +95,8 @@ def test_a_scan_with_nothing_to_see_is_drawn(name: str, scan: Scan) -> None:
         figure.draw_without_rendering()
     # Nothing was there to be got wrong.
     assert titles(figure) == ["input: intensity", "truth: 0 points of rain", "none: IoU 1.000"]
-    assert [len(panel.collections[0].get_offsets()) for panel in figure.axes] == [0] * 6
+    assert len(figure.axes) == 6
+    assert not any(len(drawn.get_offsets()) for axes in figure.axes for drawn in axes.collections)
 
 
 @pytest.mark.skipif(

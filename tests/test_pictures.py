@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.image import imread
@@ -17,10 +18,16 @@ from derain.scan import Scan
 
 def dots(figure: Figure, panel: int) -> np.ndarray:
     """Places and colours, (N, 2 + 4), of the dots in a panel."""
-    drawn = figure.axes[panel].collections  # each of one colour
-    places = [np.asarray(part.get_offsets()) for part in drawn]
-    colours = [np.repeat(part.get_facecolors(), len(part.get_offsets()), axis=0) for part in drawn]
-    return np.column_stack([np.concatenate(places), np.concatenate(colours)])
+    return dots_in(figure.axes[panel])
+
+
+def dots_in(axes: Axes) -> np.ndarray:
+    parts = [np.zeros((0, 6))]
+    for drawn in axes.collections:  # each of one colour
+        places = np.asarray(drawn.get_offsets())
+        colours = np.repeat(drawn.get_facecolors(), len(places), axis=0)
+        parts.append(np.column_stack([places, colours]))
+    return np.concatenate(parts)
 
 
 def dots_of(figure: Figure, panel: int, outcome: str) -> int:
@@ -125,8 +132,7 @@ def test_a_hard_case_is_drawn_without_a_warning(name: str, scan: Scan) -> None:
     for axes, drawn in zip(
         [*change.axes, *judgement.axes], [judged, left, judged, left, *[judged] * 8], strict=True
     ):
-        (collection,) = axes.collections
-        places = np.array(collection.get_offsets())
+        places = dots_in(axes)[:, :2]
         assert len(places) == drawn
         # Something of what is there is in sight.
         (low, high) = np.transpose([axes.get_xlim(), axes.get_ylim()])
