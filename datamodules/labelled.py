@@ -1,5 +1,6 @@
 """Labelled scans as a user names them: files, folders of scans, or the root of a data set."""
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -51,7 +52,7 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> S
         InputError: A root whose sequences hold no folder of scans that is known.
     """
     root = paths[0]
-    if len(paths) > 1 or not (root / SEMANTIC_KITTI.sequences).is_dir():
+    if len(paths) > 1 or not os.path.isdir(root / SEMANTIC_KITTI.sequences):
         return NamedScans(paths, card, loading)
     split = read_manifest(root).get("split")
     return SequenceDataModule(str(root), card, _layout_of(root), split, loading)

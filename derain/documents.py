@@ -278,7 +278,7 @@ def _refuse_what_unfolds(text: str, most: int) -> None:
         if number > most:
             raise ValueError(f"more than {most:,} values")
         if isinstance(event, yaml.AliasEvent):
-            raise ValueError(f"the alias *{short(event.anchor)}: write out what it stands for")
+            raise ValueError(f"the alias *{short(str(event.anchor))}: write out what it stands for")
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > DEEPEST:

@@ -7,9 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from derain.errors import InputError
+from derain.errors import InputError, printable
 from derain.files.atomic import replacing
 from derain.scan import Scan
 
@@ -93,6 +94,10 @@ def save(figure: Figure, path: Path) -> None:
     """
     if path.suffix[1:].lower() not in figure.canvas.get_supported_filetypes():
         raise InputError(path, f"'{path.suffix}' is not the suffix of a picture", "Name it .png.")
+    for text in figure.findobj(Text):
+        # Names of files may stand in it: what is no text, control sequences, $ of mathematics.
+        text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
+        text.set_parse_math(False)
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=110)
 

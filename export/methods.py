@@ -7,7 +7,7 @@ from typing import Any
 
 from derain.errors import InputError
 from derain.export.runtime import Derainer
-from derain.files.presence import is_there
+from derain.files.reading import is_file
 from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
 
 PARAMETER_SUFFIXES = (".yaml", ".yml")
@@ -42,7 +42,7 @@ def load_method(
     """
     if name in FILTERS:
         return FilterDerainer(filter_from(name, parameters), threads)
-    if not is_there(Path(name)):
+    if not is_file(Path(name)):
         raise InputError(
             name,
             "no such file",

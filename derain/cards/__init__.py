@@ -13,7 +13,7 @@ from derain.channels import UNITS
 from derain.documents import Entry, shown
 from derain.errors import InputError
 from derain.files.labels import LARGEST_ID
-from derain.files.reading import reading
+from derain.files.reading import is_file
 from derain.scan import Scan
 
 Parsed = TypeVar("Parsed")
@@ -141,9 +141,7 @@ def load_card(name: str | Path) -> DataCard:
     """
     cards = packaged_cards()
     path = cards.get(str(name), Path(name))
-    with reading(path):
-        exists = path.is_file()
-    if not exists:
+    if not is_file(path):
         raise InputError(
             name, "no such data card", f"Give a YAML file or one of {', '.join(cards)}."
         )

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -12,7 +13,7 @@ import numpy as np
 from tqdm import tqdm
 
 from derain.cli.arguments import factor
-from derain.cli.outputs import refuse_clashes
+from derain.cli.outputs import refuse_clashes, say
 from derain.cli.scan_options import add_columns
 from derain.data_statistics import LAYOUTS
 from derain.errors import InputError
@@ -117,13 +118,13 @@ def main(arguments: argparse.Namespace) -> int:
         picture = arguments.out / f"{sequence}.png"
         _draw(read_scan(paths[len(paths) // 2], columns), scene, plane, sequence, picture)
         report["picture"] = str(picture)
-    print(json.dumps(report) if arguments.json else _as_text(report))
+    say(json.dumps(report) if arguments.json else _as_text(report))
     return 0
 
 
 def _folder_of_scans(path: Path) -> Path:
     """The folder of scans in a sequence's folder; other paths stay."""
-    return next((path / name for name in SCAN_FOLDERS if (path / name).is_dir()), path)
+    return next((path / name for name in SCAN_FOLDERS if os.path.isdir(path / name)), path)
 
 
 def _sequence_of(scan: Path) -> str:

@@ -4,6 +4,8 @@ import argparse
 import math
 import shlex
 
+from derain.errors import printable
+
 
 def count(text: str) -> int:
     """A whole number of 1 or more."""
@@ -50,7 +52,7 @@ def command_line(arguments: argparse.Namespace, positional: str | None = None) -
             words += map(str, value)
         elif value is not True:
             words.append(str(value))
-    return shlex.join(words)
+    return printable(shlex.join(words))
 
 
 def _at_least(least: int, text: str) -> int:

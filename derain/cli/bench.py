@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from derain.cli.arguments import command_line, count, threads
 from derain.cli.labelled_data import add_data_arguments, labelled
-from derain.cli.outputs import refuse_unwritable
+from derain.cli.outputs import refuse_unwritable, say
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.notices import Notices
@@ -94,7 +94,7 @@ def main(arguments: argparse.Namespace) -> int:
     refuse_unwritable(arguments.out / "bench.json")
     if arguments.paper is None:
         rows = _bench(arguments, data, data.files(arguments.part), rates, methods, arguments.out)
-        print(main_table(rows))
+        say(main_table(rows))
         return 0
     _require_split(arguments, data)
     table = paper_table(arguments.paper)
@@ -105,7 +105,7 @@ def main(arguments: argparse.Namespace) -> int:
     text = beside_published(table, ours, data.card)
     with replacing(arguments.out / f"{arguments.paper}.md") as temporary:
         temporary.write_text(text + "\n", "utf-8")
-    print(text)
+    say(text)
     return 0
 
 

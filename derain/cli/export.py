@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cli.arguments import count, threads
+from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns
 
 if TYPE_CHECKING:
@@ -51,17 +52,17 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.errors import InputError
     from derain.export.latency import measure_latency
     from derain.export.onnx_file import export
-    from derain.files.presence import is_there
+    from derain.files.reading import is_file
     from derain.models.checkpoint import load_model
 
-    if arguments.scan is not None and not is_there(arguments.scan):
+    if arguments.scan is not None and not is_file(arguments.scan):
         raise InputError(arguments.scan, "there is no such file", "Check --scan.")
     model = load_model(arguments.checkpoint)
     proof = export(
         model, arguments.out, _calibration(arguments.calibration, arguments.int8, arguments.columns)
     )
     print(proof)
-    print(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
+    say(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
     print(
         measure_latency(
             arguments.out,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.cli.arguments import factor
-from derain.cli.outputs import refuse_clashes
+from derain.cli.outputs import refuse_clashes, say
 from derain.cli.scan_options import add_columns
 from derain.data_layout import REHEARSE3D
 from derain.errors import InputError
@@ -111,7 +111,7 @@ def main(arguments: argparse.Namespace) -> int:
         _fuse(scan, frame, extrinsics, arguments)
     _write_metadata(arguments.out / SCANS / METADATA, scans, times, partners)
     alone = partners.count(None)
-    print(f"{len(scans)} scans in {arguments.out / SCANS}, {alone} of them without a radar frame")
+    say(f"{len(scans)} scans in {arguments.out / SCANS}, {alone} of them without a radar frame")
     return 0
 
 

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from derain.cli.outputs import say
+
 SUMMARY = "make a checkpoint from published weights"
 
 DESCRIPTION = """\
@@ -46,5 +48,5 @@ def main(arguments: argparse.Namespace) -> int:
         read_state_dict(arguments.weights), load_card(arguments.stats), arguments.grid
     )
     save_model(model, arguments.out)
-    print(f"Wrote {arguments.out}: {model.NAME} with the statistics of {model.spec.data}")
+    say(f"Wrote {arguments.out}: {model.NAME} with the statistics of {model.spec.data}")
     return 0

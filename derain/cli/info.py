@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,13 @@ import yaml
 from numpy.typing import NDArray
 
 from derain.cli.info_folder import draw, facts_of_folder
+from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns
 from derain.directions import directions
-from derain.errors import InputError
+from derain.errors import InputError, printable
 from derain.files import find_scans, read_scan
 from derain.files.labels import read_labels, semantic
+from derain.files.reading import reading
 from derain.grid_fit import fit_grid
 from derain.morton import distinct_rows
 from derain.scan import Scan
@@ -69,35 +72,37 @@ def main(arguments: argparse.Namespace) -> int:
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0
     for path in arguments.files:
-        if path.is_dir():
+        if os.path.isdir(path):
             _describe_folder(path, arguments)
             continue
         facts = _facts(path, arguments.columns)
         if arguments.json:
             print(json.dumps({"file": str(path), **facts}))
         else:
-            print(path)
-            print(_indented(facts))
+            print(printable(str(path)))
+            say(_indented(facts))
     return 0
 
 
 def _refuse_unclear_picture(arguments: argparse.Namespace) -> None:
     """Refuses a picture of anything but the statistics of one folder."""
     if arguments.picture and (
-        arguments.grid or len(arguments.files) > 1 or not arguments.files[0].is_dir()
+        arguments.grid or len(arguments.files) > 1 or not os.path.isdir(arguments.files[0])
     ):
         raise InputError("--picture", "shows one folder's statistics", "Name one folder alone.")
 
 
 def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
     facts = facts_of_folder(folder, arguments)
-    print(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
+    say(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
     if arguments.picture:
         draw(facts, arguments.picture)
 
 
 def _facts(path: Path, columns: Sequence[str]) -> dict[str, Any]:
-    if not path.exists():
+    with reading(path):
+        exists = path.exists()
+    if not exists:
         raise InputError(path, "there is no such file or folder", "Check the path.")
     match path.suffix.lower():
         case ".label":

@@ -1,6 +1,7 @@
 """The command ``derain``: finds the subcommand, and turns errors of the user's into one line."""
 
 import argparse
+import io
 import os
 import signal
 import sys
@@ -69,14 +70,16 @@ def main(arguments: list[str] | None = None) -> int:
         signal that ended it.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names may hold what is no text
     try:
         with interrupting():
             code = _run(arguments)
             sys.stdout.flush()  # here, where a pipe that broke is still ours to handle
             return code
     except InputError as error:
-        print(f"derain: {error}", file=sys.stderr)
-        return 2
+        return _refused(error)
     except BrokenPipeError:
         # Whoever read our output has had enough; Python must not try to flush the rest.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -87,6 +90,16 @@ def main(arguments: list[str] | None = None) -> int:
         if isinstance(leaving.__context__, KeyboardInterrupt):  # Lightning leaves in its own way
             return _interrupted(leaving.__context__)
         raise
+    except OSError as error:
+        return _refused(
+            InputError(
+                error.filename or "derain",
+                error.strerror or str(error),
+                "Check the path, its permissions, and the room on its disk.",
+            )
+        )
+    except MemoryError:
+        return _refused(InputError("derain", "the memory is full", "Give it less at once."))
 
 
 def _interrupted(interruption: KeyboardInterrupt) -> int:
@@ -95,6 +108,11 @@ def _interrupted(interruption: KeyboardInterrupt) -> int:
     by = "" if number == signal.SIGINT else f" by {number.name}"
     print(f"derain: interrupted{by}", file=sys.stderr)
     return 128 + number
+
+
+def _refused(error: InputError) -> int:
+    print(f"derain: {error}", file=sys.stderr)
+    return 2
 
 
 def _run(arguments: list[str]) -> int:

@@ -1,11 +1,15 @@
-"""Where a command may write what it makes of scans."""
+"""What commands print, and where they may write what they make of scans."""
 
+import sys
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import TextIO
 
-from derain.errors import InputError
+from tqdm import tqdm
+
+from derain.errors import InputError, printable
 from derain.files.atomic import replacing
 from derain.files.labels import label_beside
 from derain.files.names import scan_stem
@@ -31,6 +35,16 @@ def refuse_clashes(scans: Sequence[Path], out: Path) -> None:
             raise InputError(
                 scan, "another scan has the same name", "Take them in two runs, each to its --out."
             )
+
+
+def say(text: str, stream: TextIO | None = None) -> None:
+    """Prints lines, above a progress bar if there is one, with escapes for what no terminal shows.
+
+    Args:
+        text: The lines; names in them may hold anything.
+        stream: Where to; None is the standard output.
+    """
+    tqdm.write("\n".join(map(printable, text.split("\n"))), stream or sys.stdout)
 
 
 def refuse_unwritable(path: Path) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.cli.outputs import refuse_clashes
-from derain.errors import InputError
+from derain.errors import InputError, printable
 from derain.files import find_scans, read_scan, write_scan
 from derain.files.labels import LABEL, write_labels
 from derain.files.names import beside, scan_stem
@@ -42,7 +42,7 @@ class Rained:
 
     def __str__(self) -> str:
         return (
-            f"{self.scan}: {self.clean:,} points, in the rain {self.points:,}: "
+            f"{printable(self.scan)}: {self.clean:,} points, in the rain {self.points:,}: "
             f"{self.rain:,} of drops, {self.lost:,} lost"
         )
 

@@ -15,7 +15,7 @@ from tqdm import tqdm
 from derain.cli.arguments import share, threads
 from derain.cli.outputs import refuse_clashes
 from derain.cli.scan_options import add_columns, add_intensity_scale
-from derain.errors import InputError
+from derain.errors import InputError, printable
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
 from derain.files import find_scans, read_scan, write_scan
@@ -71,9 +71,9 @@ class Cleaned:
     warnings: list[str]
 
     def __str__(self) -> str:
-        total = sum(self.milliseconds.values())
+        name, total = printable(self.scan), sum(self.milliseconds.values())
         return (
-            f"{self.scan}: {self.points:,} points, {self.rain:,} of rain "
+            f"{name}: {self.points:,} points, {self.rain:,} of rain "
             f"({self.share_removed:.1%}), {total:.0f} ms"
         )
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from derain.cli.arguments import count
+from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns
 from derain.cores import usable_cores
 from derain.errors import InputError
@@ -138,7 +139,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
     )
     simulate_track(arguments.out, campaign, arguments.workers)
     scans = len(campaign.names) * campaign.scans
-    print(
+    say(
         f"{arguments.out}: {len(campaign.names)} sequences, {scans:,} scans. "
         f"What is in them: derain info {arguments.out}"
     )

@@ -14,7 +14,7 @@ from tqdm import tqdm
 from derain import __version__
 from derain.cli.arguments import command_line, count, threads
 from derain.cli.labelled_data import add_data_arguments, labelled
-from derain.cli.outputs import refuse_unwritable
+from derain.cli.outputs import refuse_unwritable, say
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.filters import FILTERS, filter_from
@@ -77,7 +77,7 @@ def main(arguments: argparse.Namespace) -> int:
         f"{tuned.default_iou:.4f} with the defaults"
     )
     _write(arguments, tuned, facts)
-    print(f"{arguments.method}: {facts}")
+    say(f"{arguments.method}: {facts}")
     for name, value in tuned.parameters.items():
         print(f"  {name}: {value}")
     return 0

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cli.arguments import threads
+from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError
 from derain.files import read_scan
@@ -74,7 +75,7 @@ def main(arguments: argparse.Namespace) -> int:
         from derain.pictures import save
 
         save(comparison_figure(scan, predicted, rain, title), arguments.out)
-        print(arguments.out)
+        say(str(arguments.out))
     if arguments.window:
         from derain.comparison_window import show_comparison
 

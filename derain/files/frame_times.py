@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.names import COMPRESSED
-from derain.files.reading import reading
+from derain.files.reading import is_file, reading
 
 METADATA = "metadata.csv"
 
@@ -41,7 +41,7 @@ def read_frame_times(
             two times.
     """
     path = scans[0].parent / METADATA
-    if not path.exists():
+    if not is_file(path):
         raise InputError(
             path,
             "there is no such file",

@@ -3,6 +3,7 @@
 Source: Behley et al. 2019, SemanticKITTI; github.com/PRBonn/semantic-kitti-api, README.
 """
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,8 @@ LARGEST_ID = 0xFFFF
 def label_beside(scan: Path) -> Path:
     """Where a scan's labels lie: beside it if they are there, else in the sibling `labels`."""
     label = beside(scan, LABEL)
-    return label if label.is_file() else scan.parent.parent / "labels" / label.name
+    # Not Path.is_file, which raises where the name has become too long by its suffix.
+    return label if os.path.isfile(label) else scan.parent.parent / "labels" / label.name
 
 
 def label_of(scan: Path) -> Path:

@@ -80,3 +80,14 @@ def file_size(path: Path) -> int:
     if not stat.S_ISREG(status.st_mode):
         raise InputError(path, "is a pipe or a device", "Name a file.")
     return status.st_size
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file.
+
+    Raises:
+        InputError: That cannot be known: a name longer than any file's, or a folder that may not be
+            searched.
+    """
+    with reading(path):
+        return path.is_file()

@@ -11,10 +11,14 @@ from derain.files.lock import lock
 
 PREFIX = ".derain-"
 
+# No format has a longer one; what follows the last point of a long name is none, and the temporary
+# name must not be longer than a name may be.
+LONGEST_SUFFIX = 16
+
 
 @contextmanager
 def temporary_beside(path: Path) -> Iterator[Path]:
-    """Lends an empty file in the folder of another, hidden and of the same suffix.
+    """Lends an empty hidden file in the folder of another, with its suffix if a format may have it.
 
     It is gone when the block ends. A process that is killed leaves it; it holds a lock that goes
     with the process, so that others can tell.
@@ -26,7 +30,8 @@ def temporary_beside(path: Path) -> Iterator[Path]:
         OSError: The folder cannot be written.
     """
     remove_abandoned(path.parent)
-    temporary = path.with_name(f"{PREFIX}{secrets.token_hex(8)}{path.suffix}")
+    suffix = path.suffix if len(os.fsencode(path.suffix)) <= LONGEST_SUFFIX else ""
+    temporary = path.with_name(f"{PREFIX}{secrets.token_hex(8)}{suffix}")
     try:
         descriptor = _made(temporary)
         try:

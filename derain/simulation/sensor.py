@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from derain.documents import Entry, shown
 from derain.errors import InputError
-from derain.files.reading import reading
+from derain.files.reading import is_file
 from derain.scan import Scan
 from derain.spherical_grid import FULL_CIRCLE
 
@@ -225,9 +225,7 @@ def load_sensor(name: str | Path) -> Sensor:
     """
     sensors = packaged_sensors()
     path = sensors.get(str(name), Path(name))
-    with reading(path):
-        exists = path.is_file()
-    if not exists:
+    if not is_file(path):
         raise InputError(
             name, "no such sensor", f"Give a YAML file or one of {', '.join(sensors)}."
         )

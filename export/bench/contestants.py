@@ -3,6 +3,7 @@
 Nothing here loads torch, so that a process that measures a method's memory holds little else.
 """
 
+import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.baselines import PositionPrior, all_points, no_points
-from derain.errors import InputError
+from derain.errors import InputError, printable
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
-from derain.files.presence import is_there
 from derain.filters import FilterDerainer, PointFilter
 from derain.odd_scans import Judge
 from derain.one_line_rule import OneLineRule
@@ -83,8 +83,9 @@ def contestants(texts: Sequence[str], learn_from: LearnFrom | None = None) -> li
 
 def _contestant(text: str, learn_from: LearnFrom | None) -> Contestant:
     title, equals, name = text.partition("=")
-    if not equals or is_there(Path(text)):  # files may well have an equals sign in their names
+    if not equals or os.path.isfile(text):  # files may well have an equals sign in their names
         title, name = Path(text).stem, text
+    title = printable(title)  # it goes into tables and pictures
     if name in TRIVIAL:
         return Contestant(title, name, partial(_timed_rule, TRIVIAL[name]))
     if name in LEARNT:

@@ -1,0 +1,171 @@
+"""Names of files that a terminal must not be sent, that are no text, or too long for a name."""
+
+import argparse
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.cli.arguments import command_line
+from derain.files.labels import write_labels
+from derain.hard_cases import scene
+
+# An escape sequence, bytes that are no UTF-8, a line break, a mark that turns the direction of
+# writing, what matplotlib takes for mathematics, another script.
+NAMES = [
+    b"a\x1b[31m.bin",
+    b"b\xff.bin",
+    b"c\n.bin",
+    b"d\xe2\x80\xae.bin",
+    b"e$_$.bin",
+    b"f\xc3\xa9.bin",
+]
+
+TOO_LONG = 300 * "x"
+
+
+@pytest.fixture
+def scans(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Labelled scans of those names, in a folder of such a name."""
+    monkeypatch.chdir(tmp_path)
+    folder = Path(os.fsdecode(b"dir\xff\x1b[1m"))
+    folder.mkdir()
+    paths = [folder / os.fsdecode(name) for name in NAMES]
+    for path in paths:
+        scene(300).tofile(path)
+        write_labels(path.with_suffix(".label"), np.where(np.arange(300) >= 270, 110, 0))
+    return paths
+
+
+def assert_fit_for_a_terminal(text: str) -> None:
+    text.encode("utf-8")
+    assert all(line.isprintable() for line in text.split("\n")), repr(text)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["run", "dror", "{dir}", "--out", "out"],
+        ["simulate", "--on", "{dir}", "--rain", "25", "--out", "out"],
+    ],
+)
+def test_odd_names_are_told_in_one_line_each_and_whole_in_json(
+    run_derain, scans: list[Path], command: list[str]
+) -> None:
+    command = [word.format(dir=scans[0].parent) for word in command]
+    outcome = run_derain(*command)
+    assert outcome.code == 0, outcome.err
+    assert_fit_for_a_terminal(outcome.out)
+    assert len(outcome.out.splitlines()) == len(scans)
+    outcome = run_derain(*command, "--json")
+    assert [json.loads(line)["scan"] for line in outcome.out.splitlines()] == list(map(str, scans))
+    assert {path.name for path in Path("out").glob("*.bin")} == {path.name for path in scans}
+
+
+def test_info_tells_of_odd_names(run_derain, scans: list[Path]) -> None:
+    outcome = run_derain("info", *scans, scans[0].parent, "--columns", "x,y,z,intensity")
+    assert outcome.code == 0, outcome.err
+    assert_fit_for_a_terminal(outcome.out)
+    outcome = run_derain("info", *scans, "--json")
+    assert [json.loads(line)["file"] for line in outcome.out.splitlines()] == list(map(str, scans))
+
+
+def test_what_is_written_of_odd_names_is_text(run_derain, scans: list[Path]) -> None:
+    data = ["--data", scans[0].parent, "--card", "wads"]
+    title = os.fsdecode(b"\xfftitle\x1b[1m=dror")
+    once = ["--limit", "1", "--timed", "1", "--repeats", "1"]
+    outcome = run_derain("bench", *data, "--methods", title, "--out", "bench", *once)
+    assert outcome.code == 0, outcome.err
+    assert_fit_for_a_terminal(outcome.out)
+    assert r"\udcfftitle\x1b[1m" in outcome.out
+    assert_fit_for_a_terminal((Path("bench") / "bench.md").read_text("utf-8"))
+
+
+def test_a_command_line_of_odd_names_is_one_line_of_text() -> None:
+    odd = os.fsdecode(b"\xff\nmethod: x")
+    line = command_line(argparse.Namespace(command="tune", data=[Path(odd)], method="dror"))
+    assert_fit_for_a_terminal(line)
+    assert "\n" not in line
+    assert r"\udcff\nmethod: x" in line
+
+
+@pytest.mark.parametrize("number", [1, 4])
+def test_odd_names_are_drawn(run_derain, scans: list[Path], number: int) -> None:
+    picture = Path(f"{scans[number].stem}.png")
+    outcome = run_derain("view", scans[number], "--methods", "dror", "--out", picture)
+    assert outcome.code == 0, outcome.err
+    assert_fit_for_a_terminal(outcome.out)
+    assert picture.stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["run", "{long}", "a.bin", "--out", "out"],
+        ["run", "dror", "{long}.bin", "--out", "out"],
+        ["run", "dror", "a.bin", "--out", "out", "--parameters", "{long}.yaml"],
+        ["info", "{long}"],
+        ["info", "{long}.bin"],
+        ["info", ".", "--card", "{long}"],
+        ["bench", "--data", "{long}", "--card", "wads", "--methods", "dror", "--out", "o"],
+        ["bench", "--data", ".", "--card", "wads", "--methods", "{long}", "--out", "o"],
+        ["bench", "--data", ".", "--card", "wads", "--methods", "{long}=dror", "--out", "{long}"],
+        ["tune", "dror", "--data", "{long}", "--card", "wads", "--out", "tuned.yaml"],
+        ["view", "{long}", "--methods", "dror", "--out", "picture.png"],
+        ["view", "a.bin", "--methods", "{long}", "--out", "picture.png"],
+        ["view", "a.bin", "--methods", "dror", "--out", "{long}.png"],
+        ["simulate", "--on", "{long}", "--rain", "5", "--out", "out"],
+        ["simulate", "--out", "{long}"],
+        ["annotate", "a.bin", "--scene", "{long}", "--out", "out"],
+        ["fuse", "--lidar", ".", "--radar", ".", "--extrinsics", "{long}", "--out", "out"],
+    ],
+    ids=" ".join,
+)
+def test_a_name_that_is_too_long_is_one_line(
+    run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    scene(300).tofile("a.bin")
+    outcome = run_derain(*(word.format(long=TOO_LONG) for word in command))
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert outcome.err.startswith("derain: ")
+    assert len(outcome.err.splitlines()) == 1
+    assert TOO_LONG in outcome.err
+
+
+def test_a_scan_whose_labels_could_have_no_name_does_not_stop_the_others(
+    run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scans").mkdir()
+    for name in ("a.bin", f"{251 * 'b'}.bin", "c.bin"):  # as long as a name may be
+        scene(300).tofile(Path("scans") / name)
+    outcome = run_derain("run", "dror", "scans", "--out", "out")
+    assert outcome.code == 2
+    assert "File name too long" in outcome.err
+    assert "derain: 1 of 3 scans could not be cleaned" in outcome.err
+    assert {"a.label", "c.label"} == {path.name for path in Path("out").glob("*.label")}
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (PermissionError(13, "Permission denied", "a\x1b.bin"), r"a\x1b.bin: Permission denied."),
+        (OSError("odd"), "derain: odd."),
+        (MemoryError(), "derain: the memory is full."),
+    ],
+)
+def test_whatever_the_system_refuses_is_one_line(
+    run_derain, monkeypatch: pytest.MonkeyPatch, error: Exception, line: str
+) -> None:
+    def refused(arguments: object) -> int:
+        raise error
+
+    monkeypatch.setattr("derain.cli.info.main", refused)
+    outcome = run_derain("info", "a.bin")
+    assert outcome.code == 2
+    assert outcome.err.startswith(f"derain: {line}")
+    assert len(outcome.err.splitlines()) == 1
