@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from threading import Lock
 
 from tqdm import tqdm
 
@@ -107,6 +108,7 @@ def _fuzz(arguments: argparse.Namespace, models_folder: Path, scratch: Path) -> 
         for first in range(0, each, PORTION):
             portions.put((name, range(first, min(first + PORTION, each))))
     tallies: dict[str, Tally] = defaultdict(Tally)
+    counting = Lock()
     with tqdm(total=each * len(names), unit="input", disable=None) as progress:
 
         def work(number: int) -> None:
@@ -115,8 +117,9 @@ def _fuzz(arguments: argparse.Namespace, models_folder: Path, scratch: Path) -> 
             worker = Worker(arguments.seed, folder, readers)
             try:
                 for name, outcome in _judged(worker, portions):
-                    tallies[name].add(outcome)
-                    progress.update()
+                    with counting:
+                        tallies[name].add(outcome)
+                        progress.update()
                     if outcome.is_finding:
                         _keep(name, outcome, folder, arguments)
             finally:

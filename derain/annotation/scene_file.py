@@ -119,9 +119,7 @@ def _polygon(entry: Entry) -> Polygon:
     corners = entry.items()
     if len(corners) < 3:
         raise entry.fault(f"{len(corners)} corners make no polygon", "List three or more [x, y].")
-    for corner in corners:
-        corner.numbers(2)
-    return tuple((x, y) for x, y in (map(_metres, corner.items()) for corner in corners))
+    return tuple((x, y) for x, y in (_place(corner, 2) for corner in corners))
 
 
 def _boxes(entry: Entry) -> dict[str, Box]:
@@ -171,15 +169,20 @@ def _class(entry: Entry) -> TrackClass:
 
 
 def _triple(entry: Entry) -> Triple:
-    entry.numbers(3)
-    x, y, z = map(_metres, entry.items())
+    x, y, z = _place(entry, 3)
     return x, y, z
 
 
 def _size(entry: Entry) -> Triple:
-    entry.numbers(3)
-    length, width, height = map(_length, entry.items())
-    return length, width, height
+    size = _triple(entry)
+    for side in entry.items():
+        side.positive()
+    return size
+
+
+def _place(entry: Entry, axes: int) -> tuple[float, ...]:
+    entry.numbers(axes)
+    return tuple(map(_metres, entry.items()))
 
 
 def _metres(entry: Entry) -> float:
