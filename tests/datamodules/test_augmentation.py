@@ -1,6 +1,7 @@
 """Augmentation turns, jitters, mirrors and thins a scan, and changes nothing else about it."""
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.datamodules.augmentation import Augmentation
+from derain.files import read_scan
+from derain.grid_fit import fit_grid
 from derain.hard_cases import hard_cases, scene
+from derain.range_image import RangeView
 from derain.scan import Scan
 
 HARD_CASES = dict(hard_cases(largest=5000))
@@ -93,6 +97,33 @@ def test_points_are_dropped_from_their_share_of_scans(share: float) -> None:
     drop = Augmentation(0, 0, dropping_probability=share)
     lost = [len(drop(scan, rng)) < len(scan) for _ in range(400)]
     assert np.mean(lost) == pytest.approx(share, abs=0.1 if share == 0.5 else 0.01)
+
+
+@given(st.floats(-180, 180), st.floats(0, 350), st.integers(0, 2**32), st.booleans(), st.booleans())
+def test_what_is_seen_stays_where_a_network_looks_that_does_not_see_all_around(
+    right: float, width: float, seed: int, turned: bool, mirrored: bool
+) -> None:
+    azimuth = np.radians(np.linspace(right, right + width, 50))
+    points = np.stack([9 * np.cos(azimuth), 9 * np.sin(azimuth), azimuth * 0 + 1], axis=1)
+    augmentation = Augmentation(turned, 0, mirror_probability=mirrored)
+    seen = (right, right + width)
+    changed = augmentation(Scan.of(points), np.random.default_rng(seed), seen)
+    from_right = (np.degrees(np.arctan2(changed.xyz[:, 1], changed.xyz[:, 0])) - right) % 360
+    assert (np.minimum(from_right, 360 - from_right) <= width + 1e-3).all()
+    within = np.where(from_right > 359.9, 0, from_right)
+    expected = np.linspace(0, width, 50)
+    np.testing.assert_allclose(within, expected[::-1] if mirrored else expected, atol=1e-2)
+
+
+@pytest.mark.parametrize("front", ["kitti_front.bin", "hesai_at128_front.pcd"])
+def test_a_front_view_stays_in_the_image_that_is_fitted_to_it(shared: Path, front: str) -> None:
+    scan = read_scan(shared / "data/clean" / front)
+    view = RangeView(fit_grid([scan]).grid)
+    default, rng = Augmentation(mirror_probability=0.5), np.random.default_rng(0)
+    points = scan.valid.sum()
+    for _ in range(10):
+        inside = view(default(scan, rng, view.azimuth)).pixel >= 0
+        assert inside.sum() > 0.99 * points  # the jitter may take the outermost across the border
 
 
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
