@@ -120,10 +120,9 @@ def make_trainer() -> Iterator[Callable[..., lightning.Trainer]]:
             accelerator="cpu",
             deterministic=True,
             max_epochs=epochs,
-            logger=False,
             enable_progress_bar=False,
             enable_model_summary=False,
-            **{"enable_checkpointing": False, **arguments},
+            **{"logger": False, "enable_checkpointing": False, **arguments},
         )
 
     yield make

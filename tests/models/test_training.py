@@ -1,5 +1,6 @@
 """Training learns, goes on where it stopped, and does the same again from the same seed."""
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +30,7 @@ from derain.models.salsanext import SalsaNext
 from derain.one_line_rule import OneLineRule
 from derain.open3d_import import import_open3d
 from derain.scan import Scan
+from derain.seeds import Draw, generator
 from derain.simulation.campaign import Campaign
 from derain.simulation.sensor import Sensor
 
@@ -309,3 +311,45 @@ def test_a_scan_that_cannot_be_read_stops_a_run_with_its_name(
     with pytest.raises(InputError, match=r"1\.bin: 7 bytes are not whole rows") as refusal:
         trainer.fit(OutDet(), data)
     assert "Traceback" not in str(refusal.value)
+
+
+def test_accumulated_batches_make_one_step_on_the_mean_of_their_gradients(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder]
+) -> None:
+    # Not the step of one batch twice as large: BatchNorm and both losses see whole batches.
+    class Steps(lightning.Callback):
+        def __init__(self) -> None:
+            self.batches: list[Batch] = []
+            self.rates: list[float] = []
+
+        def on_train_batch_start(self, trainer: Any, module: Any, batch: Batch, *_: Any) -> None:
+            self.batches.append(batch)
+
+        def on_train_epoch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
+            self.rates.append(trainer.optimizers[0].param_groups[0]["lr"])
+
+    lightning.seed_everything(0)
+    steps, model = Steps(), OutDet(milestones=(1, 2), weight_decay=0)
+    by_hand = copy.deepcopy(model)
+    trainer = make_trainer(epochs=3, callbacks=[steps], accumulate_grad_batches=2)
+    trainer.fit(model, scenes("[0123].bin"))
+    assert trainer.global_step == 6  # of twelve batches
+    # The schedule counts epochs, however many steps they have.
+    assert steps.rates == pytest.approx([1e-3, 1e-4, 1e-5])
+
+    by_hand.adopt(model.spec)
+    by_hand.class_weight.copy_(model.class_weight)
+    by_hand.train()
+    optimizer = torch.optim.Adam(by_hand.parameters(), lr=1e-3)
+    for number, batch in enumerate(steps.batches):
+        epoch, step = divmod(number, 4)
+        optimizer.param_groups[0]["lr"] = 1e-3 * 0.1**epoch
+        seed = generator(Draw.NETWORK, 0, epoch, step, 0).integers(2**63)
+        torch.manual_seed(int(seed))  # of dropout
+        losses, _ = by_hand.losses(batch)
+        (losses["loss"] / 2).backward()
+        if number % 2:
+            optimizer.step()
+            optimizer.zero_grad()
+    for name, tensor in model.state_dict().items():
+        torch.testing.assert_close(by_hand.state_dict()[name], tensor, rtol=1e-5, atol=1e-6)

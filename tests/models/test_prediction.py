@@ -1,0 +1,57 @@
+"""Predictions are written as they come, and nothing of them is kept."""
+
+import weakref
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import lightning
+import numpy as np
+import pytest
+
+from derain.datamodules.folder import Folder
+from derain.hard_cases import scene
+from derain.models.outdet import OutDet
+from derain.models.prediction import PredictionWriter
+
+MakeTrainer = Callable[..., lightning.Trainer]
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Folder:
+    for name in ("a/0.bin", "a/1.bin", "a/2.bin", "b/0.bin"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        scene(50, seed=sum(name.encode())).tofile(tmp_path / name)
+    return Folder(str(tmp_path), "wads", test=["*/*.bin"])
+
+
+class Alive(lightning.Callback):
+    """Counts at every batch the probabilities of earlier ones that are still in memory."""
+
+    def __init__(self) -> None:
+        self.seen: list[weakref.ref[Any]] = []
+        self.counts: list[int] = []
+
+    def on_predict_batch_end(self, trainer: Any, model: Any, outputs: Any, *_: Any) -> None:
+        self.counts.append(sum(one() is not None for one in self.seen))
+        self.seen += map(weakref.ref, outputs)
+
+
+def test_what_is_written_is_not_kept(
+    make_trainer: MakeTrainer,
+    data: Folder,
+    outdet: Callable[..., OutDet],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    model, alive, out = outdet(), Alive(), tmp_path / "labels"
+    returned = make_trainer(1, callbacks=[alive, PredictionWriter(str(out))]).predict(model, data)
+    assert returned is None
+    assert len(alive.counts) == 4
+    assert max(alive.counts) <= 1  # that of the batch before may wait for this one's
+    assert f"Wrote 4 label files to {out}\n" in capsys.readouterr().out
+    kept = make_trainer(1).predict(model, data)  # who writes nothing is given what was found
+    for file, (probability,) in zip(data.files("predict"), kept, strict=True):
+        label = out / file.scan.relative_to(data.root).with_suffix(".label")
+        expected = probability > model.spec.threshold
+        np.testing.assert_array_equal(np.fromfile(label, "<u4"), expected)
