@@ -1,12 +1,15 @@
 """Which scan a process reads, and when."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from torch.utils.data import Dataset, DistributedSampler
+from torch.utils.data import DistributedSampler
 
 from derain.seeds import Draw, generator
+
+if TYPE_CHECKING:
+    from derain.datamodules.base import ScanDataset
 
 
 class Pick(NamedTuple):
@@ -40,12 +43,13 @@ class TrainingOrder(DistributedSampler[Pick]):
         process: Which of them this is.
     """
 
-    def __init__(self, scans: Dataset[object], seed: int, processes: int, process: int) -> None:
+    def __init__(self, scans: "ScanDataset", seed: int, processes: int, process: int) -> None:
         super().__init__(scans, processes, process, seed=seed)
+        self.scans = len(scans)
 
     def __iter__(self) -> Iterator[Pick]:
         chance = generator(Draw.ORDER, self.seed, self.epoch)
-        order = np.resize(chance.permutation(len(self.dataset)), self.total_size)
+        order = np.resize(chance.permutation(self.scans), self.total_size)
         for number in order[self.rank :: self.num_replicas]:
             yield Pick(int(number), self.epoch, measured=False)
 
@@ -63,9 +67,7 @@ class MeasuringOrder(DistributedSampler[Pick]):
         process: Which of them this is.
     """
 
-    def __init__(
-        self, scans: Dataset[object], batch_size: int, processes: int, process: int
-    ) -> None:
+    def __init__(self, scans: "ScanDataset", batch_size: int, processes: int, process: int) -> None:
         super().__init__(scans, processes, process, shuffle=False)
         numbers = range(len(scans))
         batches = [
