@@ -229,13 +229,9 @@ class DerainingModule(lightning.LightningModule, ABC):
     def training_step(self, batch: Batch) -> Tensor:
         """Loss of one batch."""
         losses, _ = self.losses(batch)
-        self.log_dict(
-            {f"train/{name}": value for name, value in losses.items()},
-            on_step=False,
-            on_epoch=True,
-            sync_dist=True,
-            batch_size=len(batch.cells),
-        )
+        values = {f"train/{name}": value for name, value in losses.items()}
+        scans = len(batch.cells)
+        self.log_dict(values, on_step=False, on_epoch=True, sync_dist=True, batch_size=scans)
         return losses["loss"]
 
     def validation_step(self, batch: Batch) -> list[NDArray[np.float32]]:
