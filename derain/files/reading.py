@@ -64,7 +64,7 @@ def read_bytes(path: Path, largest: int) -> bytes:
     if size > largest:
         raise ValueError(f"{size:,} bytes, more than {largest:,}")
     with path.open("rb") as file:
-        return file.read(largest)
+        return file.read(size)
 
 
 def file_size(path: Path) -> int:

@@ -68,6 +68,7 @@ def parse_table(text: bytes) -> TableText:
         return TableText(",", None, 0, [], np.empty((0, 2), np.int64))
     separator = next((each for each in ",;" if each in first.text), None)
     (values,) = _rows([_COMMENT.sub("", first.text)], separator)
+    check_columns(len(values))
     names = None if all(map(_is_number, values)) else tuple(name.strip() for name in values)
     if names is None:
         lines = chain([first], lines)
@@ -107,7 +108,6 @@ def parse_lines(
         ValueError: Lines of different lengths, or values that are not numbers.
         csv.Error: Quotes that do not match.
     """
-    check_columns(len(titles))
     columns = [_Numbers() for _ in titles]
     spans = [np.empty((0, 2), np.int64)]
     lines = iter(lines)

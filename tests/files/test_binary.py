@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from derain import InputError, Scan
 from derain.files import DEFAULT_COLUMNS, read_scan, write_scan
+from derain.files.binary import count_rows
 
 FIVE = (*DEFAULT_COLUMNS, "ring")
 SIX = (*FIVE, "time")
@@ -148,3 +149,50 @@ def test_a_column_that_would_lose_digits_is_not_written(file: Path) -> None:
     with pytest.raises(InputError, match=r"float32 cannot hold the column time \(int64\)"):
         write_scan(file, Scan(np.ones((2, 3), np.float32), fields=fields))
     assert not file.exists()
+
+
+@pytest.mark.parametrize("columns", [DEFAULT_COLUMNS, FIVE, SIX], ids=len)
+@pytest.mark.parametrize("origin", [np.float32, np.float64])
+def test_float64_is_told_from_float32_and_written_back(
+    file: Path, columns: tuple[str, ...], origin: type
+) -> None:
+    # What was float32 before has 29 bits of zeros behind each number.
+    rows = (street(2000, len(columns)).astype(np.float64) * np.pi).astype(origin).astype("<f8")
+    file.write_bytes(rows.tobytes())
+    scan = read_scan(file, columns)
+    np.testing.assert_array_equal(np.stack(list(scan.fields.values()), axis=1), rows, strict=True)
+    assert count_rows(file, columns) == 2000
+    write_scan(file, scan.take(np.arange(2000) % 2 == 0))
+    assert file.read_bytes() == rows[::2].tobytes()
+
+
+@pytest.mark.parametrize("columns", [DEFAULT_COLUMNS, FIVE, SIX], ids=len)
+def test_float32_is_not_taken_for_float64(file: Path, columns: tuple[str, ...]) -> None:
+    rows = street(2000, len(columns))
+    for damaged in (rows, np.where(np.arange(2000)[:, None] % 2 == 0, np.float32(1e-40), rows)):
+        file.write_bytes(damaged.astype("<f4").tobytes())
+        assert {column.dtype for column in read_scan(file, columns).fields.values()} == {
+            np.dtype("f4")
+        }
+        assert count_rows(file, columns) == 2000
+
+
+def test_float64_that_makes_as_good_sense_as_float32_stays_float32(file: Path) -> None:
+    # Whole numbers, which have nothing but zeros in the half that float32 would stumble over.
+    rows = np.random.default_rng(0).integers(1, 60, (100, 4)).astype("<f8")
+    file.write_bytes(rows.tobytes())
+    assert len(read_scan(file)) == 200
+
+
+@pytest.mark.parametrize(
+    "name", ["clean/kitti_hdl64", "clean/kitti_front", "wads/sample", "snowykitti/velodyne/000000"]
+)
+def test_real_scans_are_told_by_their_numbers(file: Path, shared: Path, name: str) -> None:
+    rows = np.fromfile(shared / "data" / f"{name}.bin", "<f4").reshape(-1, 4)
+    rows = rows[: len(rows) // 2 * 2]
+    for value in ("<f4", "<f8"):
+        rows.astype(value).tofile(file)
+        scan = read_scan(file)
+        assert {column.dtype for column in scan.fields.values()} == {np.dtype(value)}
+        np.testing.assert_array_equal(scan.xyz, rows[:, :3])
+        assert count_rows(file, DEFAULT_COLUMNS) == len(rows)

@@ -225,6 +225,54 @@ def test_archives_without_coordinates_are_refused(
         read_scan(tmp_path / "scan.npz")
 
 
+@pytest.mark.parametrize("name", ["points", "Points", "arr_0", "cloud"])
+@pytest.mark.parametrize("shape", [(6, 4), (2, 3, 4), (0, 4)])
+def test_an_npz_of_one_table_is_read_and_comes_back(
+    tmp_path: Path, name: str, shape: tuple[int, ...]
+) -> None:
+    rows = np.arange(np.prod(shape), dtype=">f8").reshape(shape)
+    np.savez(tmp_path / "scan.npz", **{name: rows})
+    scan = read_scan(tmp_path / "scan.npz", ("z", "y", "x", "ring"))
+    assert scan.shape == (shape[:2] if len(shape) == 3 else None)
+    np.testing.assert_array_equal(scan.xyz, rows.reshape(-1, 4)[:, 2::-1])
+    write_scan(tmp_path / "copy.npz", scan)
+    with np.load(tmp_path / "copy.npz") as copy:
+        assert list(copy) == [name]
+        np.testing.assert_array_equal(copy[name], rows, strict=True)
+
+
+def test_points_may_have_further_arrays_beside_them(tmp_path: Path) -> None:
+    points = np.arange(24, dtype=np.float32).reshape(2, 3, 4)
+    ring, time, beams = np.arange(6).reshape(2, 3), np.array([5, 6, 7]), np.array([-1.5, 1.5])
+    np.savez(tmp_path / "scan.npz", ring=ring, points=points, time=time, beams=beams)
+    scan = read_scan(tmp_path / "scan.npz")
+    assert list(scan.fields) == ["x", "y", "z", "intensity", "ring", "time"]
+    stay = np.array([True, False, True, True, False, True])
+    write_scan(tmp_path / "clean.npz", scan.take(stay))
+    with np.load(tmp_path / "clean.npz") as clean:
+        assert set(clean) == {"points", "ring", "time", "beams"}
+        np.testing.assert_array_equal(clean["points"], points.reshape(-1, 4)[stay], strict=True)
+        np.testing.assert_array_equal(clean["ring"], ring.ravel()[stay])
+        np.testing.assert_array_equal(clean["time"], np.array([5, 7, 5, 7]))
+        np.testing.assert_array_equal(clean["beams"], beams)
+    np.savez(tmp_path / "scan.npz", points=points, x=ring, y=ring, z=ring)
+    assert list(read_scan(tmp_path / "scan.npz").fields) == ["points", "x", "y", "z"]
+    np.savez(tmp_path / "scan.npz", points=points, intensity=ring)
+    with pytest.raises(InputError, match="has an array intensity beside a column intensity"):
+        read_scan(tmp_path / "scan.npz")
+
+
+def test_a_structured_table_in_an_npz_needs_no_columns_stated(tmp_path: Path) -> None:
+    table = np.zeros((2, 3), [("x", "f4"), ("y", "f4"), ("z", "f4"), ("i", "u2")])
+    table["i"] = np.arange(6).reshape(2, 3)
+    np.savez(tmp_path / "scan.npz", points=table)
+    scan = read_scan(tmp_path / "scan.npz")
+    np.testing.assert_array_equal(scan.intensity, np.arange(6))
+    write_scan(tmp_path / "copy.npz", scan)
+    with np.load(tmp_path / "copy.npz") as copy:
+        np.testing.assert_array_equal(copy["points"], table, strict=True)
+
+
 def test_a_scan_made_in_memory_is_written(tmp_path: Path) -> None:
     xyz = np.arange(6, dtype=np.float32).reshape(2, 3)
     scan = Scan(xyz, np.array([7, 8], np.float32))

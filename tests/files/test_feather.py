@@ -1,0 +1,135 @@
+"""Feather files, as Argoverse 2 has them: every column comes back, numbers or not."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from pyarrow import feather
+
+from derain import InputError, Scan
+from derain.files import read_scan, write_scan
+from derain.files.columns import scan_of
+
+COMPRESSIONS = ("uncompressed", "lz4", "zstd")
+
+
+@pytest.fixture
+def table() -> pyarrow.Table:
+    """Seven points with the columns of Argoverse 2, and some that are no numbers."""
+    generator = np.random.default_rng(0)
+    columns = {axis: generator.normal(0, 30, 7).astype(np.float16) for axis in "xyz"}
+    columns |= {
+        "intensity": generator.integers(0, 256, 7).astype(np.uint8),
+        "laser_number": generator.integers(0, 64, 7).astype(np.uint8),
+        "offset_ns": generator.integers(0, 10**8, 7).astype(np.int32),
+    }
+    further = {
+        "name": ["car", "", None, "ä", "b", "c", "d"],
+        "echo": pyarrow.array([1, None, 3, 4, 5, 6, 7], pyarrow.int16()),
+        "wet": [True, False, None, True, True, False, True],
+        "beams": [[1], [], [2, 3], [4], [5], [6], [7]],
+    }
+    return pyarrow.table({**columns, **further}).replace_schema_metadata({"sensor": "up_lidar"})
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_a_file_is_read_and_comes_back_byte_for_byte(
+    tmp_path: Path, table: pyarrow.Table, compression: str
+) -> None:
+    path = tmp_path / "scan.feather"
+    feather.write_feather(table, str(path), compression)
+    scan = read_scan(path)
+    for place, axis in enumerate("xyz"):
+        expected = table[axis].to_numpy()
+        np.testing.assert_array_equal(scan.fields[axis], expected, strict=True)
+        np.testing.assert_array_equal(scan.xyz[:, place], expected.astype(np.float32))
+    np.testing.assert_array_equal(scan.intensity, table["intensity"].to_numpy())
+    np.testing.assert_array_equal(scan.fields["echo"], [1, np.nan, 3, 4, 5, 6, 7])
+    assert set(scan.fields) == set(table.column_names) - {"name", "wet", "beams"}
+    write_scan(tmp_path / "copy.feather", scan)
+    assert (tmp_path / "copy.feather").read_bytes() == path.read_bytes()
+
+
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_a_cleaned_file_holds_the_other_rows_of_every_column(
+    tmp_path: Path, table: pyarrow.Table, compression: str
+) -> None:
+    path = tmp_path / "scan.feather"
+    feather.write_feather(table, str(path), compression)
+    stay = np.array([True, False, True, True, False, True, True])
+    write_scan(path, read_scan(path).take(stay))
+    cleaned = feather.read_table(str(path))
+    assert cleaned.equals(table.filter(stay), check_metadata=True)
+
+
+def test_columns_that_were_changed_are_written_and_others_kept(
+    tmp_path: Path, table: pyarrow.Table
+) -> None:
+    path = tmp_path / "scan.feather"
+    feather.write_feather(table, str(path))
+    scan = read_scan(path)
+    fields = {**scan.fields, "x": np.zeros(7), "new": np.ones(7, ">i2")}
+    changed = replace(scan, fields=fields)
+    write_scan(path, changed)
+    copy = feather.read_table(str(path))
+    assert copy.column_names == [*table.column_names, "new"]
+    assert copy["x"].to_pylist() == [0.0] * 7
+    assert copy["new"].to_pylist() == [1] * 7
+    assert copy.drop(["x", "new"]).equals(table.drop(["x"]))
+
+
+@st.composite
+def scans(draw: st.DrawFn) -> Scan:
+    """A scan of up to six points with columns of random bits."""
+    points = draw(st.integers(0, 6))
+    kinds = ("f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8")
+    names = draw(st.lists(st.text("abä _", min_size=2, max_size=5), max_size=4, unique=True))
+    columns = [(axis, draw(st.sampled_from(kinds[:3]))) for axis in "xyz"]
+    columns += [(name, draw(st.sampled_from(kinds))) for name in names]
+    return scan_of(
+        Path("drawn"),
+        {
+            name: draw(arrays(f"u{kind[1]}", points)).view(kind)
+            for name, kind in draw(st.permutations(columns))
+        },
+    )
+
+
+@settings(
+    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(scan=scans(), data=st.data(), suffix=st.sampled_from((".feather", ".feather.gz")))
+def test_every_bit_comes_back_in_order(
+    tmp_path: Path, scan: Scan, data: st.DataObject, suffix: str
+) -> None:
+    path = tmp_path / f"scan{suffix}"
+    write_scan(path, scan)
+    stay = data.draw(arrays(bool, len(scan)))
+    write_scan(tmp_path / f"clean{suffix}", read_scan(path).take(stay))
+    for expected, written in ((scan, path), (scan.take(stay), tmp_path / f"clean{suffix}")):
+        copy = read_scan(written)
+        assert list(copy.fields) == list(expected.fields)
+        for name, column in expected.fields.items():
+            assert copy.fields[name].dtype == column.dtype
+            assert copy.fields[name].tobytes() == column.tobytes()
+
+
+def test_what_is_no_feather_of_points_is_refused(tmp_path: Path, table: pyarrow.Table) -> None:
+    path = tmp_path / "scan.feather"
+    feather.write_feather(table, str(path))
+    content = path.read_bytes()
+    for damaged in (b"", b"FEA1" + content, content[:500], b"ARROW1\0\0" + content[500:]):
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=r"cannot be read as \.feather"):
+            read_scan(path)
+    feather.write_feather(table.drop(["z"]), str(path))
+    with pytest.raises(InputError, match="has no x, y and z among its columns"):
+        read_scan(path)
+    ones = np.ones((2, 3), np.float32)
+    with pytest.raises(InputError, match=r"\.feather has no place for the column 'normal'"):
+        write_scan(path, Scan(ones, fields={"xyz": ones, "normal": ones}))

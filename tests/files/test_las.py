@@ -1,0 +1,159 @@
+"""LAS and LAZ files: exact coordinates, every field, and their headers."""
+
+import sys
+from pathlib import Path
+
+import laspy
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
+
+from derain import InputError, Scan
+from derain.files import read_scan, write_scan
+
+UTM = (500_000.0, 4_100_000.0, 100.0)
+SUFFIXES = (".las", ".laz")
+
+
+def write(
+    path: Path, whole: NDArray[np.int32], offsets: tuple[float, ...] = UTM, version: str = "1.4"
+) -> laspy.LasData:
+    """A file of points whose coordinates are stored as these whole numbers, in millimetres."""
+    header = laspy.LasHeader(version=version, point_format=7 if version == "1.4" else 3)
+    header.scales, header.offsets = [0.001] * 3, offsets
+    header.add_extra_dim(laspy.ExtraBytesParams("ring", np.uint16))
+    header.add_extra_dim(laspy.ExtraBytesParams("normal", "3f4"))
+    header.vlrs.append(laspy.VLR("derain", 7, "of our own", b"kept"))
+    las = laspy.LasData(header)
+    las.X, las.Y, las.Z = whole.T
+    generator = np.random.default_rng(0)
+    las.intensity = generator.integers(0, 2**16, len(whole))
+    las.return_number = generator.integers(1, 5, len(whole))
+    las.gps_time = generator.random(len(whole))
+    las.red = las.ring = generator.integers(0, 2**16, len(whole))
+    las.normal = generator.random((len(whole), 3))
+    if version == "1.4":
+        las.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("derain", 8, "behind", b"kept as well")])
+    las.write(str(path), laz_backend=laspy.LazBackend.Lazrs)
+    return las
+
+
+def millimetres(*rows: tuple[int, int, int]) -> NDArray[np.int32]:
+    return np.array(rows, np.int32).reshape(-1, 3)
+
+
+STREET = millimetres((1, -2, 3), (30_001, -40_002, 1_700), (-(2**31), 2**31 - 1, 0), (5, 6, 7))
+
+
+@pytest.mark.parametrize("version", ["1.2", "1.4"])
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_coordinates_are_relative_to_the_offset_and_the_file_comes_back(
+    tmp_path: Path, suffix: str, version: str
+) -> None:
+    path = tmp_path / f"scan{suffix}"
+    las = write(path, STREET, version=version)
+    scan = read_scan(path)
+    np.testing.assert_allclose(scan.xyz, STREET / 1000, rtol=1e-7)
+    np.testing.assert_array_equal(scan.intensity, las.intensity.astype(np.float32))
+    np.testing.assert_array_equal(scan.fields["ring"], las.ring, strict=True)
+    np.testing.assert_array_equal(scan.fields["normal"], las.normal)
+    write_scan(tmp_path / f"copy{suffix}", scan)
+    assert (tmp_path / f"copy{suffix}").read_bytes() == path.read_bytes()
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_cleaned_file_holds_the_other_points_and_all_records(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"scan{suffix}"
+    las = write(path, STREET)
+    stay = np.array([True, False, True, True])
+    write_scan(path, read_scan(path).take(stay))
+    copy = laspy.read(path)
+    assert copy.points.array.tobytes() == las.points.array[stay].tobytes()
+    assert copy.header.offsets.tolist() == list(UTM)
+    assert [record.record_data for record in copy.vlrs.get_by_id("derain", (7,))] == [b"kept"]
+    assert [record.record_data for record in copy.evlrs] == [b"kept as well"]
+
+
+def test_a_survey_without_an_offset_keeps_its_millimetres(tmp_path: Path) -> None:
+    path = tmp_path / "scan.las"
+    whole = STREET[[0, 1, 3]] + np.array([500_000_000, 1_900_000_000, 0], np.int32)
+    write(path, whole, (0.0, 0.0, 0.0))
+    scan = read_scan(path)
+    steps = np.diff(scan.xyz, axis=0)
+    np.testing.assert_allclose(steps, np.diff(whole.astype(float), axis=0) / 1000, atol=1e-5)
+    assert scan.valid.sum() >= 2
+    write_scan(tmp_path / "copy.las", scan)
+    assert (tmp_path / "copy.las").read_bytes() == path.read_bytes()
+
+
+@settings(
+    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    whole=arrays(np.int32, st.tuples(st.integers(0, 6), st.just(3))),
+    suffix=st.sampled_from((*SUFFIXES, ".las.gz")),
+    data=st.data(),
+)
+def test_every_stored_number_comes_back_in_order(
+    tmp_path: Path, whole: NDArray[np.int32], suffix: str, data: st.DataObject
+) -> None:
+    source = tmp_path / f"source{suffix.removesuffix('.gz')}"
+    las = write(source, whole)
+    scan = read_scan(source)
+    rows = data.draw(st.permutations(range(len(whole))))
+    path = tmp_path / f"scan{suffix}"
+    write_scan(path, scan.take(np.array(rows, int)))
+    write_scan(source, read_scan(path))
+    copy = laspy.read(source).points.array
+    assert copy.tobytes() == las.points.array[np.array(rows, int)].tobytes()
+
+
+def test_survey_points_in_many_chunks_come_back(tmp_path: Path) -> None:
+    path = tmp_path / "scan.laz"
+    whole = np.random.default_rng(0).integers(-(10**6), 10**6, (120_000, 3)).astype(np.int32)
+    write(path, whole)
+    scan = read_scan(path)
+    np.testing.assert_array_equal(np.rint(scan.xyz * 1000), whole)
+
+
+def test_what_no_las_can_hold_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scan.las"
+    write(path, STREET)
+    scan = read_scan(path)
+    lost = {**scan.fields, "x": np.array([0, 0, np.nan, 0])}
+    with pytest.raises(InputError, match="a coordinate is beyond what the file can hold"):
+        write_scan(path, Scan(scan.xyz, fields=lost, header=scan.header))
+    for other in (Scan(scan.xyz), Scan(scan.xyz, header=scan.header)):
+        with pytest.raises(InputError, match=r"only what was read from a \.las"):
+            write_scan(path, other)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_damaged_files_are_refused(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"scan{suffix}"
+    write(path, STREET)
+    content = path.read_bytes()
+    scale_of_nothing = content[:131] + bytes(8) + content[139:]
+    for damaged in (b"", b"LASF", content[:300], content[:-200], scale_of_nothing):
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=rf"cannot be read as \{suffix}"):
+            read_scan(path)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "library", "extra"),
+    [(".las", "laspy", "las"), (".laz", "laspy", "las"), (".feather", "pyarrow", "feather")],
+)
+def test_a_library_that_is_not_installed_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, library: str, extra: str
+) -> None:
+    monkeypatch.setitem(sys.modules, library, None)
+    path = tmp_path / f"scan{suffix}"
+    path.write_bytes(b"anything")
+    missing = rf"{library}.*pip install 'derain\[{extra}\]'"
+    for use in (read_scan, lambda path: write_scan(path, Scan(np.ones((1, 3), np.float32)))):
+        with pytest.raises(InputError, match=missing):
+            use(path)
