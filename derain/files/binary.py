@@ -57,7 +57,7 @@ def decode_binary(content: Content, columns: Sequence[str]) -> Scan:
             "Name the file's columns with --columns, e.g. --columns x,y,z,intensity,ring.",
         )
     table = np.frombuffer(content.data, value).reshape(-1, len(columns))
-    fields = name_columns(content.path, table.T, columns)
+    fields = name_columns(content.path, list(table.T), columns)
     scan = scan_of(content.path, fields, header=BinaryHeader(value))
     _check_intensity(content.path, scan)
     return scan

@@ -82,8 +82,9 @@ def encode_feather(path: Path, scan: Scan) -> bytes:
     arrow = import_extra("pyarrow", "feather", path)
     feather = import_extra("pyarrow.feather", "feather", path)
     header = scan.header if isinstance(scan.header, FeatherHeader) else None
-    same = header is not None and header.table.num_rows == len(scan)
-    held = {name: header.table[name] for name in header.table.column_names} if same else {}
+    if header is not None and header.table.num_rows != len(scan):
+        header = None
+    held = {name: header.table[name] for name in header.table.column_names} if header else {}
     for name, column in columns_of(scan).items():
         if column.ndim > 1 or column.dtype.kind not in "biuf" or column.dtype.itemsize > 8:
             raise InputError(path, f".feather has no place for the column '{name}'", "Write .npz.")
@@ -91,7 +92,7 @@ def encode_feather(path: Path, scan: Scan) -> bytes:
         if name not in held or not np.array_equal(held[name].to_numpy(), column, equal_nan=exact):
             held[name] = arrow.array(column.astype(column.dtype.newbyteorder("=")))
     table = arrow.table(held)
-    if header is not None and same:
+    if header is not None:
         table = table.replace_schema_metadata(header.table.schema.metadata)
     sink = arrow.BufferOutputStream()
     feather.write_feather(table, sink, header.compression if header else "lz4")

@@ -74,7 +74,7 @@ def decode_las(content: Content) -> Scan:
         origin = _origin(whole, header.scales)
         near = (whole - origin) * header.scales
     fields = {axis: near[:, place] for place, axis in enumerate("xyz")}
-    fields |= {name: raw[name] for name in raw.dtype.names if name not in ("X", "Y", "Z")}
+    fields |= {name: raw[name] for name in raw.dtype.names or () if name not in ("X", "Y", "Z")}
     return scan_of(content.path, fields, header=LasHeader(header, origin))
 
 

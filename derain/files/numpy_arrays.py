@@ -195,7 +195,7 @@ def _columns_of_table(
         flat = array.reshape(-1)
         return {name: flat[name] for name in names}
     points = math.prod(array.shape[:-1])
-    return name_columns(path, array.reshape(points, array.shape[-1]).T, columns)
+    return name_columns(path, list(array.reshape(points, array.shape[-1]).T), columns)
 
 
 def _name_of_table(arrays: Mapping[str, NDArray[Any]]) -> str | None:

@@ -192,7 +192,16 @@ def test_files_and_folders_without_permission_are_refused(tmp_path: Path) -> Non
 
 
 def test_reading_scans_needs_no_heavy_library() -> None:
-    heavy = ("torch", "lightning", "open3d", "matplotlib", "sklearn", "onnxruntime")
+    heavy = (
+        "torch",
+        "lightning",
+        "open3d",
+        "matplotlib",
+        "sklearn",
+        "onnxruntime",
+        "pyarrow",
+        "laspy",
+    )
     code = f"import sys, derain.files; print([m for m in {heavy} if m in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"

@@ -108,3 +108,41 @@ def test_a_cleaned_file_holds_the_other_rows_of_every_column(
     write_scan(tmp_path / "scan.pcd", scan)
     write_scan(tmp_path / "clean.pcd", read_scan(tmp_path / "scan.pcd").take(~rain))
     check_same(read_scan(tmp_path / "clean.pcd"), scan.take(~rain))
+
+
+@EXAMPLES
+@pytest.mark.parametrize("suffix", [".txt", ".xyz.gz", ".asc"])
+@given(scan=scans(("f4", "f8", "i1", "u4", "i8", "u8"), st.text("abcd_ä", min_size=2)))
+def test_text(tmp_path: Path, suffix: str, scan: Scan) -> None:
+    write_scan(tmp_path / f"scan{suffix}", scan)
+    copy = read_scan(tmp_path / f"scan{suffix}")
+    assert list(copy.fields) == list(scan.fields)
+    for name, column in scan.fields.items():
+        np.testing.assert_array_equal(copy.fields[name].astype(column.dtype), column)
+
+
+@EXAMPLES
+@given(
+    rows=arrays(np.uint64, st.tuples(st.integers(0, 6), st.integers(3, 5))),
+    name=st.sampled_from(("points", "cloud")),
+)
+def test_an_npz_of_one_table(tmp_path: Path, rows: np.ndarray, name: str) -> None:
+    np.savez(tmp_path / "scan.npz", **{name: rows.view("<f8")})
+    columns = ("x", "y", "z", "intensity", "ring")[: rows.shape[1]]
+    write_scan(tmp_path / "copy.npz.gz", read_scan(tmp_path / "scan.npz", columns))
+    scan = read_scan(tmp_path / "copy.npz.gz", columns)
+    assert np.stack(list(scan.fields.values()), axis=1).tobytes() == rows.tobytes()
+
+
+@EXAMPLES
+@given(
+    rows=arrays(
+        np.float64, st.tuples(st.integers(8, 12), st.just(4)), elements=st.floats(0.001, 1e5)
+    )
+)
+def test_a_bin_of_float64(tmp_path: Path, rows: np.ndarray) -> None:
+    rows[:, :3] += np.pi * np.arange(1, len(rows) + 1)[:, None]  # no whole numbers
+    (tmp_path / "scan.bin").write_bytes(rows.astype("<f8").tobytes())
+    scan = read_scan(tmp_path / "scan.bin")
+    write_scan(tmp_path / "copy.bin", scan)
+    assert (tmp_path / "copy.bin").read_bytes() == rows.astype("<f8").tobytes()
