@@ -51,25 +51,10 @@ def decode_ply(content: Content) -> Scan:
         InputError: A file that is truncated or damaged, or has no vertices with coordinates.
     """
     with reading(content.path, ValueError):
-        encoding, comments, elements, data = parse_header(content.data)
-        names = [element.name for element in elements]
-        if "vertex" not in names:
-            raise ValueError("no element named vertex")
-        place = names.index("vertex")
-        vertex, *behind = elements[place:]
-        if not vertex.properties:
-            raise ValueError("the vertices have no properties")
-        row = vertex.row(encoding)
-        start = sum(element.size(encoding) for element in elements[:place])
-        table = read_rows(data, encoding, row, start, vertex.count)
-    faces = None
-    if behind:
-        start += vertex.size(encoding)
-        faces = read_faces(behind[0], vertex.count, encoding, data, start)
-    others = [*elements[:place], *(behind[1:] if faces else behind)]
-    left_out = tuple(element.name for element in others)
-    header = PlyHeader(encoding, comments, faces, left_out)
-    return scan_of(content.path, {name: table[name] for name in row.names or ()}, header=header)
+        header, table = _parse(content.data)
+    return scan_of(
+        content.path, {name: table[name] for name in table.dtype.names or ()}, header=header
+    )
 
 
 def encode_ply(path: Path, scan: Scan) -> bytes:
@@ -102,3 +87,22 @@ def encode_ply(path: Path, scan: Scan) -> bytes:
     data = format_rows(table) if header.encoding == "ascii" else table.tobytes()
     tail = faces.to_bytes(header.encoding) if faces else b""
     return encode("".join(f"{line}\n" for line in lines)) + data + tail
+
+
+def _parse(content: bytes) -> tuple[PlyHeader, NDArray[Any]]:
+    """What a file says besides its vertices, and the vertices, structured (N,)."""
+    encoding, comments, elements, data = parse_header(content)
+    names = [element.name for element in elements]
+    if "vertex" not in names:
+        raise ValueError("no element named vertex")
+    place = names.index("vertex")
+    before, vertex, behind = elements[:place], elements[place], elements[place + 1 :]
+    if not vertex.properties:
+        raise ValueError("the vertices have no properties")
+    start = sum(element.size(encoding) for element in before)
+    table = read_rows(data, encoding, vertex.row(encoding), start, vertex.count)
+    start += vertex.size(encoding)
+    faces = read_faces(behind[0], vertex.count, encoding, data, start) if behind else None
+    others = before + (behind[1:] if faces else behind)
+    left_out = tuple(element.name for element in others)
+    return PlyHeader(encoding, comments, faces, left_out), table
