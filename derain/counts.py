@@ -18,7 +18,8 @@ def ratio(part: ArrayLike, whole: ArrayLike, undefined: float = 1.0) -> NDArray[
     """
     part, whole = np.broadcast_arrays(part, whole)
     shares = np.full(whole.shape, undefined, np.float64)
-    return np.divide(part, whole, out=shares, where=whole != 0)
+    np.divide(part, whole, out=shares, where=whole != 0)
+    return shares
 
 
 def intersection_over_union(hits: ArrayLike, errors: ArrayLike) -> NDArray[np.float64]:

@@ -27,6 +27,7 @@ SCENE = Scene(
 def test_both_panels_show_every_valid_point_in_the_colour_of_its_class(tmp_path: Path) -> None:
     points = scene(900)
     points[5] = np.nan
+    points[6, :3] = 0  # no return
     scan, label = Scan.of(points), np.resize([*TrackClass, UNKNOWN], 900)
     figure = annotation_figure(scan, label, SCENE, "a scan")
     for panel in figure.axes:
@@ -65,7 +66,7 @@ def test_the_legend_hides_no_point() -> None:
     (legend,) = figure.legends
     assert len(legend.get_texts()) == len(TrackClass) + 1
     box = legend.get_window_extent()
-    assert not any(box.overlaps(panel.get_window_extent()) for panel in figure.axes)
+    assert not any(box.overlaps(panel.get_tightbbox()) for panel in figure.axes)
     assert figure.bbox.containsx(box.x0)
     assert figure.bbox.containsx(box.x1)
 
