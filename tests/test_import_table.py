@@ -29,7 +29,10 @@ LIBRARIES = {
     "sqlalchemy": "Optuna",
 }
 # What every room may import.
-LIGHT = {"numpy", "yaml", "tqdm", "small_gicp", "onnxruntime", "lzf", "libusb_package"}
+LIGHT = {
+    *("numpy", "yaml", "tqdm", "small_gicp", "onnxruntime"),
+    *("lzf", "flatbuffers", "libusb_package"),
+}
 
 # Modules that run on a small computer, and those that all others are made of.
 LIGHT_MODULES = re.compile(
@@ -100,7 +103,7 @@ def arrows(module: str) -> set[str]:
     found = set()
     for name in imports_of(module) - LIGHT:
         own_room = name in modules() and name not in LIBRARIES
-        found.add(room_of(modules()[name]) if own_room else LIBRARIES[name])
+        found.add(room_of(modules()[name]) if own_room else LIBRARIES.get(name, name))
     return found - {room_of(modules()[module])}
 
 

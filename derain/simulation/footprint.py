@@ -11,7 +11,8 @@ def in_hull(
     """Whether places lie in the convex hull of points, or on its edge.
 
     A convex field of view holds the hull of whatever was seen in it, however the sensor scans: a
-    circle as well as a rectangle. What was seen of the sky, nothing, adds nothing to the hull.
+    circle as well as a rectangle. The hull never goes beyond it, and falls short of it where
+    nothing returned from its edge, as from the sky.
 
     Args:
         points: Azimuth and inclination of the returns, float64 (N,) each, N > 0, degrees, the

@@ -82,11 +82,9 @@ def _exposed(scan: Scan, beams: RecordedBeams, sensor: Sensor) -> NDArray[np.int
 
 
 def _with_measured_intensity(scan: Scan, beams: RecordedBeams) -> Scan:
-    """The scan, without intensities where all returns have the same."""
-    if scan.intensity is None:
-        return scan
-    of_returns = scan.intensity[beams.row[beams.returned]]
-    return scan if (of_returns != of_returns[:1]).any() else replace(scan, intensity=None)
+    """The scan, without intensities where those of its beams' returns were not measured."""
+    returns = scan.take(beams.row[beams.returned])
+    return scan if returns.measured_intensity is not None else replace(scan, intensity=None)
 
 
 def _clear_air(

@@ -217,6 +217,26 @@ def test_one_intensity_throughout_is_as_good_as_none() -> None:
     assert equal(wet.label, wet_without.label)
 
 
+def test_intensities_that_are_no_numbers_stay_so_and_drops_get_none() -> None:
+    clear = wall(40.0, np.nan)
+    wet, wet_without = rained(clear, 50), rained(replace(clear, intensity=None), 50)
+    assert is_rain(wet).sum() > 100
+    assert wet.intensity is not None
+    assert np.isnan(wet.intensity[wet.valid]).all()
+    assert equal(wet.xyz, wet_without.xyz)
+
+
+def test_what_a_radar_measured_is_no_intensity_of_the_lidar() -> None:
+    clear = wall(40.0, 0.0, shape=None)
+    assert clear.intensity is not None
+    radar = np.arange(len(clear)) % 4 == 0
+    clear.intensity[radar] = np.arange(radar.sum())
+    wet = rained(replace(clear, radar=radar), 50)
+    assert is_rain(wet).sum() > 100
+    assert wet.intensity is not None
+    assert not wet.intensity[is_rain(wet)].any()
+
+
 def test_the_column_of_the_file_holds_the_one_intensity_of_all_returns_as_well() -> None:
     clear = wall(40.0, 7.0, shape=None)
     column = np.full(len(clear), 7, np.uint8)
