@@ -19,7 +19,7 @@ from derain.datamodules.statistics import evenly_spaced, measured
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.files.labels import read_labels, semantic
-from derain.morton import distinct_rows
+from derain.morton import first_rows
 from derain.scan import Scan
 from derain.seeds import Draw, generator, run_seed
 from derain.spec import Spec
@@ -288,8 +288,7 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
 
     def _read_distinct(self, file: ScanFile) -> Scan:
         scan = self.read(file)
-        first, _ = distinct_rows(scan)
-        return scan.take(np.sort(first))
+        return scan.take(first_rows(scan))
 
 
 def _packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:

@@ -99,6 +99,18 @@ def distinct_rows(scan: Scan) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return valid[first], inverse
 
 
+def first_rows(scan: Scan) -> NDArray[np.int64]:
+    """The first row at each distinct position, ascending; invalid rows are left out.
+
+    Args:
+        scan: The scan.
+
+    Returns:
+        Row numbers, int64 (M,).
+    """
+    return np.sort(distinct_rows(scan)[0])
+
+
 def _steps(points: NDArray[np.float32]) -> NDArray[np.bool_]:
     """True where a point is not where the one before it is, bool (N − 1,)."""
     x, y, z = points.T

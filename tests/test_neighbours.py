@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
-from derain.morton import distinct_positions, distinct_rows, morton_code
+from derain.morton import distinct_positions, distinct_rows, first_rows, morton_code
 from derain.neighbours import Neighbourhoods, NeighbourView, nearest_neighbours
 from derain.scan import Scan
 
@@ -84,6 +84,7 @@ def test_distinct_rows_are_those_of_the_rows_that_can_be_judged(
         seen.setdefault((scan.xyz[row] + 0).tobytes(), row)
     first, inverse = distinct_rows(scan)
     assert sorted(first) == list(seen.values())
+    assert first_rows(scan).tolist() == list(seen.values())
     np.testing.assert_array_equal(inverse < 0, ~scan.valid)
     np.testing.assert_array_equal(scan.xyz[first][inverse[scan.valid]], scan.xyz[scan.valid])
 

@@ -15,7 +15,7 @@ from derain.export.bench.contestants import Contestant, Method
 from derain.filters import PointFilter
 from derain.filters.derainer import filter_view
 from derain.metrics import ClassCounts, RainMetrics
-from derain.morton import distinct_rows
+from derain.morton import first_rows
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
 
@@ -82,7 +82,7 @@ def score(rows: Sequence[Contestant], data: Labelled, threads: int) -> list[Scor
     tallies = [_Tally(data.card) for _ in rows]
     for path in tqdm(data.scans, desc="scoring", unit="scan", disable=None):
         scan = data.read(path)
-        counted = _distinct_rows(scan) if data.distinct else np.arange(len(scan))
+        counted = first_rows(scan) if data.distinct else np.arange(len(scan))
         for method, tally in zip(methods, tallies, strict=True):
             tally.update(method, scan, counted)
     rates = [data.rain_rate.get(path) for path in data.scans]
@@ -143,9 +143,3 @@ class _Tally:
             {sensor: sum(parts, Counts()) for sensor, parts in self.by_sensor.items()},
             self.failures,
         )
-
-
-def _distinct_rows(scan: Scan) -> NDArray[np.int64]:
-    """The first row at each position, in order; rows that cannot be judged are left out."""
-    first, _ = distinct_rows(scan)
-    return np.sort(first)
