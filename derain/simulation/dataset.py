@@ -11,7 +11,7 @@ changes a byte. Of two runs at work on one folder the second waits for the first
 import os
 import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
@@ -152,7 +152,9 @@ def _refuse_others(root: Path, there: Mapping[str, Any], campaign: Campaign) -> 
         )
 
 
-def _complete_sequences(root: Path, campaign: Campaign, workers: int) -> Iterator[dict[str, str]]:
+def _complete_sequences(
+    root: Path, campaign: Campaign, workers: int
+) -> Generator[dict[str, str], None, None]:
     """Checksums of every sequence, made where it is missing, in ascending order."""
     complete = partial(_complete_sequence, root, campaign)
     progress = partial(
