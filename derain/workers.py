@@ -40,8 +40,10 @@ def end_with_launcher() -> None:
     Lightning runs the command again for each further device. Where its first process is killed the
     others would wait for it. Windows does not tell when a parent is gone.
     """
-    launcher = int(os.environ.setdefault(LAUNCHER, str(os.getpid())))
-    if "LOCAL_RANK" in os.environ and launcher != os.getpid():
+    if "LOCAL_RANK" not in os.environ:
+        os.environ[LAUNCHER] = str(os.getpid())
+    launcher = int(os.environ.get(LAUNCHER, os.getpid()))
+    if launcher != os.getpid():
         threading.Thread(target=_watch, args=(launcher,), daemon=True).start()
 
 

@@ -27,7 +27,7 @@ class WholeCheckpoints(TorchCheckpointIO):
         Raises:
             InputError: It cannot be written; what was there stays.
         """
-        if "://" in str(path):  # not a file of this system's
+        if "://" in str(path) or storage_options is not None:  # not a file of this system's
             super().save_checkpoint(checkpoint, path, storage_options)
             return
         content = io.BytesIO()  # torch hides what goes wrong where it writes itself

@@ -39,7 +39,8 @@ subprocess.run([sys.executable, __file__], env={**os.environ, "LOCAL_RANK": "1"}
 @pytest.mark.parametrize("program", [HAS_A_WORKER, HAS_A_RANK], ids=["worker", "rank"])
 def test_no_process_outlives_the_one_that_it_works_for(tmp_path: Path, program: str) -> None:
     (tmp_path / "program.py").write_text(program)
-    environment = {k: v for k, v in os.environ.items() if k not in (LAUNCHER, "LOCAL_RANK")}
+    environment = {k: v for k, v in os.environ.items() if k != "LOCAL_RANK"}
+    environment[LAUNCHER] = "1"  # as in a run that another run has begun
     command = [sys.executable, tmp_path / "program.py"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
