@@ -36,6 +36,7 @@ from tqdm import tqdm
 
 from benchmarks.small_inputs import COMMANDS, SmallInputs
 from benchmarks.whole_files import fault_of
+from derain.cli.signals import interrupting
 from derain.export.markdown import markdown_table
 
 # The command as installed: Lightning starts it again for each further process.
@@ -86,7 +87,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         root = Path(name)
         inputs, victims = SmallInputs(root / "inputs"), {}
-        with suppress(KeyboardInterrupt):  # the table is of the kills until then
+        with suppress(KeyboardInterrupt), interrupting():  # the table is of the kills until then
             for number in tqdm(range(arguments.kills), unit="kill", disable=None):
                 command = arguments.commands[number % len(arguments.commands)]
                 if command not in victims:
@@ -105,7 +106,7 @@ def undisturbed(arguments: Sequence[str | Path], folder: Path) -> Victim:
     """Lets a command finish, and times it."""
     begun = time.monotonic()
     process = started(arguments, folder)
-    if process.wait():
+    if ended(process):
         raise RuntimeError(f"fails undisturbed: {said(folder)}")
     return Victim(arguments, folder, time.monotonic() - begun)
 
@@ -124,10 +125,10 @@ def kill_once(victim: Victim, chance: random.Random, folder: Path, again: bool) 
     by = chance.choice([signal.SIGKILL] * 3 + [signal.SIGTERM])
     process = started(victim.arguments, folder)
     try:
-        process.wait(chance.uniform(0, victim.seconds))
+        ended(process, within=chance.uniform(0, victim.seconds))
     except subprocess.TimeoutExpired:
         process.send_signal(by)
-    code, counts = process.wait(), Counter(kills=1)
+    code, counts = ended(process), Counter(kills=1)
     orphans = left_running(process.pid)
     counts["finished first"] = int(code == 0)
     # Python is not listening yet in its first moments.
@@ -141,7 +142,7 @@ def kill_once(victim: Victim, chance: random.Random, folder: Path, again: bool) 
     faults += [f"half-written: {fault}" for fault in cut]
     if by == signal.SIGTERM:
         faults += [f"left by SIGTERM: {file}" for file in temporary_files(victim, folder)]
-    failed = [said(folder)] if started(victim.arguments, folder).wait() else []
+    failed = [said(folder)] if ended(started(victim.arguments, folder)) else []
     failed += half_written(victim, folder, complete=True)
     counts["failed again"] = int(bool(failed))
     counts["left after the next run"] = len(temporary_files(victim, folder))
@@ -162,6 +163,15 @@ def started(arguments: Sequence[str | Path], folder: Path) -> subprocess.Popen[b
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
+
+
+def ended(process: subprocess.Popen[bytes], within: float | None = None) -> int:
+    """Exit code of a command, waited for; it does not outlive this program."""
+    try:
+        return process.wait(within)
+    except KeyboardInterrupt:
+        process.kill()
+        raise
 
 
 def said(folder: Path) -> str:
