@@ -58,7 +58,8 @@ def make_open3d_loadable() -> None:
     with contextlib.suppress(ImportError, OSError):  # Open3D will name what it lacks
         import libusb_package
 
-        _lay_beside(Path(open3d.origin).parent, Path(libusb_package.get_library_path()))
+        if library := libusb_package.get_library_path():
+            _lay_beside(Path(open3d.origin).parent, library)
 
 
 def _lay_beside(folder: Path, library: Path) -> None:

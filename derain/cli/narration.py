@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 
+from derain.cli.outputs import refuse_unwritable
+
 # How often one learns how far a command is, in seconds: on a terminal, and in a file.
 PERIODS = {True: 0.5, False: 15.0}
 
@@ -68,14 +70,17 @@ class Narrator:
     Args:
         run: Runs a command of derain, and returns its exit code.
         log: File that everything the commands print goes to.
+
+    Raises:
+        InputError: The file cannot be written.
     """
 
     def __init__(self, run: Callable[[list[str]], int], log: Path) -> None:
         self._run = run
         self._log = log
         self._begun = time.monotonic()
-        log.parent.mkdir(parents=True, exist_ok=True)
-        log.write_text("")
+        refuse_unwritable(log)
+        log.write_text("", "utf-8")
 
     def step(self, *command: str, result: Callable[[Transcript], str]) -> list[str]:
         """Runs one command.

@@ -7,11 +7,11 @@ from typing import Any
 
 import torch
 from jsonargparse import DefaultHelpFormatter
+from lightning.fabric.utilities.exceptions import MisconfigurationException
 from lightning.pytorch import Trainer
 from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
 from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
 from lightning.pytorch.loggers import TensorBoardLogger
-from lightning.pytorch.utilities.exceptions import MisconfigurationException
 
 from derain.cli.configurations import (
     own_configurations,
@@ -102,7 +102,8 @@ class DerainCLI(LightningCLI):
     def parse_arguments(self, parser: LightningArgumentParser, args: ArgsType) -> None:
         """Refuses what cannot be used: options, and checkpoints before Lightning reads them."""
         known = known_options(self.last_added, CLASSES)
-        files = [read_configuration(path, known) for path in own_configurations(args)]
+        arguments = args if isinstance(args, list) else []
+        files = [read_configuration(path, known) for path in own_configurations(arguments)]
         parser.set_defaults({"test.verbose": False})  # the table is in our report
         try:
             super().parse_arguments(parser, args)
