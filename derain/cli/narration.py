@@ -128,7 +128,7 @@ def _told_how_far(transcripts: Sequence[Transcript], begun: float) -> Iterator[N
     def tell() -> None:
         while not done.wait(PERIODS[live]):
             progress = " ".join(filter(None, (each.progress for each in transcripts)))
-            text = f"  {_clock(time.monotonic() - begun)}  {progress}"
+            text = f"  {_clock(time.monotonic() - begun)}  {progress or '...'}"
             if live:
                 width = shutil.get_terminal_size().columns - 1
                 out.write(f"\r\x1b[K{text[:width]}")

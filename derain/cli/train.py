@@ -125,9 +125,8 @@ class DerainCLI(LightningCLI):
         try:
             super().instantiate_classes()
         except MisconfigurationException as error:
-            raise InputError(
-                "--trainer", str(error), "Correct the option that it names."
-            ) from error
+            reason = str(error).rstrip(".")
+            raise InputError("--trainer", reason, "Correct the option that it names.") from error
         except ValueError as error:
             if isinstance(error.__cause__, InputError):
                 raise error.__cause__ from None
