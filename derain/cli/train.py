@@ -13,11 +13,7 @@ from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
 from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
 from lightning.pytorch.loggers import TensorBoardLogger
 
-from derain.cli.configurations import (
-    own_configurations,
-    packaged_configs,
-    with_packaged_configs,
-)
+from derain.cli.configurations import own_configurations, with_packaged_configs
 from derain.cli.lightning_silence import silence_advertisements
 from derain.cli.run_folder import WholeConfig, writing_to_the_run_folder
 from derain.cli.training_errors import as_input_error, read_configuration
@@ -61,7 +57,6 @@ __all__ = [
     "SalsaNext",
     "Simulated",
     "Wads",
-    "packaged_configs",
     "train",
 ]
 

@@ -1,7 +1,10 @@
 """The demo tells its story on a screen, and leaves what it names."""
 
+import io
 import re
 import shlex
+import sys
+import threading
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -11,7 +14,7 @@ import pytest
 import yaml
 from matplotlib.image import imread
 
-from derain.cli import demo
+from derain.cli import demo, narration
 from derain.cli.demo import STREETS, Story, tell
 from derain.cli.main import main
 from derain.cli.narration import Narrator, Transcript
@@ -21,6 +24,7 @@ from derain.files import read_scan
 from derain.hard_cases import scene
 from derain.open3d_import import import_open3d
 from derain.scan import Scan
+from derain.simulation.campaign import Campaign, partition
 
 
 @pytest.fixture
@@ -31,7 +35,8 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Story:
     except InputError as error:
         pytest.skip(str(error))
     monkeypatch.chdir(tmp_path)
-    # The whole proof has tests of its own.
+    # How far a step is has a test of its own, and so has the whole proof.
+    monkeypatch.setattr(narration, "PERIODS", {True: 3600, False: 3600})
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     Path("sensor.yaml").write_text(yaml.safe_dump({"rows": 16, "columns": 60}))
     return Story(
@@ -91,8 +96,6 @@ def test_a_step_that_fails_says_why_and_ends_the_story(capsys: pytest.CaptureFix
 
 
 def test_the_streets_of_the_demo_have_rain_to_choose_by_and_to_test_on() -> None:
-    from derain.simulation.campaign import Campaign, partition
-
     options = dict(pairwise(STREETS))
     rates = tuple(map(float, STREETS[STREETS.index("--rain") + 1 :][:4]))
     campaign = Campaign(*partition(int(options["--sequences"])), rain_rates=rates)
@@ -124,31 +127,31 @@ def test_bars_are_progress_and_lines_are_kept(narrate: Callable[..., list[str]])
     assert narrate("one\ntwo", " and\n", "three") == ["", "one", "two and"]
 
 
+@pytest.mark.parametrize(("live", "before"), [(False, ""), (True, "\r\x1b[K")])
 def test_a_long_step_says_now_and_then_how_far_it_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, live: bool, before: str
 ) -> None:
-    import sys
-    import threading
-
-    monkeypatch.setattr("derain.cli.narration.PERIODS", {True: 0.001, False: 0.001})
     told = threading.Event()
-    out = sys.stdout
-    write = out.write
 
-    def watched(text: str) -> int:
-        if "judging 40%" in text:
-            told.set()
-        return write(text)
+    class Screen(io.StringIO):
+        def isatty(self) -> bool:
+            return live
 
-    monkeypatch.setattr(out, "write", watched)
+        def write(self, text: str) -> int:
+            if "judging 40%" in text:
+                told.set()
+            return super().write(text)
 
     def slow(command: list[str]) -> int:
         print("\rjudging:  40%|## | 4/10 [00:01<00:01]", end="", file=sys.stderr)
         assert told.wait(timeout=30)
         return 0
 
+    monkeypatch.setattr(narration, "PERIODS", {True: 0.001, False: 0.001})
+    monkeypatch.setattr(sys, "stdout", Screen())
     Narrator(slow, tmp_path / "log.txt").step("tune", result=lambda _: "tuned")
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "$ derain tune"
-    assert "  0:00  judging 40%" in lines
-    assert lines[-1].endswith("  tuned")
+    told_in_all = sys.stdout.getvalue()
+    assert told_in_all.startswith("$ derain tune\n" + before)
+    assert f"{before}  0:00  judging 40%" in told_in_all
+    # On a terminal, what was only progress is wiped away.
+    assert told_in_all.rpartition("\x1b[K")[2].splitlines()[-1].endswith("  tuned")
