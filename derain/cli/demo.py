@@ -8,7 +8,7 @@ from pathlib import Path
 
 from derain.cli.narration import Narrator, Transcript
 
-SUMMARY = "the whole story on simulated rain, in about six minutes"
+SUMMARY = "the whole story on simulated rain, in under ten minutes"
 
 DESCRIPTION = """\
 Lets it rain on simulated streets, and draws a scan of them; trains 3D-OutDet, SalsaNext and
