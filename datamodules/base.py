@@ -23,6 +23,7 @@ from derain.morton import first_rows
 from derain.scan import Scan
 from derain.seeds import Draw, generator, run_seed
 from derain.spec import Spec
+from derain.training_record import recorded
 from derain.view import View
 
 Part = Literal["train", "validation", "test", "predict"]
@@ -193,6 +194,10 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
             InputError: A scan that cannot be read.
         """
         return map(self.read, evenly_spaced(self.files("validation"), most))
+
+    def training_record(self) -> dict[str, tuple[str, ...]]:
+        """Which scans it trains on, by their names, for the Spec of what is trained on them."""
+        return recorded([file.scan for file in self.find("train")])
 
     def train_dataloader(self) -> DataLoader[Sample | InputError]:
         """Training scans, in another order and augmented anew every epoch."""

@@ -104,11 +104,6 @@ def full_name(card: DataCard) -> str:
     return card.name if told else f"{card.name} (simulated)"
 
 
-def sequence_of(scan: Path) -> str:
-    """Name of the sequence that a scan lies in: ``<sequence>/<folder of scans>/<frame>.bin``."""
-    return scan.absolute().parent.parent.name
-
-
 def _layout_of(root: Path) -> Layout:
     for layout in (REHEARSE3D, SEMANTIC_KITTI):
         if next(root.glob(f"{layout.sequences}/*/{layout.scans}"), None):

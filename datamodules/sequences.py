@@ -10,6 +10,7 @@ from derain.errors import InputError
 from derain.files import find_scans
 from derain.files.labels import LABEL
 from derain.files.names import scan_stem
+from derain.training_record import whole
 
 
 class SequenceDataModule(ScanDataModule):
@@ -46,6 +47,10 @@ class SequenceDataModule(ScanDataModule):
         if not sequences:
             raise InputError(self.root, f"no sequences are named for {part}", "Give a split.")
         return [file for name in sequences for file in self._sequence(name)]
+
+    def training_record(self) -> dict[str, tuple[str, ...]]:
+        """Which scans it trains on: those of whole sequences."""
+        return whole(self.split.get("train", ()))
 
     def _sequence(self, name: str) -> list[ScanFile]:
         folder = self.root / self.layout.sequences / name

@@ -1,6 +1,7 @@
 """Where the scans and labels of a data set lie."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -23,3 +24,8 @@ SEMANTIC_KITTI = Layout()
 
 # Source: sporsho/sporsho.github.io, REHEARSE3D.md.
 REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels")
+
+
+def sequence_of(scan: Path) -> str:
+    """Name of the sequence that a scan lies in: ``<sequence>/<folder of scans>/<frame>.bin``."""
+    return scan.absolute().parent.parent.name

@@ -222,7 +222,7 @@ class RainMetrics(Metric):
 def _check(classes: Mapping[int, str], rain: Collection[int], range_edges: Sequence[float]) -> None:
     if len(set(classes.values())) < len(classes):
         raise InputError("classes", "two ids have the same name", "Give each a name of its own.")
-    if not rain or not set(rain) <= set(classes):
+    if not set(rain) <= set(classes):
         raise InputError(
             "rain", f"{sorted(rain)} are not ids of classes", "Give ids that the classes name."
         )

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar, Protocol, Self
 
 import lightning
@@ -40,6 +41,9 @@ class TrainingData(Protocol):
 
     def validation_scans(self, most: int) -> Iterator[Scan]:
         """Some of the validation scans."""
+
+    def training_record(self) -> Mapping[str, tuple[str, ...]]:
+        """Which scans it trains on, as a Spec holds it."""
 
 
 class DerainingModule(lightning.LightningModule, ABC):
@@ -196,7 +200,8 @@ class DerainingModule(lightning.LightningModule, ABC):
         data: TrainingData = self.trainer.datamodule  # type: ignore[attr-defined]
         self.card = data.card
         if self._spec is None and stage == "fit":
-            self.adopt(self.spec_for(self.card, list(data.training_scans(EXAMPLES))))
+            spec = self.spec_for(self.card, list(data.training_scans(EXAMPLES)))
+            self.adopt(replace(spec, training=data.training_record()))
         self.metrics = RainMetrics(self.card.classes, self.card.rain, unknown=self.card.unknown)
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:

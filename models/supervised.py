@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from derain.batch import Batch
+from derain.errors import InputError
 from derain.losses import SegmentationLoss, class_weights, segmentation_loss
 from derain.models.base import DerainingModule
 from derain.view import IGNORED
@@ -26,8 +27,16 @@ class SupervisedModule(DerainingModule):
         self.register_buffer("class_weight", torch.ones(2), persistent=False)
 
     def setup(self, stage: str) -> None:
-        """Weighs the classes by their shares in the data."""
+        """Weighs the classes by their shares in the data.
+
+        Raises:
+            InputError: Data in which nothing counts as rain, to be trained on.
+        """
         super().setup(stage)
+        if stage == "fit" and not self.card.rain:
+            raise InputError(
+                self.card.name, "has no rain that could be learnt", "Train on data that have."
+            )
         if (share := self.card.rain_share) is not None:
             self.class_weight.copy_(class_weights([1 - share, share]))
 

@@ -131,7 +131,6 @@ def test_extra_statistics_join_those_that_a_card_has(card_file: Path) -> None:
         {"classes": {0: "ground", 3: ["rain"], 4: "spray"}},
         {"name": {"a": 1}},
         {"classes": {0: "rain", 3: "rain", 4: "spray"}},
-        {"rain": []},
         {"rain": 3},
         {"rain": [5]},
         {"unknown": [5]},
@@ -220,3 +219,31 @@ def test_the_class_shares_of_a_card_are_of_all_points() -> None:
     share = load_card("rehearse3d").rain_share
     assert share is not None
     assert math.isclose(share, 0.06638644365199696, rel_tol=1e-6)
+
+
+def test_a_card_of_clean_data_says_that_it_has_no_rain(card_file: Path) -> None:
+    card_file.write_text(yaml.safe_dump({**OWN, "rain": []}))
+    card = load_card(card_file)
+    scan = Scan.of(np.ones((2, 4))).with_label(np.array([0, 3]))
+    assert card.rain == ()
+    assert not card.rain_of(scan).any()
+    card_file.write_text(yaml.safe_dump({k: v for k, v in OWN.items() if k != "rain"}))
+    with pytest.raises(InputError, match="rain is missing"):
+        load_card(card_file)
+
+
+def test_semantickitti_has_the_classes_of_wads_but_for_its_snow() -> None:
+    clean, wads = load_card("semantickitti"), load_card("wads")
+    assert clean.rain == ()
+    assert clean.classes == {id_: n for id_, n in wads.classes.items() if "snow" not in n}
+    sequences = [name for names in clean.split.values() for name in names]
+    assert sorted(sequences) == [f"{number:02d}" for number in range(22)]
+    assert clean.split["validation"] == ("08",)
+
+
+def test_a_card_takes_the_normalisation_of_another_and_stays_itself() -> None:
+    rehearse, wads = load_card("rehearse3d"), load_card("wads")
+    both = rehearse.normalised_as(wads)
+    for channel in ("x", "y", "z", "intensity", "range"):
+        assert both.statistics(channel) == wads.statistics(channel)
+    assert replace(both, mean=None, std=None, range=None) == rehearse

@@ -338,7 +338,6 @@ def test_a_scan_number_out_of_bounds_is_refused_and_nothing_is_counted(scan_numb
     ("classes", "rain", "edges"),
     [
         ({0: "ground", 3: "rain"}, (4,), (0, 10)),
-        ({0: "ground", 3: "rain"}, (), (0, 10)),
         ({0: "rain", 3: "rain"}, (3,), (0, 10)),
         ({0: "ground", 3: "rain"}, (3,), (5, 10)),
         ({0: "ground", 3: "rain"}, (3,), (0, 10, 10)),
@@ -351,3 +350,16 @@ def test_what_cannot_be_counted_by_is_refused(
 ) -> None:
     with pytest.raises(InputError):
         RainMetrics(classes, rain, edges)
+
+
+def test_on_clean_data_whatever_is_called_rain_is_a_false_alarm() -> None:
+    metrics = RainMetrics({0: "road", 1: "car"}, rain=())
+    metrics.update(
+        predicted=torch.tensor([True, False, False, True]),
+        label=torch.tensor([0, 0, 1, 1]),
+        range=torch.tensor([5.0, 5.0, 5.0, 15.0]),
+        scan=torch.zeros(4, dtype=torch.int64),
+        scans=1,
+    )
+    assert metrics.pooled() == Counts(0, 2, 0, 2)
+    assert [c.share_lost for c in metrics.by_class().values()] == [0.5, 0.5]

@@ -29,7 +29,7 @@ class DataCard:
     Attributes:
         name: Name of the data set, for tables and models.
         classes: Names of its semantic classes, by id.
-        rain: Ids of the classes that are to be removed.
+        rain: Ids of the classes that are to be removed; none where the data are clean.
         unknown: Ids of the classes of which it is not known whether they are rain: neither trained
             on nor measured by.
         licence: Licence of the data.
@@ -108,6 +108,12 @@ class DataCard:
         """
         return self._of_classes(scan, self.unknown)
 
+    def normalised_as(self, other: "DataCard") -> "DataCard":
+        """The same card with the means and standard deviations of another one."""
+        return replace(
+            self, mean=other.mean, std=other.std, range=other.range, extra=dict(other.extra)
+        )
+
     def completed(
         self, extra: Mapping[str, tuple[float, float]] = {}, **statistics: Any
     ) -> "DataCard":
@@ -169,8 +175,6 @@ def _card(document: Entry) -> DataCard:
     members = document.members()
     if len(set(card.classes.values())) < len(card.classes):
         raise members["classes"].fault("two classes have the same name", "Give each its own.")
-    if not card.rain:
-        raise members["rain"].fault("it names no class", "Give the ids of those that are rain.")
     for key, ids, known in (
         ("rain", card.rain, card.classes.keys()),
         ("unknown", card.unknown, card.classes.keys() - set(card.rain)),

@@ -1,10 +1,13 @@
 """``derain bench``: methods side by side, speed against error."""
 
 import argparse
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from tqdm import tqdm
 
 from derain.cli.arguments import command_line, count, threads
 from derain.cli.labelled_data import add_data_arguments, labelled
@@ -13,11 +16,14 @@ from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.notices import Notices
 from derain.odd_scans import oddities
+from derain.spec import Spec
+from derain.training_record import overlap
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule, ScanFile
     from derain.export.bench.contestants import Contestant
     from derain.export.bench.rows import Row
+    from derain.export.bench.scores import Labelled
     from derain.scan import Scan
 
 SUMMARY = "compare methods on labelled scans: error, time and memory"
@@ -118,7 +124,7 @@ def _bench(
     out: Path,
 ) -> list["Row"]:
     """Benches the methods on some scans, and writes tables and picture."""
-    from derain.datamodules.labelled import sequence_of
+    from derain.data_layout import sequence_of
     from derain.datamodules.statistics import evenly_spaced
     from derain.export.bench.bench import provenance, run_bench
     from derain.export.bench.cost import Timing
@@ -144,9 +150,11 @@ def _bench(
         arguments.repeats,
         data.loading.intensity_scale,
     )
+    notes = _notes(methods, scans)
     rows = run_bench(methods, scans, timing, arguments.seed)
     notices.tell_how_many_more()
     facts = provenance(command_line(arguments), data, files, timing, arguments.seed)
+    facts["notes"] = notes
     write_report(rows, facts, out)
     draw_speed_error(rows, facts, out / "speed_error.png")
     return rows
@@ -164,6 +172,19 @@ def _read(
     for method in methods:
         notices.tell(str(scan), oddities(read, method.judge), method.title)
     return read
+
+
+def _notes(methods: Sequence["Contestant"], scans: "Labelled") -> list[str]:
+    """Says, and gives back, which models were trained on what they are measured on."""
+    notes = [
+        note
+        for method in methods
+        if isinstance(method.judge, Spec)
+        and (note := overlap(method.title, method.judge, scans.card, scans.scans))
+    ]
+    for note in notes:
+        tqdm.write(f"derain: warning: {note}", sys.stderr)
+    return notes
 
 
 def _learn_from(arguments: argparse.Namespace, data: "ScanDataModule") -> Any:

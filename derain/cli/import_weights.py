@@ -1,6 +1,7 @@
 """``derain import-weights``: a checkpoint of derain from weights that others published."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from derain.cli.outputs import say
@@ -11,14 +12,15 @@ DESCRIPTION = """\
 Makes a checkpoint of derain from published weights.
 
   derain import-weights outdet saved_models/bin_desnow_wads/outdet.pt --stats wads --out outdet.ckpt
-  derain import-weights outdet rehearse3d_outdet.pt --stats wads --out outdet.ckpt
-  derain import-weights salsanext SalsaNext_valid_best --stats kitti --grid rehearse3d \
-      --out salsanext.ckpt
+  derain import-weights outdet rehearse3d_outdet.pt --stats wads --data rehearse3d --out outdet.ckpt
+  derain import-weights salsanext SalsaNext_valid_best --stats semantickitti --data rehearse3d \
+      --grid rehearse3d --out salsanext.ckpt
 
---stats names the data card whose mean and standard deviation the weights were trained with: a
-packaged one or a YAML file. The published REHEARSE-3D weights of 3D-OutDet fit those of WADS best
-(inferred); those of SalsaNext were trained with SemanticKITTI's. --grid names the grid of the range
-images that the weights were trained on.
+--data names the data card of what the weights were trained on, which says their classes, rain and
+licence; --stats the one whose mean and standard deviation their input was normalised by. Each is a
+packaged card or a YAML file. The published REHEARSE-3D weights of 3D-OutDet fit the statistics of
+WADS best (inferred); those of SalsaNext were trained with SemanticKITTI's. --grid names the grid of
+the range images that the weights were trained on.
 """
 
 
@@ -27,7 +29,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("network", help="outdet, salsanext or lisnownet")
     parser.add_argument("weights", type=Path, help="the published state_dict or checkpoint")
     parser.add_argument(
-        "--stats", required=True, help="data card: wads, kitti, spray, or a YAML file"
+        "--stats",
+        required=True,
+        help="data card with their mean and std: wads, kitti, semantickitti, spray, or a YAML file",
+    )
+    parser.add_argument(
+        "--data", help="data card of what they were trained on (default: that of --stats)"
     )
     parser.add_argument(
         "--grid", help="of a range image: semantickitti, rehearse3d or wads (not for outdet)"
@@ -41,12 +48,23 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.errors import InputError
     from derain.models.checkpoint import MODELS, save_model
     from derain.models.published import read_state_dict
+    from derain.training_record import whole
 
     if arguments.network not in MODELS:
         raise InputError(arguments.network, "no such network", f"Known are {', '.join(MODELS)}.")
+    stats = load_card(arguments.stats)
+    data = stats if arguments.data is None else load_card(arguments.data)
+    if not data.rain:
+        raise InputError(
+            "--data", f"{data.name} has no rain that weights could know", "Say what theirs had."
+        )
     model = MODELS[arguments.network].from_published(
-        read_state_dict(arguments.weights), load_card(arguments.stats), arguments.grid
+        read_state_dict(arguments.weights), data.normalised_as(stats), arguments.grid
     )
+    model.adopt(replace(model.spec, training=whole(data.split.get("train", ()))))
     save_model(model, arguments.out)
-    say(f"Wrote {arguments.out}: {model.NAME} with the statistics of {model.spec.data}")
+    say(
+        f"Wrote {arguments.out}: {model.NAME} trained on {data.name}, "
+        f"with the statistics of {stats.name}"
+    )
     return 0

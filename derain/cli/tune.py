@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -20,6 +21,7 @@ from derain.files.atomic import replacing
 from derain.filters import FILTERS, filter_from
 from derain.notices import Notices
 from derain.odd_scans import Judge, oddities
+from derain.training_record import overlap
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule, ScanFile
@@ -128,6 +130,9 @@ def _tuned_model(
             known = scan.valid & ~data.card.unknown_of(scan)
             yield derainer.probability(scan)[known], data.card.rain_of(scan)[known]
 
+    note = overlap(arguments.method, derainer.spec, data.card, [file.scan for file in files])
+    if note is not None:
+        tqdm.write(f"derain: warning: {note}", sys.stderr)
     scans = list(judged())
     if not any(rain.any() for _, rain in scans):
         raise _no_rain(data)
@@ -149,7 +154,7 @@ def _drawn(files: list["ScanFile"], most: int, seed: int) -> list["ScanFile"]:
 
 
 def _no_rain(data: "ScanDataModule") -> InputError:
-    rain = ", ".join(data.card.classes[id_] for id_ in data.card.rain)
+    rain = ", ".join(data.card.classes[id_] for id_ in data.card.rain) or "rain"
     return InputError(
         "--data", f"no point of these scans is {rain}", "Tune on scans with rain, and their --card."
     )

@@ -70,6 +70,7 @@ def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
         f"# {facts['title']}, {points:,} points",
         f"    {facts['command']}",
         *([SIMULATED_IS_EASY] if facts["simulated"] else []),
+        *(f"**{note}.**" for note in facts.get("notes", ())),
         main_table(rows),
         READING,
         "## Called rain, by class",

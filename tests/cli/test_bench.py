@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from derain.export.bench import bench
 from derain.export.bench.contestants import Contestant
 from derain.export.bench.cost import Timing, run_alone
+from derain.export.runtime import Derainer
 from derain.scan import Scan
 from derain.simulation.campaign import MAKER
 from derain.stopwatch import Stopwatch
@@ -107,6 +108,34 @@ def test_methods_are_timed_on_scaled_intensities(root: Path) -> None:
 
     run_alone(Contestant("t", "t", lambda threads: judge), Timing([scan], intensity_scale=2.0))
     assert set(seen) == {2 * np.fromfile(scan, np.float32).reshape(-1, 4)[:, 3].max()}
+
+
+def test_a_model_that_knows_the_scans_from_its_training_is_named(
+    run_derain, root: Path, tmp_path: Path, onnx_model: Path, saying
+) -> None:
+    spec = Derainer(onnx_model).metadata["spec"]
+    here = {"data": "simulated rain", "training": {"002": ["0"], "003": [], "000": ["0"]}}
+    knowing, out = saying({"spec": {**spec, **here}}), tmp_path / "out"
+    methods = [f"knowing={knowing}", f"other={onnx_model}", "all"]
+    outcome = run_derain("bench", "--data", root, "--methods", *methods, "--out", out)
+    assert outcome.code == 0, outcome.err
+    (warning,) = [line for line in outcome.err.splitlines() if "warning" in line]
+    assert warning.startswith("derain: warning: knowing was trained on 2 of these 3 scans, such as")
+    assert str(root / "sequences/002/lidar_radar_pcd/0.bin") in warning
+    content = json.loads((out / "bench.json").read_text())
+    assert [f"derain: warning: {note}" for note in content["notes"]] == [warning]
+    assert content["notes"][0] in (out / "bench.md").read_text()
+
+
+def test_a_threshold_tuned_on_training_scans_is_warned_of(
+    run_derain, root: Path, tmp_path: Path, onnx_model: Path, saying
+) -> None:
+    spec = Derainer(onnx_model).metadata["spec"]
+    here = {"data": "simulated rain", "training": {"001": []}}
+    knowing = saying({"spec": {**spec, **here}})
+    outcome = run_derain("tune", knowing, "--data", root, "--out", tmp_path / "tuned.yaml")
+    assert outcome.code == 0, outcome.err
+    assert "was trained on 1 of these 1 scans" in outcome.err
 
 
 def test_the_command_in_the_report_makes_the_same_figures_again(

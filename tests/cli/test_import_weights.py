@@ -1,5 +1,6 @@
 """``derain import-weights`` makes a checkpoint of published weights, and of nothing else."""
 
+import json
 import pickle
 from pathlib import Path
 
@@ -44,6 +45,37 @@ def test_the_checkpoint_computes_what_the_weights_do(
     assert (model.spec.mean, model.spec.std, model.spec.data) == (card.mean, card.std, card.name)
     for name, tensor in random_outdet.network.state_dict().items():
         torch.testing.assert_close(model.network.state_dict()[name], tensor, rtol=0, atol=0)
+
+
+def test_normalisation_and_identity_are_two_things(
+    run_derain, published: dict[str, Tensor], tmp_path: Path
+) -> None:
+    weights, out = tmp_path / "published.pt", tmp_path / "outdet.ckpt"
+    torch.save(published, weights)
+    options = ["--stats", "wads", "--data", "rehearse3d", "--out", out]
+    outcome = run_derain("import-weights", "outdet", weights, *options)
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "trained on REHEARSE-3D, with the statistics of WADS" in outcome.out
+    said = json.loads(run_derain("info", out, "--json").out)["spec"]
+    wads, rehearse = load_card("wads"), load_card("rehearse3d")
+    assert (said["data"], said["licence"]) == (rehearse.name, rehearse.licence)
+    assert said["classes"] == {str(id_): name for id_, name in rehearse.classes.items()}
+    assert said["rain"] == [3]
+    assert (said["mean"], said["std"]) == (list(wads.mean), list(wads.std))
+    assert said["training"] == {name: [] for name in rehearse.split["train"]}
+
+
+def test_weights_that_know_rain_were_not_trained_on_clean_data(
+    run_derain, published: dict[str, Tensor], tmp_path: Path
+) -> None:
+    weights, out = tmp_path / "published.pt", tmp_path / "outdet.ckpt"
+    torch.save(published, weights)
+    outcome = run_derain(
+        "import-weights", "outdet", weights, "--stats", "semantickitti", "--out", out
+    )
+    assert (outcome.code, outcome.out) == (2, "")
+    assert outcome.err.startswith("derain: --data: SemanticKITTI has no rain")
+    assert not out.exists()
 
 
 def test_a_training_checkpoint_that_holds_the_weights_will_do(

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from derain.cards import load_card
+from derain.data_layout import sequence_of
 from derain.datamodules.base import Loading
-from derain.datamodules.labelled import card_of, labelled_scans, rain_rates, sequence_of
+from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
 from derain.errors import InputError
 from derain.simulation.campaign import MAKER
 

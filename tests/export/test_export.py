@@ -15,7 +15,7 @@ from derain.cards import load_card
 from derain.errors import InputError
 from derain.export import onnx_file
 from derain.export.onnx_file import export
-from derain.export.proof import FLOAT32, INT8, THREADS, Case, prove
+from derain.export.proof import FINITE, FLOAT32, INT8, THREADS, Case, Proof, prove
 from derain.export.runtime import Derainer
 from derain.hard_cases import hard_cases, scene
 from derain.models.outdet import OutDet
@@ -165,9 +165,8 @@ def test_swapped_logits_flip_every_point(onnx_model: Path, random_outdet: OutDet
         ({"flipped": 2, "points": 9_999}, False),
         ({"finite": False}, False),
         ({"points": 0}, True),
-        ({"difference": 1e9, "bounds": INT8}, True),
-        ({"flipped": 1000, "bounds": INT8}, True),
-        ({"flipped": 1001, "bounds": INT8}, False),
+        ({"difference": 1e9, "flipped": 20_000, "bounds": FINITE}, True),
+        ({"finite": False, "bounds": FINITE}, False),
         ({"finite": False, "bounds": INT8}, False),
     ],
 )
@@ -176,6 +175,34 @@ def test_a_case_holds_within_its_bounds_only(change: dict[str, float], holds: bo
         "case", points=round(2 / FLOAT32.flipped), threads=1, difference=0, flipped=0, finite=True
     )
     assert replace(case, **change).holds == holds
+
+
+@pytest.mark.parametrize(
+    ("found", "holds"),
+    [
+        ([(70, 100)], True),
+        ([(69, 100)], False),
+        ([(0, 300)], False),
+        ([(0, 10), (90, 100)], True),
+        ([(90, 100), (0, 50)], False),
+        ([(0, 0)], False),
+    ],
+    ids=str,
+)
+def test_in_eight_bits_seven_tenths_of_the_rain_is_found_alike(
+    found: list[tuple[int, int]], holds: bool
+) -> None:
+    # Of 10,000 cells: what changes is no twentieth of them.
+    cases = [
+        Case("scan", 10_000, 1, 0.1, either - both, True, both, either, INT8)
+        for both, either in found
+    ]
+    beside = Case("hard", 10_000, 1, 0.1, 0, True, both=0, either=5000, bounds=FINITE)
+    proof = Proof((*cases, beside))
+    assert proof.holds == holds
+    assert ("FAILED: the IoU of the rain must be 0.7" in str(proof)) != holds
+    pooled = [sum(column) for column in zip(*found, strict=True)]
+    assert proof.as_dict()["rain_iou"] == (pooled[0] / pooled[1] if pooled[1] else 0.0)
 
 
 class SpoiltFarAway(nn.Module):
@@ -242,6 +269,44 @@ def test_an_output_that_cannot_be_written_is_reported(
         export(random_outdet, tmp_path)
     assert list(tmp_path.iterdir()) == [file]
     assert file.read_text() == "in the way"
+
+
+@pytest.mark.usefixtures("one_block")
+def test_numbers_too_small_to_count_are_set_to_0_and_the_proof_holds(
+    tmp_path: Path, random_outdet: OutDet, few_cases: None
+) -> None:
+    model = deepcopy(random_outdet)
+    subnormal, negligible, kept = 1e-40, -9e-21, 2e-20
+    with torch.no_grad():
+        # What is folded into the head's weights is nothing: they are exported as they are.
+        model.network.head.weight[:, 0] = subnormal
+        model.network.head.weight[0, 1] = negligible
+        model.network.head.weight[1, 1] = kept
+    proof = export(model, tmp_path / "model.onnx")
+    assert proof.holds
+    stored = np.concatenate(
+        [
+            np.ravel(onnx.numpy_helper.to_array(tensor)).astype(np.float64)
+            for tensor in onnx.load(tmp_path / "model.onnx").graph.initializer
+            if tensor.data_type == onnx.TensorProto.FLOAT
+        ]
+    )
+    assert np.abs(stored[stored != 0]).min() == pytest.approx(kept)
+    assert Derainer(tmp_path / "model.onnx").metadata["flushed"] == 3
+
+
+def test_a_whole_number_of_0_is_left_alone() -> None:
+    graph = onnx.helper.make_graph([], "graph", [], [])
+    tensors = [np.array([0, 1]), np.array([True]), np.array([0.0, 1.0, 1e-30], np.float16)]
+    tensors += [np.array([[1e-30, -0.0], [1.0, np.nan]]), np.array(1e-30, np.float32)]
+    graph.initializer.extend(onnx.numpy_helper.from_array(t, str(i)) for i, t in enumerate(tensors))
+    proto = onnx.helper.make_model(graph)
+    assert onnx_file.flush(proto) == 2
+    found = [onnx.numpy_helper.to_array(tensor) for tensor in proto.graph.initializer]
+    for before, after in zip(tensors, found, strict=True):
+        assert (after.dtype, after.shape) == (before.dtype, before.shape)
+        expected = np.where(before == 1e-30, 0, before) if before.dtype.kind == "f" else before
+        np.testing.assert_array_equal(after, np.where(np.abs(expected) < 1e-20, 0, expected))
 
 
 def _rows(model: OutDet) -> np.ndarray:

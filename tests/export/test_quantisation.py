@@ -1,6 +1,10 @@
 """Eight-bit models: smaller, proved on the scans that set their scales, finite on all others."""
 
+import weakref
 from collections import Counter
+from collections.abc import Iterable, Sequence
+from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,15 +12,18 @@ import onnx
 import pytest
 
 from derain.errors import InputError
-from derain.export import onnx_file
+from derain.export import onnx_file, quantisation
 from derain.export.onnx_file import export
 from derain.export.proof import FINITE, INT8, THREADS, Proof
-from derain.export.quantisation import ScanReader
+from derain.export.quantisation import CalibrationScans, ScanReader
 from derain.export.runtime import Derainer
+from derain.files import read_scan
 from derain.hard_cases import hard_cases, scene
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
+from derain.probability import probability_of_rain
 from derain.scan import Scan
+from derain.view import View
 
 HARD_CASES = dict(hard_cases(largest=5000))
 CALIBRATION = [Scan.of(scene(3000, seed), f"scene {seed}") for seed in range(3)]
@@ -77,7 +84,12 @@ def test_the_proof_is_made_on_the_calibration_scans_and_on_every_hard_case(
     assert {case.bounds for case in others} == {FINITE}
     assert all(case.finite for case in proof.cases)
     assert Derainer(path).metadata["proof"] == proof.as_dict()
-    assert proof.as_dict()["cases"][0]["bounds"] == {"difference": None, "flipped": 0.05}
+    written = proof.as_dict()
+    bounds = {"difference": None, "flipped": None, "rain_iou": 0.7}
+    assert written["cases"][0]["bounds"] == bounds
+    rain = [(case["both"], case["either"]) for case in written["cases"][: len(seen)]]
+    both, either = np.sum(rain, axis=0)
+    assert 0.7 < written["rain_iou"] == both / either < 1
 
 
 def test_few_labels_of_a_scene_flip(int8: tuple[Path, Proof], image_onnx: Path) -> None:
@@ -109,28 +121,75 @@ def test_a_reader_gives_the_inputs_of_every_scan_once(image_model: DerainingModu
     assert reader.get_next() is None
 
 
-def test_too_many_flipped_labels_leave_no_file(
+def test_a_model_that_finds_no_rain_any_more_leaves_no_file(
     image_model: DerainingModule,
     image_onnx: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def ruined(proto: onnx.ModelProto, *_: object) -> onnx.ModelProto:
-        """Swaps the two logits."""
+    def blind(proto: onnx.ModelProto, *_: object) -> onnx.ModelProto:
+        """Takes so much from every score of rain that none is left."""
         (logits,) = proto.graph.output
         for node in proto.graph.node:
-            node.output[:] = ["straight" if name == logits.name else name for name in node.output]
-        one = onnx.numpy_helper.from_array(np.array([1, 0]), "swap")
-        proto.graph.initializer.append(one)
-        swap = onnx.helper.make_node("Gather", ["straight", "swap"], [logits.name], axis=1)
-        proto.graph.node.append(swap)
+            node.output[:] = ["seeing" if name == logits.name else name for name in node.output]
+        loss = onnx.numpy_helper.from_array(np.array([0, -1e3], np.float32), "loss")
+        proto.graph.initializer.append(loss)
+        proto.graph.node.append(onnx.helper.make_node("Add", ["seeing", "loss"], [logits.name]))
         return proto
 
+    # With this threshold, little is rain: less than a twentieth of all pixels.
+    derainer, pixels = Derainer(image_onnx), []
+    for scan in CALIBRATION:
+        view = derainer.view(scan)
+        pixels.append(probability_of_rain(derainer.logits(view))[view.valid.ravel()])
+    threshold = float(np.quantile(np.concatenate(pixels), 0.9))
+    model = deepcopy(image_model)
+    model.adopt(replace(model.spec, threshold=threshold))
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(image_onnx))
-    monkeypatch.setattr(onnx_file, "quantised", ruined)
-    with pytest.raises(InputError, match="the exported model differs: FAILED scene 0"):
-        export(image_model, tmp_path / "model.onnx", CALIBRATION)
-    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [])
+    monkeypatch.setattr(onnx_file, "quantised", lambda proto, *_: proto)
+    seeing = export(model, tmp_path / "seeing.onnx", CALIBRATION)
+    assert seeing.rain_iou > 0.99
+    assert all(0 < case.both < 0.05 * case.points for case in seeing.cases)
+    monkeypatch.setattr(onnx_file, "quantised", blind)
+    with pytest.raises(InputError, match=r"FAILED: the IoU of the rain must be 0\.7"):
+        export(model, tmp_path / "blind.onnx", CALIBRATION)
+    assert [path.name for path in tmp_path.iterdir()] == ["seeing.onnx"]
+
+
+def test_one_calibration_scan_is_held_at_a_time(
+    image_model: DerainingModule,
+    image_onnx: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    paths = [tmp_path / "scans" / f"{number}.bin" for number in range(4)]
+    paths[0].parent.mkdir()
+    for number, path in enumerate(paths):
+        scene(500, number).tofile(path)
+    held: weakref.WeakSet[Scan] = weakref.WeakSet()
+    read: list[tuple[Path, int]] = []
+
+    def counted(path: Path, columns: Sequence[str]) -> Scan:
+        read.append((path, len(held)))
+        scan = read_scan(path, columns)
+        held.add(scan)
+        return scan
+
+    def gone_through(proto: onnx.ModelProto, view: View, scans: Iterable[Scan]) -> onnx.ModelProto:
+        reader = ScanReader(view, scans)
+        while reader.get_next() is not None:
+            pass
+        return proto
+
+    monkeypatch.setattr(quantisation, "read_scan", counted)
+    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(image_onnx))
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [])
+    monkeypatch.setattr(onnx_file, "quantised", gone_through)
+    scans = CalibrationScans(paths, ("x", "y", "z", "intensity"))
+    assert export(image_model, tmp_path / "model.onnx", scans).holds
+    # Once to be scaled by, and once to be proved on; none while another is held.
+    assert read == [(path, 0) for path in (*paths, *paths)]
 
 
 def test_a_network_without_convolutions_is_refused(

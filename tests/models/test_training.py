@@ -239,7 +239,18 @@ def test_a_checkpoint_of_a_run_is_a_model(
     copy = load_model(tmp_path / "run.ckpt")
     assert copy.spec == model.spec
     assert copy.spec.view == {"kind": "neighbours", "neighbours": 6}
+    assert copy.spec.training == {tmp_path.parent.name: ("0", "1", "2")}
     assert_same(copy, model)
+
+
+def test_clean_data_teach_a_network_of_labels_nothing(
+    make_trainer: MakeTrainer, tmp_path: Path
+) -> None:
+    scene(300).tofile(tmp_path / "0.bin")
+    write_labels(tmp_path / "0.label", np.zeros(300, np.int64))
+    clean = Folder(str(tmp_path), "semantickitti", train=["0.bin"], validation=["0.bin"])
+    with pytest.raises(InputError, match="SemanticKITTI: has no rain that could be learnt"):
+        make_trainer(epochs=1).fit(OutDet(), clean)
 
 
 def test_a_test_takes_the_normalisation_from_the_checkpoint(
