@@ -150,7 +150,7 @@ def broken(checkpoint: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("other_parameters.ckpt", "depth"),
         ("other_weights.ckpt", "its weights do not fit outdet"),
         ("other_size.ckpt", "its weights do not fit outdet"),
-        ("newer.ckpt", "schema 2, newer than this derain's 1"),
+        ("newer.ckpt", "schema 2 is newer than this derain's 1"),
     ],
 )
 def test_what_cannot_be_exported_is_one_line_and_exit_code_2(
