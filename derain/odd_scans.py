@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.files.ply import PlyHeader
 from derain.filters import SSR, PointFilter
 from derain.one_line_rule import OneLineRule
 from derain.scan import FEWEST_ALIKE, Scan
@@ -94,6 +95,15 @@ def much_removed(share: float) -> Iterator[Oddity]:
             f"more than {MOST_RAIN:.0%} called rain",
             f"{share:.0%} of the points are called rain, where the heaviest rain has "
             f"{HEAVIEST_RAIN:.0%}: the method may not suit the sensor",
+        )
+
+
+def left_out(scan: Scan) -> Iterator[Oddity]:
+    """Whether a scan's file holds what is not written with the cleaned scan."""
+    if isinstance(scan.header, PlyHeader) and scan.header.left_out:
+        yield Oddity(
+            "parts of the file that are not written",
+            f"the cleaned file is without its {', '.join(scan.header.left_out)}",
         )
 
 

@@ -140,7 +140,8 @@ def _clean(narrator: Narrator, out: Path, title: str, scan: Path) -> None:
 
 def _rainiest(data: Path) -> Path:
     """The last test scan of the sequence where it rains most."""
-    from derain.datamodules.labelled import rain_rates, sequence_of
+    from derain.data_layout import sequence_of
+    from derain.datamodules.labelled import rain_rates
     from derain.datamodules.simulated import Simulated
 
     rates = rain_rates([data], None)

@@ -23,7 +23,7 @@ from derain.files.labels import LABEL, write_labels
 from derain.files.names import beside
 from derain.filters import FILTERS, FilterDerainer, read_parameters
 from derain.notices import Notices
-from derain.odd_scans import Oddity, much_removed, oddities, outside_view
+from derain.odd_scans import Oddity, left_out, much_removed, oddities, outside_view
 from derain.scan import Scan
 from derain.stopwatch import Stopwatch
 
@@ -141,7 +141,7 @@ def _clean(
     rain, odd = _judge(scan.with_intensity_times(arguments.intensity_scale), method, stopwatch)
     valid, removed = int(scan.valid.sum()), int(rain.sum())
     share_removed = removed / max(valid, 1)
-    odd += much_removed(share_removed)
+    odd += [*much_removed(share_removed), *left_out(scan)]
     notices.tell(str(path), odd)
     if share_removed > arguments.most_removed:
         raise InputError(

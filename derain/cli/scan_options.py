@@ -30,8 +30,8 @@ def add_columns(
         type=column_names,
         metavar="NAMES",
         default=default,
-        help=f"names of the columns of {of}.bin and .npy files "
-        f"(default: {','.join(DEFAULT_COLUMNS)})",
+        help=f"names of the columns of {of}files that do not name them: .bin, .npy, .npz of one "
+        f"array, text without a line of names (default: {','.join(DEFAULT_COLUMNS)})",
     )
 
 

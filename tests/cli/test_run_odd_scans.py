@@ -123,3 +123,16 @@ def test_a_scan_is_projected_once_and_in_the_time_that_is_told(
         f"derain: warning: {tmp_path / 'scan.bin'}: {outside:.0%} of the points lie outside the "
         "grid of WADS, and stay"
     ]
+
+
+def test_parts_of_a_file_that_are_not_written_are_named(run_derain, tmp_path: Path) -> None:
+    points = "\n".join(f"{x} {y} 0" for x in range(1, 4) for y in range(3))
+    scan = tmp_path / "mesh.ply"
+    scan.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nproperty float y\n"
+        "property float z\nelement edge 1\nproperty int a\nproperty int b\nend_header\n"
+        f"{points}\n0 1\n"
+    )
+    outcome = run_derain("run", "ror", scan, "--out", tmp_path / "out")
+    assert outcome.code == 0
+    assert outcome.said == [f"derain: warning: {scan}: the cleaned file is without its edge"]
