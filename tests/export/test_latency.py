@@ -74,5 +74,5 @@ def test_the_versions_are_those_that_run() -> None:
 def test_what_cannot_be_read_is_reported(onnx_model: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.bin: there is no such file"):
         measure_latency(onnx_model, tmp_path / "none.bin")
-    with pytest.raises(InputError, match=r"none\.onnx: no such file"):
+    with pytest.raises(InputError, match=r"none\.onnx: there is no such file"):
         measure_latency(tmp_path / "none.onnx")
