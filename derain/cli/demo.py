@@ -32,6 +32,9 @@ STREETS = (
     *("--rain", "0", "10", "25", "50", "--sensor", "mems_64", "--no-radar"),
 )
 
+# Columns of the comparison that fit on a screen.
+SHOWN = ("method", "P", "R", "F1", "IoU", "IoU 95 %", "ms")
+
 
 @dataclass(frozen=True)
 class Story:
@@ -40,7 +43,7 @@ class Story:
     Attributes:
         out: Folder that everything is written to.
         streets: Options of ``derain simulate``.
-        networks: Networks that are trained: what they are called, and their configurations.
+        networks: Networks that are trained, as ``NETWORKS`` calls them.
         others: Methods beside them.
         fit: Options of every training.
         bench: Options of the comparison.
@@ -97,7 +100,7 @@ def tell(story: Story) -> None:
         *("--methods", *networks, f"dsor, tuned={tuned}", *story.others),
         result=lambda _: f"every method on the same scans: {out / 'bench' / 'bench.md'}",
     )
-    print("", *map(_narrowed, table), "", sep="\n")
+    print("", *_narrowed(table), "", sep="\n")
     print("Simulated rain on streets not trained on is easy, and says nothing of real rain.")
     print(f"Pictures: {out}/filters.png, before_after.png, bench/speed_error.png")
     print(f"Training: tensorboard --logdir {out / 'runs'}")
@@ -169,7 +172,8 @@ def _proof(printed: Transcript) -> str:
     return f"beside PyTorch {proof.partition(': ')[2]}"
 
 
-def _narrowed(row: str) -> str:
-    """The columns of a row that say how good and how fast a method is."""
-    cells = row.split("|")
-    return "|".join([*cells[:7], cells[10], ""])
+def _narrowed(lines: Sequence[str]) -> list[str]:
+    """Of a table among these lines, the columns that say how good and how fast a method is."""
+    rows = [line.strip("|").split("|") for line in lines if line.startswith("|")]
+    shown = [number for number, name in enumerate(rows[0]) if name.strip() in SHOWN]
+    return ["|".join(["", *(row[number] for number in shown), ""]) for row in rows]

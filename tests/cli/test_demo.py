@@ -66,6 +66,8 @@ def test_every_step_is_told_and_leaves_what_it_says(
     assert any("3D-OutDet trained: IoU 0." in line for line in times)
     table = [line.split("|")[1].strip() for line in lines if line.startswith("| ")]
     assert table == ["method", "3D-OutDet", "dsor, tuned", "none"]
+    (header,) = [line for line in lines if line.startswith("| method")]
+    assert [name.strip() for name in header.split("|")[1:-1]] == list(demo.SHOWN)
     assert len(lines) <= 40
 
     out = small.out
