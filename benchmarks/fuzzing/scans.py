@@ -29,7 +29,8 @@ BOMB = 1500
 
 def readers() -> list[Reader]:
     """One for each format, those of compressed files included, and one for labels."""
-    formats = [_reader(suffix) for suffix in FORMATS]
+    # A format whose library is not installed can be neither written nor read.
+    formats = [reader for reader in map(_reader, FORMATS) if reader.seeds()]
     packed = [_packed(reader) for reader in formats if reader.file in ("scan.bin", "scan.ply")]
     labels = Reader("label", "scan.label", _read_labels, lambda: [bytes(range(4 * POINTS))])
     return [*formats, *packed, labels]
