@@ -67,7 +67,7 @@ def test_a_stated_grid_is_taken_whatever_the_scans(
     ("arguments", "reason"),
     [
         ({"grid": "mars"}, "there is no grid named 'mars'. Known are semantickitti"),
-        ({"grid": {"rows": 8}}, "not a grid"),
+        ({"grid": {"rows": 8}}, "grid: columns is missing"),
         ({"grid": "wads", "way_back": "guess"}, "no such way back: 'guess'"),
     ],
 )
