@@ -1,99 +1,31 @@
 """From a data set's files to batches of views."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Literal
 
 import lightning
 import numpy as np
-from torch.utils.data import DataLoader, Dataset
+from torch.utils.data import DataLoader
 
 from derain.batch import Batch, Sample
 from derain.cards import DataCard
 from derain.channels import extra_channels, with_columns
 from derain.datamodules.augmentation import Augmentation
-from derain.datamodules.order import MeasuringOrder, Pick, TrainingOrder
+from derain.datamodules.order import MeasuringOrder, TrainingOrder
+from derain.datamodules.scan_dataset import LateLoader, ScanDataset, ScanFile, packed
 from derain.datamodules.statistics import evenly_spaced, measured
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.morton import first_rows
 from derain.scan import Scan
-from derain.seeds import Draw, generator, run_seed
+from derain.seeds import run_seed
 from derain.spec import Spec
 from derain.training_record import recorded
-from derain.view import View
 
 Part = Literal["train", "validation", "test", "predict"]
-
-
-@dataclass(frozen=True)
-class ScanFile:
-    """Where one scan lies, and where its labels are to be read, if they are."""
-
-    scan: Path
-    label: Path | None = None
-
-
-class ScanDataset(Dataset[Sample | InputError]):
-    """Reads scans and views them.
-
-    Args:
-        files: The scans.
-        read: Reads one of them.
-        view: What the network sees.
-        card: Data card that says which labels are rain.
-        augmentation: Changes each scan anew every epoch; None leaves them as they are.
-        seed: Seed of the run; with the epoch and the scan it says how that scan is changed.
-    """
-
-    def __init__(
-        self,
-        files: Sequence[ScanFile],
-        read: Callable[[ScanFile], Scan],
-        view: View,
-        card: DataCard,
-        augmentation: Augmentation | None = None,
-        seed: int = 0,
-    ) -> None:
-        self.files = files
-        self.read = read
-        self.view = view
-        self.card = card
-        self.augmentation = augmentation
-        self.seed = seed
-
-    def __len__(self) -> int:
-        return len(self.files)
-
-    def __getitem__(self, pick: Pick | int) -> Sample | InputError:
-        # What a worker raises becomes a RuntimeError with a traceback in the training process;
-        # what it returns crosses as it is, and is raised there.
-        try:
-            # Lightning's --trainer.overfit_batches brings its own order: numbers alone.
-            return self._sample(pick if isinstance(pick, Pick) else Pick(pick))
-        except InputError as error:
-            return error
-
-    def _sample(self, pick: Pick) -> Sample:
-        scan = self.read(self.files[pick.number])
-        if self.augmentation is not None:
-            chance = generator(Draw.AUGMENTATION, self.seed, pick.epoch, pick.number)
-            scan = self.augmentation(scan, chance, self.view.azimuth)
-        return Sample.of(scan, self.view(scan), self.card, pick.measured)
-
-
-class LateLoader(DataLoader[Sample | InputError]):
-    """Starts to read when the first batch is asked for.
-
-    Lightning makes the iterators of a run that goes on from a checkpoint before it tells the epoch,
-    and workers read ahead as soon as there is an iterator.
-    """
-
-    def __iter__(self) -> Any:
-        yield from super().__iter__()
 
 
 @dataclass(frozen=True)
@@ -269,7 +201,7 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
             sampler=self._order(part, dataset),
             num_workers=self.loading.workers,
             persistent_workers=self.loading.workers > 0,
-            collate_fn=_packed,
+            collate_fn=packed,
         )
 
     def _order(self, part: Part, dataset: ScanDataset) -> TrainingOrder | MeasuringOrder:
@@ -294,13 +226,6 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
     def _read_distinct(self, file: ScanFile) -> Scan:
         scan = self.read(file)
         return scan.take(first_rows(scan))
-
-
-def _packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:
-    for error in samples:
-        if isinstance(error, InputError):
-            return error
-    return Batch.of([sample for sample in samples if isinstance(sample, Sample)])
 
 
 def _has_labels(file: ScanFile) -> bool:

@@ -4,7 +4,8 @@ from glob import glob
 from pathlib import Path
 
 from derain.cards import load_card
-from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile
+from derain.datamodules.base import Loading, Part, ScanDataModule
+from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
 from derain.files.labels import label_beside
 

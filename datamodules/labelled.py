@@ -6,7 +6,8 @@ from pathlib import Path
 
 from derain.cards import DataCard, load_card, packaged_cards
 from derain.data_layout import REHEARSE3D, SEMANTIC_KITTI, Layout
-from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile
+from derain.datamodules.base import Loading, Part, ScanDataModule
+from derain.datamodules.scan_dataset import ScanFile
 from derain.datamodules.sequences import SequenceDataModule
 from derain.documents import Entry
 from derain.errors import InputError

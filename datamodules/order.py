@@ -9,7 +9,7 @@ from torch.utils.data import DistributedSampler
 from derain.seeds import Draw, generator
 
 if TYPE_CHECKING:
-    from derain.datamodules.base import ScanDataset
+    from derain.datamodules.scan_dataset import ScanDataset
 
 
 class Pick(NamedTuple):

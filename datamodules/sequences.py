@@ -5,7 +5,8 @@ from pathlib import Path
 
 from derain.cards import DataCard
 from derain.data_layout import Layout
-from derain.datamodules.base import Loading, Part, ScanDataModule, ScanFile
+from derain.datamodules.base import Loading, Part, ScanDataModule
+from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
 from derain.files import find_scans
 from derain.files.labels import LABEL

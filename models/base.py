@@ -1,31 +1,23 @@
-"""What every derainer shares: its Spec, its metrics, and what it logs."""
+"""What every derainer shares: its Spec, and how a step of training goes."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Protocol, Self
 
-import lightning
-import numpy as np
 import torch
 from lightning.pytorch.loggers import TensorBoardLogger
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from derain.batch import Batch
 from derain.cards import DataCard
 from derain.documents import shown
 from derain.errors import InputError
-from derain.mean_losses import MeanLosses
 from derain.metrics import RainMetrics
-from derain.probability import probability_of_rain
+from derain.models.measured import MeasuredModule
 from derain.scan import Scan
 from derain.seeds import Draw, generator, run_seed
 from derain.spec import Spec
-
-# What the checkpoint of a run is chosen by, the more the better: the IoU of the validation scans
-# where a network learns from labels, and minus the loss where it does not.
-MERIT = "val/merit"
 
 # Scans that a view or a rule is fitted to; more change its grid by nothing.
 EXAMPLES = 20
@@ -46,8 +38,8 @@ class TrainingData(Protocol):
         """Which scans it trains on, as a Spec holds it."""
 
 
-class DerainingModule(lightning.LightningModule, ABC):
-    """A network with its loss, metrics and Spec.
+class DerainingModule(MeasuredModule):
+    """A network with its loss and Spec.
 
     The Spec comes from the first data the model is trained on and from then on travels in its
     checkpoints; so the input's normalisation is never configured twice.
@@ -55,7 +47,6 @@ class DerainingModule(lightning.LightningModule, ABC):
     Attributes:
         NAME: Name of the network in a Spec and on the command line.
         AMPLIFIES: How many times more than other networks' its logits amplify rounding.
-        LEARNS_FROM_LABELS: Whether it does; where not, none is read in its training.
         channels: Names of its input channels, as :meth:`Scan.channel` takes them.
         network: The network itself.
         card: Data card of the data it is trained or tested on.
@@ -66,11 +57,9 @@ class DerainingModule(lightning.LightningModule, ABC):
 
     NAME: ClassVar[str]
     AMPLIFIES: ClassVar[float] = 1.0
-    LEARNS_FROM_LABELS: ClassVar[bool] = True
     network: nn.Module
     mean: Tensor
     std: Tensor
-    metrics: RainMetrics
     card: DataCard
 
     def __init__(self, channels: Sequence[str]) -> None:
@@ -81,7 +70,6 @@ class DerainingModule(lightning.LightningModule, ABC):
             )
         self.channels = tuple(channels)
         self._spec: Spec | None = None
-        self.mean_losses = MeanLosses()
         # Not in the state_dict: the Spec holds them.
         self.register_buffer("mean", torch.zeros(len(channels)), persistent=False)
         self.register_buffer("std", torch.ones(len(channels)), persistent=False)
@@ -115,15 +103,6 @@ class DerainingModule(lightning.LightningModule, ABC):
     def rule(self, scans: Sequence[Scan]) -> dict[str, float]:
         """Constants of the network's own rule for rain, fitted to training scans."""
         return {}
-
-    @abstractmethod
-    def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
-        """What the network is to make small, and what it says.
-
-        Returns:
-            ``loss`` and what it is made of, each a scalar, by name; and the logits of "not rain"
-            and "rain" of every cell, float (M, 2).
-        """
 
     @abstractmethod
     def folded(self) -> nn.Module:
@@ -238,76 +217,3 @@ class DerainingModule(lightning.LightningModule, ABC):
         scans = len(batch.cells)
         self.log_dict(values, on_step=False, on_epoch=True, sync_dist=True, batch_size=scans)
         return losses["loss"]
-
-    def validation_step(self, batch: Batch) -> list[NDArray[np.float32]]:
-        """Loss of one batch, its points counted, and the probability of each, as for predict."""
-        losses, logits = self.losses(batch)
-        self.mean_losses.update(losses, scans=len(batch.measured))
-        return self._count(batch, logits)
-
-    def test_step(self, batch: Batch) -> None:
-        """Counts the points of one batch."""
-        self._count(batch, self(**batch.inputs))
-
-    def predict_step(self, batch: Batch) -> list[NDArray[np.float32]]:
-        """Probability of rain for every row of every scan, a list of float32 (N,)."""
-        return self.probabilities(batch, self(**batch.inputs))
-
-    def on_validation_epoch_start(self) -> None:
-        """Forgets losses and scores of the last epoch, or of the sanity check."""
-        self.mean_losses.reset()
-        self.metrics.reset()
-
-    def on_validation_epoch_end(self) -> None:
-        """Logs losses and scores of the epoch."""
-        losses = self.mean_losses.compute()
-        self._log_alike({f"val/{name}": loss for name, loss in losses.items()})
-        if not self.LEARNS_FROM_LABELS:
-            self._log_alike({MERIT: -losses["loss"]})
-        self._log_scores("val")
-
-    def on_test_epoch_start(self) -> None:
-        """Forgets the scores of another test."""
-        self.metrics.reset()
-
-    def on_test_epoch_end(self) -> None:
-        """Logs the scores of the test; the metrics keep their counts for whoever reports them."""
-        self._log_scores("test")
-
-    def probabilities(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
-        """Carries logits back to every row of every scan, as the deployed model does.
-
-        Args:
-            batch: A batch.
-            logits: Of "not rain" and "rain" of every cell, float (M, 2).
-
-        Returns:
-            The probability of rain, a float32 (N,) for each scan that is measured.
-        """
-        if not batch.measured:
-            return []
-        return [
-            scan.way_to_rows(probability_of_rain(scores.float().cpu().numpy()))
-            for scan, scores in zip(batch.measured, batch.split(logits), strict=True)
-        ]
-
-    def _count(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
-        probabilities = self.probabilities(batch, logits)
-        for measured, probability in zip(batch.measured, probabilities, strict=True):
-            if measured.scan.label is not None:
-                self.metrics.update_scan(measured.scan, probability > self.spec.threshold)
-        return probabilities
-
-    def _log_scores(self, part: str) -> None:
-        if not self.metrics.per_scan():  # scans without labels measure nothing
-            return
-        scores = self.metrics.compute()
-        self._log_alike({f"{part}/{name}": score for name, score in scores.items()})
-        self._log_alike({f"{part}_iou": scores["iou"]}, prog_bar=True, logger=False)
-        if part == "val":
-            merit = {MERIT: scores["iou"]} if self.LEARNS_FROM_LABELS else {}
-            self._log_alike({"hp_metric": scores["iou"], **merit})
-
-    def _log_alike(self, values: Mapping[str, Tensor], **options: Any) -> None:
-        """Logs what all processes have computed alike; the largest of equal numbers is exact."""
-        self.log_dict(values, sync_dist=True, reduce_fx="max", **options)

@@ -20,7 +20,8 @@ from derain.spec import Spec
 from derain.training_record import overlap
 
 if TYPE_CHECKING:
-    from derain.datamodules.base import ScanDataModule, ScanFile
+    from derain.datamodules.base import ScanDataModule
+    from derain.datamodules.scan_dataset import ScanFile
     from derain.export.bench.contestants import Contestant
     from derain.export.bench.rows import Row
     from derain.export.bench.scores import Labelled

@@ -29,9 +29,10 @@ from derain.datamodules.scan_check import ScanCheck
 from derain.datamodules.simulated import Simulated
 from derain.datamodules.wads import Wads
 from derain.errors import InputError
-from derain.models.base import MERIT, DerainingModule
+from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
+from derain.models.measured import MERIT
 from derain.models.outdet import OutDet
 from derain.models.panels import ScanPanels
 from derain.models.prediction import PredictionWriter

@@ -24,7 +24,8 @@ from derain.odd_scans import Judge, oddities
 from derain.training_record import overlap
 
 if TYPE_CHECKING:
-    from derain.datamodules.base import ScanDataModule, ScanFile
+    from derain.datamodules.base import ScanDataModule
+    from derain.datamodules.scan_dataset import ScanFile
     from derain.export.tuning import Tuned
     from derain.scan import Scan
 

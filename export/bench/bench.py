@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from derain.datamodules.base import ScanDataModule, ScanFile
+from derain.datamodules.base import ScanDataModule
 from derain.datamodules.labelled import full_name
+from derain.datamodules.scan_dataset import ScanFile
 from derain.export.bench.contestants import Contestant
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.rows import Row, joined

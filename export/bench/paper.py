@@ -10,8 +10,9 @@ import yaml
 from derain.cards import DataCard
 from derain.counts import SCORES
 from derain.data_layout import sequence_of
-from derain.datamodules.base import ScanDataModule, ScanFile
+from derain.datamodules.base import ScanDataModule
 from derain.datamodules.labelled import full_name
+from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
 from derain.export.bench.rows import Row
 from derain.export.markdown import markdown_table

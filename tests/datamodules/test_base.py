@@ -13,8 +13,9 @@ import torch
 from derain.batch import Batch
 from derain.cards import load_card
 from derain.datamodules.augmentation import Augmentation
-from derain.datamodules.base import Loading, ScanDataModule, ScanFile
+from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.folder import Folder
+from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
 from derain.files.labels import write_labels
 from derain.hard_cases import scene

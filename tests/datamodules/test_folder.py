@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from derain.datamodules.base import ScanFile
 from derain.datamodules.folder import Folder
+from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
 
 Write = Callable[..., None]

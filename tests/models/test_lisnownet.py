@@ -21,10 +21,10 @@ from derain.datamodules.folder import Folder
 from derain.errors import InputError
 from derain.files.labels import write_labels
 from derain.hard_cases import scene
-from derain.models.base import MERIT
 from derain.models.checkpoint import load_model, save_model
 from derain.models.lisnownet import LiSnowNet, cube_roots, select
 from derain.models.lisnownet_network import LiSnowNetwork, published_key
+from derain.models.measured import MERIT
 from derain.probability import probability_of_rain
 from derain.scan import Scan
 from derain.selection_rule import FEWEST, SelectionRule

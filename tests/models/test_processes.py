@@ -11,7 +11,7 @@ import pytest
 
 from derain.files.labels import write_labels
 from derain.hard_cases import scene
-from derain.models.base import MERIT
+from derain.models.measured import MERIT
 
 from . import two_processes
 

@@ -19,9 +19,10 @@ from lightning.pytorch.loggers import CSVLogger
 
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
-from derain.models.base import MERIT, DerainingModule
+from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
+from derain.models.measured import MERIT
 from derain.models.outdet import OutDet
 from derain.models.prediction import PredictionWriter
 from derain.models.report import TestReport

@@ -1,0 +1,124 @@
+"""What every derainer says of scans, counted and logged: validation, test and prediction."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import lightning
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from derain.batch import Batch
+from derain.mean_losses import MeanLosses
+from derain.metrics import RainMetrics
+from derain.probability import probability_of_rain
+from derain.spec import Spec
+
+# What the checkpoint of a run is chosen by, the more the better: the IoU of the validation scans
+# where a network learns from labels, and minus the loss where it does not.
+MERIT = "val/merit"
+
+
+class MeasuredModule(lightning.LightningModule, ABC):
+    """Measures a network: every scan once, on any number of processes, counts in whole numbers.
+
+    Attributes:
+        LEARNS_FROM_LABELS: Whether it does; where not, none is read in its training.
+        metrics: Counts of the points of the epoch, made when the data are known.
+        mean_losses: Sums of the epoch's losses.
+    """
+
+    LEARNS_FROM_LABELS: ClassVar[bool] = True
+    metrics: RainMetrics
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.mean_losses = MeanLosses()
+
+    @property
+    @abstractmethod
+    def spec(self) -> Spec:
+        """How the network is used."""
+
+    @abstractmethod
+    def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
+        """What the network is to make small, and what it says.
+
+        Returns:
+            ``loss`` and what it is made of, each a scalar, by name; and the logits of "not rain"
+            and "rain" of every cell, float (M, 2).
+        """
+
+    def validation_step(self, batch: Batch) -> list[NDArray[np.float32]]:
+        """Loss of one batch, its points counted, and the probability of each, as for predict."""
+        losses, logits = self.losses(batch)
+        self.mean_losses.update(losses, scans=len(batch.measured))
+        return self._count(batch, logits)
+
+    def test_step(self, batch: Batch) -> None:
+        """Counts the points of one batch."""
+        self._count(batch, self(**batch.inputs))
+
+    def predict_step(self, batch: Batch) -> list[NDArray[np.float32]]:
+        """Probability of rain for every row of every scan, a list of float32 (N,)."""
+        return self.probabilities(batch, self(**batch.inputs))
+
+    def on_validation_epoch_start(self) -> None:
+        """Forgets losses and scores of the last epoch, or of the sanity check."""
+        self.mean_losses.reset()
+        self.metrics.reset()
+
+    def on_validation_epoch_end(self) -> None:
+        """Logs losses and scores of the epoch."""
+        losses = self.mean_losses.compute()
+        self._log_alike({f"val/{name}": loss for name, loss in losses.items()})
+        if not self.LEARNS_FROM_LABELS:
+            self._log_alike({MERIT: -losses["loss"]})
+        self._log_scores("val")
+
+    def on_test_epoch_start(self) -> None:
+        """Forgets the scores of another test."""
+        self.metrics.reset()
+
+    def on_test_epoch_end(self) -> None:
+        """Logs the scores of the test; the metrics keep their counts for whoever reports them."""
+        self._log_scores("test")
+
+    def probabilities(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
+        """Carries logits back to every row of every scan, as the deployed model does.
+
+        Args:
+            batch: A batch.
+            logits: Of "not rain" and "rain" of every cell, float (M, 2).
+
+        Returns:
+            The probability of rain, a float32 (N,) for each scan that is measured.
+        """
+        if not batch.measured:
+            return []
+        return [
+            scan.way_to_rows(probability_of_rain(scores.float().cpu().numpy()))
+            for scan, scores in zip(batch.measured, batch.split(logits), strict=True)
+        ]
+
+    def _count(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
+        probabilities = self.probabilities(batch, logits)
+        for measured, probability in zip(batch.measured, probabilities, strict=True):
+            if measured.scan.label is not None:
+                self.metrics.update_scan(measured.scan, probability > self.spec.threshold)
+        return probabilities
+
+    def _log_scores(self, part: str) -> None:
+        if not self.metrics.per_scan():  # scans without labels measure nothing
+            return
+        scores = self.metrics.compute()
+        self._log_alike({f"{part}/{name}": score for name, score in scores.items()})
+        self._log_alike({f"{part}_iou": scores["iou"]}, prog_bar=True, logger=False)
+        if part == "val":
+            merit = {MERIT: scores["iou"]} if self.LEARNS_FROM_LABELS else {}
+            self._log_alike({"hp_metric": scores["iou"], **merit})
+
+    def _log_alike(self, values: Mapping[str, Tensor], **options: Any) -> None:
+        """Logs what all processes have computed alike; the largest of equal numbers is exact."""
+        self.log_dict(values, sync_dist=True, reduce_fx="max", **options)
