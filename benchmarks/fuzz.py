@@ -148,8 +148,8 @@ def _keep(name: str, outcome: Outcome, folder: Path, arguments: argparse.Namespa
     kept = arguments.out / f"{name}-{arguments.seed}-{outcome.number}"
     shutil.rmtree(kept, ignore_errors=True)
     kept.mkdir(parents=True)
-    for file in folder.iterdir():
-        if file.is_file() and file.name != "stderr":
+    for file in (folder / name).iterdir():
+        if file.is_file():
             shutil.copy(file, kept)
 
 

@@ -37,26 +37,29 @@ MEANS = {"x": 1.0, "y": 2.0, "z": 3.0, "intensity": 4.0}
 
 MEANS_OF = ("channels", "units", "mean", "std")
 
+# A text may be the name of a file, in which the system allows no null character.
+TEXTS = st.text(st.characters(exclude_characters="\0"))
+
 four_numbers = st.tuples(*[st.floats(-1e6, 1e6)] * 4)
 specs = st.builds(
     lambda classes, share, **parts: Spec(
         classes=classes, rain=tuple(sorted(classes)[: round(share * len(classes))]), **parts
     ),
-    network=st.text(),
+    network=TEXTS,
     view=st.fixed_dictionaries(
         {"kind": st.just("neighbours"), "neighbours": st.integers(1, MOST_NEIGHBOURS)}
     ),
     mean=four_numbers,
     std=st.tuples(*[st.floats(1e-6, 1e6)] * 4),
-    classes=st.dictionaries(st.integers(0, 65535), st.text()),
+    classes=st.dictionaries(st.integers(0, 65535), TEXTS),
     share=st.floats(0, 1),
-    data=st.text(),
-    licence=st.text(),
+    data=TEXTS,
+    licence=TEXTS,
     channels=st.just(("x", "y", "z", "intensity")),
-    units=st.tuples(*[st.text()] * 4),
-    rule=st.dictionaries(st.text(), st.floats(-1e6, 1e6)),
+    units=st.tuples(*[TEXTS] * 4),
+    rule=st.dictionaries(TEXTS, st.floats(-1e6, 1e6)),
     threshold=st.floats(0, 1),
-    training=st.dictionaries(st.text(), st.lists(st.text()).map(tuple)),
+    training=st.dictionaries(TEXTS, st.lists(TEXTS).map(tuple)),
 )
 
 

@@ -57,9 +57,10 @@ def judge(reader: Reader, seed: int, number: int, folder: Path) -> Outcome:
         reader: What reads it.
         seed: Of the whole run.
         number: Of the input.
-        folder: Takes the file.
+        folder: Takes a folder for each reader: what one leaves must not be seen by another.
     """
-    path = folder / reader.file
+    path = folder / reader.name / reader.file
+    path.parent.mkdir(exist_ok=True)
     path.write_bytes(reader.content(seed, number))
     _forget_peak()
     start = time.process_time()

@@ -187,7 +187,8 @@ def test_a_scan_without_a_valid_point_has_no_grid(run_derain, tmp_path: Path) ->
         ("noise.onnx", b"12345", "not an ONNX model"),
         ("noise.ckpt", b"12345", "damaged"),
         ("noise.pcd", b"12345", "noise.pcd"),
-        ("notes.txt", b"12345", "'.txt' is not the suffix of a scan"),
+        ("notes.doc", b"12345", "'.doc' is not the suffix of a scan"),
+        ("notes.txt", b"12345", "has 1 columns, but 4 are stated"),
     ],
 )
 def test_a_file_that_cannot_be_read_is_one_line_and_exit_code_2(

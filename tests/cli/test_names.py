@@ -58,7 +58,9 @@ def test_odd_names_are_told_in_one_line_each_and_whole_in_json(
     outcome = run_derain(*command)
     assert outcome.code == 0, outcome.err
     assert_fit_for_a_terminal(outcome.out)
-    assert len(outcome.out.splitlines()) == len(scans)
+    told = outcome.out.splitlines()
+    assert all(line.startswith(r"dir\udcff\x1b[1m/") for line in told[: len(scans)])
+    assert len(told) - len(scans) == (command[0] == "run")  # which ends with a summary
     outcome = run_derain(*command, "--json")
     assert [json.loads(line)["scan"] for line in outcome.out.splitlines()] == list(map(str, scans))
     assert {path.name for path in Path("out").glob("*.bin")} == {path.name for path in scans}

@@ -272,13 +272,13 @@ class Run:
 def train(
     make_trainer: MakeTrainer, small_grid: dict[str, Any], tmp_path: Path
 ) -> Callable[..., Run]:
-    """Trains on the scenes in a folder, always from the same seed."""
+    """Trains on the scenes in a folder, from the same seed unless it is given another."""
     for number in range(4):
         scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
         write_labels(tmp_path / f"{number}.label", 110 * (np.arange(300) >= 270))
 
-    def fit(card: str = "wads", rule: dict[str, float] = LENIENT) -> Run:
-        lightning.seed_everything(0)
+    def fit(card: str = "wads", rule: dict[str, float] = LENIENT, seed: int = 0) -> Run:
+        lightning.seed_everything(seed)
         parts = {"train": ["[012].bin"], "validation": ["3.bin"]}
         data = Folder(str(tmp_path), card, **parts, loading=Loading(batch_size=3))
         model = LiSnowNet(small_grid, width=2, learning_rate=0.05, decay=0.5, rule=rule)
@@ -357,6 +357,10 @@ def dense(train: Callable[..., Run], tmp_path: Path) -> None:
     write_labels(tmp_path / "3.label", 110 * (np.arange(3000) >= 2700))
 
 
+# From this seed a network comes that moves many returns nearer and makes them brighter at once, so
+# that a residual can be fitted to them.
+SEED = 2
+
 # The constants that leave every return to the residual.
 UNSTATED = {"ground": -10.0, "intensity": 1.0}
 
@@ -365,7 +369,7 @@ UNSTATED = {"ground": -10.0, "intensity": 1.0}
 def test_the_residual_is_fitted_to_what_the_network_changes_in_the_validation_scans(
     train: Callable[..., Run], tmp_path: Path
 ) -> None:
-    run = train(rule=UNSTATED)
+    run = train(rule=UNSTATED, seed=SEED)
     best = LiSnowNet(**run.best["hyper_parameters"]).eval()
     best.load_state_dict(run.best["state_dict"])
     scan = Scan.of(np.fromfile(tmp_path / "3.bin", np.float32).reshape(-1, 4))
@@ -381,7 +385,7 @@ def test_the_residual_is_fitted_to_what_the_network_changes_in_the_validation_sc
     assert best.selection.residual != SelectionRule().residual
     label = np.fromfile(tmp_path / "3.label", "<u4")
     write_labels(tmp_path / "3.label", np.where(label == 110, 0, 110))
-    again = train(rule=UNSTATED)
+    again = train(rule=UNSTATED, seed=SEED)
     assert again.best["hyper_parameters"]["spec"] == run.best["hyper_parameters"]["spec"]
 
 
@@ -389,7 +393,7 @@ def test_the_residual_is_fitted_to_what_the_network_changes_in_the_validation_sc
 def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(
     train: Callable[..., Run], tmp_path: Path
 ) -> None:
-    run = train(rule=UNSTATED)
+    run = train(rule=UNSTATED, seed=SEED)
     best = LiSnowNet(**run.best["hyper_parameters"]).eval()
     best.load_state_dict(run.best["state_dict"])
     view = best.spec.make_view()(Scan.of(np.fromfile(tmp_path / "3.bin", "<f4").reshape(-1, 4)))
