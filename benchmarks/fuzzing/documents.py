@@ -120,7 +120,6 @@ _HOSTILE: Sequence[Callable[[], bytes]] = (
 def _read_card(path: Path) -> None:
     card = load_card(path)
     assert set(card.rain) <= set(card.classes)
-    assert card.rain
     assert not set(card.unknown) & set(card.rain)
     numbers = [*(card.mean or ()), *(card.std or ()), *(card.range or ()), card.rain_share or 0]
     assert all(map(math.isfinite, numbers)), numbers
