@@ -158,6 +158,7 @@ def _replay(finding: Path) -> int:
     name = finding.name.rsplit("-", 2)[0]
     with tempfile.TemporaryDirectory() as scratch:
         copy = shutil.copytree(finding, Path(scratch) / "finding")
+        models.write_models(Path(scratch))
         reader = all_readers(Path(scratch))[name]
         reader.read(copy / reader.file)
     print(RIGHT)

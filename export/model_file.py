@@ -101,7 +101,8 @@ def sealed(content: bytes) -> bytes:
 
 def _refuse_changed(path: Path, content: bytes, checksum: Any) -> None:
     """Refuses a file that is not as it was when it was proved; earlier ones had no checksum."""
-    place = content.rfind(checksum.encode()) if isinstance(checksum, str) else -1
+    readable = isinstance(checksum, str) and checksum.isascii()
+    place = content.rfind(checksum.encode()) if readable else -1
     if place < 0 or _checksum(content, place) != checksum:
         raise InputError(
             path, "it is not as it was exported: its checksum differs", "Copy or export it again."

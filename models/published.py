@@ -119,9 +119,10 @@ def with_tensors(make: Callable[[], Network], tensors: Mapping[str, Tensor]) -> 
         warnings.simplefilter("ignore")
         shapes = make()
         shapes.load_state_dict(tensors)
-    for name, ours in shapes.state_dict().items():
-        if tensors[name].is_floating_point() != ours.is_floating_point():
-            raise TypeError(f"{name} is of {tensors[name].dtype}")
+    ours = shapes.state_dict()
+    for name, tensor in tensors.items():
+        if tensor.is_floating_point() != ours[name].is_floating_point():
+            raise TypeError(f"{name} is of {tensor.dtype}")
     network = make()
     network.load_state_dict(tensors)
     return network

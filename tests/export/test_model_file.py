@@ -75,7 +75,9 @@ def test_a_flipped_bit_is_refused_or_changes_no_answer(exported: bytes, path: Pa
     assert refused > 0.98 * len(bits)
 
 
-@pytest.mark.parametrize("part", ["a weight", "the threshold", "the checksum", "a byte more"])
+@pytest.mark.parametrize(
+    "part", ["a weight", "the threshold", "the checksum", "no text", "a byte more"]
+)
 def test_a_file_that_is_not_as_it_was_exported_says_so(
     exported: bytes, path: Path, part: str
 ) -> None:
@@ -84,6 +86,7 @@ def test_a_file_that_is_not_as_it_was_exported_says_so(
         "a weight": exported.replace(weights.raw_data[:64], weights.raw_data[1:65]),
         "the threshold": exported.replace(b'"threshold": 0.5', b'"threshold": 0.9'),
         "the checksum": exported.replace(json_checksum(exported), b"f" * 64),
+        "no text": exported.replace(json_checksum(exported), rb"\ud800" + b"f" * 58),
         "a byte more": exported + b"\x0a\x00",
     }[part]
     assert changed != exported

@@ -186,6 +186,19 @@ def test_tensors_of_another_kind_are_refused(
         load_model(path)
 
 
+def test_a_count_of_batches_that_is_missing_changes_nothing(
+    content: dict[str, Any], path: Path
+) -> None:
+    weights = load_model(path).state_dict()
+    # Without torch's own record of versions, it takes the count for one of before there was any.
+    content["state_dict"] = dict(content["state_dict"])
+    del content["state_dict"]["network.norm2.num_batches_tracked"]
+    torch.save(content, path)
+    for name, tensor in load_model(path).state_dict().items():
+        if not name.endswith("num_batches_tracked"):
+            assert torch.equal(tensor, weights[name]), name
+
+
 @pytest.mark.parametrize(
     "view",
     [
