@@ -156,6 +156,10 @@ def _with_change(value: Any, draw: Random) -> Any:
     return _odd_value(value, draw)
 
 
+# Characters that a repeated value may take: repeated twice, it would take gigabytes to write down.
+_MOST_REPEATED = 10**7
+
+
 def _odd_value(value: Any, draw: Random) -> Any:
     nested: Any = value
     for _ in range(draw.choice((1, 5, 40, 80))):
@@ -168,7 +172,7 @@ def _odd_value(value: Any, draw: Random) -> Any:
             draw.choice((None, True, False)),
             draw.choice(("", "spam", "1", "nan", "x" * 20_000, "a\0b", "\ud800", "\x1b[31m")),
             draw.choice(([], {}, [[]], {"a": {}})),
-            [value] * draw.choice((2, 100, 3000)),
+            [value] * min(draw.choice((2, 100, 3000)), _MOST_REPEATED // len(repr(value)) + 1),
             nested,
         )
     )
