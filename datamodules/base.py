@@ -23,7 +23,7 @@ from derain.morton import first_rows
 from derain.scan import Scan
 from derain.seeds import run_seed
 from derain.spec import Spec
-from derain.training_record import recorded
+from derain.training_record import by_fingerprint
 
 Part = Literal["train", "validation", "test", "predict"]
 
@@ -35,7 +35,7 @@ class Loading:
     Attributes:
         batch_size: Scans in a batch.
         workers: Processes that read and view scans; 0 does it in the training process.
-        columns: Names of the columns of ``.bin`` and ``.npy`` files.
+        columns: Names of the columns of files that do not name them.
         intensity_scale: What takes the scans' intensities to the unit of the data card, e.g. 255.
         deduplicate: Whether points at one position are measured once; None does as the data card
             says. Predictions are for every row in any case.
@@ -128,8 +128,8 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
         return map(self.read, evenly_spaced(self.files("validation"), most))
 
     def training_record(self) -> dict[str, tuple[str, ...]]:
-        """Which scans it trains on, by their names, for the Spec of what is trained on them."""
-        return recorded([file.scan for file in self.find("train")])
+        """Which scans it trains on, for the Spec of what is trained on them."""
+        return by_fingerprint([file.scan for file in self.find("train")])
 
     def train_dataloader(self) -> DataLoader[Sample | InputError]:
         """Training scans, in another order and augmented anew every epoch."""

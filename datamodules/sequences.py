@@ -11,7 +11,7 @@ from derain.errors import InputError
 from derain.files import find_scans
 from derain.files.labels import LABEL
 from derain.files.names import scan_stem
-from derain.training_record import whole
+from derain.training_record import by_name
 
 
 class SequenceDataModule(ScanDataModule):
@@ -50,8 +50,13 @@ class SequenceDataModule(ScanDataModule):
         return [file for name in sequences for file in self._sequence(name)]
 
     def training_record(self) -> dict[str, tuple[str, ...]]:
-        """Which scans it trains on: those of whole sequences."""
-        return whole(self.split.get("train", ()))
+        """Which scans it trains on: those of whole sequences.
+
+        Simulated sequences are called the same in every data set, so that their names say nothing.
+        """
+        if self.card.simulated:
+            return super().training_record()
+        return by_name(self.split.get("train", ()))
 
     def _sequence(self, name: str) -> list[ScanFile]:
         folder = self.root / self.layout.sequences / name

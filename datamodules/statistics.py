@@ -73,5 +73,5 @@ def _refuse_unheard_of(channels: Sequence[str], count: NDArray[np.float64]) -> N
             raise InputError(
                 f"channel '{name}'",
                 "no training scan holds a number of that name",
-                "Name columns of the scans; data.loading.columns names those of .bin and .npy.",
+                "Name columns of the scans, with data.loading.columns where files do not.",
             )

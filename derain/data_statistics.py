@@ -139,7 +139,7 @@ def count_scan(path: Path, layout: tuple[str, str] | None, columns: Sequence[str
     Args:
         path: The scan.
         layout: Names of its folder and that of its labels; None looks for them beside it.
-        columns: Names of the columns of .bin and .npy files.
+        columns: Names of the columns of files that do not name them.
 
     Raises:
         InputError: A scan that cannot be read, or labels that do not belong to it.

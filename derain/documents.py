@@ -29,7 +29,10 @@ DEEPEST = 32
 BYTES_PER_VALUE = 16
 
 # What PyYAML lets out: its own errors, and what Python says of a tag such as !!int over no number.
-_YAML_DAMAGE = (yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError, RecursionError)
+_YAML_DAMAGE = (
+    *(yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError),
+    *(ArithmeticError, RecursionError),
+)
 
 # The parser in C where PyYAML was built with it: ten times faster on a large document.
 _LOADER: Any = type("_Loader", (getattr(yaml, "CSafeLoader", yaml.SafeLoader),), {})

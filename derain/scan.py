@@ -183,6 +183,8 @@ class Scan:
     def with_intensity_times(self, factor: float) -> "Scan":
         """The same scan with its intensities in another unit; what was read stays in `fields`.
 
+        The mark of a cell without a return is none of them, and stays.
+
         Args:
             factor: What takes them there, such as 255 from 0..1 to 0..255.
 
@@ -193,7 +195,9 @@ class Scan:
             raise InputError("intensity_scale", f"it is {factor:g}", "Give a number above 0.")
         if self.intensity is None or factor == 1:
             return self
-        return replace(self, intensity=self.intensity * np.float32(factor))
+        scaled = self.intensity * np.float32(factor)
+        empty = self.intensity == SENTINEL
+        return replace(self, intensity=np.where(empty, self.intensity, scaled))
 
     def take(self, rows: NDArray[Any]) -> "Scan":
         """The scan of some rows only, as an unorganised cloud.

@@ -9,6 +9,7 @@ from typing import Any
 from derain.channels import MOST_CHANNELS
 from derain.documents import Entry, shown
 from derain.errors import InputError
+from derain.files.labels import LARGEST_ID
 from derain.neighbours import NeighbourView
 from derain.range_image import RangeView
 from derain.scan import Scan
@@ -17,7 +18,6 @@ from derain.view import View
 SCHEMA = 1
 
 # A label has two bytes for its class.
-LARGEST_ID = 65_535
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Spec:
         threshold: A point is rain where its probability is greater.
         data: Name of the training data.
         licence: Licence of the training data.
-        training: Stems of the scans that it was trained on, by the name of their sequence; none
-            stands for the whole sequence. Empty where that is not known.
+        training: What it was trained on, as `derain.training_record` says it: names of sequences,
+            fingerprints of scans. Empty where that is not known.
         schema: Version of this layout.
     """
 
@@ -149,14 +149,10 @@ def _refuse_contradictions(spec: Spec, entry: Entry) -> None:
         raise entry.fault(f"rain {shown(spec.rain)} is not of its classes", "Name ids of them.")
 
 
-def _texts(entry: Entry) -> tuple[str, ...]:
-    return tuple(item.text() for item in entry.items())
-
-
 def _channels(entry: Entry) -> tuple[str, ...]:
     if len(entry.items()) > MOST_CHANNELS:
         raise entry.fault(f"more than {MOST_CHANNELS} channels", "Name fewer.")
-    return _texts(entry)
+    return entry.texts()
 
 
 def _classes(entry: Entry) -> dict[int, str]:
@@ -180,10 +176,10 @@ _PARSERS: dict[str, Callable[[Entry], Any]] = {
     "data": Entry.text,
     "licence": Entry.text,
     "channels": _channels,
-    "units": _texts,
+    "units": Entry.texts,
     "rule": lambda entry: {name: part.number() for name, part in entry.members().items()},
     "threshold": lambda entry: entry.within(0, 1),
-    "training": lambda entry: {name: _texts(part) for name, part in entry.members().items()},
+    "training": lambda entry: {name: part.texts() for name, part in entry.members().items()},
     "schema": lambda entry: entry.whole(1, SCHEMA),
 }
 

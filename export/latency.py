@@ -61,7 +61,7 @@ def measure_latency(
     Args:
         model: ONNX file.
         scan: Scan to time it on; None takes a made-up one of 100,000 points.
-        columns: Names of the columns of a ``.bin`` or ``.npy`` scan.
+        columns: Names of the columns of a scan that does not name them.
         threads: Threads; 0 takes every core this process may use.
         repeats: Timed runs.
 

@@ -29,7 +29,7 @@ class CalibrationScans(Collection[Scan]):
 
     Args:
         paths: Their files.
-        columns: Names of the columns of ``.bin`` and ``.npy`` files.
+        columns: Names of the columns of files that do not name them.
     """
 
     def __init__(self, paths: Sequence[Path], columns: Sequence[str]) -> None:

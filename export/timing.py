@@ -25,7 +25,7 @@ def timed_runs(
     Args:
         method: Judges a scan, and gives the stopwatch its stages.
         scans: Files of the scans, one or more.
-        columns: Names of the columns of ``.bin`` and ``.npy`` scans.
+        columns: Names of the columns of scans that do not name them.
         warm_up: Runs on the first scan before any is timed.
         repeats: Timed runs on each scan.
 

@@ -239,7 +239,7 @@ class LiSnowNet(DerainingModule):
         rule = self.selection.with_residual_of(np.concatenate(changes))
         # Several processes go on with one rule, however each has rounded.
         rule = replace(rule, residual=self.trainer.strategy.broadcast(rule.residual))
-        self.log("val/rule_residual", rule.residual)
+        self._log_alike({"val/rule_residual": torch.tensor(rule.residual)})
         self.adopt(replace(self.spec, rule=rule.as_dict()))
 
     def _changes(self, scan: Scan) -> NDArray[np.float32]:

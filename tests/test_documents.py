@@ -21,6 +21,7 @@ BAD_YAML = {
     "empty_int": "!!int ''",
     "date": "2001-13-45",
     "timestamp": "!!timestamp nothing",
+    "sixties": ":".join(["1"] * 200) + ".0",
     "digits": "9" * 5000,
     "control": "a: \x07",
 }

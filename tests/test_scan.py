@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.hard_cases import hard_cases
+from derain.hard_cases import hard_cases, scene
 from derain.scan import FEWEST_ALIKE, Scan
 
 HARD_CASES = dict(hard_cases())
@@ -251,3 +251,11 @@ def test_a_column_that_is_not_one_number_a_point_is_no_channel(column: NDArray[A
 def test_a_scan_without_intensity_or_source_has_no_such_channels() -> None:
     scan = Scan(np.ones((2, 3), np.float32))
     assert (scan.channel("intensity"), scan.channel("radar")) == (None, None)
+
+
+def test_another_unit_makes_no_point_of_an_empty_cell() -> None:
+    table = np.concatenate([np.full((5, 4), -1, np.float32), scene(20)])
+    scan = Scan.of(table)
+    scaled = scan.with_intensity_times(255)
+    np.testing.assert_array_equal(scaled.valid, scan.valid)
+    np.testing.assert_array_equal(scaled.intensity[5:], table[5:, 3] * 255)

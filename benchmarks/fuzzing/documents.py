@@ -112,6 +112,7 @@ _HOSTILE: Sequence[Callable[[], bytes]] = (
     lambda: b"!!int ''",
     lambda: b"2001-13-45",
     lambda: b"a: " + b"9" * 5000,
+    lambda: b"a: " + b"1:" * 200 + b"1.0",
     lambda: b"a: 0x" + b"f" * 5000,
     lambda: b"[" + b"[]," * 300_000 + b"0]",
 )

@@ -245,7 +245,17 @@ _BY_OTHERS: dict[str, Sequence[Callable[[], bytes]]] = {
     ),
 }
 
+
+def _columns_of_nothing() -> bytes:
+    """An array of no rows and of columns that would fill the memory, were each of them made."""
+    file = io.BytesIO()
+    header = {"descr": "<f4", "fortran_order": False, "shape": (0, 10**9)}
+    np.lib.format.write_array_header_1_0(file, header)
+    return file.getvalue()
+
+
 _HOSTILE: dict[str, Sequence[Callable[[], bytes]]] = {
     ".pcd": (_pcd_of_many_counts, _lzf_bomb),
+    ".npy": (_columns_of_nothing,),
     ".npz": (_zip_bomb,),
 }

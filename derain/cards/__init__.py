@@ -109,9 +109,14 @@ class DataCard:
         return self._of_classes(scan, self.unknown)
 
     def normalised_as(self, other: "DataCard") -> "DataCard":
-        """The same card with the means and standard deviations of another one."""
+        """The same card with the input's statistics of another one, and the unit they are in."""
         return replace(
-            self, mean=other.mean, std=other.std, range=other.range, extra=dict(other.extra)
+            self,
+            intensity_unit=other.intensity_unit,
+            mean=other.mean,
+            std=other.std,
+            range=other.range,
+            extra=dict(other.extra),
         )
 
     def completed(

@@ -6,6 +6,9 @@ import shlex
 
 from derain.errors import printable
 
+# Flags that can be given as --no-..., by the name that argparse gives their values.
+DENIABLE = ("distinct", "picture")
+
 
 def count(text: str) -> int:
     """A whole number of 1 or more."""
@@ -42,15 +45,15 @@ def command_line(arguments: argparse.Namespace, positional: str | None = None) -
     """
     words = ["derain", arguments.command]
     for name, value in vars(arguments).items():
-        if name == "command" or value is None or value is False:
+        if name == "command" or value is None or (value is False and name not in DENIABLE):
             continue
         if name != positional:
-            words.append(f"--{name.replace('_', '-')}")
+            words.append(f"--{'no-' if value is False else ''}{name.replace('_', '-')}")
         if isinstance(value, tuple):  # names between commas
             words.append(",".join(value))
         elif isinstance(value, list):
             words += map(str, value)
-        elif value is not True:
+        elif not isinstance(value, bool):
             words.append(str(value))
     return printable(shlex.join(words))
 

@@ -142,7 +142,7 @@ def _bench(
         list(by_scan),
         partial(_read, data, by_scan, methods, notices),
         known_rates,
-        data.distinct if arguments.distinct is None else arguments.distinct,
+        data.distinct,
     )
     timing = Timing(
         evenly_spaced(scans.scans, arguments.timed),
@@ -200,7 +200,7 @@ def _learn_from(arguments: argparse.Namespace, data: "ScanDataModule") -> Any:
 
     def scans() -> Iterator[Any]:
         for file in evenly_spaced(training.files("train"), MOST_TRAINING_SCANS):
-            yield known_truth(training.read(file), training.card)
+            yield known_truth(training.read_measured(file), training.card)
 
     return scans
 

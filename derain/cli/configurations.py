@@ -1,5 +1,6 @@
 """The configurations that come with derain, and how a command line names one."""
 
+import re
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
@@ -8,8 +9,9 @@ from derain.errors import InputError
 
 OPTIONS = ("--config", "-c")
 
-# With one of these a run needs no configuration, or there is no run.
-_INSTEAD = ("--model", "--print_config", "--help-all")
+# With one of these a run needs no configuration, or there is no run. --data.help and its kin show
+# the options of a class.
+_INSTEAD = re.compile(r"--(model|print_config|help-all|[\w.]+\.help\b)")
 
 
 def packaged_configs() -> dict[str, Path]:
@@ -45,7 +47,7 @@ def require_configuration(arguments: Sequence[str]) -> None:
     Raises:
         InputError: None is given.
     """
-    if not any(argument.startswith((*OPTIONS, *_INSTEAD)) for argument in arguments):
+    if not any(a.startswith(OPTIONS) or _INSTEAD.match(a) for a in arguments):
         raise InputError(
             arguments[0],
             "no configuration is given",

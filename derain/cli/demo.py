@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from derain.cli.arguments import count
 from derain.cli.narration import Narrator, Transcript
 
-SUMMARY = "the whole story on simulated rain, in under ten minutes"
+SUMMARY = "the whole story on simulated rain, in about six minutes"
 
 DESCRIPTION = """\
 Lets it rain on simulated streets, and draws a scan of them; trains 3D-OutDet, SalsaNext and
@@ -60,7 +61,7 @@ class Story:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument("--out", type=Path, default=Path("demo"), help="folder (default: demo)")
-    parser.add_argument("--epochs", type=int, help="train for another number of epochs")
+    parser.add_argument("--epochs", type=count, help="train for another number of epochs")
 
 
 def main(arguments: argparse.Namespace) -> int:

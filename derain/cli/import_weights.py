@@ -13,7 +13,7 @@ Makes a checkpoint of derain from published weights.
 
   derain import-weights outdet saved_models/bin_desnow_wads/outdet.pt --stats wads --out outdet.ckpt
   derain import-weights outdet rehearse3d_outdet.pt --stats wads --data rehearse3d --out outdet.ckpt
-  derain import-weights salsanext SalsaNext_valid_best --stats semantickitti --data rehearse3d \
+  derain import-weights salsanext SalsaNext_valid_best --stats semantickitti --data rehearse3d \\
       --grid rehearse3d --out salsanext.ckpt
 
 --data names the data card of what the weights were trained on, which says their classes, rain and
@@ -48,7 +48,7 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.errors import InputError
     from derain.models.checkpoint import MODELS, save_model
     from derain.models.published import read_state_dict
-    from derain.training_record import whole
+    from derain.training_record import by_name
 
     if arguments.network not in MODELS:
         raise InputError(arguments.network, "no such network", f"Known are {', '.join(MODELS)}.")
@@ -61,7 +61,7 @@ def main(arguments: argparse.Namespace) -> int:
     model = MODELS[arguments.network].from_published(
         read_state_dict(arguments.weights), data.normalised_as(stats), arguments.grid
     )
-    model.adopt(replace(model.spec, training=whole(data.split.get("train", ()))))
+    model.adopt(replace(model.spec, training=by_name(data.split.get("train", ()))))
     save_model(model, arguments.out)
     say(
         f"Wrote {arguments.out}: {model.NAME} trained on {data.name}, "

@@ -21,8 +21,8 @@ from derain.data_statistics import (
 )
 from derain.errors import InputError
 
-# The data card that explains labels, by the folder of their scans. SemanticKITTI's classes are on
-# the card of WADS.
+# The data card that explains labels, by the folder of their scans. Both WADS and SemanticKITTI have
+# velodyne; WADS's card has the classes of both.
 CARDS = {REHEARSE3D.scans: "rehearse3d", SEMANTIC_KITTI.scans: "wads"}
 
 

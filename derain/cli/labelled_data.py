@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from derain.cards import packaged_cards
 from derain.cli.scan_options import add_columns, add_intensity_scale
 
 if TYPE_CHECKING:
@@ -33,8 +34,8 @@ def add_data_arguments(parser: argparse.ArgumentParser, part: str) -> None:
     )
     parser.add_argument(
         "--card",
-        help="data card, which says what labels mean: wads, kitti, spray, rehearse3d, simulated, "
-        "derain (of simulate --on) or a YAML file (default: as the data set's folders tell)",
+        help=f"data card, which says what labels mean: {', '.join(packaged_cards())} (derain: of "
+        "simulate --on), or a YAML file (default: as the data set's folders tell)",
     )
     add_columns(parser)
     add_intensity_scale(parser)
@@ -49,5 +50,9 @@ def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanDataModul
     from derain.datamodules.base import Loading
     from derain.datamodules.labelled import card_of, labelled_scans
 
-    loading = Loading(columns=arguments.columns, intensity_scale=arguments.intensity_scale)
+    loading = Loading(
+        columns=arguments.columns,
+        intensity_scale=arguments.intensity_scale,
+        deduplicate=getattr(arguments, "distinct", None),
+    )
     return labelled_scans(paths, card_of(paths, arguments.card), loading)

@@ -93,13 +93,13 @@ def main(arguments: list[str] | None = None) -> int:
     except OSError as error:
         return _refused(
             InputError(
-                error.filename or "derain",
+                error.filename or "system",
                 error.strerror or str(error),
                 "Check the path, its permissions, and the room on its disk.",
             )
         )
     except MemoryError:
-        return _refused(InputError("derain", "the memory is full", "Give it less at once."))
+        return _refused(InputError("memory", "it is full", "Give it less at once."))
 
 
 def _interrupted(interruption: KeyboardInterrupt) -> int:

@@ -15,6 +15,7 @@ from derain.errors import InputError, printable
 from derain.files import find_scans, read_scan, write_scan
 from derain.files.labels import LABEL, write_labels
 from derain.files.names import beside, scan_stem
+from derain.files.reading import reading
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain_field import UniformRain
@@ -69,7 +70,8 @@ def rain_on_scans(arguments: argparse.Namespace) -> int:
     for number, path in enumerate(tqdm(scans, unit="scan", disable=None)):
         chance = np.random.SeedSequence(arguments.seed, spawn_key=(number,))
         try:
-            rained = _rain_on(path, rain, sensor, np.random.default_rng(chance), arguments)
+            with reading(path):  # which knows what to say where the memory is full
+                rained = _rain_on(path, rain, sensor, np.random.default_rng(chance), arguments)
         except InputError as error:
             failed += 1
             tqdm.write(f"derain: {error}", sys.stderr)

@@ -21,6 +21,7 @@ from derain.export.runtime import Derainer
 from derain.files import find_scans, read_scan, write_scan
 from derain.files.labels import LABEL, write_labels
 from derain.files.names import beside
+from derain.files.reading import reading
 from derain.filters import FILTERS, FilterDerainer, read_parameters
 from derain.notices import Notices
 from derain.odd_scans import Oddity, left_out, much_removed, oddities, outside_view
@@ -118,7 +119,8 @@ def main(arguments: argparse.Namespace) -> int:
     done: list[Cleaned] = []
     for path in tqdm(scans, unit="scan", disable=None):
         try:
-            cleaned = _clean(path, method, arguments, notices)
+            with reading(path):  # which knows what to say where the memory is full
+                cleaned = _clean(path, method, arguments, notices)
         except InputError as error:
             tqdm.write(f"derain: {error}", sys.stderr)
             continue

@@ -93,11 +93,11 @@ class DerainCLI(LightningCLI):
                 "last.enable_version_counter": False,
             }
         )
-        self.last_added = parser  # the subcommands have nearly the same options
+        self.parser_of_a_subcommand = parser  # the subcommands have nearly the same options
 
     def parse_arguments(self, parser: LightningArgumentParser, args: ArgsType) -> None:
         """Refuses what cannot be used: options, and checkpoints before Lightning reads them."""
-        known = known_options(self.last_added, CLASSES)
+        known = known_options(self.parser_of_a_subcommand, CLASSES)
         arguments = args if isinstance(args, list) else []
         files = [read_configuration(path, known) for path in own_configurations(arguments)]
         parser.set_defaults({"test.verbose": False})  # the table is in our report

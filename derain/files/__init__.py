@@ -69,8 +69,8 @@ def find_scans(paths: Iterable[Path | str]) -> list[Path]:
 
     Args:
         paths: Files, which are taken as they are, and folders, which stand for the scans directly
-            in them, sorted by name. Passed over are hidden files, RECORDS, and any .csv and .txt
-            beside scans of other formats.
+            in them, sorted by name. Passed over are hidden files, RECORDS, any .csv beside scans of
+            other formats, and any .txt beside scans of other formats or .csv.
 
     Raises:
         InputError: A path that does not exist or may not be read, or a folder without scans.
@@ -91,7 +91,8 @@ def _scans_in(folder: Path) -> list[Path]:
         and not path.name.startswith(".")
         and path.is_file()
     )
-    scans = [path for path in scans if not FORMATS[scan_suffix(path)].record] or scans
+    least = min((FORMATS[scan_suffix(path)].record for path in scans), default=0)
+    scans = [path for path in scans if FORMATS[scan_suffix(path)].record == least]
     if not scans:
         raise InputError(
             folder, f"holds no scans ({', '.join(FORMATS)})", "Name a folder with scans in it."

@@ -26,13 +26,13 @@ class Format:
             the file does not name them itself. Content that it cannot read raises InputError.
         encode: The content of a file for a scan; the path is for messages. A scan that the format
             cannot hold raises InputError.
-        record: Whether such a file beside scans of other formats is a record of something else,
-            such as of poses.
+        record: How likely such a file is a record of something else, such as of poses: of a
+            folder's files those of the lowest number are its scans.
     """
 
     decode: Callable[[Content, Sequence[str]], Scan]
     encode: Callable[[Path, Scan], bytes]
-    record: bool = False
+    record: int = 0
 
 
 def _naming(decode: Callable[[Content], Scan]) -> Callable[[Content, Sequence[str]], Scan]:
@@ -46,8 +46,8 @@ FORMATS = {
     ".npz": Format(decode_npz, encode_npz),
     ".pcd": Format(_naming(decode_pcd), encode_pcd),
     ".ply": Format(_naming(decode_ply), encode_ply),
-    ".csv": Format(decode_table, encode_table, record=True),
-    ".txt": Format(decode_table, encode_table, record=True),
+    ".csv": Format(decode_table, encode_table, record=1),
+    ".txt": Format(decode_table, encode_table, record=2),
     ".xyz": Format(decode_table, encode_table),
     ".asc": Format(decode_table, encode_table),
     ".feather": Format(_naming(decode_feather), encode_feather),

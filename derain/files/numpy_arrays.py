@@ -194,6 +194,8 @@ def _columns_of_table(
     if names := array.dtype.names:
         flat = array.reshape(-1)
         return {name: flat[name] for name in names}
+    with reading(path, ValueError):  # before an array is made of each
+        check_columns(array.shape[-1])
     points = math.prod(array.shape[:-1])
     return name_columns(path, list(array.reshape(points, array.shape[-1]).T), columns)
 

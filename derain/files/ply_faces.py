@@ -31,11 +31,12 @@ class Faces:
         """The faces whose vertices all stay, renumbered.
 
         Args:
-            rows: The vertices that stay: their numbers, or a bool mask.
+            rows: The vertices that stay: their numbers, or a bool mask. Of a vertex that is taken
+                more than once, the faces keep the first.
         """
         kept = np.arange(self.points)[rows]
         number = np.full(self.points, -1)
-        number[kept] = np.arange(len(kept))
+        number[kept[::-1]] = np.arange(len(kept))[::-1]
         name = self.element.lists[0].name
         vertices = number[self.table[name]]
         stay = (vertices >= 0).all(axis=1)

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from derain.documents import Entry
+from derain.files.reading import is_file
 
 
 def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
@@ -29,5 +30,5 @@ def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
         )
     method = values.pop("method").text()
     beside = path.parent / method
-    named = str(beside) if Path(method).suffix and beside.is_file() else method
+    named = str(beside) if Path(method).suffix and is_file(beside) else method
     return named, {name: entry.scalar() for name, entry in values.items()}

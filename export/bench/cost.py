@@ -27,7 +27,7 @@ class Timing:
 
     Attributes:
         scans: Scans to time them on, one or more.
-        columns: Names of the columns of ``.bin`` and ``.npy`` scans.
+        columns: Names of the columns of scans that do not name them.
         threads: Threads of view and network; 0 takes every core this process may use.
         repeats: Timed runs on each scan.
         intensity_scale: What takes the scans' intensities to the unit of the methods.

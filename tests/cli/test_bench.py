@@ -114,7 +114,7 @@ def test_a_model_that_knows_the_scans_from_its_training_is_named(
     run_derain, root: Path, tmp_path: Path, onnx_model: Path, saying
 ) -> None:
     spec = Derainer(onnx_model).metadata["spec"]
-    here = {"data": "simulated rain", "training": {"002": ["0"], "003": [], "000": ["0"]}}
+    here = {"data": "simulated rain", "training": {"sequences": ["002", "003", "000"]}}
     knowing, out = saying({"spec": {**spec, **here}}), tmp_path / "out"
     methods = [f"knowing={knowing}", f"other={onnx_model}", "all"]
     outcome = run_derain("bench", "--data", root, "--methods", *methods, "--out", out)
@@ -131,7 +131,7 @@ def test_a_threshold_tuned_on_training_scans_is_warned_of(
     run_derain, root: Path, tmp_path: Path, onnx_model: Path, saying
 ) -> None:
     spec = Derainer(onnx_model).metadata["spec"]
-    here = {"data": "simulated rain", "training": {"001": []}}
+    here = {"data": "simulated rain", "training": {"sequences": ["001"]}}
     knowing = saying({"spec": {**spec, **here}})
     outcome = run_derain("tune", knowing, "--data", root, "--out", tmp_path / "tuned.yaml")
     assert outcome.code == 0, outcome.err

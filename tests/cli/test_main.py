@@ -33,6 +33,7 @@ def test_the_help_of_a_command_starts_with_examples_of_it(run_derain, command: s
     outcome = run_derain(command, "--help")
     assert outcome.code == 0
     assert f"\n  derain {command}" in outcome.out.split("options:")[0]
+    assert max(map(len, str(COMMANDS[command].DESCRIPTION).splitlines())) <= 100
 
 
 @pytest.mark.parametrize("arguments", [["wash"], [], ["run"], ["run", "model.onnx", "scan.bin"]])

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from derain.export.runtime import Derainer
 from derain.files import write_scan
+from derain.filters import FilterDerainer
 from derain.hard_cases import scene
 from derain.scan import Scan
 from derain.spherical_grid import SphericalGrid
@@ -136,3 +138,20 @@ def test_parts_of_a_file_that_are_not_written_are_named(run_derain, tmp_path: Pa
     outcome = run_derain("run", "ror", scan, "--out", tmp_path / "out")
     assert outcome.code == 0
     assert outcome.said == [f"derain: warning: {scan}: the cleaned file is without its edge"]
+
+
+def test_a_scan_for_which_the_memory_is_too_small_does_not_end_the_run(
+    run_derain, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judge = FilterDerainer.__call__
+
+    def judge_if_small(self: FilterDerainer, scan: Scan, *more: Any) -> NDArray[np.bool_]:
+        if scan.name.endswith("a.bin"):
+            raise MemoryError
+        return judge(self, scan, *more)
+
+    monkeypatch.setattr(FilterDerainer, "__call__", judge_if_small)
+    outcome = run_derain("run", "dror", scans, "--out", tmp_path / "out")
+    assert outcome.code == 2
+    assert f"derain: {scans / 'a.bin'}: needs more memory than there is" in outcome.err
+    assert {path.stem for path in (tmp_path / "out").glob("*.label")} == {*"bcde"}

@@ -52,6 +52,8 @@ def test_points_that_a_scan_holds_twice_are_counted_alike(
     (row,) = json.loads(Path("bench/bench.json").read_text())["rows"]
 
     assert sum(row["counts"].values()) == points
+    command = json.loads(Path("bench/bench.json").read_text())["command"]
+    assert ("--no-distinct" in command) == ("--no-distinct" in bench_options)
     classes = report["classes"]
     assert sum(counts["points"] for counts in classes.values()) == points
     snow = classes["falling-snow"]

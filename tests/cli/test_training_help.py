@@ -31,6 +31,12 @@ def test_every_option_of_the_short_help_is_in_the_long_one(run_derain) -> None:
     assert {"trainer.precision", "checkpoint.monitor", "panels.scans"} <= listed - named
 
 
+def test_the_options_of_a_class_are_told_without_a_configuration(run_derain) -> None:
+    outcome = run_derain("fit", "--data.help", "Wads")
+    assert outcome.code == 0, outcome.err
+    assert "Folder of the data set" in outcome.out
+
+
 @pytest.mark.parametrize("command", ["fit", "test"])
 def test_a_command_alone_names_the_configurations(run_derain, command: str) -> None:
     outcome = run_derain(command)

@@ -148,6 +148,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "repeated rows": (".npz", repeated_rows, "room for"),
     "shape": (".npy", lambda: npy((10**12, 4)), "bytes in the header"),
     "item size": (".npy", lambda: npy((1,), [("x", "<f4", (2**28,))]), "bytes in the header"),
+    "columns of nothing": (".npy", lambda: npy((0, 10**9)), "1,000,000,000 columns"),
     "objects": (".npy", lambda: npy((10**12,), "|O"), "allow_pickle=False"),
     "vertices": (
         ".ply",

@@ -144,9 +144,11 @@ def test_an_unknown_suffix_is_refused_with_the_known_ones(
 
 
 def test_tables_are_scans_where_there_are_no_others(tmp_path: Path) -> None:
-    for name in ("0.csv", "1.txt", "metadata.csv", "times.txt"):
+    for name in ("1.txt", "metadata.csv", "times.txt"):
         (tmp_path / name).touch()
-    assert [path.name for path in find_scans([tmp_path])] == ["0.csv", "1.txt"]
+    assert [path.name for path in find_scans([tmp_path])] == ["1.txt"]
+    (tmp_path / "0.csv").touch()  # what lies beside it may be a readme
+    assert [path.name for path in find_scans([tmp_path])] == ["0.csv"]
     (tmp_path / "2.xyz").touch()
     assert [path.name for path in find_scans([tmp_path])] == ["2.xyz"]
 

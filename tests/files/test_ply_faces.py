@@ -75,6 +75,16 @@ def test_faces_follow_vertices_in_any_order(tmp_path: Path) -> None:
     assert lines[-1] == "1.5 3 2 1 0 3"
 
 
+def test_faces_keep_the_first_of_a_vertex_that_is_taken_twice(tmp_path: Path) -> None:
+    path = tmp_path / "mesh.ply"
+    path.write_bytes(mesh(TRIANGLES, "ascii"))
+    every = np.arange(len(POINTS))
+    taken = read_scan(path).take(np.concatenate([every, every[::-1]]))
+    faces = taken.header.faces
+    name = faces.element.lists[0].name
+    np.testing.assert_array_equal(faces.table[name], read_scan(path).header.faces.table[name])
+
+
 @pytest.mark.parametrize("encoding", BYTE_ORDERS)
 @pytest.mark.parametrize(
     "faces", [[*TRIANGLES, (0, 1, 2, 3)], [(0, 1, 6)], [(0, 1, -1)]], ids=["mixed", "far", "minus"]
