@@ -32,16 +32,21 @@ class Notices:
         for oddity in oddities:
             self._seen[prefix + oddity.kind] += 1
             if self._seen[prefix + oddity.kind] == 1:
-                _warn(f"{scan}: {prefix}{oddity.detail}")
+                warn(f"{scan}: {prefix}{oddity.detail}")
 
     def tell_how_many_more(self) -> None:
         """Says of each kind how many more scans had it."""
         for kind, scans in self._seen.items():
             if scans > 1:
                 more = "1 more scan" if scans == 2 else f"{scans - 1:,} more scans"
-                _warn(f"{more}: {kind}")
+                warn(f"{more}: {kind}")
 
 
-def _warn(text: str) -> None:
+def warn(text: str) -> None:
+    """Warns on stderr, in one line.
+
+    Args:
+        text: Of what.
+    """
     # Not print: a progress bar may stand in the line.
     tqdm.write(f"derain: warning: {printable(text)}", sys.stderr)

@@ -1,9 +1,10 @@
 """Checkpoints on disk: every model of derain, by the name in its Spec."""
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import lightning
 
@@ -21,6 +22,9 @@ MODELS: dict[str, type[DerainingModule]] = {
     model.NAME: model for model in (OutDet, SalsaNext, LiSnowNet)
 }
 
+# What Lightning asks of a checkpoint that a training goes on from.
+STATE_OF_TRAINING = {"optimizer_states", "lr_schedulers", "loops"}
+
 
 def load_model(path: Path) -> DerainingModule:
     """Reads a checkpoint that derain wrote. It is not trusted: only plain values are unpickled.
@@ -28,7 +32,26 @@ def load_model(path: Path) -> DerainingModule:
     Raises:
         InputError: A missing or damaged file, or a checkpoint of something else.
     """
+    return _model_of(read_checkpoint(path), path)
+
+
+def check_resumable(path: Path) -> None:
+    """Finds out whether a training can go on from a checkpoint.
+
+    Raises:
+        InputError: What `load_model` raises, or a checkpoint without the state of a training.
+    """
     content = read_checkpoint(path)
+    _model_of(content, path)
+    if not content.keys() >= STATE_OF_TRAINING:
+        raise InputError(
+            path,
+            "holds weights alone, no state of a training to go on from",
+            "Go on from the last.ckpt of a run, or train anew without --ckpt_path.",
+        )
+
+
+def _model_of(content: Mapping[str, Any], path: Path) -> DerainingModule:
     parameters, weights = content.get("hyper_parameters"), content.get("state_dict")
     if not (
         isinstance(parameters, dict)
@@ -59,7 +82,9 @@ def load_model(path: Path) -> DerainingModule:
 
 
 def save_model(model: DerainingModule, path: Path) -> None:
-    """Writes a checkpoint as a training run would, for ``derain test``, ``fit`` and ``export``.
+    """Writes weights and Spec as a training run would, for all that uses or measures a model.
+
+    No training goes on from it, for it holds no state of one.
 
     Raises:
         InputError: An output that cannot be written.

@@ -30,7 +30,8 @@ from derain.datamodules.simulated import Simulated
 from derain.datamodules.wads import Wads
 from derain.errors import InputError
 from derain.models.base import DerainingModule
-from derain.models.checkpoint import load_model
+from derain.models.best_checkpoint import BestCheckpoint
+from derain.models.checkpoint import check_resumable, load_model
 from derain.models.lisnownet import LiSnowNet
 from derain.models.measured import MERIT
 from derain.models.outdet import OutDet
@@ -75,7 +76,7 @@ class DerainCLI(LightningCLI):
 
     def add_arguments_to_parser(self, parser: LightningArgumentParser) -> None:
         """Adds the callbacks; ``--checkpoint.monitor`` and so on change them."""
-        parser.add_lightning_class_args(ModelCheckpoint, "checkpoint")
+        parser.add_lightning_class_args(BestCheckpoint, "checkpoint")
         parser.add_lightning_class_args(ModelCheckpoint, "last")
         parser.add_lightning_class_args(LearningRateMonitor, "learning_rate")
         parser.add_lightning_class_args(ScanPanels, "panels")
@@ -110,7 +111,8 @@ class DerainCLI(LightningCLI):
             return
         if "://" in str(path):  # Lightning would unpickle anything in it
             raise InputError(path, "is an address", "Download it and give the file.")
-        load_model(Path(path))
+        check = check_resumable if self.config.subcommand == "fit" else load_model
+        check(Path(path))
 
     def instantiate_trainer(self, **kwargs: Any) -> Trainer:
         """Makes the trainer, which writes its checkpoints whole or not at all."""
@@ -147,6 +149,8 @@ def train(arguments: list[str]) -> None:
     warnings.filterwarnings("ignore", message="LightningCLI's args parameter")
     # Lightning 2.6 uses a name that torch 2.13 deprecates.
     warnings.filterwarnings("ignore", message=".*LeafSpec")
+    # The last checkpoint has nothing to lose by it, and of the best one BestCheckpoint takes care.
+    warnings.filterwarnings("ignore", message="The dirpath has changed")
     end_with_launcher()
     torch.set_num_threads(min(torch.get_num_threads(), usable_cores()))
     of_parsers = {

@@ -77,6 +77,17 @@ def test_a_checkpoint_that_cannot_be_used_is_one_line(
     assert not Path("runs").exists()
 
 
+def test_no_training_goes_on_from_weights_alone(
+    run_derain, wads: list[str], checkpoint: Path
+) -> None:
+    outcome = run_derain("fit", *wads, "--ckpt_path", checkpoint)
+    assert (outcome.code, outcome.out) == (2, "")
+    (line,) = outcome.err.splitlines()
+    reason = "holds weights alone, no state of a training to go on from"
+    assert line.startswith(f"derain: {checkpoint}: {reason}. Go on from the last.ckpt of a run")
+    assert not Path("runs").exists()
+
+
 @pytest.mark.parametrize("command", ["validate", "test", "predict"])
 def test_a_model_without_training_is_not_measured(
     run_derain, wads: list[str], command: str
@@ -219,3 +230,18 @@ def test_training_goes_on_from_a_checkpoint(run_derain, wads: list[str]) -> None
     assert (first["epoch"], second["epoch"]) == (0, 1)
     assert second["global_step"] == 2 * first["global_step"] == 2
     assert load_model(last).spec.data == "WADS"
+
+
+def test_a_run_that_goes_on_keeps_what_was_best_before(run_derain, wads: list[str]) -> None:
+    first, second = (Path(f"runs/outdet_wads/version_{n}/checkpoints") for n in (0, 1))
+    # The earlier the better, as where a training goes wrong.
+    earliest = ["--checkpoint.monitor", "epoch", "--checkpoint.mode", "min", "--panels.scans", "0"]
+    fit = ["fit", *wads, *earliest, "--trainer.max_epochs"]
+    assert run_derain(*fit, "1").code == 0
+    outcome = run_derain(*fit, "2", "--ckpt_path", first / "last.ckpt")
+    assert outcome.code == 0
+    assert "derain: warning" not in outcome.err
+    assert torch.load(second / "last.ckpt", weights_only=True)["epoch"] == 1
+    assert (second / "best.ckpt").read_bytes() == (first / "best.ckpt").read_bytes()
+    assert run_derain("test", *wads, "--ckpt_path", first / "last.ckpt").code == 0
+    assert not Path("runs/outdet_wads/version_2/checkpoints").exists()  # nothing was trained
