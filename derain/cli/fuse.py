@@ -32,8 +32,8 @@ lidar_radar_pcd, in each file the points of the LiDAR, then those of the radar i
 and with --labels lidar_radar_labels.
 
   derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused
-  derain fuse --lidar innoviz --radar ext_radar --extrinsics radar_to_lidar.yaml --out fused \\
-    --extra velocity,cross_section
+  derain fuse --lidar innoviz --radar ext_radar --extrinsics radar_to_lidar.yaml \\
+    --out fused --extra velocity,cross_section
   derain fuse --lidar innoviz --radar radar --extrinsics radar_to_lidar.yaml --out fused \\
     --radar-columns x,y,z,doppler,rcs --extra doppler,rcs
   derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused \\

@@ -156,8 +156,8 @@ def test_a_scan_whose_labels_could_have_no_name_does_not_stop_the_others(
     ("error", "line"),
     [
         (PermissionError(13, "Permission denied", "a\x1b.bin"), r"a\x1b.bin: Permission denied."),
-        (OSError("odd"), "derain: system: odd."),
-        (MemoryError(), "derain: memory: it is full."),
+        (OSError("odd"), "system: odd."),
+        (MemoryError(), "memory: it is full."),
     ],
 )
 def test_whatever_the_system_refuses_is_one_line(
