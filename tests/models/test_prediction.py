@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from derain.datamodules.folder import Folder
+from derain.errors import InputError
 from derain.hard_cases import scene
 from derain.models.outdet import OutDet
 from derain.models.prediction import PredictionWriter
@@ -55,3 +56,56 @@ def test_what_is_written_is_not_kept(
         label = out / file.scan.relative_to(data.root).with_suffix(".label")
         expected = probability > model.spec.threshold
         np.testing.assert_array_equal(np.fromfile(label, "<u4"), expected)
+
+
+@pytest.mark.parametrize("place", ["beside", "in the folder of labels"])
+def test_labels_are_not_overwritten_by_what_is_found(
+    make_trainer: MakeTrainer,
+    data: Folder,
+    outdet: Callable[..., OutDet],
+    tmp_path: Path,
+    place: str,
+) -> None:
+    label, out = {
+        "beside": (tmp_path / "a/2.label", tmp_path),
+        "in the folder of labels": (tmp_path / "labels/2.label", tmp_path / "a/../labels"),
+    }[place]
+    if place == "in the folder of labels":
+        data.patterns["predict"] = ["a/*.bin"]
+    label.parent.mkdir(exist_ok=True)
+    label.write_bytes(b"truth")
+    files = sorted(tmp_path.rglob("*"))
+    with pytest.raises(InputError, match=r"overwrite the labels .* another folder\.") as refused:
+        make_trainer(1, callbacks=[PredictionWriter(str(out))]).predict(outdet(), data)
+    assert refused.value.subject == out
+    assert label.name in refused.value.reason
+    assert sorted(tmp_path.rglob("*")) == files  # nor is there anything of the scans before it
+    assert label.read_bytes() == b"truth"
+
+
+def test_scans_whose_labels_would_have_one_name_are_refused(
+    make_trainer: MakeTrainer, data: Folder, outdet: Callable[..., OutDet], tmp_path: Path
+) -> None:
+    scene(50).tofile(tmp_path / "a/1.BIN")
+    data.patterns["predict"] = ["a/*.bin", "a/1.*"]  # which finds a/1.bin twice
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match="would both be") as refused:
+        make_trainer(1, callbacks=[PredictionWriter(str(out))]).predict(outdet(), data)
+    assert f"{tmp_path / 'a/1.bin'} and for {tmp_path / 'a/1.BIN'}" in refused.value.reason
+    assert not out.exists()
+
+
+def test_without_labels_predictions_may_lie_beside_the_scans(
+    make_trainer: MakeTrainer,
+    data: Folder,
+    outdet: Callable[..., OutDet],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    data.patterns["predict"] = ["*/*.bin", "a/0.bin"]  # a scan that is found twice is one scan
+    out = tmp_path / "\N{RIGHT-TO-LEFT OVERRIDE}" / ".."
+    out.parent.mkdir()
+    make_trainer(1, callbacks=[PredictionWriter(str(out))]).predict(outdet(), data)
+    labels = {label.relative_to(tmp_path).as_posix() for label in tmp_path.rglob("*.label")}
+    assert labels == {"a/0.label", "a/1.label", "a/2.label", "b/0.label"}
+    assert f"to {tmp_path}/\\u202e/..\n" in capsys.readouterr().out
