@@ -30,11 +30,15 @@ class CalibrationScans(Collection[Scan]):
     Args:
         paths: Their files.
         columns: Names of the columns of files that do not name them.
+        intensity_scale: What takes their intensities to the unit of the model, e.g. 255.
     """
 
-    def __init__(self, paths: Sequence[Path], columns: Sequence[str]) -> None:
+    def __init__(
+        self, paths: Sequence[Path], columns: Sequence[str], intensity_scale: float = 1.0
+    ) -> None:
         self.paths = paths
         self.columns = columns
+        self.intensity_scale = intensity_scale
 
     def __len__(self) -> int:
         return len(self.paths)
@@ -43,7 +47,10 @@ class CalibrationScans(Collection[Scan]):
         return isinstance(scan, Scan) and scan.name in map(str, self.paths)
 
     def __iter__(self) -> Iterator[Scan]:
-        return (read_scan(path, self.columns) for path in self.paths)
+        return map(self._read, self.paths)
+
+    def _read(self, path: Path) -> Scan:
+        return read_scan(path, self.columns).with_intensity_times(self.intensity_scale)
 
 
 class ScanReader(CalibrationDataReader):  # type: ignore[misc]

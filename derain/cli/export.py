@@ -1,16 +1,19 @@
 """``derain export``: an ONNX file from a checkpoint, proved and timed."""
 
 import argparse
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cli.arguments import count, threads
 from derain.cli.outputs import say
-from derain.cli.scan_options import add_columns
+from derain.cli.scan_options import add_columns, add_intensity_scale
+from derain.notices import Notices
+from derain.odd_scans import oddities
 
 if TYPE_CHECKING:
     from derain.scan import Scan
+    from derain.spec import Spec
 
 SUMMARY = "make an ONNX file that runs on a CPU without torch"
 
@@ -23,7 +26,7 @@ Exports a checkpoint as one ONNX file, proves it against PyTorch, and times it.
 
 Where the proof fails, no file is left. With --int8, convolutions compute in eight bits, scaled by
 what they see in scans of the calibration folder. They must find the rain there that the network
-finds: so the scans have to hold some.
+finds: so the scans have to hold some, and their intensities the unit of the training data.
 """
 
 
@@ -41,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scan", type=Path, help="time the model on this scan; by default on a made-up one"
     )
     add_columns(parser)
+    add_intensity_scale(parser, of="calibration ")
     parser.add_argument(
         "--threads", type=threads, default=0, help="threads to time with (default all)"
     )
@@ -58,9 +62,9 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.scan is not None and not is_file(arguments.scan):
         raise InputError(arguments.scan, "there is no such file", "Check --scan.")
     model = load_model(arguments.checkpoint)
-    proof = export(
-        model, arguments.out, _calibration(arguments.calibration, arguments.int8, arguments.columns)
-    )
+    calibration = _calibration(arguments)
+    _warn_of_odd(calibration, model.spec)
+    proof = export(model, arguments.out, calibration)
     print(proof)
     say(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
     print(
@@ -75,18 +79,32 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _calibration(
-    paths: Sequence[Path] | None, int8: bool, columns: Sequence[str]
-) -> Collection["Scan"]:
+def _calibration(arguments: argparse.Namespace) -> Collection["Scan"]:
     """Scans that an eight-bit model is scaled by; none for one in float32."""
     from derain.datamodules.statistics import evenly_spaced
     from derain.errors import InputError
     from derain.export.quantisation import CALIBRATION_SCANS, CalibrationScans
     from derain.files import find_scans
 
-    if int8 != bool(paths):
+    if arguments.int8 != bool(arguments.calibration):
         raise InputError(
             "--int8", "needs --calibration, and that needs it", "Give both or neither."
         )
-    found = evenly_spaced(find_scans(paths or []), CALIBRATION_SCANS)
-    return CalibrationScans(found, columns)
+    found = evenly_spaced(find_scans(arguments.calibration or []), CALIBRATION_SCANS)
+    return CalibrationScans(found, arguments.columns, arguments.intensity_scale)
+
+
+def _warn_of_odd(scans: Iterable["Scan"], spec: "Spec") -> None:
+    """Warns of scans that do not suit the model.
+
+    The proof would not tell: it has both models judge the same scans, in whatever unit.
+    """
+    notices = Notices()
+
+    def tell(scan: "Scan") -> None:
+        notices.tell(scan.name, oddities(scan, spec))
+
+    # Mapped, not looped over: a loop would hold on to one scan while the next is read.
+    for _ in map(tell, scans):
+        pass
+    notices.tell_how_many_more()

@@ -35,12 +35,17 @@ def add_columns(
     )
 
 
-def add_intensity_scale(parser: argparse.ArgumentParser) -> None:
-    """Declares what takes the scans' intensities to the unit of the methods."""
+def add_intensity_scale(parser: argparse.ArgumentParser, of: str = "") -> None:
+    """Declares what takes the scans' intensities to the unit of the methods.
+
+    Args:
+        parser: The command's parser.
+        of: Which scans they are, where a command reads several kinds.
+    """
     parser.add_argument(
         "--intensity-scale",
         type=factor,
         default=1.0,
         metavar="FACTOR",
-        help="what takes the scans' intensities to the method's unit, e.g. 255 (default: 1)",
+        help=f"what takes the {of}scans' intensities to the method's unit, e.g. 255 (default: 1)",
     )

@@ -1,5 +1,6 @@
 """``derain export``: a checkpoint in, a proved and timed ONNX file out, or one line."""
 
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -73,6 +74,40 @@ def test_a_model_in_eight_bits_is_scaled_by_scans_like_those_it_will_see(
     assert len(names) == 17
     operators = {node.op_type for node in onnx.load(tmp_path / "int8.onnx").graph.node}
     assert {"QuantizeLinear", "DequantizeLinear"} <= operators
+
+
+def test_calibration_scans_of_another_unit_are_warned_of_once_and_scaled(
+    run_derain,
+    random_salsanext: DerainingModule,
+    scans: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    brightest = []
+
+    def export(model: DerainingModule, path: Path, calibration: Collection[Scan]) -> str:
+        path.touch()
+        brightest[:] = [scan.intensity.max() for scan in [*calibration, *calibration]]
+        return "proof"
+
+    monkeypatch.setattr(onnx_file, "export", export)
+    monkeypatch.setattr("derain.export.latency.measure_latency", lambda *_: "times")
+    save_model(random_salsanext, tmp_path / "model.ckpt")
+    options = ["--out", tmp_path / "int8.onnx", "--int8", "--calibration", scans]
+    assert run_derain("export", tmp_path / "model.ckpt", *options).said == []
+    whole = brightest.copy()
+    for scan in scans.iterdir():
+        points = np.fromfile(scan, np.float32).reshape(-1, 4)
+        (points / np.array([1, 1, 1, 256], np.float32)).tofile(scan)
+    first, more = run_derain("export", tmp_path / "model.ckpt", *options).said
+    assert first.startswith(f"derain: warning: {scans / '00.bin'}: mean intensity 0.")
+    assert first.endswith("see --intensity-scale")
+    assert more == "derain: warning: 15 more scans: intensity of a smaller unit"
+    assert max(brightest) < 1 < max(whole)
+    scaled = run_derain("export", tmp_path / "model.ckpt", *options, "--intensity-scale", "256")
+    assert scaled.said == []
+    assert brightest == whole
+    assert len(whole) == 32
 
 
 @pytest.mark.parametrize("options", [["--int8"], ["--calibration", "scans"]], ids=str)
