@@ -3,7 +3,7 @@
 import argparse
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,9 @@ sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated), one sequence, or a fold
   derain info WADS --json
   derain info my_data --layout lidar,classes --card my_card.yaml
 """
+
+# Of a training on more sequences than these the text only says how many.
+MOST_SEQUENCES = 10
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -80,7 +83,7 @@ def main(arguments: argparse.Namespace) -> int:
             print(json.dumps({"file": str(path), **facts}))
         else:
             print(printable(str(path)))
-            say(_indented(facts))
+            say(_indented(_in_brief(facts)))
     return 0
 
 
@@ -174,6 +177,23 @@ def _span(values: NDArray[Any]) -> dict[str, float] | str:
         "min": round(float(lowest), 4),
         "median": round(float(median), 4),
         "max": round(float(highest), 4),
+    }
+
+
+def _in_brief(facts: dict[str, Any]) -> dict[str, Any]:
+    """The same with the record of a model's training as counts: it may name 2,000 scans."""
+    match facts:
+        case {"spec": {"training": dict(training)}}:
+            return {**facts, "spec": {**facts["spec"], "training": _counted(training)}}
+    return facts
+
+
+def _counted(training: Mapping[str, Sequence[str]]) -> dict[str, str] | str:
+    if len(training) > MOST_SEQUENCES:
+        return f"{len(training):,} sequences"
+    return {
+        sequence: f"{len(scans):,} scan{'s' * (len(scans) > 1)}" if scans else "all"
+        for sequence, scans in training.items()
     }
 
 

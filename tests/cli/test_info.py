@@ -1,6 +1,8 @@
 """``derain info`` says what is in a scan, labels, a model and a checkpoint."""
 
 import json
+from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +142,32 @@ def test_a_checkpoint_says_its_spec_and_size(
     assert facts["spec"] == random_outdet.spec.as_dict()
     assert facts["parameters"] == sum(p.numel() for p in random_outdet.parameters())
     assert "  parameters: 11019" in run_derain("info", checkpoint).out.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("training", "line"),
+    [
+        (
+            {"00": [f"{n:06}" for n in range(1200)], "01": ["7"], "02": []},
+            "    training: 00 1,200 scans, 01 1 scan, 02 all",
+        ),
+        ({f"{n:04}": [] for n in range(2000)}, "    training: 2,000 sequences"),
+        ({}, "    training: "),
+    ],
+    ids=["scans", "sequences", "unknown"],
+)
+def test_scans_of_a_training_are_counted_in_the_text_and_named_in_json(
+    run_derain,
+    random_outdet: OutDet,
+    tmp_path: Path,
+    training: dict[str, list[str]],
+    line: str,
+) -> None:
+    model, path = deepcopy(random_outdet), tmp_path / "model.ckpt"
+    model.adopt(replace(model.spec, training=training))
+    save_model(model, path)
+    assert line in run_derain("info", path).out.splitlines()
+    assert strict_json(run_derain("info", path, "--json").out)["spec"]["training"] == training
 
 
 def test_several_files_give_one_object_each(
