@@ -70,6 +70,10 @@ def oddities(scan: Scan, judge: Judge) -> Iterator[Oddity]:
 def outside_view(scan: Scan, judged: NDArray[np.bool_], judge: Spec) -> Iterator[Oddity]:
     """Whether much of a scan lies outside what a model sees.
 
+    Only who judged the scan can say: to project it once more would take as long as the view. A
+    bench does not, whose methods give no more than what they call rain, and whose recall counts
+    the rain that they do not see as missed.
+
     Args:
         scan: The scan.
         judged: Rows that the model judged, bool (N,).

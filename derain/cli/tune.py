@@ -20,7 +20,7 @@ from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.filters import FILTERS, filter_from
 from derain.notices import Notices
-from derain.odd_scans import Judge, oddities
+from derain.odd_scans import Judge, oddities, outside_view
 from derain.training_record import overlap
 
 if TYPE_CHECKING:
@@ -129,7 +129,10 @@ def _tuned_model(
         for file in tqdm(files, desc="judging", unit="scan", disable=None):
             scan = _read(data, derainer.spec, notices, file)
             known = scan.valid & ~data.card.unknown_of(scan)
-            yield derainer.probability(scan)[known], data.card.rain_of(scan)[known]
+            judgement = derainer.judge(scan)
+            outside = outside_view(scan, judgement.judged, derainer.spec)
+            notices.tell(str(file.scan), outside)
+            yield judgement.probability[known], data.card.rain_of(scan)[known]
 
     note = overlap(arguments.method, derainer.spec, data.card, [file.scan for file in files])
     if note is not None:

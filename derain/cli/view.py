@@ -10,12 +10,13 @@ from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError
 from derain.files import read_scan
 from derain.notices import Notices
-from derain.odd_scans import oddities
+from derain.odd_scans import oddities, outside_view
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from derain.export.bench.contestants import Contestant
     from derain.scan import Scan
 
 SUMMARY = "draw a scan as several methods clean it"
@@ -51,7 +52,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     from derain.export.bench.contestants import contestants
-    from derain.stopwatch import Stopwatch
 
     if not (arguments.out or arguments.window):
         raise InputError(arguments.scan, "nothing is to be done with it", "Give --out or --window.")
@@ -63,7 +63,7 @@ def main(arguments: argparse.Namespace) -> int:
         notices.tell(str(arguments.scan), oddities(scan, method.judge), method.title)
     truth = _truth(scan, arguments)
     predicted = {
-        method.title: method.ready(arguments.threads)(scan, Stopwatch()) for method in methods
+        method.title: _rain(scan, method, arguments.threads, notices) for method in methods
     }
     title, rain = f"{arguments.scan.name}: {len(scan):,} points", None
     if truth is not None:
@@ -81,6 +81,22 @@ def main(arguments: argparse.Namespace) -> int:
 
         show_comparison(scan, predicted, rain)
     return 0
+
+
+def _rain(
+    scan: "Scan", method: "Contestant", threads: int, notices: Notices
+) -> "NDArray[np.bool_]":
+    """Which points a method calls rain, bool (N,); warns where a model cannot see much of them."""
+    from derain.export.runtime import Derainer
+    from derain.stopwatch import Stopwatch
+
+    judge = method.ready(threads)
+    if not isinstance(judge, Derainer):
+        return judge(scan, Stopwatch())
+    judgement = judge.judge(scan)
+    outside = outside_view(scan, judgement.judged, judge.spec)
+    notices.tell(scan.name, outside, method.title)
+    return judgement.rain
 
 
 def _truth(

@@ -60,6 +60,23 @@ def test_the_threshold_of_a_model_is_tuned(
     assert iou(parameters["threshold"]) == max(map(iou, [0, *probability]))
 
 
+def test_points_outside_the_grid_of_a_model_are_warned_of(
+    run_derain, data: list[str | Path], tmp_path: Path, image_onnx: Path
+) -> None:
+    outsides = []
+    for path in sorted((tmp_path / "velodyne").iterdir()):
+        points = np.fromfile(path, np.float32).reshape(-1, 4)
+        points[:100, 2] = 80.0
+        points.tofile(path)
+        outsides.append((Derainer(image_onnx).view.grid.pixel(points[:, :3]) < 0).mean())
+    outcome = run_derain("tune", image_onnx, *data, "--out", tmp_path / "best.yaml")
+    assert outcome.said == [
+        f"derain: warning: {tmp_path / 'velodyne/0.bin'}: {outsides[0]:.0%} of the points lie "
+        "outside the grid of WADS, and stay",
+        "derain: warning: 2 more scans: points outside the grid",
+    ]
+
+
 def test_a_tuned_model_is_found_from_any_folder(
     run_derain,
     data: list[str | Path],
