@@ -6,6 +6,7 @@ from pathlib import Path
 import lightning
 
 from derain.counts import SCORES
+from derain.errors import printable
 from derain.files.atomic import replacing
 from derain.metrics import RainMetrics
 from derain.models.base import DerainingModule
@@ -28,7 +29,7 @@ class TestReport(lightning.Callback):
             path = Path(folder) / "test.json"
             with replacing(path) as temporary:
                 temporary.write_text(json.dumps(scores, indent=2) + "\n")
-            print(f"Written to {path}")
+            print(printable(f"Written to {path}"))
 
 
 def as_dict(metrics: RainMetrics) -> dict[str, object]:
