@@ -3,7 +3,7 @@
 import argparse
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,9 +40,6 @@ sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated), one sequence, or a fold
   derain info WADS --json
   derain info my_data --layout lidar,classes --card my_card.yaml
 """
-
-# Of a training on more sequences than these the text only says how many.
-MOST_SEQUENCES = 10
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -184,17 +181,9 @@ def _in_brief(facts: dict[str, Any]) -> dict[str, Any]:
     """The same with the record of a model's training as counts: it may name 2,000 scans."""
     match facts:
         case {"spec": {"training": dict(training)}}:
-            return {**facts, "spec": {**facts["spec"], "training": _counted(training)}}
+            counts = {kind: f"{len(names):,}" for kind, names in training.items()}
+            return {**facts, "spec": {**facts["spec"], "training": counts}}
     return facts
-
-
-def _counted(training: Mapping[str, Sequence[str]]) -> dict[str, str] | str:
-    if len(training) > MOST_SEQUENCES:
-        return f"{len(training):,} sequences"
-    return {
-        sequence: f"{len(scans):,} scan{'s' * (len(scans) > 1)}" if scans else "all"
-        for sequence, scans in training.items()
-    }
 
 
 def _indented(facts: Any, depth: int = 1) -> str:
