@@ -43,7 +43,7 @@ The extrinsics say where the radar is in the LiDAR's frame (x forward, y left, z
 
   {{x: 0.5, y: 0.0, z: -0.7, roll: 0, pitch: 0, yaw: 1.5}}     metres and degrees
 
-or as a 4 x 4 matrix. When each scan was taken is in the {METADATA} of its folder, a line for each:
+or as a 4 x 4 matrix. When each scan was taken is in its folder's {METADATA}, a line for each:
 frame (its name), timestamp (in seconds). The label of a radar point is that of the nearest LiDAR
 point, {UNKNOWN} (unknown) if none is near. A LiDAR scan without a radar frame stays alone.
 """
