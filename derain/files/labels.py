@@ -25,14 +25,19 @@ def label_beside(scan: Path) -> Path:
     """Where a scan's labels lie: beside it if they are there, else in the sibling `labels`."""
     label = beside(scan, LABEL)
     # Not Path.is_file, which raises where the name has become too long by its suffix.
-    return label if os.path.isfile(label) else scan.parent.parent / "labels" / label.name
+    return label if os.path.isfile(label) else _sequence(scan) / "labels" / label.name
 
 
 def label_of(scan: Path) -> Path:
     """Where a scan's labels lie: beside it, or in the folder that its layout has for them."""
-    if scan.parent.name == REHEARSE3D.scans:
-        return scan.parent.parent / REHEARSE3D.labels / f"{scan_stem(scan)}{LABEL}"
+    if scan.absolute().parent.name == REHEARSE3D.scans:
+        return _sequence(scan) / REHEARSE3D.labels / f"{scan_stem(scan)}{LABEL}"
     return label_beside(scan)
+
+
+def _sequence(scan: Path) -> Path:
+    """The folder that a scan's folder lies in, also where the scan is named from within its own."""
+    return scan.absolute().parent.parent
 
 
 def read_labels(path: Path, points: int) -> NDArray[np.uint32]:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from derain import InputError
-from derain.files.labels import instance, read_labels, semantic, write_labels
+from derain.files.labels import instance, label_of, read_labels, semantic, write_labels
 
 LABELS = arrays(np.uint32, st.integers(0, 20))
 
@@ -72,3 +72,16 @@ def test_real_labels_come_back(tmp_path: Path, shared: Path) -> None:
     assert np.count_nonzero(semantic(raw) == 110) == 14_276
     write_labels(tmp_path / "scan.label", semantic(raw), instance(raw))
     assert (tmp_path / "scan.label").read_bytes() == source.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("scans", "labels"), [("velodyne", "labels"), ("lidar_radar_pcd", "lidar_radar_labels")]
+)
+def test_labels_are_found_of_scans_that_are_named_from_within_their_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scans: str, labels: str
+) -> None:
+    for folder in (scans, labels):
+        (tmp_path / folder).mkdir()
+    (tmp_path / labels / "0.label").touch()
+    monkeypatch.chdir(tmp_path / scans)
+    assert label_of(Path("0.bin")) == tmp_path / labels / "0.label"
