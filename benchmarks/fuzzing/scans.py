@@ -7,6 +7,8 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from random import Random
 
@@ -221,6 +223,22 @@ def _zip_bomb() -> bytes:
     )
 
 
+def _las(compressed: bool, version: str) -> bytes:
+    import laspy
+
+    header = laspy.LasHeader(version=version, point_format=7 if version == "1.4" else 3)
+    header.offsets, header.scales = np.array([4e5, 5e6, 0]), np.full(3, 0.001)
+    las = laspy.LasData(header)
+    points = scene(POINTS)
+    las.xyz = points[:, :3] + header.offsets
+    las.intensity = points[:, 3].astype(np.uint16)
+    file = io.BytesIO()
+    las.write(file, do_compress=compressed)
+    return file.getvalue()
+
+
+_LAS_VERSIONS = ("1.2", "1.4") if find_spec("laspy") else ()
+
 _BY_OTHERS: dict[str, Sequence[Callable[[], bytes]]] = {
     ".bin": (lambda: scene(POINTS).tobytes(),),
     ".npy": (
@@ -243,6 +261,8 @@ _BY_OTHERS: dict[str, Sequence[Callable[[], bytes]]] = {
         lambda: b"x,y,z,intensity\n" + _lines().replace(b" ", b","),
         lambda: b'"x","y","z","name"\r\n1,2,3,4\r\n5,6,,8\r\n',
     ),
+    ".las": [partial(_las, False, version) for version in _LAS_VERSIONS],
+    ".laz": [partial(_las, True, version) for version in _LAS_VERSIONS],
 }
 
 
