@@ -4,6 +4,7 @@ import random
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import ModuleType
 
@@ -81,6 +82,8 @@ def test_what_is_left_lying_about_or_running_is_told(
     assert len(kills.temporary_files(victim, tmp_path / "kill")) == 2
     monkeypatch.setattr(kills, "NOTICE", 0)
     with subprocess.Popen(["sleep", "600"], start_new_session=True) as process:
+        while not Path(f"/proc/{process.pid}/cmdline").read_bytes():
+            time.sleep(0.01)  # it is not that program yet
         assert kills.left_running(process.pid) == ["sleep 600 "]
         process.wait()
         assert kills.left_running(process.pid) == []
