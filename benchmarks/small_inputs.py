@@ -1,4 +1,7 @@
-"""Every command of derain that writes, on inputs so small that it takes seconds."""
+"""Every command of derain that writes, on inputs so small that it takes seconds.
+
+The demonstration is not among them: it runs others.
+"""
 
 from collections.abc import Callable
 from pathlib import Path

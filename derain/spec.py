@@ -17,8 +17,6 @@ from derain.view import View
 
 SCHEMA = 1
 
-# A label has two bytes for its class.
-
 
 @dataclass(frozen=True)
 class Spec:

@@ -7,7 +7,7 @@ import shlex
 from derain.errors import printable
 
 # Flags that can be given as --no-..., by the name that argparse gives their values.
-DENIABLE = ("distinct", "picture")
+DENIABLE = ("distinct",)
 
 
 def count(text: str) -> int:
