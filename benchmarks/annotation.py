@@ -23,9 +23,9 @@ from derain.annotation.plane import Plane
 from derain.annotation.scene import Scene, inside
 from derain.annotation.steps import annotate, road_plane
 from derain.annotation.track_scene import scene_of_track
-from derain.counts import ratio
-from derain.label_transfer import UNKNOWN
-from derain.pictures import save
+from derain.evaluation.counts import ratio
+from derain.fusion.label_transfer import UNKNOWN
+from derain.pictures.scan_pictures import save
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_facility

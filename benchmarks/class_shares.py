@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from derain.cards import load_card
-from derain.data_layout import REHEARSE3D
-from derain.data_statistics import Tally, count_scan, find_sequences
+from derain.cards.card import load_card
+from derain.cards.layout import REHEARSE3D
 from derain.datamodules.simulated import Simulated
+from derain.sources.contents import Tally, count_scan, find_sequences
 
 LAYOUT = (REHEARSE3D.scans, REHEARSE3D.labels)
 COLUMNS = ("x", "y", "z", "intensity")

@@ -20,7 +20,7 @@ from derain.errors import InputError
 from derain.export.latency import versions
 from derain.files import read_scan
 from derain.filters import DROR, DSOR, ROR, SOR, FilterDerainer, PointFilter
-from derain.open3d_import import import_open3d
+from derain.system.open3d_import import import_open3d
 
 ROUNDS = 9
 

@@ -14,13 +14,13 @@ import numpy as np
 import torch
 from labelled import read_labelled
 
-from derain.cards import load_card
-from derain.counts import SCORES, Counts
+from derain.cards.card import load_card
+from derain.evaluation.counts import SCORES, Counts
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
-from derain.probability import probability_of_rain
+from derain.models.lisnownet.selection_rule import SelectionRule
 from derain.scan import Scan
-from derain.selection_rule import SelectionRule
+from derain.views.probability import probability_of_rain
 
 # Source: umautobots/lisnownet for WADS.
 PUBLISHED = {"residual": 0.008, "ground": -1.8, "intensity": 2 / 255, "near": 2.5}

@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 from published_outdet import PublishedPipeline
 
-from derain.cards import load_card
+from derain.cards.card import load_card
 from derain.export.latency import versions
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer

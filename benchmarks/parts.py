@@ -22,7 +22,7 @@ from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.models import outdet
 from derain.models.checkpoint import load_model
-from derain.morton import distinct_positions
+from derain.views.morton import distinct_positions
 
 NEIGHBOURS = 9
 ROUNDS = 15

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from derain.cards import load_card
+from derain.cards.card import load_card
+from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
-from derain.hard_cases import scene
 from derain.models.checkpoint import save_model
 from derain.models.outdet import PUBLISHED_KEYS, OutDet
 

@@ -16,14 +16,14 @@ import numpy as np
 from labelled import read_labelled
 from numpy.typing import NDArray
 
-from derain.cards import load_card
-from derain.counts import Counts
-from derain.grid_fit import fit_grid
-from derain.range_image import RangeView
+from derain.cards.card import load_card
+from derain.evaluation.counts import Counts
 from derain.scan import Scan
-from derain.spherical_grid import SphericalGrid, grid_of
-from derain.stopwatch import Stopwatch
-from derain.way_back import WAYS_BACK
+from derain.system.stopwatch import Stopwatch
+from derain.views.back_projection import WAYS_BACK
+from derain.views.grid_fit import fit_grid
+from derain.views.range_image import RangeView
+from derain.views.spherical_grid import SphericalGrid, grid_of
 
 
 @dataclass

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import Scan
-from derain.spherical_grid import ALL_AROUND, FULL_CIRCLE
+from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,7 @@ import lightning
 import numpy as np
 from torch.utils.data import DataLoader
 
-from derain.batch import Batch, Sample
-from derain.cards import DataCard
-from derain.channels import extra_channels, with_columns
+from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.order import MeasuringOrder, TrainingOrder
 from derain.datamodules.scan_dataset import LateLoader, ScanDataset, ScanFile, packed
@@ -19,11 +17,13 @@ from derain.datamodules.statistics import evenly_spaced, measured
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.files.labels import read_labels, semantic
-from derain.morton import first_rows
+from derain.learning.batch import Batch, Sample
+from derain.learning.seeds import run_seed
 from derain.scan import Scan
-from derain.seeds import run_seed
+from derain.sources.training_record import by_fingerprint
 from derain.spec import Spec
-from derain.training_record import by_fingerprint
+from derain.views.channels import extra_channels, with_columns
+from derain.views.morton import first_rows
 
 Part = Literal["train", "validation", "test", "predict"]
 

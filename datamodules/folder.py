@@ -3,7 +3,7 @@
 from glob import glob
 from pathlib import Path
 
-from derain.cards import load_card
+from derain.cards.card import load_card
 from derain.datamodules.base import Loading, Part, ScanDataModule
 from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError

@@ -4,14 +4,14 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from derain.cards import DataCard, load_card, packaged_cards
-from derain.data_layout import REHEARSE3D, SEMANTIC_KITTI, Layout
+from derain.cards.card import DataCard, load_card, packaged_cards
+from derain.cards.layout import REHEARSE3D, SEMANTIC_KITTI, Layout
 from derain.datamodules.base import Loading, Part, ScanDataModule
 from derain.datamodules.scan_dataset import ScanFile
 from derain.datamodules.sequences import SequenceDataModule
-from derain.documents import Entry
 from derain.errors import InputError
 from derain.files import find_scans
+from derain.files.documents import Entry
 from derain.files.labels import label_of
 from derain.simulation.manifest import RAIN_RATE, rates_of_sequences, read_manifest
 

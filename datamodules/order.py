@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from torch.utils.data import DistributedSampler
 
-from derain.seeds import Draw, generator
+from derain.learning.seeds import Draw, generator
 
 if TYPE_CHECKING:
     from derain.datamodules.scan_dataset import ScanDataset

@@ -1,7 +1,7 @@
 """REHEARSE-3D: emulated rain, a MEMS LiDAR fused with a 4D radar."""
 
-from derain.cards import load_card
-from derain.data_layout import REHEARSE3D, Layout
+from derain.cards.card import load_card
+from derain.cards.layout import REHEARSE3D, Layout
 from derain.datamodules.base import Loading
 from derain.datamodules.sequences import SequenceDataModule
 

@@ -8,8 +8,8 @@ from lightning.pytorch.trainer.states import TrainerFn
 
 from derain.datamodules.base import Part, ScanDataModule
 from derain.datamodules.statistics import evenly_spaced
-from derain.notices import Notices
-from derain.odd_scans import oddities
+from derain.system.notices import Notices
+from derain.views.oddities import oddities
 
 
 class ScanCheck(lightning.Callback):

@@ -7,14 +7,14 @@ from typing import Any
 
 from torch.utils.data import DataLoader, Dataset
 
-from derain.batch import Batch, Sample
-from derain.cards import DataCard
+from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.order import Pick
 from derain.errors import InputError
+from derain.learning.batch import Batch, Sample
+from derain.learning.seeds import Draw, generator
 from derain.scan import Scan
-from derain.seeds import Draw, generator
-from derain.view import View
+from derain.views.view import View
 
 
 @dataclass(frozen=True)

@@ -3,15 +3,15 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from derain.cards import DataCard
-from derain.data_layout import Layout
+from derain.cards.card import DataCard
+from derain.cards.layout import Layout
 from derain.datamodules.base import Loading, Part, ScanDataModule
 from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
 from derain.files import find_scans
 from derain.files.labels import LABEL
 from derain.files.names import scan_stem
-from derain.training_record import by_name
+from derain.sources.training_record import by_name
 
 
 class SequenceDataModule(ScanDataModule):

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from derain.cards import load_card
-from derain.data_layout import REHEARSE3D
+from derain.cards.card import load_card
+from derain.cards.layout import REHEARSE3D
 from derain.datamodules.base import Loading, Part
 from derain.datamodules.scan_dataset import ScanFile
 from derain.datamodules.sequences import SequenceDataModule

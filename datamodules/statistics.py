@@ -6,10 +6,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.cards import CHANNELS, DataCard
-from derain.channels import USUAL_CHANNELS, channel_values
+from derain.cards.card import CHANNELS, DataCard
 from derain.errors import InputError
 from derain.scan import Scan
+from derain.views.channels import USUAL_CHANNELS, channel_values
 
 Item = TypeVar("Item")
 

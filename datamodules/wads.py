@@ -1,7 +1,7 @@
 """WADS: real snow on a 64-beam LiDAR."""
 
-from derain.cards import load_card
-from derain.data_layout import SEMANTIC_KITTI, Layout
+from derain.cards.card import load_card
+from derain.cards.layout import SEMANTIC_KITTI, Layout
 from derain.datamodules.base import Loading
 from derain.datamodules.sequences import SequenceDataModule
 

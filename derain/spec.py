@@ -6,14 +6,14 @@ from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from derain.channels import MOST_CHANNELS
-from derain.documents import Entry, shown
 from derain.errors import InputError
+from derain.files.documents import Entry, shown
 from derain.files.labels import LARGEST_ID
-from derain.neighbours import NeighbourView
-from derain.range_image import RangeView
 from derain.scan import Scan
-from derain.view import View
+from derain.views.channels import MOST_CHANNELS
+from derain.views.neighbours import NeighbourView
+from derain.views.range_image import RangeView
+from derain.views.view import View
 
 SCHEMA = 1
 
@@ -36,8 +36,8 @@ class Spec:
         threshold: A point is rain where its probability is greater.
         data: Name of the training data.
         licence: Licence of the training data.
-        training: What it was trained on, as `derain.training_record` says it: names of sequences,
-            fingerprints of scans. Empty where that is not known.
+        training: What it was trained on, as `derain.sources.training_record` says it: names of
+            sequences, fingerprints of scans. Empty where that is not known.
         schema: Version of this layout.
     """
 

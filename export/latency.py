@@ -11,10 +11,10 @@ import onnxruntime
 from numpy.typing import NDArray
 
 import derain
+from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.export.timing import timed_runs
 from derain.files import DEFAULT_COLUMNS, read_scan
-from derain.hard_cases import scene
 
 WARM_UP = 5
 PERCENTILES = (50, 90, 99)

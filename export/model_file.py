@@ -9,8 +9,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, Self
 
-from derain.documents import Entry
 from derain.errors import InputError
+from derain.files.documents import Entry
 from derain.files.reading import reading
 from derain.spec import Spec
 

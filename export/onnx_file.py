@@ -14,16 +14,16 @@ import onnxruntime
 import torch
 
 import derain
-from derain.channels import extra_channels
 from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.model_file import CHECKSUM_KEY, METADATA_KEY, NO_CHECKSUM, sealed
 from derain.export.proof import FINITE, FLOAT32, INT8, Proof, prove
 from derain.export.quantisation import quantised
 from derain.files.atomic import replacing
-from derain.hard_cases import hard_cases, scene
 from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.spec import Spec
+from derain.views.channels import extra_channels
 
 # Pinned: what a file may contain is then the same whatever torch exports by default.
 # 18 is the oldest opset that torch 2.13's exporter writes without converting.

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from derain.export.runtime import Derainer
-from derain.probability import probability_of_rain
 from derain.scan import Scan
-from derain.view import ViewedScan
+from derain.views.probability import probability_of_rain
+from derain.views.view import ViewedScan
 
 THREADS = (1, 2)
 

@@ -18,7 +18,7 @@ from onnxruntime.quantization import (
 from derain.errors import InputError
 from derain.files import read_scan
 from derain.scan import Scan
-from derain.view import View, ViewedScan
+from derain.views.view import View, ViewedScan
 
 # Scans that the ranges of activations are taken from; they are held in memory one at a time.
 CALIBRATION_SCANS = 16

@@ -8,13 +8,13 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from derain.cores import usable_cores
 from derain.errors import InputError
 from derain.export.model_file import METADATA_KEY, ModelFile
-from derain.probability import probability_of_rain
 from derain.scan import Scan
-from derain.stopwatch import Stopwatch
-from derain.view import View, ViewedScan
+from derain.system.cores import usable_cores
+from derain.system.stopwatch import Stopwatch
+from derain.views.probability import probability_of_rain
+from derain.views.view import View, ViewedScan
 
 __all__ = ["METADATA_KEY", "Derainer", "open_session"]
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from derain.files import read_scan
 from derain.scan import Scan
-from derain.stopwatch import Stopwatch
+from derain.system.stopwatch import Stopwatch
 
 STAGES = ("read", "view", "network", "back")
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.cards import DataCard
-from derain.counts import Counts, intersection_over_union
+from derain.cards.card import DataCard
 from derain.errors import InputError
+from derain.evaluation.counts import Counts, intersection_over_union
 from derain.filters import PointFilter, filter_from
 from derain.filters.derainer import filter_view
-from derain.neighbours import Neighbourhoods
 from derain.scan import Scan
+from derain.views.neighbours import Neighbourhoods
 
 if TYPE_CHECKING:
     import optuna

@@ -9,14 +9,14 @@ import torch
 from lightning.pytorch.loggers import TensorBoardLogger
 from torch import Tensor, nn
 
-from derain.batch import Batch
-from derain.cards import DataCard
-from derain.documents import shown
+from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.metrics import RainMetrics
+from derain.evaluation.metrics import RainMetrics
+from derain.files.documents import shown
+from derain.learning.batch import Batch
+from derain.learning.seeds import Draw, generator, run_seed
 from derain.models.measured import MeasuredModule
 from derain.scan import Scan
-from derain.seeds import Draw, generator, run_seed
 from derain.spec import Spec
 
 # Scans that a view or a rule is fitted to; more change its grid by nothing.

@@ -8,14 +8,14 @@ from typing import Any
 
 import lightning
 
-from derain.documents import shown
 from derain.errors import InputError
+from derain.files.documents import shown
 from derain.models.base import DerainingModule
+from derain.models.callbacks.whole_checkpoints import save_whole
 from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
 from derain.models.published import MISFITS, read_checkpoint, with_tensors
 from derain.models.salsanext import SalsaNext
-from derain.models.whole_checkpoints import save_whole
 from derain.spec import Spec
 
 MODELS: dict[str, type[DerainingModule]] = {

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from derain.batch import Batch
-from derain.mean_losses import MeanLosses
-from derain.metrics import RainMetrics
-from derain.probability import probability_of_rain
+from derain.evaluation.metrics import RainMetrics
+from derain.learning.batch import Batch
+from derain.learning.mean_losses import MeanLosses
 from derain.spec import Spec
+from derain.views.probability import probability_of_rain
 
 # What the checkpoint of a run is chosen by, the more the better: the IoU of the validation scans
 # where a network learns from labels, and minus the loss where it does not.

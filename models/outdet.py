@@ -13,13 +13,13 @@ from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor, nn
 from torch.nn import functional
 
-from derain.cards import DataCard
+from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.models.batch_norm import PointBatchNorm
+from derain.models.layers.batch_norm import PointBatchNorm
 from derain.models.published import network_of, published_tensors
 from derain.models.supervised import SupervisedModule
-from derain.neighbours import NeighbourView
 from derain.scan import Scan
+from derain.views.neighbours import NeighbourView
 
 CHANNELS = ("x", "y", "z", "intensity")
 WIDTH = 32

@@ -6,10 +6,10 @@ from typing import Any
 from torch import Tensor
 
 from derain.errors import InputError
-from derain.grid_fit import fit_grid
-from derain.range_image import RangeView
 from derain.scan import Scan
-from derain.spherical_grid import SphericalGrid, grid_of
+from derain.views.grid_fit import fit_grid
+from derain.views.range_image import RangeView
+from derain.views.spherical_grid import SphericalGrid, grid_of
 
 # In place of a grid's name: the one that fits the training scans.
 FITTED = "fitted"
@@ -22,7 +22,7 @@ def range_view(
 
     Args:
         grid: ``fitted`` for one that fits the scans; or the name of a published grid, or its
-            bounds, as :func:`~derain.spherical_grid.grid_of` takes them.
+            bounds, as :func:`~derain.views.spherical_grid.grid_of` takes them.
         way_back: How points that lost their pixel get a score, as :class:`RangeView` takes it.
         scans: Training scans.
 

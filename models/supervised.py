@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from derain.batch import Batch
 from derain.errors import InputError
-from derain.losses import SegmentationLoss, class_weights, segmentation_loss
+from derain.learning.batch import Batch
+from derain.learning.losses import SegmentationLoss, class_weights, segmentation_loss
 from derain.models.base import DerainingModule
-from derain.view import IGNORED
+from derain.views.view import IGNORED
 
 
 class SupervisedModule(DerainingModule):

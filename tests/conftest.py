@@ -16,8 +16,8 @@ import pytest
 from filelock import FileLock
 
 from derain.cli.main import main
+from derain.evaluation.hard_cases import scene
 from derain.export.runtime import METADATA_KEY
-from derain.hard_cases import scene
 from derain.scan import Scan
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def random_outdet() -> "OutDet":
     """3D-OutDet with random weights and the statistics of WADS; it calls half of a scene rain."""
     import torch
 
-    from derain.cards import load_card
+    from derain.cards.card import load_card
     from derain.models.outdet import OutDet
 
     with torch.random.fork_rng(), torch.no_grad():
@@ -158,7 +158,7 @@ def random_salsanext(small_grid: dict[str, Any]) -> "SalsaNext":
     """A narrow SalsaNext of random weights; it calls half of a scene rain."""
     import torch
 
-    from derain.cards import load_card
+    from derain.cards.card import load_card
     from derain.models.salsanext import SalsaNext
 
     with torch.random.fork_rng(), torch.no_grad():
@@ -180,7 +180,7 @@ def random_lisnownet(small_grid: dict[str, Any]) -> "LiSnowNet":
     """A narrow LiSnowNet of random weights, whose rule knows no limits; it finds rain."""
     import torch
 
-    from derain.cards import load_card
+    from derain.cards.card import load_card
     from derain.models.lisnownet import LiSnowNet
 
     unlimited = {"residual": 0.008, "ground": -10.0, "intensity": 1.0}
@@ -225,7 +225,7 @@ def one_block(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def two_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Halves images once in LiSnowNet: a network of two stages, traced in a third of the time."""
-    monkeypatch.setattr("derain.models.lisnownet_network.HALVINGS", 1)
+    monkeypatch.setattr("derain.models.lisnownet.network.HALVINGS", 1)
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
-from derain.hard_cases import scene
 
 HEAVY = {
     "torch",
@@ -113,4 +113,4 @@ def test_a_picture_loads_no_more_than_the_drawing_and_the_method_need(
 
 
 def test_heavy_packages_are_seen_where_they_are_loaded() -> None:
-    assert "matplotlib" in loaded_by("import derain.pictures")
+    assert "matplotlib" in loaded_by("import derain.pictures.scan_pictures")

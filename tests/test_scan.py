@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.hard_cases import hard_cases, scene
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.scan import FEWEST_ALIKE, Scan
 
 HARD_CASES = dict(hard_cases())

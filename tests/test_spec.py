@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from derain.channels import MOST_CHANNELS
 from derain.errors import InputError
-from derain.neighbours import MOST_NEIGHBOURS, NeighbourView
-from derain.range_image import RangeView
 from derain.scan import Scan
 from derain.spec import SCHEMA, Spec
-from derain.spherical_grid import MOST_PIXELS, SphericalGrid
-from derain.way_back import WAYS_BACK
+from derain.views.back_projection import WAYS_BACK
+from derain.views.channels import MOST_CHANNELS
+from derain.views.neighbours import MOST_NEIGHBOURS, NeighbourView
+from derain.views.range_image import RangeView
+from derain.views.spherical_grid import MOST_PIXELS, SphericalGrid
 
 SPEC = Spec(
     network="outdet",

@@ -12,16 +12,16 @@ import yaml
 from benchmarks.fuzzing.mutations import as_json, changed
 from benchmarks.fuzzing.reader import Reader
 from derain.annotation.scene_file import read_scene, write_scene
-from derain.cards import load_card, packaged_cards
-from derain.data_statistics import find_sequences
-from derain.documents import Entry
-from derain.extrinsics import read_extrinsics
+from derain.cards.card import load_card, packaged_cards
+from derain.evaluation.hard_cases import scene
+from derain.files.documents import Entry
 from derain.files.frame_times import read_frame_times
 from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
-from derain.hard_cases import scene
+from derain.fusion.extrinsics import read_extrinsics
 from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MANIFEST, rates_of_sequences, read_manifest
 from derain.simulation.sensor import load_sensor, packaged_sensors
+from derain.sources.contents import find_sequences
 
 SCENE = """
 height: 0.1

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.fuzzing.mutations import as_json, changed
 from benchmarks.fuzzing.reader import Reader
-from derain.hard_cases import scene
+from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
 
 POINTS = 60
@@ -36,7 +36,7 @@ def write_models(folder: Path) -> None:
     """Writes untrained networks that are quick to export, as models and as checkpoints."""
     import torch
 
-    from derain.cards import load_card
+    from derain.cards.card import load_card
     from derain.export.onnx_file import export
     from derain.models import outdet
     from derain.models.checkpoint import save_model

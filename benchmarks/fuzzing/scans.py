@@ -18,9 +18,9 @@ from benchmarks.fuzzing.mutations import damaged
 from benchmarks.fuzzing.reader import Reader
 from derain import files
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.files.formats import FORMATS
 from derain.files.labels import read_labels, semantic
-from derain.hard_cases import scene
 from derain.scan import Scan
 
 POINTS = 40

@@ -8,11 +8,11 @@ from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
 from derain.annotation.scene import Scene
-from derain.directions import directions
-from derain.label_transfer import UNKNOWN
-from derain.pictures import BACKGROUND
+from derain.fusion.label_transfer import UNKNOWN
+from derain.pictures.scan_pictures import BACKGROUND
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
+from derain.views.directions import directions
 
 # Bright on dark; what there is much of is dull.
 COLOURS = {

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.open3d_import import import_open3d
+from derain.system.open3d_import import import_open3d
 
 # A road leans less; a wall leans more.
 STEEPEST = 30.0

@@ -23,8 +23,8 @@ import yaml
 from derain.annotation.boxes import Box, Correction, Triple
 from derain.annotation.plane import PlaneSearch
 from derain.annotation.scene import Polygon, Scene
-from derain.documents import Entry, shown
 from derain.files.atomic import replacing
+from derain.files.documents import Entry, shown
 from derain.simulation.classes import TrackClass
 
 # Points of a candidate for the plane: more make it no better, and RANSAC less likely to find it.

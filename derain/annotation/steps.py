@@ -11,7 +11,7 @@ Source: REHEARSE-3D, section III.B. Step by step:
 7. The rest over the polygon is road: `annotate`.
 8. The rest is background: `annotate`.
 9. Boxes are corrected by sequence: `Scene.in_sequence`.
-10. Points of the radar take the label of the nearest LiDAR point: `derain.label_transfer`.
+10. Points of the radar take the label of the nearest LiDAR point: `derain.fusion.label_transfer`.
 
 Rows are never dropped: what the paper omits, and rows that cannot be judged, are unknown here.
 """
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from derain.annotation.plane import Plane, find_plane
 from derain.annotation.scene import Scene, inside
-from derain.label_transfer import UNKNOWN
+from derain.fusion.label_transfer import UNKNOWN
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 

@@ -9,10 +9,10 @@ from derain.annotation.boxes import Box
 from derain.annotation.plane import Plane
 from derain.annotation.rectangle import Rectangle
 from derain.annotation.scene import Polygon, Scene
-from derain.open3d_import import import_open3d
 from derain.simulation.classes import TrackClass
 from derain.simulation.sensor import Sensor
 from derain.simulation.track import Track
+from derain.system.open3d_import import import_open3d
 
 # Corners as near to each other are one, and leaves as near are one bush's. Metres.
 SAME_CORNER = 1e-3

@@ -15,13 +15,13 @@ from tqdm import tqdm
 from derain.cli.arguments import factor
 from derain.cli.outputs import refuse_clashes, say
 from derain.cli.scan_options import add_columns
-from derain.data_statistics import LAYOUTS
 from derain.errors import InputError
 from derain.files import find_scans, read_scan
 from derain.files.labels import LABEL, write_labels
 from derain.files.names import scan_stem
-from derain.label_transfer import LABEL_WITHIN, UNKNOWN, transfer_labels
+from derain.fusion.label_transfer import LABEL_WITHIN, UNKNOWN, transfer_labels
 from derain.simulation.classes import TrackClass
+from derain.sources.contents import LAYOUTS
 
 if TYPE_CHECKING:
     from derain.annotation.plane import Plane
@@ -187,7 +187,7 @@ def _label_all(
 def _draw(scan: "Scan", scene: "Scene", plane: "Plane", sequence: str, picture: Path) -> None:
     from derain.annotation.picture import annotation_figure
     from derain.annotation.steps import annotate
-    from derain.pictures import save
+    from derain.pictures.scan_pictures import save
 
     title = f"sequence {sequence}, {Path(scan.name).name}: {len(scan):,} points"
     save(annotation_figure(scan, annotate(scan, scene, plane), scene, title), picture)

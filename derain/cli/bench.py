@@ -14,10 +14,10 @@ from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
 from derain.errors import InputError
 from derain.files.atomic import replacing
-from derain.notices import Notices
-from derain.odd_scans import oddities
+from derain.sources.training_record import overlap
 from derain.spec import Spec
-from derain.training_record import overlap
+from derain.system.notices import Notices
+from derain.views.oddities import oddities
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule
@@ -125,7 +125,7 @@ def _bench(
     out: Path,
 ) -> list["Row"]:
     """Benches the methods on some scans, and writes tables and picture."""
-    from derain.data_layout import sequence_of
+    from derain.cards.layout import sequence_of
     from derain.datamodules.statistics import evenly_spaced
     from derain.export.bench.bench import provenance, run_bench
     from derain.export.bench.cost import Timing
@@ -190,9 +190,9 @@ def _notes(methods: Sequence["Contestant"], scans: "Labelled") -> list[str]:
 
 def _learn_from(arguments: argparse.Namespace, data: "ScanDataModule") -> Any:
     """What gives the training scans; None where none are named."""
-    from derain.baselines import known_truth
     from derain.datamodules.sequences import SequenceDataModule
     from derain.datamodules.statistics import evenly_spaced
+    from derain.evaluation.baselines import known_truth
 
     if arguments.train is None and not isinstance(data, SequenceDataModule):
         return None

@@ -130,7 +130,7 @@ def _clean(narrator: Narrator, out: Path, title: str, scan: Path) -> None:
     """Cleans the scans beside one, and draws that one before and after."""
     from derain.export.runtime import Derainer
     from derain.files import read_scan
-    from derain.pictures import before_after_figure, save
+    from derain.pictures.scan_pictures import before_after_figure, save
 
     model, picture = out / f"{NETWORKS[title]}.onnx", out / "before_after.png"
     narrator.step(
@@ -144,7 +144,7 @@ def _clean(narrator: Narrator, out: Path, title: str, scan: Path) -> None:
 
 def _rainiest(data: Path) -> Path:
     """The last test scan of the sequence where it rains most."""
-    from derain.data_layout import sequence_of
+    from derain.cards.layout import sequence_of
     from derain.datamodules.labelled import rain_rates
     from derain.datamodules.simulated import Simulated
 

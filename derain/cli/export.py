@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from derain.cli.arguments import count, threads
 from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns, add_intensity_scale
-from derain.notices import Notices
-from derain.odd_scans import oddities
+from derain.system.notices import Notices
+from derain.views.oddities import oddities
 
 if TYPE_CHECKING:
     from derain.scan import Scan

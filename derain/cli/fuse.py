@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from derain.cards.layout import REHEARSE3D
 from derain.cli.arguments import factor
 from derain.cli.outputs import refuse_clashes, say
 from derain.cli.scan_options import add_columns
-from derain.data_layout import REHEARSE3D
 from derain.errors import InputError
-from derain.extrinsics import Extrinsics, read_extrinsics
 from derain.files import find_scans, read_scan, write_scan
 from derain.files.atomic import replacing
 from derain.files.frame_times import FRAME_COLUMNS, METADATA, read_frame_times
 from derain.files.labels import LABEL, instance, read_labels, semantic, write_labels
 from derain.files.names import scan_stem
-from derain.fusion import NO_DETECTIONS, fuse, nearest_in_time
-from derain.label_transfer import LABEL_WITHIN, UNKNOWN
+from derain.fusion.extrinsics import Extrinsics, read_extrinsics
+from derain.fusion.fuse import NO_DETECTIONS, fuse, nearest_in_time
+from derain.fusion.label_transfer import LABEL_WITHIN, UNKNOWN
 from derain.scan import Scan
 
 SUMMARY = "merge the frames of a LiDAR and of a 4D radar"

@@ -44,11 +44,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    from derain.cards import load_card
+    from derain.cards.card import load_card
     from derain.errors import InputError
     from derain.models.checkpoint import MODELS, save_model
     from derain.models.published import read_state_dict
-    from derain.training_record import by_name
+    from derain.sources.training_record import by_name
 
     if arguments.network not in MODELS:
         raise InputError(arguments.network, "no such network", f"Known are {', '.join(MODELS)}.")

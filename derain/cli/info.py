@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from derain.cli.info_folder import draw, facts_of_folder
 from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns
-from derain.directions import directions
 from derain.errors import InputError, printable
 from derain.files import find_scans, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.files.reading import reading
-from derain.grid_fit import fit_grid
-from derain.morton import distinct_rows
 from derain.scan import Scan
+from derain.views.directions import directions
+from derain.views.grid_fit import fit_grid
+from derain.views.morton import distinct_rows
 
 SUMMARY = "say what is in a scan, a label file, a model or a data set"
 

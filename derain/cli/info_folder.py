@@ -8,9 +8,10 @@ from typing import Any
 
 from tqdm import tqdm
 
-from derain.cards import DataCard, load_card
-from derain.data_layout import REHEARSE3D, SEMANTIC_KITTI
-from derain.data_statistics import (
+from derain.cards.card import DataCard, load_card
+from derain.cards.layout import REHEARSE3D, SEMANTIC_KITTI
+from derain.errors import InputError
+from derain.sources.contents import (
     Tally,
     class_name,
     count_scan,
@@ -19,7 +20,6 @@ from derain.data_statistics import (
     manifest_of,
     rate_name,
 )
-from derain.errors import InputError
 
 # The data card that explains labels, by the folder of their scans. Both WADS and SemanticKITTI have
 # velodyne; WADS's card has the classes of both.
@@ -122,8 +122,8 @@ def draw(facts: FolderFacts, picture: Path) -> None:
     Raises:
         InputError: The picture cannot be written.
     """
-    from derain.data_pictures import statistics_figure
-    from derain.pictures import save
+    from derain.pictures.data_statistics import statistics_figure
+    from derain.pictures.scan_pictures import save
 
     total = facts.total
     title = f"{facts.folder.absolute().name}: {total.scans:,} scans, {total.points:,} points"

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from derain.cards import packaged_cards
+from derain.cards.card import packaged_cards
 from derain.cli.scan_options import add_columns, add_intensity_scale
 
 if TYPE_CHECKING:

@@ -21,9 +21,9 @@ from derain.cli import (
     tune,
     view,
 )
-from derain.cli.configurations import require_configuration
 from derain.cli.signals import interrupting
-from derain.cli.training_help import short_help
+from derain.cli.training.configurations import require_configuration
+from derain.cli.training.help import short_help
 from derain.errors import InputError
 
 DESCRIPTION = """\
@@ -121,7 +121,7 @@ def _run(arguments: list[str]) -> int:
             print(short_help(arguments[0]))
             return 0
         require_configuration(arguments)
-        from derain.cli.train import train
+        from derain.cli.training.train import train
 
         train(arguments)
         return 0

@@ -107,7 +107,7 @@ def _write(path: Path, rainy: Scan, drops: NDArray[np.bool_]) -> None:
 
 
 def _draw(path: Path, rainy: Scan, drops: NDArray[np.bool_], rain: UniformRain) -> None:
-    from derain.pictures import before_after_figure, save
+    from derain.pictures.scan_pictures import before_after_figure, save
 
     title = f"{scan_stem(path)} in {rain.heaviest:g} mm/h of simulated rain, and without its drops"
     save(before_after_figure(rainy, drops, title), path)

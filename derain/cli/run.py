@@ -23,10 +23,10 @@ from derain.files.labels import LABEL, write_labels
 from derain.files.names import beside
 from derain.files.reading import reading
 from derain.filters import FILTERS, FilterDerainer, read_parameters
-from derain.notices import Notices
-from derain.odd_scans import Oddity, left_out, much_removed, oddities, outside_view
 from derain.scan import Scan
-from derain.stopwatch import Stopwatch
+from derain.system.notices import Notices
+from derain.system.stopwatch import Stopwatch
+from derain.views.oddities import Oddity, left_out, much_removed, oddities, outside_view
 
 SUMMARY = "clean scans on a CPU, without torch"
 

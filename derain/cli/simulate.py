@@ -8,9 +8,9 @@ from typing import Any
 from derain.cli.arguments import count
 from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns
-from derain.cores import usable_cores
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
+from derain.system.cores import usable_cores
 
 SUMMARY = "make a data set of simulated rain, or let it rain on clean scans"
 

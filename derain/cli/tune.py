@@ -19,9 +19,9 @@ from derain.cli.outputs import refuse_unwritable, say
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.filters import FILTERS, filter_from
-from derain.notices import Notices
-from derain.odd_scans import Judge, oddities, outside_view
-from derain.training_record import overlap
+from derain.sources.training_record import overlap
+from derain.system.notices import Notices
+from derain.views.oddities import Judge, oddities, outside_view
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule

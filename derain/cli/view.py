@@ -9,8 +9,8 @@ from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError
 from derain.files import read_scan
-from derain.notices import Notices
-from derain.odd_scans import oddities, outside_view
+from derain.system.notices import Notices
+from derain.views.oddities import oddities, outside_view
 
 if TYPE_CHECKING:
     import numpy as np
@@ -71,13 +71,13 @@ def main(arguments: argparse.Namespace) -> int:
         scan, rain = scan.take(known), rain[known]
         predicted = {name: called_rain[known] for name, called_rain in predicted.items()}
     if arguments.out:
-        from derain.comparison_pictures import comparison_figure
-        from derain.pictures import save
+        from derain.pictures.comparison import comparison_figure
+        from derain.pictures.scan_pictures import save
 
         save(comparison_figure(scan, predicted, rain, title), arguments.out)
         say(str(arguments.out))
     if arguments.window:
-        from derain.comparison_window import show_comparison
+        from derain.pictures.comparison_window import show_comparison
 
         show_comparison(scan, predicted, rain)
     return 0
@@ -88,7 +88,7 @@ def _rain(
 ) -> "NDArray[np.bool_]":
     """Which points a method calls rain, bool (N,); warns where a model cannot see much of them."""
     from derain.export.runtime import Derainer
-    from derain.stopwatch import Stopwatch
+    from derain.system.stopwatch import Stopwatch
 
     judge = method.ready(threads)
     if not isinstance(judge, Derainer):
@@ -103,7 +103,7 @@ def _truth(
     scan: "Scan", arguments: argparse.Namespace
 ) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]] | None":
     """Which points are rain, and of which it is known; None where no card says what labels mean."""
-    from derain.cards import load_card
+    from derain.cards.card import load_card
     from derain.files.labels import label_of, read_labels, semantic
 
     if arguments.card is None:

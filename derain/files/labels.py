@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.data_layout import REHEARSE3D
+from derain.cards.layout import REHEARSE3D
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.files.names import beside, scan_stem

@@ -3,18 +3,18 @@
 One view of the neighbours serves them all (``filter_view``, ``PointFilter.judge``); one filter by
 itself takes the shortest way to the same verdict (``FilterDerainer``).
 
-They see the distinct valid positions of a scan (:class:`derain.neighbours.Neighbourhoods`). Copies
-of a point count once: in a raw WADS scan 40 % of the rows are exact copies of others, and every
-one of them would have a neighbour at distance 0, which no drop has. Rows that cannot be judged are
-not rain.
+They see the distinct valid positions of a scan (:class:`derain.views.neighbours.Neighbourhoods`).
+Copies of a point count once: in a raw WADS scan 40 % of the rows are exact copies of others, and
+every one of them would have a neighbour at distance 0, which no drop has. Rows that cannot be
+judged are not rain.
 """
 
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from derain.documents import short
 from derain.errors import InputError
+from derain.files.documents import short
 from derain.filters.derainer import FilterDerainer, filter_view
 from derain.filters.dror import DROR
 from derain.filters.dsor import DSOR

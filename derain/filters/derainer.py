@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.cores import usable_cores
 from derain.errors import InputError
 from derain.filters.point_filter import PointFilter
 from derain.filters.radius_filter import RadiusFilter
-from derain.morton import distinct_rows
-from derain.neighbours import NeighbourView
 from derain.scan import Scan
-from derain.stopwatch import Stopwatch
+from derain.system.cores import usable_cores
+from derain.system.stopwatch import Stopwatch
+from derain.views.morton import distinct_rows
+from derain.views.neighbours import NeighbourView
 
 
 class FilterDerainer:

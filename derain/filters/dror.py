@@ -7,8 +7,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.documents import shown
 from derain.errors import InputError
+from derain.files.documents import shown
 from derain.filters.radius_filter import RadiusFilter
 
 Variant = Literal["code", "paper"]

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from derain.documents import Entry
+from derain.files.documents import Entry
 from derain.files.reading import is_file
 
 

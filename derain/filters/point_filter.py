@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.documents import shown
 from derain.errors import InputError
-from derain.neighbours import Neighbourhoods
+from derain.files.documents import shown
+from derain.views.neighbours import Neighbourhoods
 
 # No published filter looks at more than 51, and a search for thousands would fill the memory.
 MOST_NEIGHBOURS = 200

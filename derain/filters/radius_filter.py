@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from derain.filters.crowding import few_around
 from derain.filters.point_filter import PointFilter
-from derain.neighbours import Neighbourhoods
+from derain.views.neighbours import Neighbourhoods
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from derain.filters.point_filter import PointFilter
 from derain.filters.usual_distance import mean_distance, usual_limit
-from derain.neighbours import Neighbourhoods
+from derain.views.neighbours import Neighbourhoods
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.filters.point_filter import PointFilter
-from derain.neighbours import Neighbourhoods
+from derain.views.neighbours import Neighbourhoods
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.neighbours import Neighbourhoods
+from derain.views.neighbours import Neighbourhoods
 
 
 def mean_distance(view: Neighbourhoods, neighbours: int) -> NDArray[np.float64]:

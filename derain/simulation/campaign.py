@@ -6,8 +6,8 @@ from itertools import cycle
 from typing import Any, Literal
 
 from derain import __version__
-from derain.documents import shown
 from derain.errors import InputError
+from derain.files.documents import shown
 from derain.simulation.manifest import MAKER, RAIN_RATE
 from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain

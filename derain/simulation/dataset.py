@@ -24,11 +24,11 @@ from tqdm import tqdm
 from derain.errors import InputError
 from derain.files.lock import lock
 from derain.files.temporary import remove_abandoned
-from derain.open3d_import import import_open3d
 from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MANIFEST, checksums, read_manifest, write_manifest
 from derain.simulation.sequence import write_sequence
-from derain.workers import worker_pool
+from derain.system.open3d_import import import_open3d
+from derain.system.workers import worker_pool
 
 SEQUENCES = "sequences"
 

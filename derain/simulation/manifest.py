@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from derain.documents import Entry
 from derain.errors import InputError
 from derain.files.atomic import replacing
+from derain.files.documents import Entry
 from derain.simulation.rain_field import HARDEST_RAIN
 
 MANIFEST = "manifest.json"

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import Scan
-from derain.selection_rule import full_scale
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import RainField
 from derain.simulation.recorded_beams import RecordedBeams, find_beams
 from derain.simulation.rewriting import with_intensity, with_points
 from derain.simulation.sensor import FULL_SCALE_INTENSITY, Returns, Sensor
+from derain.views.full_scale import full_scale
 
 # What everything is taken to reflect in a scan without intensities: a tenth, which the ranges of
 # LiDARs are stated for.

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.directions import directions
-from derain.grid_fit import GridFit, fit_grid
 from derain.scan import Scan
 from derain.simulation.footprint import in_hull
-from derain.spherical_grid import ALL_AROUND, FULL_CIRCLE
+from derain.views.directions import directions
+from derain.views.grid_fit import GridFit, fit_grid
+from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
 # Rounds of the median polish: as many as sensors take whose lasers point to a few distinct sides.
 ROUNDS = 3
@@ -45,11 +45,12 @@ def find_beams(scan: Scan, generator: np.random.Generator) -> RecordedBeams:
     - An organised scan has a cell for each beam. The direction of an empty one is the sum of what
       is usual of its row and of its column; cells in rows or columns without any return have none,
       nor has any where this says little of the returns, as of a rosette's.
-    - For any other scan a grid is fitted, see :func:`derain.grid_fit.fit_grid`. Its empty pixels
-      are beams, except for as many as there are returns that share a pixel with another: those left
-      their own pixels empty, chance says which. The grid is in ascending order by construction, and
-      its azimuths wrap around. A sensor that looks one way, and whose returns are in no rows, may
-      look through a circle: only pixels in the convex hull of its returns are beams.
+    - For any other scan a grid is fitted, see :func:`derain.views.grid_fit.fit_grid`. Its empty
+      pixels are beams, except for as many as there are returns that share a pixel with another:
+      those left their own pixels empty, chance says which. The grid is in ascending order by
+      construction, and its azimuths wrap around. A sensor that looks one way, and whose returns are
+      in no rows, may look through a circle: only pixels in the convex hull of its returns are
+      beams.
 
     Args:
         scan: The scan. Rows that are not valid, or of a radar, are empty cells or no beams.

@@ -10,11 +10,11 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.documents import Entry, shown
 from derain.errors import InputError
+from derain.files.documents import Entry, shown
 from derain.files.reading import is_file
 from derain.scan import Scan
-from derain.spherical_grid import FULL_CIRCLE
+from derain.views.spherical_grid import FULL_CIRCLE
 
 FULL_SCALE_INTENSITY = 255.0
 

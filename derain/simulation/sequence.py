@@ -21,13 +21,13 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
 
-from derain.data_layout import REHEARSE3D
-from derain.extrinsics import POSE, Extrinsics
+from derain.cards.layout import REHEARSE3D
 from derain.files import write_scan
 from derain.files.atomic import replacing
 from derain.files.frame_times import FRAME_COLUMNS, METADATA
 from derain.files.labels import write_labels
-from derain.fusion import NO_DETECTIONS, fuse, nearest_in_time
+from derain.fusion.extrinsics import POSE, Extrinsics
+from derain.fusion.fuse import NO_DETECTIONS, fuse, nearest_in_time
 from derain.scan import Scan, to_float32
 from derain.simulation.campaign import Campaign
 from derain.simulation.facility import lay_out_facility

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.open3d_import import import_open3d
 from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
 from derain.simulation.sensor import Returns, Sensor
+from derain.system.open3d_import import import_open3d
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.counts import intersection_over_union
+from derain.evaluation.counts import intersection_over_union
 
 DRAWS = 2000
 CONFIDENCE = 0.95

@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.baselines import PositionPrior, all_points, no_points
 from derain.errors import InputError, printable
+from derain.evaluation.baselines import PositionPrior, all_points, no_points
+from derain.evaluation.intensity_rule import OneLineRule
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
 from derain.filters import FilterDerainer, PointFilter
-from derain.odd_scans import Judge
-from derain.one_line_rule import OneLineRule
 from derain.scan import Scan
-from derain.stopwatch import Stopwatch
+from derain.system.stopwatch import Stopwatch
+from derain.views.oddities import Judge
 
 # Judges a scan, bool (N,), and gives the stopwatch its stages.
 Method = Callable[[Scan, Stopwatch], NDArray[np.bool_]]

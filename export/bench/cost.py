@@ -15,8 +15,8 @@ from derain.export.bench.contestants import Contestant
 from derain.export.timing import STAGES, timed_runs
 from derain.files import DEFAULT_COLUMNS
 from derain.scan import Scan
-from derain.stopwatch import Stopwatch
-from derain.workers import worker_pool
+from derain.system.stopwatch import Stopwatch
+from derain.system.workers import worker_pool
 
 WARM_UP = 2
 

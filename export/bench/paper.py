@@ -7,13 +7,13 @@ from typing import Literal
 
 import yaml
 
-from derain.cards import DataCard
-from derain.counts import SCORES
-from derain.data_layout import sequence_of
+from derain.cards.card import DataCard
+from derain.cards.layout import sequence_of
 from derain.datamodules.base import ScanDataModule
 from derain.datamodules.labelled import full_name
 from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
+from derain.evaluation.counts import SCORES
 from derain.export.bench.rows import Row
 from derain.export.markdown import markdown_table
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from derain.counts import SCORES, Counts
+from derain.evaluation.counts import SCORES, Counts
 from derain.export.bench.rows import Row
 from derain.export.markdown import markdown_table
 from derain.export.timing import STAGES

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from derain.counts import SCORES, Counts
+from derain.evaluation.counts import SCORES, Counts
 from derain.export.bench.bootstrap import Bootstrap, Interval, bootstrap
 from derain.export.bench.contestants import Contestant
 from derain.export.bench.cost import Cost

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from derain.cards import DataCard
-from derain.counts import Counts
+from derain.cards.card import DataCard
+from derain.evaluation.counts import Counts
+from derain.evaluation.metrics import ClassCounts, RainMetrics
 from derain.export.bench.contestants import Contestant, Method
 from derain.filters import PointFilter
 from derain.filters.derainer import filter_view
-from derain.metrics import ClassCounts, RainMetrics
-from derain.morton import first_rows
 from derain.scan import Scan
-from derain.stopwatch import Stopwatch
+from derain.system.stopwatch import Stopwatch
+from derain.views.morton import first_rows
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from typing import Any
 from derain.export.bench.contestants import LEARNT, TRIVIAL
 from derain.export.bench.rows import Row
 from derain.filters import FILTERS
-from derain.pictures import save
-from derain.speed_error_picture import Standing, speed_error_figure
+from derain.pictures.scan_pictures import save
+from derain.pictures.speed_error import Standing, speed_error_figure
 
 
 def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) -> None:

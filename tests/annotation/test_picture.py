@@ -11,9 +11,9 @@ from matplotlib.colors import to_rgba
 from derain.annotation.boxes import Box
 from derain.annotation.picture import COLOURS, SURROUNDINGS, UNKNOWN_COLOUR, annotation_figure
 from derain.annotation.scene import Scene
-from derain.hard_cases import hard_cases, scene
-from derain.label_transfer import UNKNOWN
-from derain.pictures import save
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.fusion.label_transfer import UNKNOWN
+from derain.pictures.scan_pictures import save
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from derain.annotation.plane import MOST_POINTS, Plane, PlaneSearch, find_plane
 from derain.errors import InputError
-from derain.open3d_import import import_open3d
+from derain.system.open3d_import import import_open3d
 
 
 def road(points: int, slope: tuple[float, float] = (0.03, -0.02)) -> NDArray[np.float64]:

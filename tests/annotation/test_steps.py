@@ -9,8 +9,8 @@ from derain.annotation.plane import Plane
 from derain.annotation.scene import Scene
 from derain.annotation.steps import annotate, road_plane
 from derain.errors import InputError
-from derain.hard_cases import hard_cases
-from derain.label_transfer import UNKNOWN
+from derain.evaluation.hard_cases import hard_cases
+from derain.fusion.label_transfer import UNKNOWN
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 

@@ -6,7 +6,7 @@ import pytest
 from derain.annotation.scene import Scene
 from derain.annotation.steps import annotate, road_plane
 from derain.annotation.track_scene import scene_of_track
-from derain.label_transfer import UNKNOWN
+from derain.fusion.label_transfer import UNKNOWN
 from derain.simulation import objects
 from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_facility

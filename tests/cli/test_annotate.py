@@ -9,10 +9,10 @@ import pytest
 
 from derain.annotation.scene_file import read_scene
 from derain.cli.annotate import DESCRIPTION
+from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
 from derain.files.labels import read_labels, semantic
-from derain.hard_cases import scene
-from derain.label_transfer import UNKNOWN
+from derain.fusion.label_transfer import UNKNOWN
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 

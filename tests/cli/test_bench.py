@@ -14,7 +14,7 @@ from derain.export.bench.cost import Timing, run_alone
 from derain.export.runtime import Derainer
 from derain.scan import Scan
 from derain.simulation.campaign import MAKER
-from derain.stopwatch import Stopwatch
+from derain.system.stopwatch import Stopwatch
 
 FILES = ["bench.csv", "bench.json", "bench.md", "speed_error.png"]
 

@@ -19,12 +19,12 @@ from derain.cli.demo import STREETS, Story, tell
 from derain.cli.main import main
 from derain.cli.narration import Narrator, Transcript
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.files import read_scan
-from derain.hard_cases import scene
-from derain.open3d_import import import_open3d
 from derain.scan import Scan
 from derain.simulation.campaign import Campaign, partition
+from derain.system.open3d_import import import_open3d
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ import onnx
 import pytest
 import torch
 
+from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.runtime import Derainer
-from derain.hard_cases import scene
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import save_model
 from derain.scan import Scan

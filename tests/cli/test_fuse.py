@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from derain.errors import InputError
-from derain.extrinsics import Extrinsics
+from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
 from derain.files.labels import instance, read_labels, semantic, write_labels
-from derain.hard_cases import scene
-from derain.label_transfer import UNKNOWN
-from derain.open3d_import import import_open3d
+from derain.fusion.extrinsics import Extrinsics
+from derain.fusion.label_transfer import UNKNOWN
 from derain.simulation.campaign import Campaign
 from derain.simulation.radar import Radar
 from derain.simulation.sequence import write_sequence
+from derain.system.open3d_import import import_open3d
 
 PLACE = Extrinsics.of_pose(0.5, 0, -0.7, 0, 0, 90)
 COLUMNS = "x,y,z,doppler,rcs,range,azimuth,elevation,probability,class"

@@ -8,14 +8,14 @@ import pytest
 import torch
 from torch import Tensor
 
-from derain.cards import load_card
+from derain.cards.card import load_card
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
-from derain.models.lisnownet_network import published_key
+from derain.models.lisnownet.network import published_key
 from derain.models.outdet import PUBLISHED_KEYS, OutDet
 from derain.models.salsanext import SalsaNext
-from derain.models.salsanext_network import PUBLISHED_KEYS as SALSANEXT_KEYS
-from derain.spherical_grid import grid_of
+from derain.models.salsanext.network import PUBLISHED_KEYS as SALSANEXT_KEYS
+from derain.views.spherical_grid import grid_of
 
 
 @pytest.fixture(scope="module")

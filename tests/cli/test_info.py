@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 import yaml
 
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
 from derain.files.labels import write_labels
-from derain.grid_fit import fit_grid
-from derain.hard_cases import hard_cases, scene
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import save_model
 from derain.models.outdet import OutDet
 from derain.scan import Scan
-from derain.spherical_grid import grid_of
+from derain.views.grid_fit import fit_grid
+from derain.views.spherical_grid import grid_of
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from derain.cards import load_card
+from derain.cards.card import load_card
+from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
-from derain.hard_cases import scene
 from derain.simulation.manifest import MAKER
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import derain
 from derain.cli.main import COMMANDS, TRAINING
-from derain.hard_cases import scene
+from derain.evaluation.hard_cases import scene
 
 MAIN = "import sys; from derain.cli.main import main; sys.exit(main())"
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from derain.cli.arguments import command_line
+from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
-from derain.hard_cases import scene
 
 # An escape sequence, bytes that are no UTF-8, a line break, a mark that turns the direction of
 # writing, what matplotlib takes for mathematics, another script.

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import write_scan
-from derain.hard_cases import scene
 from derain.scan import Scan
 
 

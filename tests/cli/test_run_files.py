@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
 from derain.files.pcd_header import ENCODINGS
-from derain.hard_cases import scene
 from derain.scan import Scan
 
 

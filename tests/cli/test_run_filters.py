@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.files import read_scan, write_scan
 from derain.filters import DROR, DSOR, FILTERS, SSR, FilterDerainer, filter_from
-from derain.hard_cases import hard_cases, scene
 from derain.scan import Scan
 
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import write_scan
 from derain.filters import FilterDerainer
-from derain.hard_cases import scene
 from derain.scan import Scan
-from derain.spherical_grid import SphericalGrid
+from derain.views.spherical_grid import SphericalGrid
 
 
 @pytest.fixture

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import yaml
 
+from derain.evaluation.hard_cases import scene
 from derain.export.bench import bench
 from derain.export.bench.cost import run_alone
 from derain.files.labels import write_labels
-from derain.hard_cases import scene
 
 
 @pytest.fixture(autouse=True)

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from derain.datamodules.simulated import Simulated
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.files import find_scans, read_scan
 from derain.files.labels import read_labels
-from derain.hard_cases import scene
-from derain.open3d_import import import_open3d
+from derain.system.open3d_import import import_open3d
 
 QUICK = ["--sensor", "mems_64", "--workers", "1", "--sequences", "3", "--scans", "1"]
 

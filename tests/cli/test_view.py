@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from derain import comparison_pictures, pictures
+from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import write_labels
 from derain.filters import DROR, FilterDerainer
-from derain.hard_cases import scene
+from derain.pictures import comparison, scan_pictures
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def scan(tmp_path: Path, write_labelled) -> Path:
 def saved(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """The figures that are drawn from here on, and not written."""
     figures: list[Figure] = []
-    monkeypatch.setattr(pictures, "save", lambda figure, path: figures.append(figure))
+    monkeypatch.setattr(scan_pictures, "save", lambda figure, path: figures.append(figure))
     return figures
 
 
@@ -119,8 +119,8 @@ def test_points_that_nobody_knows_are_not_judged(
     run_derain, scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_labels(tmp_path / "labels/7.label", np.repeat([255, 0, 3], [100, 170, 30]))
-    drawn = Mock(wraps=comparison_pictures.comparison_figure)
-    monkeypatch.setattr(comparison_pictures, "comparison_figure", drawn)
+    drawn = Mock(wraps=comparison.comparison_figure)
+    monkeypatch.setattr(comparison, "comparison_figure", drawn)
     options = ["--methods", "all", "--card", "rehearse3d", "--out", tmp_path / "out.png"]
     assert run_derain("view", scan, *options).code == 0
     shown, predicted, rain, title = drawn.call_args.args

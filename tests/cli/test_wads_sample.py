@@ -8,10 +8,10 @@ import pytest
 import torch
 
 from derain.cli.main import main
+from derain.evaluation.metrics import RainMetrics
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import read_labels, semantic
-from derain.metrics import RainMetrics
 from derain.models.checkpoint import load_model
 
 FALLING_SNOW = 110

@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from derain.datamodules.base import ScanDataModule
+from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
 from derain.files.labels import write_labels
-from derain.hard_cases import scene
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 

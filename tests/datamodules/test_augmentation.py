@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.datamodules.augmentation import Augmentation
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.files import read_scan
-from derain.grid_fit import fit_grid
-from derain.hard_cases import hard_cases, scene
-from derain.range_image import RangeView
 from derain.scan import Scan
+from derain.views.grid_fit import fit_grid
+from derain.views.range_image import RangeView
 
 HARD_CASES = dict(hard_cases(largest=5000))
 TURN = Augmentation(rotation_probability=1, jitter_probability=0)

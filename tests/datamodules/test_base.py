@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 import torch
 
-from derain.batch import Batch
-from derain.cards import load_card
+from derain.cards.card import load_card
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.folder import Folder
 from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
-from derain.hard_cases import scene
+from derain.learning.batch import Batch
 from derain.models.lisnownet import LiSnowNet
-from derain.neighbours import NeighbourView
 from derain.scan import Scan
+from derain.views.neighbours import NeighbourView
 
 Write = Callable[..., None]
 Connect = Callable[..., ScanDataModule]

@@ -12,9 +12,9 @@ from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
 from derain.files.labels import write_labels
-from derain.hard_cases import scene
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from derain.cards import load_card
-from derain.data_layout import sequence_of
+from derain.cards.card import load_card
+from derain.cards.layout import sequence_of
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
 from derain.errors import InputError

@@ -13,12 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch.utils.data import BatchSampler
 
-from derain.batch import Batch
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.folder import Folder
 from derain.datamodules.order import MeasuringOrder, Pick, TrainingOrder
-from derain.hard_cases import scene
+from derain.evaluation.hard_cases import scene
+from derain.learning.batch import Batch
 
 SIZES = st.integers(1, 30)
 PROCESSES = st.integers(1, 5)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from derain.data_layout import Layout
+from derain.cards.layout import Layout
 from derain.datamodules.base import Loading
 from derain.datamodules.rehearse3d import Rehearse3D
 from derain.datamodules.sequences import SequenceDataModule

@@ -7,11 +7,11 @@ import pytest
 
 from derain.datamodules.simulated import Simulated
 from derain.errors import InputError
-from derain.open3d_import import import_open3d
 from derain.simulation.campaign import Campaign
 from derain.simulation.dataset import simulate_track
 from derain.simulation.manifest import MAKER, write_manifest
 from derain.simulation.sensor import Sensor
+from derain.system.open3d_import import import_open3d
 
 TINY = Campaign(
     train=2,

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from derain.cards import DataCard
+from derain.cards.card import DataCard
 from derain.datamodules.statistics import evenly_spaced, measured
 from derain.errors import InputError
-from derain.hard_cases import hard_cases
+from derain.evaluation.hard_cases import hard_cases
 from derain.scan import Scan
 
 CARD = DataCard("ours", {0: "ground", 3: "rain", 4: "spray"}, rain=(3, 4))

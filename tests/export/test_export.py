@@ -11,13 +11,13 @@ import torch
 from torch import Tensor, nn
 
 import derain
-from derain.cards import load_card
+from derain.cards.card import load_card
 from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file
 from derain.export.onnx_file import export
 from derain.export.proof import FINITE, FLOAT32, INT8, THREADS, Case, Proof, prove
 from derain.export.runtime import Derainer
-from derain.hard_cases import hard_cases, scene
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 

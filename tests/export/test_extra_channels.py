@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
 from derain.files.labels import read_labels, write_labels
-from derain.hard_cases import scene
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
 from derain.models.outdet import OutDet

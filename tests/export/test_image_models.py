@@ -14,13 +14,13 @@ import torch
 from numpy.typing import NDArray
 
 from derain import models
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.proof import THREADS
 from derain.export.runtime import METADATA_KEY, Derainer
-from derain.hard_cases import hard_cases, scene
 from derain.models.base import DerainingModule
-from derain.probability import probability_of_rain
-from derain.range_image import RangeView
 from derain.scan import Scan
+from derain.views.probability import probability_of_rain
+from derain.views.range_image import RangeView
 
 HARD_CASES = dict(hard_cases(largest=5000))
 PIXELS = 18 * 60
@@ -116,7 +116,7 @@ import sys
 for name in ("torch", "lightning", "open3d", "onnx", "matplotlib", "scipy", "sklearn"):
     sys.modules[name] = None  # importing it is an error
 from derain.export.runtime import Derainer
-from derain.hard_cases import scene
+from derain.evaluation.hard_cases import scene
 print(Derainer(sys.argv[1], threads=1)(scene()).nonzero()[0].tolist())
 """
     printed = subprocess.run(

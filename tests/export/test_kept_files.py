@@ -13,11 +13,11 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
+from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
-from derain.hard_cases import scene
 from derain.models.checkpoint import load_model
-from derain.probability import probability_of_rain
 from derain.scan import Scan
+from derain.views.probability import probability_of_rain
 
 KEPT = Path(__file__).parent / "kept"
 

@@ -9,9 +9,9 @@ import pytest
 
 import derain
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.export import latency
 from derain.export.latency import Latency, measure_latency, versions
-from derain.hard_cases import scene
 
 STAGES = ["read", "view", "network", "back", "total"]
 

@@ -11,6 +11,7 @@ import pytest
 from onnx import TensorProto, helper
 
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.export import model_file
 from derain.export.model_file import (
     CHECKSUM_KEY,
@@ -20,7 +21,6 @@ from derain.export.model_file import (
     sealed,
 )
 from derain.export.runtime import Derainer
-from derain.hard_cases import scene
 
 KEPT = Path(__file__).parent / "kept/outdet.onnx"
 SPEC = ModelFile.read(KEPT).metadata["spec"]

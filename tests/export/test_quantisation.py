@@ -12,18 +12,18 @@ import onnx
 import pytest
 
 from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file, quantisation
 from derain.export.onnx_file import export
 from derain.export.proof import FINITE, INT8, THREADS, Proof
 from derain.export.quantisation import CalibrationScans, ScanReader
 from derain.export.runtime import Derainer
 from derain.files import read_scan
-from derain.hard_cases import hard_cases, scene
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
-from derain.probability import probability_of_rain
 from derain.scan import Scan
-from derain.view import View
+from derain.views.probability import probability_of_rain
+from derain.views.view import View
 
 HARD_CASES = dict(hard_cases(largest=5000))
 CALIBRATION = [Scan.of(scene(3000, seed), f"scene {seed}") for seed in range(3)]

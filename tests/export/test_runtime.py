@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.runtime import Derainer
-from derain.hard_cases import hard_cases, scene
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 
@@ -157,7 +157,7 @@ import sys
 for name in ("torch", "lightning", "open3d", "onnx", "matplotlib", "scipy", "sklearn"):
     sys.modules[name] = None  # importing it is an error
 from derain.export.runtime import Derainer
-from derain.hard_cases import scene
+from derain.evaluation.hard_cases import scene
 print(Derainer(sys.argv[1], threads=1)(scene()).nonzero()[0].tolist())
 """
     printed = subprocess.run(

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.export.timing import STAGES, timed_runs
 from derain.files import DEFAULT_COLUMNS
-from derain.hard_cases import scene
 from derain.scan import Scan
-from derain.stopwatch import Stopwatch
+from derain.system.stopwatch import Stopwatch
 
 
 class Recorder:

@@ -13,8 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from derain.cards import DataCard
+from derain.cards.card import DataCard
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.export import tuning
 from derain.export.tuning import (
     SPACES,
@@ -25,7 +26,6 @@ from derain.export.tuning import (
     tune_threshold,
 )
 from derain.filters import FILTERS, FilterDerainer, filter_from
-from derain.hard_cases import scene
 from derain.scan import Scan
 
 CARD = DataCard("made up", {0: "solid", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from derain import Scan
 from derain.files import read_scan, write_scan
-from derain.open3d_import import import_open3d
+from derain.system.open3d_import import import_open3d
 
 Columns = dict[str, NDArray[Any]]
 

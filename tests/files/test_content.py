@@ -17,11 +17,11 @@ import pytest
 from pyarrow import feather
 
 from derain import InputError, Scan
+from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
 from derain.files.content import ALWAYS_ROOM, LARGEST_EXPANSION, LARGEST_SCAN, Room, read_content
 from derain.files.formats import FORMATS, Format
 from derain.files.labels import read_labels
-from derain.hard_cases import scene
 
 # A float32 x, y, z and intensity for each of seven million points.
 BOMB = 7 * 2**24

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from derain import InputError, Scan
-from derain.data_statistics import count_scan
+from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
 from derain.files.frame_times import read_frame_times
 from derain.files.labels import label_beside
 from derain.files.names import beside, scan_stem, scan_suffix
-from derain.hard_cases import scene
+from derain.sources.contents import count_scan
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.filters import ROR, SOR, FilterDerainer
-from derain.hard_cases import scene
-from derain.open3d_import import import_open3d
+from derain.system.open3d_import import import_open3d
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.filters import (
     DROR,
     DSOR,
@@ -20,9 +21,8 @@ from derain.filters import (
     filter_from,
     read_parameters,
 )
-from derain.hard_cases import hard_cases, scene
 from derain.scan import Scan
-from derain.stopwatch import Stopwatch
+from derain.system.stopwatch import Stopwatch
 
 HARD_CASES = dict(hard_cases(largest=5000))
 every_filter = pytest.mark.parametrize("name", FILTERS)

@@ -9,13 +9,13 @@ import pytest
 import torch
 from torch import nn
 
-from derain.batch import Sample
-from derain.cards import load_card
+from derain.cards.card import load_card
+from derain.learning.batch import Sample
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
-from derain.neighbours import NeighbourView
 from derain.scan import Scan
 from derain.spec import Spec
+from derain.views.neighbours import NeighbourView
 
 
 def randomise(network: nn.Module, seed: int) -> None:

@@ -13,9 +13,9 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import pytest
 import torch
 
-from derain.batch import Batch, Sample
 from derain.errors import InputError
-from derain.hard_cases import scene
+from derain.evaluation.hard_cases import scene
+from derain.learning.batch import Batch, Sample
 from derain.models.checkpoint import load_model, save_model
 from derain.models.outdet import PUBLISHED_KEYS, OutDet, OutDetNetwork
 from derain.models.published import read_checkpoint, read_state_dict

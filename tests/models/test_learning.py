@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from derain.batch import Batch, Sample
-from derain.hard_cases import hard_cases, scene
-from derain.losses import segmentation_loss
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.learning.batch import Batch, Sample
+from derain.learning.losses import segmentation_loss
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 

@@ -10,15 +10,15 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from derain.batch import Batch, Sample
-from derain.cards import load_card
+from derain.cards.card import load_card
 from derain.errors import InputError
-from derain.hard_cases import scene
-from derain.metrics import Counts
+from derain.evaluation.hard_cases import scene
+from derain.evaluation.metrics import Counts
+from derain.learning.batch import Batch, Sample
 from derain.models.outdet import PUBLISHED_KEYS, OutDet, OutDetNetwork
 from derain.models.published import read_state_dict
-from derain.neighbours import NeighbourView
 from derain.scan import Scan
+from derain.views.neighbours import NeighbourView
 
 MakeModel = Callable[..., OutDet]
 MakeSample = Callable[..., Sample]

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
-from derain.hard_cases import scene
 from derain.models.measured import MERIT
 
 from . import two_processes

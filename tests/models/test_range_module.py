@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 import torch
 
-from derain.batch import Batch, Sample
-from derain.cards import load_card
+from derain.cards.card import load_card
 from derain.errors import InputError
-from derain.grid_fit import fit_grid
-from derain.hard_cases import hard_cases, scene
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.learning.batch import Batch, Sample
 from derain.models.base import DerainingModule
 from derain.models.lisnownet import LiSnowNet
 from derain.models.salsanext import SalsaNext
-from derain.range_image import RangeView
 from derain.scan import Scan
-from derain.spherical_grid import grid_of
+from derain.views.grid_fit import fit_grid
+from derain.views.range_image import RangeView
+from derain.views.spherical_grid import grid_of
 
 HARD_CASES = dict(hard_cases(largest=5000))
 MakeModel = Callable[..., DerainingModule]

@@ -13,27 +13,27 @@ import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
 from numpy.typing import NDArray
 
-from derain.batch import Batch
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.datamodules.simulated import Simulated
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.evaluation.intensity_rule import OneLineRule
 from derain.files.labels import write_labels
-from derain.hard_cases import scene
-from derain.losses import class_weights
+from derain.learning.batch import Batch
+from derain.learning.losses import class_weights
+from derain.learning.seeds import Draw, generator
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNext
-from derain.one_line_rule import OneLineRule
-from derain.open3d_import import import_open3d
 from derain.scan import Scan
-from derain.seeds import Draw, generator
 from derain.simulation.campaign import Campaign
 from derain.simulation.sensor import Sensor
-from derain.training_record import by_fingerprint
+from derain.sources.training_record import by_fingerprint
+from derain.system.open3d_import import import_open3d
 
 MakeTrainer = Callable[..., lightning.Trainer]
 RAIN = 3

@@ -20,12 +20,12 @@ from lightning.pytorch.loggers import CSVLogger
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.models.base import DerainingModule
+from derain.models.callbacks.prediction import PredictionWriter
+from derain.models.callbacks.report import TestReport
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
 from derain.models.measured import MERIT
 from derain.models.outdet import OutDet
-from derain.models.prediction import PredictionWriter
-from derain.models.report import TestReport
 
 GRID = {"rows": 16, "columns": 64, "inclination": [-30.0, 20.0]}
 NETWORKS: Mapping[str, Callable[[], DerainingModule]] = {

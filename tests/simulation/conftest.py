@@ -5,7 +5,7 @@ from types import ModuleType
 import pytest
 
 from derain.errors import InputError
-from derain.open3d_import import import_open3d
+from derain.system.open3d_import import import_open3d
 
 
 @pytest.fixture(scope="session")

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from derain.documents import shown
 from derain.errors import InputError
+from derain.files.documents import shown
 from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MAKER, read_manifest, write_manifest
 

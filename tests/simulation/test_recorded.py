@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.directions import directions
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.files import read_scan, write_scan
-from derain.hard_cases import hard_cases, scene
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.drops import DROP_REFLECTIVITY, farthest_visible_drop
 from derain.simulation.rain_field import SprinkledRain, UniformRain
 from derain.simulation.recorded import rain_on_scan
 from derain.simulation.sensor import Sensor
+from derain.views.directions import directions
 
 SENSOR = Sensor()
 FILES = (

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
-from derain.hard_cases import hard_cases
 from derain.scan import Scan
 from derain.simulation.recorded_beams import RecordedBeams, find_beams
 from derain.simulation.sensor import Sensor

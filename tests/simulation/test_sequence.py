@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.extrinsics import read_extrinsics
 from derain.files import read_scan
 from derain.files.labels import read_labels
+from derain.fusion.extrinsics import read_extrinsics
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
 from derain.simulation.radar import Radar

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from derain.cards import DataCard
+from derain.cards.card import DataCard
+from derain.evaluation.hard_cases import scene
 from derain.export.bench.scores import Labelled
 from derain.files import read_scan
 from derain.files.labels import label_beside, read_labels, semantic, write_labels
-from derain.hard_cases import scene
 from derain.scan import Scan
 
 CARD = DataCard("made up", {0: "solid", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))

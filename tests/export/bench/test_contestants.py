@@ -8,12 +8,12 @@ import pytest
 import yaml
 
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.export.bench.contestants import contestants
 from derain.export.runtime import Derainer
 from derain.filters import DSOR
-from derain.hard_cases import scene
 from derain.scan import Scan
-from derain.stopwatch import Stopwatch
+from derain.system.stopwatch import Stopwatch
 
 
 def parameters(path: Path, **content: object) -> str:

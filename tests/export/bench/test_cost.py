@@ -16,7 +16,7 @@ from derain.export.bench.scores import Labelled
 from derain.export.methods import load_method
 from derain.export.timing import STAGES
 from derain.scan import Scan
-from derain.stopwatch import Stopwatch
+from derain.system.stopwatch import Stopwatch
 
 
 def test_each_run_is_timed_by_stage(labelled: Labelled) -> None:

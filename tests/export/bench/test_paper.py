@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from derain.cards import load_card
+from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import labelled_scans
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.export.bench.contestants import contestants
 from derain.export.bench.cost import Cost
 from derain.export.bench.paper import TABLES, beside_published, files_by_group, paper_table
@@ -17,7 +18,6 @@ from derain.export.bench.rows import Row, joined
 from derain.export.bench.scores import Labelled, score
 from derain.export.timing import STAGES
 from derain.files.labels import write_labels
-from derain.hard_cases import scene
 
 
 def rows_of(names: Sequence[str], data: Labelled) -> list[Row]:

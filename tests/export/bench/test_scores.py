@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from derain.evaluation.metrics import Counts
 from derain.export.bench.contestants import Contestant, contestants
 from derain.export.bench.scores import Labelled, score
 from derain.filters import FILTERS, FilterDerainer
-from derain.metrics import Counts
-from derain.neighbours import NeighbourView
 from derain.scan import Scan
+from derain.views.neighbours import NeighbourView
 
 
 def test_the_trivial_methods_are_counted_over_known_points(labelled: Labelled) -> None:

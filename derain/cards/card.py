@@ -1,0 +1,221 @@
+"""Data cards: what must be known of a data set to train on it and to use what was trained."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.documents import Entry, shown
+from derain.files.labels import LARGEST_ID
+from derain.files.reading import is_file
+from derain.scan import Scan
+from derain.views.channels import UNITS
+
+Parsed = TypeVar("Parsed")
+
+# What mean and std are of, in their order.
+CHANNELS = ("x", "y", "z", "intensity")
+
+
+@dataclass(frozen=True)
+class DataCard:
+    """What must be known of a data set.
+
+    Attributes:
+        name: Name of the data set, for tables and models.
+        classes: Names of its semantic classes, by id.
+        rain: Ids of the classes that are to be removed; none where the data are clean.
+        unknown: Ids of the classes of which it is not known whether they are rain: neither trained
+            on nor measured by.
+        licence: Licence of the data.
+        intensity_unit: Unit or span of its intensities, such as ``0..255``.
+        mean: Mean of x, y, z (metres) and intensity over the training points; None if not known.
+        std: Their standard deviations; None if not known.
+        range: Mean and standard deviation of range in metres; None if not known.
+        extra: Mean and standard deviation of further channels, by name, such as ``doppler``.
+        rain_share: Share of rain among the training points; None if not known.
+        simulated: Whether its rain or snow fell in a computer; scores on it are labelled so.
+        deduplicate: Whether results on it count points at one position once, as those of a sensor
+            that writes many points twice are published.
+        split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
+    """
+
+    name: str
+    classes: Mapping[int, str]
+    rain: tuple[int, ...]
+    unknown: tuple[int, ...] = ()
+    licence: str = "not stated"
+    intensity_unit: str = "not stated"
+    mean: tuple[float, ...] | None = None
+    std: tuple[float, ...] | None = None
+    range: tuple[float, ...] | None = None
+    extra: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    rain_share: float | None = None
+    simulated: bool = False
+    deduplicate: bool = False
+    split: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def has_statistics(self) -> bool:
+        """True where the statistics of every channel and the rain share are known."""
+        return None not in (self.mean, self.std, self.range, self.rain_share)
+
+    def statistics(self, channel: str) -> tuple[float, float]:
+        """Mean and standard deviation of a channel over the training points.
+
+        Args:
+            channel: ``x``, ``y``, ``z``, ``intensity``, ``range``, or one of the extra ones.
+
+        Raises:
+            InputError: They are not known.
+        """
+        if channel == "range" and self.range is not None:
+            mean, std = self.range
+            return mean, std
+        if channel in CHANNELS and self.mean is not None and self.std is not None:
+            number = CHANNELS.index(channel)
+            return self.mean[number], self.std[number]
+        if channel in self.extra:
+            return self.extra[channel]
+        raise InputError(
+            self.name,
+            f"the data card has no statistics of {channel}",
+            "Add mean and std (of x, y, z, intensity), range, or extra (by name, mean and std).",
+        )
+
+    def unit(self, channel: str) -> str:
+        """Unit of a channel."""
+        return self.intensity_unit if channel == "intensity" else UNITS.get(channel, "not stated")
+
+    def rain_of(self, scan: Scan) -> NDArray[np.bool_]:
+        """Which points of a labelled scan are rain, bool (N,).
+
+        Raises:
+            InputError: A scan without labels.
+        """
+        return self._of_classes(scan, self.rain)
+
+    def unknown_of(self, scan: Scan) -> NDArray[np.bool_]:
+        """Of which points of a labelled scan it is not known whether they are rain, bool (N,).
+
+        Raises:
+            InputError: A scan without labels.
+        """
+        return self._of_classes(scan, self.unknown)
+
+    def normalised_as(self, other: "DataCard") -> "DataCard":
+        """The same card with the input's statistics of another one, and the unit they are in."""
+        return replace(
+            self,
+            intensity_unit=other.intensity_unit,
+            mean=other.mean,
+            std=other.std,
+            range=other.range,
+            extra=dict(other.extra),
+        )
+
+    def completed(
+        self, extra: Mapping[str, tuple[float, float]] = {}, **statistics: Any
+    ) -> "DataCard":
+        """The same card with statistics in place of those that it lacks."""
+        return replace(
+            self,
+            extra={**extra, **self.extra},
+            **{name: value for name, value in statistics.items() if getattr(self, name) is None},
+        )
+
+    def _of_classes(self, scan: Scan, ids: tuple[int, ...]) -> NDArray[np.bool_]:
+        if scan.label is None:
+            raise InputError(scan.name, "it has no labels", "Give its label file.")
+        return np.isin(scan.label, ids)
+
+
+def packaged_cards() -> dict[str, Path]:
+    """Files of the data cards that come with derain, by name."""
+    folder = Path(str(resources.files("derain.cards")))
+    return {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+
+
+def load_card(name: str | Path) -> DataCard:
+    """Reads a data card.
+
+    Args:
+        name: Name of a packaged card, or a YAML file with the attributes of :class:`DataCard`.
+
+    Raises:
+        InputError: No such card, or a file that is not one.
+    """
+    cards = packaged_cards()
+    path = cards.get(str(name), Path(name))
+    if not is_file(path):
+        raise InputError(
+            name, "no such data card", f"Give a YAML file or one of {', '.join(cards)}."
+        )
+    return _card(Entry.of_yaml(path))
+
+
+def _card(document: Entry) -> DataCard:
+    parsers: dict[str, Callable[[Entry], Any]] = {
+        "name": Entry.text,
+        "classes": _classes,
+        "rain": _ids,
+        "unknown": _ids,
+        "licence": Entry.text,
+        "intensity_unit": Entry.text,
+        "mean": _if_known(lambda entry: entry.numbers(len(CHANNELS))),
+        "std": _if_known(_deviations),
+        "range": _if_known(_mean_and_deviation),
+        "extra": lambda entry: _each(entry, _mean_and_deviation),
+        "rain_share": _if_known(lambda entry: entry.within(0, 1)),
+        "simulated": Entry.truth,
+        "deduplicate": Entry.truth,
+        "split": lambda entry: _each(entry, Entry.texts),
+    }
+    card = DataCard(**document.record(parsers, required=["name", "classes", "rain"]))
+    members = document.members()
+    if len(set(card.classes.values())) < len(card.classes):
+        raise members["classes"].fault("two classes have the same name", "Give each its own.")
+    for key, ids, known in (
+        ("rain", card.rain, card.classes.keys()),
+        ("unknown", card.unknown, card.classes.keys() - set(card.rain)),
+    ):
+        if not known >= set(ids):
+            raise members[key].fault(
+                f"{shown(list(ids))} are not all ids of classes"
+                f"{' that are not rain' if key == 'unknown' else ''}",
+                "Name ids that stand under classes.",
+            )
+    return card
+
+
+def _classes(entry: Entry) -> dict[int, str]:
+    return {id_: name.text() for id_, name in entry.numbered(0, LARGEST_ID).items()}
+
+
+def _ids(entry: Entry) -> tuple[int, ...]:
+    return tuple(item.whole(0, LARGEST_ID) for item in entry.items())
+
+
+def _deviations(entry: Entry) -> tuple[float, ...]:
+    for item in entry.items():
+        item.positive()
+    return entry.numbers(len(CHANNELS))
+
+
+def _mean_and_deviation(entry: Entry) -> tuple[float, ...]:
+    numbers = entry.numbers(2)
+    entry.items()[1].positive()
+    return numbers
+
+
+def _if_known(parser: Callable[[Entry], Parsed]) -> Callable[[Entry], Parsed | None]:
+    return lambda entry: None if entry.value is None else parser(entry)
+
+
+def _each(entry: Entry, parser: Callable[[Entry], Parsed]) -> dict[str, Parsed]:
+    return {name: parser(member) for name, member in entry.members().items()}

@@ -1,0 +1,1 @@
+"""The four commands that are Lightning's: fit, validate, test and predict."""

@@ -1,0 +1,106 @@
+"""One line for what Lightning's command line cannot use: an option, a key or a value."""
+
+import difflib
+import re
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from derain.cli.training.options import IMPLIED
+from derain.errors import InputError
+from derain.files.documents import Entry
+
+# How jsonargparse names an option that it does not know, on the command line and in a file.
+_UNKNOWN = (
+    re.compile(r"unrecognized arguments: --(?P<key>[^\s=]+)"),
+    re.compile(r"Group '(?P<group>[^']+)' does not accept option '(?P<key>[^']+)'"),
+    re.compile(r"does not accept option '(?P<key>[^']+)'"),
+    re.compile(r"Option '(?P<key>[^']+)' is not accepted"),
+)
+_SECTION = re.compile(r'Parser key "([^"]+)"')
+_ARGUMENT = re.compile(r"argument (?P<options>\S+): (?P<fault>.*)")
+_EXPECTED = re.compile(r"Expected an? <class '(?P<kind>[^']+)'>")
+_GIVEN = re.compile(r"(?:Got|Given) value: (?P<value>.*)$", re.MULTILINE)
+
+HINT = "All options: --help-all."
+
+# What only says that something below it went wrong, or where.
+_HEADINGS = ("Parser key", "Does not validate", "Subtypes:", "Errors:", "Problem with", "Given ")
+
+
+def read_configuration(path: Path, known: Collection[str]) -> Entry:
+    """Reads a configuration within bounds, before a library that trusts it does.
+
+    Args:
+        path: A YAML file.
+        known: All options, without their dashes.
+
+    Raises:
+        InputError: A file that :meth:`Entry.of_yaml` refuses, or whose sections are no mappings.
+    """
+    document = Entry.of_yaml(path)
+    sections = {option.split(".")[0] for option in known if "." in option}
+    for name, entry in document.members().items():
+        if name in sections and not isinstance(entry.value, str | None):
+            entry.members()
+    return document
+
+
+def as_input_error(
+    message: str, known: Collection[str], configurations: Sequence[Entry]
+) -> InputError:
+    """Says in a line what the parser says in a page.
+
+    Args:
+        message: The parser's.
+        known: All options, without their dashes.
+        configurations: The user's own files, where the key may stand.
+    """
+    section = ".".join(_SECTION.findall(message))
+    for pattern in _UNKNOWN:
+        if found := pattern.search(message):
+            groups = found.groupdict()
+            key = ".".join(filter(None, (section, groups.get("group"), groups["key"])))
+            return _unknown(key, known, configurations)
+    if found := _ARGUMENT.match(message):
+        return InputError(found["options"], found["fault"], HINT)
+    subject = _place(section, configurations)[0] if section else "command line"
+    return _unusable(subject, message)
+
+
+def _unknown(key: str, known: Collection[str], configurations: Sequence[Entry]) -> InputError:
+    subject, dashes = _place(key, configurations)
+    near = difflib.get_close_matches(key, known, n=1)
+    remedy = f"Did you mean {dashes}{near[0]}?" if near else HINT
+    return InputError(subject, "no such option", remedy)
+
+
+def _unusable(subject: str, message: str) -> InputError:
+    lines = [line.strip().removeprefix("- ") for line in message.splitlines()]
+    faults = [line for line in lines if line and not line.startswith(_HEADINGS)]
+    kinds = [found["kind"] for line in faults if (found := _EXPECTED.match(line))]
+    kinds = [kind for kind in dict.fromkeys(kinds) if kind != "NoneType"]
+    others = list(dict.fromkeys(line for line in faults if not _EXPECTED.match(line)))
+    given = _GIVEN.search(message)
+    if others or not (kinds and given):
+        return InputError(subject, "; ".join(others or faults), HINT)
+    return InputError(subject, f"cannot be {given['value']}", f"Give: {' or '.join(kinds)}.")
+
+
+def _place(key: str, configurations: Sequence[Entry]) -> tuple[str, str]:
+    """Where a key stands: in one of the files, or else on the command line; and its dashes."""
+    for document in configurations:
+        if _holds(document.value, key.split(".")):
+            return f"{document.source}: {key}", ""
+    return f"--{key}", "--"
+
+
+def _holds(value: Any, steps: Sequence[str]) -> bool:
+    if not steps:
+        return True
+    if not isinstance(value, Mapping):
+        return False
+    below = [value.get(step) for step in IMPLIED]
+    return (steps[0] in value and _holds(value[steps[0]], steps[1:])) or any(
+        _holds(inner, steps) for inner in below
+    )

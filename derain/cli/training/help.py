@@ -1,0 +1,74 @@
+"""What ``derain fit``, ``validate``, ``test`` and ``predict`` say of themselves in short."""
+
+from collections.abc import Iterable
+
+from derain.cli.training.configurations import packaged_configs
+
+# What `--help` becomes where all options are asked for.
+ALL = "--help-all"
+
+EXAMPLES = {
+    "fit": """\
+Trains a derainer. The best and the last checkpoint, the TensorBoard log and the configuration go
+to runs/<name>/version_<n>.
+
+  derain fit --config outdet_wads.yaml --data.root WADS
+  derain fit --config outdet_wads.yaml --data.root WADS --trainer.logger.name my_run
+  derain fit --config outdet_wads.yaml --data.root WADS --ckpt_path .../last.ckpt   (goes on)
+  tensorboard --logdir runs
+""",
+    "validate": """\
+Measures a checkpoint on the validation scans.
+
+  derain validate --config outdet_wads.yaml --data.root WADS --ckpt_path outdet.ckpt
+""",
+    "test": """\
+Measures a checkpoint on the test scans: scores by average, class and range.
+
+  derain test --config outdet_wads.yaml --data.root WADS --ckpt_path outdet.ckpt
+""",
+    "predict": """\
+Writes the labels that a checkpoint gives the test scans, which need none of their own.
+
+  derain predict --config outdet_wads.yaml --data.root WADS --ckpt_path outdet.ckpt \\
+      --predictions.folder labels
+""",
+}
+
+# The options that most runs need; `ALL` lists those that any run can have.
+OPTIONS = {
+    "--config FILE": "configuration: a YAML file, or the name of a packaged one",
+    "--data.root FOLDER": "where the data set lies",
+    "--ckpt_path FILE": "checkpoint to go on from, to measure or to use",
+    "--trainer.max_epochs N": "passes over the training scans",
+    "--trainer.devices N": "devices, or processes on a CPU",
+    "--trainer.accelerator NAME": "cpu, gpu, ...",
+    "--trainer.logger.name NAME": "name of the run's folder",
+    "--trainer.logger.save_dir FOLDER": "where runs are logged (runs)",
+    "--data.loading.batch_size N": "scans in a batch",
+    "--data.loading.workers N": "processes that read scans",
+    "--predictions.folder FOLDER": "where `predict` writes labels",
+    "--seed_everything N": "of everything drawn (0)",
+}
+
+
+def short_help(command: str) -> str:
+    """The help of a command of Lightning's that fits on a screen.
+
+    Args:
+        command: ``fit``, ``validate``, ``test`` or ``predict``.
+    """
+    options = "\n".join(f"  {option:<34}{meaning}" for option, meaning in OPTIONS.items())
+    return (
+        f"usage: derain {command} --config FILE [--OPTION VALUE ...]\n\n{EXAMPLES[command]}\n"
+        f"packaged configurations:\n{_by_network(packaged_configs())}\n\noptions:\n{options}\n\n"
+        "Any option can stand in a configuration, and any key of one be given as an option.\n"
+        f"All options: derain {command} {ALL}. All values, as they would be used: --print_config."
+    )
+
+
+def _by_network(names: Iterable[str]) -> str:
+    networks: dict[str, list[str]] = {}
+    for name in names:
+        networks.setdefault(name.split("_")[0], []).append(name)
+    return "\n".join(f"  {'  '.join(of_one)}" for of_one in networks.values())

@@ -1,0 +1,178 @@
+"""``derain fit``, ``validate``, ``test`` and ``predict``: Lightning's own command line."""
+
+import argparse
+import warnings
+from pathlib import Path
+from typing import Any
+
+import torch
+from jsonargparse import DefaultHelpFormatter
+from lightning.fabric.utilities.exceptions import MisconfigurationException
+from lightning.pytorch import Trainer
+from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
+from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
+from lightning.pytorch.loggers import TensorBoardLogger
+
+from derain.cli.training.configurations import own_configurations, with_packaged_configs
+from derain.cli.training.errors import as_input_error, read_configuration
+from derain.cli.training.help import ALL, EXAMPLES
+from derain.cli.training.lightning_silence import silence_advertisements
+from derain.cli.training.options import known_options
+from derain.cli.training.run_folder import WholeConfig, writing_to_the_run_folder
+
+# Imported so that a configuration may name them without their modules.
+from derain.datamodules.base import ScanDataModule
+from derain.datamodules.folder import Folder
+from derain.datamodules.rehearse3d import Rehearse3D
+from derain.datamodules.scan_check import ScanCheck
+from derain.datamodules.simulated import Simulated
+from derain.datamodules.wads import Wads
+from derain.errors import InputError
+from derain.models.base import DerainingModule
+from derain.models.callbacks.best_checkpoint import BestCheckpoint
+from derain.models.callbacks.panels import ScanPanels
+from derain.models.callbacks.prediction import PredictionWriter
+from derain.models.callbacks.report import TestReport
+from derain.models.callbacks.whole_checkpoints import save_whole
+from derain.models.checkpoint import check_resumable, load_model
+from derain.models.lisnownet import LiSnowNet
+from derain.models.measured import MERIT
+from derain.models.outdet import OutDet
+from derain.models.salsanext import SalsaNext
+from derain.system.cores import usable_cores
+from derain.system.open3d_import import make_open3d_loadable
+from derain.system.workers import end_with_launcher
+
+# What `--ckpt_path` may be besides a file: checkpoints that Lightning looks for itself.
+FOUND_BY_LIGHTNING = ("last", "hpc")
+
+
+class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatter):
+    """Leaves the line breaks of the examples alone."""
+
+
+__all__ = [
+    "Folder",
+    "LiSnowNet",
+    "OutDet",
+    "Rehearse3D",
+    "SalsaNext",
+    "Simulated",
+    "Wads",
+    "train",
+]
+
+
+# What has options of its own, by the option that chooses it.
+CLASSES = {
+    "data": (Folder, Rehearse3D, Simulated, Wads),
+    "model": (LiSnowNet, OutDet, SalsaNext),
+    "trainer.logger": (TensorBoardLogger,),
+}
+
+
+class DerainCLI(LightningCLI):
+    """Lightning's command line with the callbacks that every run of derain has."""
+
+    def add_arguments_to_parser(self, parser: LightningArgumentParser) -> None:
+        """Adds the callbacks; ``--checkpoint.monitor`` and so on change them."""
+        parser.add_lightning_class_args(BestCheckpoint, "checkpoint")
+        parser.add_lightning_class_args(ModelCheckpoint, "last")
+        parser.add_lightning_class_args(LearningRateMonitor, "learning_rate")
+        parser.add_lightning_class_args(ScanPanels, "panels")
+        parser.add_lightning_class_args(PredictionWriter, "predictions")
+        parser.add_lightning_class_args(TestReport, "report")
+        parser.add_lightning_class_args(ScanCheck, "scan_check")
+        parser.set_defaults(
+            {
+                "checkpoint.monitor": MERIT,
+                "checkpoint.mode": "max",
+                "checkpoint.filename": "best",
+                "checkpoint.enable_version_counter": False,
+                # What `--ckpt_path` goes on from: the best epoch may lie far back.
+                "last.filename": "last",
+                "last.enable_version_counter": False,
+            }
+        )
+        self.parser_of_a_subcommand = parser  # the subcommands have nearly the same options
+
+    def parse_arguments(self, parser: LightningArgumentParser, args: ArgsType) -> None:
+        """Refuses what cannot be used: options, and checkpoints before Lightning reads them."""
+        known = known_options(self.parser_of_a_subcommand, CLASSES)
+        arguments = args if isinstance(args, list) else []
+        files = [read_configuration(path, known) for path in own_configurations(arguments)]
+        parser.set_defaults({"test.verbose": False})  # the table is in our report
+        try:
+            super().parse_arguments(parser, args)
+        except argparse.ArgumentError as error:
+            raise as_input_error(error.message, known, files) from error
+        path = self.config[self.config.subcommand].get("ckpt_path")
+        if path in (None, *FOUND_BY_LIGHTNING):
+            return
+        if "://" in str(path):  # Lightning would unpickle anything in it
+            raise InputError(path, "is an address", "Download it and give the file.")
+        check = check_resumable if self.config.subcommand == "fit" else load_model
+        check(Path(path))
+
+    def instantiate_trainer(self, **kwargs: Any) -> Trainer:
+        """Makes the trainer, which writes its checkpoints whole or not at all."""
+        return save_whole(super().instantiate_trainer(**kwargs))
+
+    def instantiate_classes(self) -> None:
+        """Instantiates data, model and trainer; what they find wrong is not the parser's error."""
+        try:
+            super().instantiate_classes()
+        except MisconfigurationException as error:
+            reason = str(error).rstrip(".")
+            raise InputError("--trainer", reason, "Correct the option that it names.") from error
+        except ValueError as error:
+            if isinstance(error.__cause__, InputError):
+                raise error.__cause__ from None
+            raise
+
+
+def train(arguments: list[str]) -> None:
+    """Runs one of Lightning's subcommands.
+
+    Args:
+        arguments: The subcommand and its options; ``--config`` takes a file or the name of a
+            packaged configuration.
+
+    Raises:
+        InputError: A configuration that does not exist, a folder that cannot be written, or what
+            data and model raise.
+    """
+    arguments = ["--help" if argument == ALL else argument for argument in arguments]
+    silence_advertisements()
+    make_open3d_loadable()  # TensorBoard is to start, and show what this run logs
+    # Lightning means the mixing of both; arguments of the command line are all that we pass on.
+    warnings.filterwarnings("ignore", message="LightningCLI's args parameter")
+    # Lightning 2.6 uses a name that torch 2.13 deprecates.
+    warnings.filterwarnings("ignore", message=".*LeafSpec")
+    # The last checkpoint has nothing to lose by it, and of the best one BestCheckpoint takes care.
+    warnings.filterwarnings("ignore", message="The dirpath has changed")
+    end_with_launcher()
+    torch.set_num_threads(min(torch.get_num_threads(), usable_cores()))
+    of_parsers = {
+        "formatter_class": ExamplesFormatter,
+        "allow_abbrev": False,  # a misspelling is no abbreviation
+        "exit_on_error": False,  # what is wrong we say ourselves
+    }
+    with writing_to_the_run_folder():
+        DerainCLI(
+            DerainingModule,
+            ScanDataModule,
+            subclass_mode_model=True,
+            subclass_mode_data=True,
+            seed_everything_default=0,
+            auto_configure_optimizers=False,
+            save_config_callback=WholeConfig,
+            # Every run has a folder of its own; only one without a logger meets its last one.
+            save_config_kwargs={"overwrite": True},
+            trainer_defaults={"enable_model_summary": False},
+            parser_kwargs={
+                **of_parsers,
+                **{name: {**of_parsers, "description": text} for name, text in EXAMPLES.items()},
+            },
+            args=with_packaged_configs(arguments),
+        )

@@ -1,0 +1,1 @@
+"""How good methods are: counts, metrics, baselines, hard cases."""

@@ -1,0 +1,145 @@
+"""What shows whether a derainer has learnt rain at all: places alone, everything, nothing.
+
+The fourth, dim and near points, is :class:`derain.evaluation.intensity_rule.OneLineRule`.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.cards.card import DataCard
+from derain.errors import InputError
+from derain.evaluation.counts import intersection_over_union
+from derain.scan import Scan
+
+# Bits of a voxel's number along each axis; three of them fit into an int64.
+AXIS_BITS = 21
+
+
+def all_points(scan: Scan) -> NDArray[np.bool_]:
+    """Calls every point rain that can be judged, bool (N,)."""
+    return scan.valid
+
+
+def no_points(scan: Scan) -> NDArray[np.bool_]:
+    """Calls no point rain, bool (N,)."""
+    return np.zeros(len(scan), bool)
+
+
+def known_truth(scan: Scan, card: DataCard) -> tuple[Scan, NDArray[np.bool_]]:
+    """What a labelled scan teaches: the points of which it is known whether they are rain.
+
+    Args:
+        scan: A scan with labels.
+        card: Its data card.
+
+    Returns:
+        The scan of these M points, and which of them are rain, bool (M,).
+    """
+    known = ~card.unknown_of(scan)
+    return scan.take(known), card.rain_of(scan)[known]
+
+
+@dataclass(frozen=True, eq=False)
+class PositionPrior:
+    """Calls a point rain if training scans mostly had rain where it lies.
+
+    It sees neither intensity nor neighbours. Where every scan shows one scene, as in REHEARSE-3D,
+    it is good without knowing what rain is: a method that does not beat it may have learnt places.
+
+    Attributes:
+        voxel: Edge of the voxels in metres, which are fixed to the sensor.
+        rain: Numbers of the voxels of rain, int64 (V,), ascending. Any other voxel, those that no
+            training scan has seen included, is not rain.
+    """
+
+    voxel: float
+    rain: NDArray[np.int64]
+
+    def __call__(self, scan: Scan) -> NDArray[np.bool_]:
+        """True for the points called rain, bool (N,)."""
+        valid = scan.valid
+        called_rain = np.zeros(len(scan), bool)
+        called_rain[valid] = np.isin(_voxel_of(scan.xyz[valid], self.voxel), self.rain)
+        return called_rain
+
+    @classmethod
+    def learn(cls, scans: Iterable[tuple[Scan, NDArray[np.bool_]]], voxel: float = 0.5) -> Self:
+        """Finds the voxels that, called rain, give the greatest IoU on the training scans.
+
+        They are those with the greatest shares of rain. A share is counted with one more point in
+        the voxel, which is rain as much as the average point is: a few points prove little.
+
+        Args:
+            scans: Scans, and their rain, bool (N,). One is in memory at a time.
+            voxel: Edge of the voxels, metres.
+
+        Returns:
+            The prior; one that finds nothing where there is no rain to learn from.
+
+        Raises:
+            InputError: Voxels without an extent.
+        """
+        if not (voxel > 0 and math.isfinite(voxel)):
+            raise InputError("voxel", f"{voxel:g} m", "Give a finite length above 0.")
+        seen = _Voxels.none()
+        for scan, rain in scans:
+            seen = seen.joined(_Voxels.of(scan.xyz[scan.valid], rain[scan.valid], voxel))
+        return cls(voxel, np.sort(seen.number[seen.best()]))
+
+
+class _Voxels(NamedTuple):
+    """Distinct voxels by number, ascending, with their points and their points of rain."""
+
+    number: NDArray[np.int64]
+    points: NDArray[np.int64]
+    rain: NDArray[np.int64]
+
+    @classmethod
+    def none(cls) -> "_Voxels":
+        empty = np.zeros(0, np.int64)
+        return cls(empty, empty, empty)
+
+    @classmethod
+    def of(cls, xyz: NDArray[np.float32], rain: NDArray[np.bool_], voxel: float) -> "_Voxels":
+        ones = np.ones(len(xyz), np.int64)
+        return _added_up(_voxel_of(xyz, voxel), ones, rain.astype(np.int64))
+
+    def joined(self, other: "_Voxels") -> "_Voxels":
+        return _added_up(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+
+    def best(self) -> NDArray[np.int64]:
+        """Rows of the voxels that are best called rain, by descending share."""
+        total = self.rain.sum()
+        if not total:
+            return np.zeros(0, np.int64)
+        share = (self.rain + total / self.points.sum()) / (self.points + 1)
+        order = np.argsort(-share, kind="stable")
+        hits, called = np.cumsum(self.rain[order]), np.cumsum(self.points[order])
+        iou = intersection_over_union(hits, total - hits + called - hits)
+        # Voxels of one share are called alike: only the last of them ends a choice.
+        iou[:-1][np.diff(share[order]) == 0] = 0
+        return order[: np.argmax(iou) + 1]
+
+
+def _voxel_of(xyz: NDArray[np.float32], voxel: float) -> NDArray[np.int64]:
+    """Number of each point's voxel, int64 (N,); the outermost take in all that lies beyond."""
+    half = 2 ** (AXIS_BITS - 1)
+    cell = np.clip(np.floor(xyz.astype(np.float64) / voxel), -half, half - 1).astype(np.int64)
+    x, y, z = (cell + half).T
+    number: NDArray[np.int64] = (x << 2 * AXIS_BITS) | (y << AXIS_BITS) | z
+    return number
+
+
+def _added_up(
+    number: NDArray[np.int64], points: NDArray[np.int64], rain: NDArray[np.int64]
+) -> _Voxels:
+    """Adds up what is counted more than once."""
+    distinct, row = np.unique(number, return_inverse=True)
+    # bincount adds in float64, which is exact up to 2⁵³ points.
+    sums = (np.bincount(row, counts, len(distinct)) for counts in (points, rain))
+    return _Voxels(distinct, *(total.astype(np.int64) for total in sums))

@@ -1,0 +1,1 @@
+"""LiDAR and 4D radar as one cloud."""

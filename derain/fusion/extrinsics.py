@@ -1,0 +1,127 @@
+"""Where a sensor is mounted: what takes its points into another sensor's frame."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.documents import Entry
+from derain.scan import to_float32
+
+POSE = ("x", "y", "z", "roll", "pitch", "yaw")
+
+# Farthest that the product of a rotation and its transpose may be from the identity: calibration
+# files are rounded, to four digits or more.
+ROUNDING = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Extrinsics:
+    """A rigid motion from one sensor's frame (x forward, y left, z up) into another's.
+
+    Attributes:
+        matrix: Homogeneous transformation, float64 (4, 4), translation in metres.
+
+    Raises:
+        ValueError: A matrix that is not rigid.
+    """
+
+    matrix: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        if self.matrix.shape != (4, 4):
+            raise ValueError(f"the matrix has shape {self.matrix.shape}, not (4, 4)")
+        if not np.isfinite(self.matrix).all():
+            raise ValueError("it holds numbers that are not finite")
+        if not np.array_equal(self.matrix[3], (0, 0, 0, 1)):
+            raise ValueError(f"the matrix's last row is {self.matrix[3].tolist()}, not 0 0 0 1")
+        rotation = self.matrix[:3, :3]
+        if not _is_rotation(rotation):
+            raise ValueError("the matrix's upper left 3 x 3 numbers are not a rotation")
+
+    @classmethod
+    def of_pose(
+        cls, x: float, y: float, z: float, roll: float, pitch: float, yaw: float
+    ) -> "Extrinsics":
+        """Takes points of a sensor into the frame in which the sensor has a pose.
+
+        Args:
+            x: Where the sensor is: ahead, metres.
+            y: To the left, metres.
+            z: Above, metres.
+            roll: Turn about its x axis, degrees, applied first.
+            pitch: About the y axis, degrees; positive looks down.
+            yaw: About the z axis, degrees, applied last; positive looks left.
+
+        Source: ROS REP 103, fixed-axis roll, pitch, yaw.
+        """
+        matrix = np.eye(4)
+        matrix[:3, :3] = _rotation(roll, pitch, yaw)
+        matrix[:3, 3] = x, y, z
+        return cls(matrix)
+
+    @property
+    def inverse(self) -> "Extrinsics":
+        """The motion back."""
+        return Extrinsics(np.linalg.inv(self.matrix).astype(np.float64))
+
+    def __call__(self, xyz: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Moves points, float32 (N, 3), metres."""
+        return to_float32(xyz @ self.matrix[:3, :3].T + self.matrix[:3, 3])
+
+
+def read_extrinsics(path: Path) -> Extrinsics:
+    """Reads where a sensor is mounted.
+
+    Args:
+        path: A YAML file with the sensor's pose (``x``, ``y``, ``z`` in metres; ``roll``,
+            ``pitch``, ``yaw`` in degrees), or with ``matrix``, four rows of four numbers that take
+            points of the sensor into the other frame.
+
+    Raises:
+        InputError: A file that is missing or says something else, or a motion that is not rigid.
+    """
+    document = Entry.of_yaml(path)
+    try:
+        return _extrinsics(document)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise document.fault(str(error), "Write the sensor's pose, or a rigid motion.") from error
+
+
+def _extrinsics(document: Entry) -> Extrinsics:
+    values = document.members()
+    if values.keys() == {"matrix"}:
+        rows = values["matrix"].items()
+        return Extrinsics(np.array([row.numbers(4) for row in rows], np.float64))
+    if values.keys() != set(POSE):
+        raise document.fault(
+            f"its keys are {', '.join(values)}",
+            f"It needs {', '.join(POSE)} (metres, degrees), or matrix (4 rows of 4 numbers).",
+        )
+    return Extrinsics.of_pose(**{name: value.number() for name, value in values.items()})
+
+
+def _is_rotation(matrix: NDArray[np.float64]) -> bool:
+    # The first is asked first: squares of what is far larger would not be numbers.
+    return bool(
+        np.abs(matrix).max() <= 1 + ROUNDING
+        and np.abs(matrix @ matrix.T - np.eye(3)).max() <= ROUNDING
+        and np.linalg.det(matrix) > 0
+    )
+
+
+def _rotation(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+    """Turns by roll about x, then pitch about y, then yaw about z, degrees; float64 (3, 3)."""
+    cr, cp, cy = np.cos(np.radians([roll, pitch, yaw]))
+    sr, sp, sy = np.sin(np.radians([roll, pitch, yaw]))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

@@ -1,0 +1,123 @@
+"""LiDAR and 4D radar as one cloud: which frames belong together, and how they are joined."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.fusion.extrinsics import Extrinsics
+from derain.fusion.label_transfer import LABEL_WITHIN, transfer_labels
+from derain.scan import Scan
+
+# Columns that every merged file has; a channel of the radar's cannot go by their names.
+MERGED_COLUMNS = ("x", "y", "z", "intensity", "radar")
+
+# What is fused with a LiDAR scan that has no radar frame near in time.
+NO_DETECTIONS = Scan(np.zeros((0, 3), np.float32), name="no radar frame")
+
+
+def nearest_in_time(
+    times: NDArray[np.float64], among: NDArray[np.float64], within: float
+) -> NDArray[np.int64]:
+    """Finds for every time the nearest of others, such as a radar frame for each LiDAR frame.
+
+    Of two that are equally near the earlier is taken, and of equal times the first row.
+
+    Args:
+        times: Times, float64 (N,), seconds, in any order.
+        among: Times to choose from, float64 (M,), seconds of the same clock, in any order.
+        within: How far away the nearest may be, seconds, inclusive.
+
+    Returns:
+        Rows of ``among``, int64 (N,); -1 where none is so near.
+    """
+    row = np.full(len(times), -1, np.int64)
+    if not len(among):
+        return row
+    order = np.argsort(among, kind="stable")
+    ascending = among[order]
+    # The first of those at or after each time, and the first of those at the time before it.
+    after = np.searchsorted(ascending, times).clip(max=len(among) - 1)
+    before = np.searchsorted(ascending, ascending[(after - 1).clip(min=0)])
+    earlier = np.abs(times - ascending[before]) <= np.abs(ascending[after] - times)
+    nearest = np.where(earlier, before, after)
+    near = np.abs(times - ascending[nearest]) <= within
+    row[near] = order[nearest[near]]
+    return row
+
+
+def fuse(
+    lidar: Scan,
+    radar: Scan,
+    extrinsics: Extrinsics,
+    label_within: float = LABEL_WITHIN,
+    channels: Sequence[str] = (),
+) -> Scan:
+    """Joins a LiDAR scan and a radar frame in the LiDAR's frame.
+
+    Args:
+        lidar: The LiDAR's scan. With labels, the fused cloud has labels.
+        radar: The radar's frame; its own labels count if it has any, else it gets the LiDAR's.
+        extrinsics: Takes points of the radar into the LiDAR's frame.
+        label_within: How far a LiDAR point's label reaches, metres.
+        channels: Fields of the radar frame to carry along, such as doppler and rcs.
+
+    Returns:
+        The rows of the LiDAR in their order, then those of the radar in theirs, told apart by
+        `Scan.radar`; rows that cannot be judged are as they were. Intensity is 0 where the source
+        has none. A file of it has the columns of REHEARSE-3D: x, y, z and intensity; with channels
+        also ``radar`` (1 or 0) and each of them, float32, NaN for the LiDAR.
+
+    Raises:
+        InputError: A channel that the radar frame, not being empty, lacks, or one of
+            ``MERGED_COLUMNS``.
+    """
+    for name in channels:
+        if name in MERGED_COLUMNS:
+            raise InputError(name, "is a column of the merged cloud itself", "Leave it out.")
+    radar = _moved(radar, extrinsics)
+    xyz = np.concatenate([lidar.xyz, radar.xyz])
+    intensity = np.concatenate([_intensity(lidar), _intensity(radar)])
+    is_radar = np.arange(len(xyz)) >= len(lidar)
+    columns: dict[str, NDArray[Any]] = {}
+    if channels:
+        merged = *xyz.T, intensity, is_radar.astype(np.uint8)
+        columns = dict(zip(MERGED_COLUMNS, merged, strict=True))
+        columns |= {name: _channel(name, len(lidar), radar) for name in channels}
+    label = _label(lidar, radar, label_within)
+    return Scan(xyz, intensity, label, is_radar, columns, name=lidar.name)
+
+
+def _moved(scan: Scan, extrinsics: Extrinsics) -> Scan:
+    # Rows that cannot be judged stay as they are: a missing return, at the origin, would become a
+    # point where the sensor is mounted.
+    valid = scan.valid
+    xyz = scan.xyz.copy()
+    xyz[valid] = extrinsics(xyz[valid])
+    return replace(scan, xyz=xyz)
+
+
+def _intensity(scan: Scan) -> NDArray[np.float32]:
+    return np.zeros(len(scan), np.float32) if scan.intensity is None else scan.intensity
+
+
+def _label(lidar: Scan, radar: Scan, within: float) -> NDArray[np.int64] | None:
+    if lidar.label is None:
+        return None
+    if radar.label is None:
+        radar = radar.with_label(transfer_labels(lidar, radar.xyz, within))
+    return np.concatenate([lidar.label, radar.label])
+
+
+def _channel(name: str, lidar_points: int, radar: Scan) -> NDArray[np.float32]:
+    column = radar.channel(name) if len(radar) else np.zeros(0, np.float32)
+    if column is None:
+        raise InputError(
+            radar.name,
+            f"has no column {name} of numbers ({', '.join(radar.fields)})",
+            "Name the radar's columns with --radar-columns.",
+        )
+    return np.concatenate([np.full(lidar_points, np.nan, np.float32), column])

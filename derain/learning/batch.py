@@ -1,0 +1,106 @@
+"""Several scans on their way through a network."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from derain.cards.card import DataCard
+from derain.scan import Scan
+from derain.views.view import IGNORED, ViewedScan, WayToRows
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One scan and what a network sees of it.
+
+    Attributes:
+        scan: The whole scan, with its labels where they are known.
+        view: The network's view of it.
+        target: What the network is to say of each of its cells, int64 (M,); None without labels.
+        measured: Whether what the network says is counted or written. It is not in training, nor
+            of a scan that is only read again so that all processes take as many steps.
+    """
+
+    scan: Scan
+    view: ViewedScan
+    target: Tensor | None
+    measured: bool = True
+
+    @classmethod
+    def of(cls, scan: Scan, view: ViewedScan, card: DataCard, measured: bool = True) -> "Sample":
+        """Gives a view its target, by the labels of its scan if there are any.
+
+        Cells of points of which it is not known whether they are rain are not judged.
+        """
+        if scan.label is None:
+            return cls(scan, view, None, measured)
+        target = view.target(card.rain_of(scan))
+        target[view.target(card.unknown_of(scan)) == 1] = IGNORED
+        return cls(scan, view, torch.from_numpy(target), measured)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredScan:
+    """What is needed of a scan once the network has scored it.
+
+    Attributes:
+        scan: The whole scan, with its labels where they are known.
+        way_to_rows: Carries scores of its cells to its rows.
+    """
+
+    scan: Scan
+    way_to_rows: WayToRows
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Several scans, packed.
+
+    Attributes:
+        inputs: The network's inputs by name, scans one after the other.
+        target: What the network is to say of each cell, int64 (M,); None without labels.
+        cells: How many cells each scan has, in order.
+        measured: The scans, in order, where what the network says of them is counted or written;
+            else none, so that no worker sends what nobody asks for.
+    """
+
+    inputs: dict[str, Tensor]
+    target: Tensor | None
+    cells: Sequence[int]
+    measured: Sequence[MeasuredScan]
+
+    @classmethod
+    def of(cls, samples: Sequence[Sample]) -> "Batch":
+        """Packs samples of one kind of view, which sees to it that scans do not mix.
+
+        All of them are measured, or none.
+        """
+        packed = type(samples[0].view).pack([sample.view for sample in samples])
+        targets = [sample.target for sample in samples if sample.target is not None]
+        return cls(
+            inputs={name: torch.from_numpy(array) for name, array in packed.items()},
+            target=torch.cat(targets) if len(targets) == len(samples) else None,
+            cells=[sample.view.size for sample in samples],
+            measured=[
+                MeasuredScan(sample.scan, sample.view.way_to_rows())
+                for sample in samples
+                if sample.measured
+            ],
+        )
+
+    def to(self, device: torch.device, non_blocking: bool = False) -> "Batch":
+        """The same batch with its tensors on a device; the scans stay in main memory."""
+        inputs = {
+            name: tensor.to(device, non_blocking=non_blocking)
+            for name, tensor in self.inputs.items()
+        }
+        target = self.target
+        if target is not None:
+            target = target.to(device, non_blocking=non_blocking)
+        return Batch(inputs, target, self.cells, self.measured)
+
+    def split(self, scores: Tensor) -> list[Tensor]:
+        """Takes scores of all cells, (M, ...), apart into those of each scan."""
+        return list(torch.split(scores, list(self.cells)))

@@ -1,0 +1,25 @@
+"""The full scale of intensities, which tells their unit."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from derain.scan import Scan
+
+# Full scales that files of intensities have: a share, one byte, two bytes.
+FULL_SCALES = (1.0, 255.0, 65_535.0)
+
+
+def full_scale(scans: Sequence[Scan]) -> float:
+    """Full scale of the scans' intensities, in their unit; not a number where none has any.
+
+    It is the smallest of FULL_SCALES that no intensity exceeds.
+
+    Args:
+        scans: Scans of one sensor.
+    """
+    intensities = [scan.intensity[scan.valid] for scan in scans if scan.intensity is not None]
+    if not any(len(intensity) for intensity in intensities):
+        return np.nan
+    brightest = max(float(intensity.max(initial=0)) for intensity in intensities)
+    return next((scale for scale in FULL_SCALES if brightest <= scale), FULL_SCALES[-1])

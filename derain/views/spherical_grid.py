@@ -1,0 +1,249 @@
+"""A spherical grid: the rows and columns of directions that a range image is made of."""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.documents import Entry, shown
+from derain.views.directions import directions
+from derain.views.published_grids import PUBLISHED_GRIDS
+
+FULL_CIRCLE = 360.0
+ALL_AROUND = (-180.0, 180.0)
+
+# 512 beams by 8192 steps: more than any sensor has, and an image of 84 MB.
+MOST_PIXELS = 2**22
+
+
+@dataclass(frozen=True)
+class SphericalGrid:
+    """Rows of inclination by columns of azimuth.
+
+    A pixel holds its upper and its left border; the lowest row also holds the lower bound. On a
+    full circle the last column is the neighbour of the first; elsewhere it also holds the right
+    bound.
+
+    Attributes:
+        columns: W, the number of columns, of equal width, column 0 at the left.
+        azimuth: Right and left bound, degrees counter-clockwise from x; the left one may pass 180
+            where the grid looks backward.
+        edges: Borders of the H rows from top to bottom, H + 1 inclinations, degrees.
+
+    Raises:
+        InputError: Bounds that leave no room, or that no direction can have; more than MOST_PIXELS.
+    """
+
+    columns: int
+    azimuth: tuple[float, float]
+    edges: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        right, left = self.azimuth
+        if self.rows < 1 or self.columns < 1:
+            raise _wrong(
+                f"{self.rows} rows by {self.columns} columns", "Give at least one of each."
+            )
+        if self.rows * self.columns > MOST_PIXELS:
+            raise _wrong(
+                f"{self.rows} rows by {self.columns} columns",
+                f"Give at most {MOST_PIXELS:,} pixels.",
+            )
+        if not (-FULL_CIRCLE <= right < left <= right + FULL_CIRCLE):
+            raise _wrong(
+                f"azimuth from {right:g} to {left:g} degrees",
+                "Give the right bound, then the left, at most 360 degrees apart.",
+            )
+        descending = all(above > below for above, below in itertools.pairwise(self.edges))
+        if not (descending and self.edges[0] <= 90 and self.edges[-1] >= -90):
+            raise _wrong(
+                f"inclination from {self.edges[-1]:g} to {self.edges[0]:g} degrees",
+                "Rows must follow one another within -90 and 90.",
+            )
+
+    @classmethod
+    def even(
+        cls,
+        rows: int,
+        columns: int,
+        inclination: tuple[float, float],
+        azimuth: tuple[float, float] = ALL_AROUND,
+    ) -> Self:
+        """A grid with rows of equal height.
+
+        Args:
+            rows: Number of rows.
+            columns: Number of columns.
+            inclination: Lower and upper bound, degrees.
+            azimuth: Right and left bound, degrees.
+
+        Raises:
+            InputError: Bounds that leave no room, or that no direction can have.
+        """
+        bottom, top = inclination
+        edges = np.linspace(top, bottom, max(rows, 0) + 1)
+        return cls(columns, azimuth, tuple(edges.tolist()))
+
+    @classmethod
+    def of_beams(
+        cls, beams: Sequence[float], columns: int, azimuth: tuple[float, float] = ALL_AROUND
+    ) -> Self:
+        """A grid with one row a beam: borders midway between beams, half a step beyond the last.
+
+        Args:
+            beams: Inclinations of two or more beams in any order, degrees.
+            columns: Number of columns.
+            azimuth: Right and left bound, degrees.
+
+        Raises:
+            InputError: Fewer than two beams, equal ones, or bounds that no direction can have.
+        """
+        if len(beams) < 2:
+            raise _wrong("fewer than two beams", "Give rows and inclination instead.")
+        table = np.sort(np.asarray(beams, np.float64))[::-1]
+        half = -np.diff(table) / 2
+        edges = np.concatenate([[table[0] + half[0]], table[1:] + half, [table[-1] - half[-1]]])
+        return cls(columns, azimuth, tuple(np.clip(edges, -90, 90).tolist()))
+
+    @property
+    def rows(self) -> int:
+        """H, the number of rows."""
+        return len(self.edges) - 1
+
+    @property
+    def is_full_circle(self) -> bool:
+        """True where the last column is the neighbour of the first."""
+        right, left = self.azimuth
+        return left - right == FULL_CIRCLE
+
+    def pixel(self, xyz: NDArray[np.float32]) -> NDArray[np.int64]:
+        """The pixel that each point falls into.
+
+        On an even grid this is the published projection, except that it clamps points beyond the
+        upper and lower bound into the outermost rows, and a pixel that holds -180 degrees holds
+        180 degrees too.
+
+        Args:
+            xyz: Finite coordinates, float32 (N, 3), metres in the sensor frame.
+
+        Returns:
+            row · W + column, int64 (N,); -1 outside the grid.
+
+        Source: Milioto et al. 2019, RangeNet++, eq. 1; github.com/TiagoCortinhal/SalsaNext,
+            train/common/laserscan.py.
+        """
+        azimuth, inclination = directions(xyz)
+        row, in_height = self._row(inclination)
+        column, in_width = self._column(azimuth)
+        return np.where(in_height & in_width, row * self.columns + column, -1)
+
+    def _row(self, inclination: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Row, int64 (N,), and whether it is one of the grid's."""
+        ascending = np.array(self.edges[::-1])
+        row = self.rows - np.searchsorted(ascending, inclination, side="left")
+        inside = (inclination >= ascending[0]) & (inclination <= ascending[-1])
+        return np.minimum(row, self.rows - 1), inside
+
+    def _column(self, azimuth: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Column, int64 (N,), and whether it is one of the grid's."""
+        right, left = self.azimuth
+        from_left = (left - azimuth) % FULL_CIRCLE
+        # Multiplied before it is divided: that is exact for the usual bounds and round azimuths.
+        column = (from_left * self.columns / (left - right)).astype(np.int64)
+        return np.minimum(column, self.columns - 1), from_left <= left - right
+
+    def as_dict(self) -> dict[str, Any]:
+        """The grid as JSON-able primitives, which :func:`grid_of` reads back."""
+        return {
+            "columns": self.columns,
+            "azimuth": list(self.azimuth),
+            "edges": list(self.edges),
+        }
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any], source: str | Path) -> "SphericalGrid":
+        """Reads a grid back.
+
+        Args:
+            content: What :meth:`as_dict` gave.
+            source: The file it was found in, for messages.
+
+        Raises:
+            InputError: Something that is not a grid.
+        """
+        return grid_of(content, source)
+
+
+def grid_of(config: str | Mapping[str, Any], source: str | Path) -> SphericalGrid:
+    """The grid that a user, or a Spec, describes.
+
+    Args:
+        config: Name of a published grid; or a mapping with ``columns``, ``azimuth`` (right and
+            left bound; all around by default) and how the rows lie: ``rows`` and ``inclination``
+            (lower and upper bound), or ``beams``, or ``edges``. Degrees.
+        source: Where it was found, for messages.
+
+    Raises:
+        InputError: An unknown name, or something that does not describe a grid.
+    """
+    return grid_at(Entry(source, "", config))
+
+
+def grid_at(entry: Entry) -> SphericalGrid:
+    """The grid that stands in a document, as :func:`grid_of` takes it.
+
+    Raises:
+        InputError: An unknown name, or something that does not describe a grid.
+    """
+    if not isinstance(entry.value, str):
+        return _described(entry)
+    if entry.value not in PUBLISHED_GRIDS:
+        raise entry.fault(
+            f"there is no grid named {shown(entry.value)}",
+            f"Known are {', '.join(PUBLISHED_GRIDS)}; or describe one by columns, rows and "
+            "inclination.",
+        )
+    return _described(Entry(entry.source, entry.key, PUBLISHED_GRIDS[entry.value]))
+
+
+def _described(entry: Entry) -> SphericalGrid:
+    parts = {"azimuth": ALL_AROUND, **entry.record(_PARSERS, required=("columns",))}
+    columns, azimuth = parts.pop("columns"), parts.pop("azimuth")
+    try:
+        match sorted(parts):
+            case ["inclination", "rows"]:
+                return SphericalGrid.even(parts["rows"], columns, parts["inclination"], azimuth)
+            case ["beams"]:
+                return SphericalGrid.of_beams(parts["beams"], columns, azimuth)
+            case ["edges"]:
+                return SphericalGrid(columns, azimuth, parts["edges"])
+    except InputError as error:
+        raise entry.fault(f"a grid of {error.reason}", error.remedy) from error
+    raise entry.fault(
+        f"its rows are described by {', '.join(parts) or 'nothing'}",
+        "Give rows with inclination, or beams, or edges.",
+    )
+
+
+def _numbers(entry: Entry) -> tuple[float, ...]:
+    return tuple(item.number() for item in entry.items())
+
+
+# What reads each part of a grid's description. No image has more rows or columns than pixels.
+_PARSERS: dict[str, Callable[[Entry], Any]] = {
+    "columns": lambda entry: entry.whole(1, MOST_PIXELS),
+    "rows": lambda entry: entry.whole(1, MOST_PIXELS),
+    "azimuth": lambda entry: entry.numbers(2),
+    "inclination": lambda entry: entry.numbers(2),
+    "beams": _numbers,
+    "edges": _numbers,
+}
+
+
+def _wrong(reason: str, remedy: str) -> InputError:
+    return InputError("grid", reason, remedy)

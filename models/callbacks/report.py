@@ -1,0 +1,74 @@
+"""The report at the end of ``derain test``."""
+
+import json
+from pathlib import Path
+
+import lightning
+
+from derain.errors import printable
+from derain.evaluation.counts import SCORES
+from derain.evaluation.metrics import RainMetrics
+from derain.files.atomic import replacing
+from derain.models.base import DerainingModule
+
+
+class TestReport(lightning.Callback):
+    """Prints the scores by average, semantic class and range, and writes them as ``test.json``."""
+
+    __test__ = False  # not a test of pytest's
+
+    def on_test_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
+        """Prints the report, and writes it beside the run's log where there is one."""
+        # Counts and folder are put together by all processes, the report is the first one's.
+        text, scores = as_text(model.metrics, model.card.name), as_dict(model.metrics)
+        folder = trainer.log_dir
+        if not trainer.is_global_zero:
+            return
+        print(text)
+        if folder is not None:
+            path = Path(folder) / "test.json"
+            with replacing(path) as temporary:
+                temporary.write_text(json.dumps(scores, indent=2) + "\n")
+            print(printable(f"Written to {path}"))
+
+
+def as_dict(metrics: RainMetrics) -> dict[str, object]:
+    """Scores and counts as JSON-able primitives."""
+    return {
+        "scores": {name: float(score) for name, score in metrics.compute().items()},
+        "scans": len(metrics.per_scan()),
+        "classes": {
+            name: {"points": counts.points, "called_rain": counts.called_rain, "rain": counts.rain}
+            for name, counts in metrics.by_class().items()
+        },
+        "ranges": {
+            name: {score: getattr(counts, score) for score in SCORES}
+            for name, counts in metrics.by_range().items()
+        },
+    }
+
+
+def as_text(metrics: RainMetrics, data: str) -> str:
+    """Scores and counts as three small tables."""
+    scores = {name: float(score) for name, score in metrics.compute().items()}
+    lines = [
+        f"{data}, {len(metrics.per_scan())} scans      precision  recall      F1     IoU",
+    ]
+    width = lines[0].index("precision")
+    for average, suffix in (("pooled over points", ""), ("mean over scans", "_per_scan")):
+        lines.append(average.ljust(width) + _row([scores[score + suffix] for score in SCORES]))
+    for band, counts in metrics.by_range().items():
+        lines.append(band.ljust(width) + _row([getattr(counts, score) for score in SCORES]))
+    lines += ["", "class".ljust(width) + "   points  called rain   share"]
+    for name, of_class in metrics.by_class().items():
+        if of_class.points:
+            name += " (rain)" if of_class.rain else ""
+            lines.append(
+                f"{name:<{width}}{of_class.points:9,}{of_class.called_rain:13,}"
+                f"{of_class.share_lost:8.2%}"
+            )
+    return "\n".join(lines)
+
+
+def _row(scores: list[float]) -> str:
+    return "".join(f"{score:{width}.4f}" for score, width in zip(scores, (9, 8, 8, 8), strict=True))

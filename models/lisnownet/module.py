@@ -1,0 +1,259 @@
+"""LiSnowNet-L1: learns without a label what a range image would be without snow or rain.
+
+Rain is where the image changes: a network trained to make images sparse, and to change them as
+little as that takes, takes out what is small and bright against nothing.
+
+Source: M.-Y. Yu, R. Vasudevan, M. Johnson-Roberson, "LiSnowNet: Real-time Snow Removal for LiDAR
+Point Clouds", IROS 2022.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import torch
+from lightning.pytorch.utilities.types import OptimizerLRScheduler
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from derain.cards.card import DataCard
+from derain.errors import InputError
+from derain.learning.batch import Batch
+from derain.models.base import EXAMPLES, DerainingModule, TrainingData
+from derain.models.lisnownet.network import LiSnowNetwork
+from derain.models.lisnownet.selection_rule import SelectionRule
+from derain.models.lisnownet.sparsity import sparsity_loss
+from derain.models.range_module import FITTED, per_pixel, range_view, stated
+from derain.scan import Scan
+from derain.spec import Spec
+from derain.views.range_image import RangeView
+
+__all__ = ["DeployedLiSnowNet", "LiSnowNet", "LiSnowNetwork"]
+
+CHANNELS = ("range", "z", "intensity")
+
+# How surely a residual of twice the rule's threshold is rain: its logit.
+STEEPNESS = 4.0
+
+# Logit of what the rule decides whatever the residual is.
+CERTAIN = 20.0
+
+
+class DeployedLiSnowNet(nn.Module):
+    """The network with its selection rule: from a raw range image to logits of its pixels.
+
+    Args:
+        network: A trained network.
+        rule: What it calls rain.
+    """
+
+    def __init__(self, network: LiSnowNetwork, rule: SelectionRule) -> None:
+        super().__init__()
+        self.network = network
+        self.rule = rule
+
+    def forward(self, image: Tensor, valid: Tensor) -> Tensor:
+        """Scores every pixel; arguments and result as for :class:`LiSnowNet`."""
+        seen = cube_roots(image, self.rule)
+        return select(image, valid, seen, self.network(seen, valid), self.rule)
+
+
+def cube_roots(image: Tensor, rule: SelectionRule) -> Tensor:
+    """What the network sees: cube roots of range and of intensity, in 0..1, float (B, 2, H, W).
+
+    Args:
+        image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
+        rule: Its full scale of intensity.
+    """
+    share = (image[:, 2:] / rule.full_scale).clamp(0, 1)
+    return torch.cat([image[:, :1], share], dim=1) ** (1 / 3)
+
+
+def select(
+    image: Tensor, valid: Tensor, seen: Tensor, denoised: Tensor, rule: SelectionRule
+) -> Tensor:
+    """Logits of "not rain" and "rain" of every pixel, float (B · H · W, 2), row by row.
+
+    The published rule says yes or no. Here its answer is that of a probability of one half, which
+    the residual moves. A pixel without a return is not rain.
+
+    Args:
+        image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
+        valid: Pixels with a return, bool (B, 1, H, W).
+        seen: What the network saw, float (B, 2, H, W).
+        denoised: What it made of that, float (B, 2, H, W).
+        rule: The rule.
+    """
+    excess = change(seen, denoised) / rule.residual - 1
+    margin = (STEEPNESS * excess).clamp(-CERTAIN, CERTAIN)
+    margin = torch.where(possible(image, rule), margin, -CERTAIN)
+    margin = torch.where(image[:, :1] < rule.near, CERTAIN, margin)
+    margin = torch.where(valid, margin, -CERTAIN)
+    return per_pixel(torch.cat([-margin, margin], dim=1) / 2)
+
+
+def change(seen: Tensor, denoised: Tensor) -> Tensor:
+    """What denoising changed: of range, times that of intensity cubed, float (B, 1, H, W)."""
+    of_range, of_intensity = (denoised - seen).split(1, dim=1)
+    return of_range * of_intensity**3
+
+
+def possible(image: Tensor, rule: SelectionRule) -> Tensor:
+    """Which pixels may be rain by their height and intensity, bool (B, 1, H, W)."""
+    _, height, intensity = image.split(1, dim=1)
+    return (height > rule.ground) & (intensity < rule.intensity * rule.full_scale)
+
+
+class LiSnowNet(DerainingModule):
+    """Trains LiSnowNet-L1 on scans without reading a label; the recipe is the published one.
+
+    Args:
+        grid: The range image's grid: ``fitted`` to the training scans, the name of a published
+            one, or its bounds.
+        way_back: How points that lost their pixel to a nearer one get a score.
+        width: Channels of the features at full size, 8 as published.
+        dropout: Share of feature maps dropped in training.
+        alpha: How much sparsity counts against the residual: it weighs 1 - 2^-alpha.
+        beta: Share of the wavelet part in sparsity.
+        learning_rate: Of Adam.
+        decay: Factor by which the learning rate falls per epoch.
+        rule: Constants of the :class:`SelectionRule` that are stated, by name. Of the others,
+            ground and full scale are fitted to the training scans, and the residual, after every
+            epoch, to what the network changes in the validation scans, or in twenty of them.
+        threshold: A point is rain where its probability is greater.
+        spec: Set by derain when it saves a checkpoint; leave it out otherwise.
+
+    Raises:
+        InputError: Weights of the loss, or constants of the rule, that cannot be meant.
+    """
+
+    NAME: ClassVar[str] = "lisnownet"
+    # What denoising changed is divided by the rule's residual, some thousandths.
+    AMPLIFIES: ClassVar[float] = 100.0
+    LEARNS_FROM_LABELS: ClassVar[bool] = False
+    network: LiSnowNetwork
+
+    def __init__(
+        self,
+        grid: str | dict[str, Any] = FITTED,
+        way_back: str = "nearest range",
+        width: int = 8,
+        dropout: float = 0.5,
+        alpha: float = 5.5,
+        beta: float = 0.5,
+        learning_rate: float = 1e-3,
+        decay: float = 0.95,
+        rule: dict[str, float] = {},
+        threshold: float = 0.5,
+        spec: dict[str, Any] | None = None,
+    ) -> None:
+        super().__init__(CHANNELS)
+        if alpha < 0 or not 0 <= beta <= 1:
+            raise InputError(
+                self.NAME,
+                f"alpha {alpha:g} and beta {beta:g} weigh no loss",
+                "Give an alpha of at least 0 and a beta from 0 to 1.",
+            )
+        self.save_hyperparameters()
+        self.network = LiSnowNetwork(width=width, dropout=dropout)
+        self.selection = SelectionRule.fitted(rule, [])
+        self.adopt(spec)
+
+    @classmethod
+    def from_published(
+        cls, state_dict: Mapping[str, Tensor], card: DataCard, grid: str | None = None
+    ) -> Self:
+        """Builds the model from a published state_dict, with or without ``module.`` prefixes.
+
+        Raises:
+            InputError: A state_dict of another network, or no grid.
+        """
+        network = LiSnowNetwork.from_published(state_dict)
+        if network.channels != 2:
+            raise InputError(
+                cls.NAME,
+                f"the weights see {network.channels} channels",
+                "Give weights that see range and intensity.",
+            )
+        model = cls(grid=stated(grid, cls.NAME), width=network.width)
+        model.network = network
+        model.adopt(model.spec_for(card))
+        return model
+
+    def adopt(self, spec: Spec | dict[str, Any] | None) -> None:
+        """Takes over a Spec, its selection rule included."""
+        super().adopt(spec)
+        if self._spec is not None:
+            self.selection = SelectionRule(**self._spec.rule)
+
+    def view_parameters(self, scans: Sequence[Scan]) -> dict[str, Any]:
+        """Kind and parameters of the view that the network sees."""
+        return range_view(self.hparams["grid"], self.hparams["way_back"], scans)
+
+    def sees_through(self, view: Mapping[str, Any]) -> bool:
+        """Whether the network can take what a Spec's view gives: range images of any size."""
+        return view["kind"] == RangeView.KIND
+
+    def rule(self, scans: Sequence[Scan]) -> dict[str, float]:
+        """Constants of the selection rule, fitted to training scans where they are not stated."""
+        return SelectionRule.fitted(self.hparams["rule"], scans).as_dict()
+
+    def forward(self, image: Tensor, valid: Tensor) -> Tensor:
+        """Logits of every pixel, float (B · H · W, 2).
+
+        Args:
+            image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
+            valid: Pixels with a return, bool (B, 1, H, W).
+        """
+        return self.folded()(image, valid)
+
+    def folded(self) -> nn.Module:
+        """The network as it is deployed."""
+        return DeployedLiSnowNet(self.network, self.selection)
+
+    def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
+        """Loss with its parts, from the images alone, and logits."""
+        image, valid = batch.inputs["image"], batch.inputs["valid"]
+        seen = cube_roots(image, self.selection)
+        denoised = self.network(seen, valid)
+        loss = sparsity_loss(denoised, seen, valid, self.hparams["alpha"], self.hparams["beta"])
+        return {
+            "loss": loss.total,
+            "wavelet": loss.wavelet,
+            "fourier": loss.fourier,
+            "residual": loss.residual,
+        }, select(image, valid, seen, denoised, self.selection)
+
+    def on_validation_epoch_start(self) -> None:
+        """Fits the rule's residual, where it is not stated, to what the network changes by now.
+
+        Before anything is scored: the epoch's scores are those of the checkpoint that it leaves.
+        """
+        super().on_validation_epoch_start()
+        training = self.trainer.state.fn == "fit" and not self.trainer.sanity_checking
+        if not training or "residual" in self.hparams["rule"]:
+            return
+        data: TrainingData = self.trainer.datamodule  # type: ignore[attr-defined]
+        changes = [self._changes(scan) for scan in data.validation_scans(EXAMPLES)]
+        rule = self.selection.with_residual_of(np.concatenate(changes))
+        # Several processes go on with one rule, however each has rounded.
+        rule = replace(rule, residual=self.trainer.strategy.broadcast(rule.residual))
+        self._log_alike({"val/rule_residual": torch.tensor(rule.residual)})
+        self.adopt(replace(self.spec, rule=rule.as_dict()))
+
+    def _changes(self, scan: Scan) -> NDArray[np.float32]:
+        """What the network changes of the returns that the rule's limits leave, float32 (M,)."""
+        inputs = self.spec.make_view()(scan).inputs()
+        image, valid = (
+            torch.from_numpy(inputs[name]).to(self.device) for name in ("image", "valid")
+        )
+        seen = cube_roots(image, self.selection)
+        changes = change(seen, self.network(seen, valid))
+        return changes[valid & possible(image, self.selection)].cpu().numpy()
+
+    def configure_optimizers(self) -> OptimizerLRScheduler:
+        """Adam with a learning rate that falls after every epoch."""
+        optimizer = torch.optim.Adam(self.parameters(), lr=self.hparams["learning_rate"])
+        schedule = torch.optim.lr_scheduler.ExponentialLR(optimizer, self.hparams["decay"])
+        return {"optimizer": optimizer, "lr_scheduler": schedule}

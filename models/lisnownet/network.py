@@ -1,0 +1,206 @@
+"""The network of LiSnowNet: a U-Net whose halving and doubling are Haar transforms.
+
+Source: M.-Y. Yu, R. Vasudevan, M. Johnson-Roberson, "LiSnowNet: Real-time Snow Removal for LiDAR
+Point Clouds", IROS 2022.
+"""
+
+from collections.abc import Mapping
+from functools import partial
+from itertools import pairwise
+from typing import Self
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from derain.errors import InputError
+from derain.models.layers.batch_norm import PixelBatchNorm
+from derain.models.layers.image_size import pad_to_multiple
+from derain.models.layers.padding import pad_around
+from derain.models.lisnownet.haar import haar, inverse_haar
+from derain.models.lisnownet.hole_filling import fill_holes
+from derain.models.published import network_of, published_tensors
+
+HALVINGS = 4
+
+# What the parts of our parameters' names are called in the published state_dict.
+PUBLISHED_WORDS = {
+    "encoder.": "enc",
+    "decoder.": "dec",
+    ".path.": ".main_block.",
+    ".convolution.": ".conv.",
+    ".norm.": ".bn.",
+}
+
+
+class NormalisedConvolution(nn.Module):
+    """A convolution that keeps the image's size, then BatchNorm.
+
+    Args:
+        inputs: Channels that come in.
+        outputs: Channels that go out.
+        size: Height and width of the kernel, odd.
+    """
+
+    def __init__(self, inputs: int, outputs: int, size: int) -> None:
+        super().__init__()
+        self.margin = size // 2
+        self.convolution = nn.Conv2d(inputs, outputs, size, bias=False)
+        self.norm = PixelBatchNorm(outputs)
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Maps (B, inputs, H, W) to (B, outputs, H, W)."""
+        if self.margin:
+            features = pad_around(features, self.margin)
+        return self.norm(self.convolution(features))
+
+
+class ResidualBlock(nn.Module):
+    """Two convolutions with a shortcut past them.
+
+    Args:
+        inputs: Channels that come in.
+        outputs: Channels that go out.
+        dropout: Share of channels dropped between the convolutions in training.
+    """
+
+    def __init__(self, inputs: int, outputs: int, dropout: float) -> None:
+        super().__init__()
+        self.path = nn.Sequential(
+            NormalisedConvolution(inputs, outputs, size=3),
+            nn.ReLU(),
+            nn.Dropout2d(dropout),
+            NormalisedConvolution(outputs, outputs, size=3),
+        )
+        self.shortcut = (
+            nn.Identity() if inputs == outputs else NormalisedConvolution(inputs, outputs, size=1)
+        )
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Maps (B, inputs, H, W) to (B, outputs, H, W)."""
+        return functional.relu(self.path(features) + self.shortcut(features))
+
+
+class Haar(nn.Module):
+    """Halves the image and has four times the channels."""
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Maps (B, channels, H, W) to (B, 4 channels, H / 2, W / 2)."""
+        return haar(features)
+
+
+class InverseHaar(nn.Module):
+    """Doubles the image and has a quarter of the channels."""
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Maps (B, 4 channels, H, W) to (B, channels, 2 H, 2 W)."""
+        return inverse_haar(features)
+
+
+class LiSnowNetwork(nn.Module):
+    """The network as published, from a range image with holes to a denoised one without.
+
+    Args:
+        channels: Channels of the image.
+        width: Channels of the features at full size; each halving doubles them.
+        dropout: Share of channels dropped in each residual block in training.
+
+    Raises:
+        InputError: Channels or a width below 1.
+    """
+
+    def __init__(self, channels: int = 2, width: int = 8, dropout: float = 0.5) -> None:
+        super().__init__()
+        if channels < 1 or width < 1:
+            raise InputError(
+                "network", f"{channels} channels of width {width}", "Give numbers of at least 1."
+            )
+        self.channels, self.width = channels, width
+        block = partial(ResidualBlock, dropout=dropout)
+        widths = [width * 2**level for level in range(HALVINGS + 1)]
+        # Stage by stage from full size to the smallest, in the encoder and in the decoder alike.
+        self.encoder = nn.ModuleList(
+            [nn.Sequential(block(channels + 1, width), block(width, width))]
+        )
+        self.decoder = nn.ModuleList(
+            [nn.Sequential(block(width, width), block(width, width), nn.Conv2d(width, channels, 1))]
+        )
+        for finer, coarser in pairwise(widths):
+            self.encoder.append(
+                nn.Sequential(Haar(), block(4 * finer, coarser), block(coarser, coarser))
+            )
+        for finer, coarser in pairwise(widths[:-1]):
+            self.decoder.append(
+                nn.Sequential(block(coarser, coarser), block(coarser, 4 * finer), InverseHaar())
+            )
+        self.decoder.append(
+            nn.Sequential(NormalisedConvolution(widths[-1], 4 * widths[-2], size=1), InverseHaar())
+        )
+
+    @classmethod
+    def from_published(cls, state_dict: Mapping[str, Tensor]) -> Self:
+        """Builds the network from a published state_dict, with or without ``module.`` prefixes.
+
+        Raises:
+            InputError: A state_dict of another network.
+        """
+        keys = {name: published_key(name) for name in cls().state_dict()}
+        tensors = published_tensors(state_dict, keys, "LiSnowNet")
+        channels = tensors["decoder.0.2.bias"].numel()
+        width = tensors["decoder.0.0.path.0.norm.bias"].numel()
+        return network_of(lambda: cls(channels, width), tensors, "LiSnowNet")
+
+    def forward(self, image: Tensor, valid: Tensor) -> Tensor:
+        """Denoises range images.
+
+        Sides that are no multiples of 16 are continued with empty pixels, below and on the right,
+        which are filled like all others, and cut off in the end.
+
+        Args:
+            image: Cube roots of range in metres and of intensity in 0..1, float (B, 2, H, W). What
+                empty pixels hold does not matter.
+            valid: Which pixels hold a return, bool (B, 1, H, W).
+
+        Returns:
+            The image as it would be without snow or rain, in the same units, a value in every
+            pixel, float32 (B, 2, H, W).
+        """
+        height, width = image.shape[-2:]
+        image = pad_to_multiple(image, 2**HALVINGS, 0)
+        valid = pad_to_multiple(valid, 2**HALVINGS, False)
+        filled = fill_holes(image, valid)
+        seen = torch.cat([filled, valid.to(filled)], dim=1)
+        skips, features = [], seen
+        for stage in self.encoder:
+            features = stage(features)
+            skips.append(features)
+        features = self.decoder[HALVINGS](features)
+        for level in reversed(range(HALVINGS)):
+            features = self.decoder[level](features + skips[level])
+        if self.training:
+            features = torch.where(varies(seen), features, features.detach())
+        return (filled + features)[..., :height, :width]
+
+
+def varies(image: Tensor) -> Tensor:
+    """Which images are more than one value throughout, as far as bfloat16 can tell.
+
+    Others teach nothing: where nothing varies, each BatchNorm divides by the root of its ε alone,
+    which multiplies the gradient by 300, layer after layer, beyond all numbers.
+
+    Args:
+        image: float (B, channels, H, W).
+
+    Returns:
+        bool (B, 1, 1, 1).
+    """
+    least, greatest = image.amin(dim=(2, 3), keepdim=True), image.amax(dim=(2, 3), keepdim=True)
+    noticeable = torch.finfo(torch.bfloat16).eps * greatest.abs()
+    return (greatest - least > noticeable).any(dim=1, keepdim=True)
+
+
+def published_key(name: str) -> str:
+    """Where one of our parameters stands in the published state_dict."""
+    for ours, published in PUBLISHED_WORDS.items():
+        name = name.replace(ours, published)
+    return name

@@ -1,0 +1,247 @@
+"""``derain fit|validate|test|predict``: Lightning's command line, and what it cannot use."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from derain.cli.training.configurations import packaged_configs, with_packaged_configs
+from derain.errors import InputError
+from derain.models.checkpoint import load_model
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("written", [["--config", "{}"], ["-c", "{}"], ["--config={}"]])
+def test_a_packaged_configuration_is_found_by_name(written: list[str]) -> None:
+    packaged = packaged_configs()["outdet_wads.yaml"]
+    assert packaged.is_file()
+    arguments = ["fit", *(part.format("outdet_wads.yaml") for part in written), "--data.root", "x"]
+    expected = ["fit", *(part.format(packaged) for part in written), "--data.root", "x"]
+    assert with_packaged_configs(arguments) == expected
+
+
+def test_a_file_of_the_name_of_a_packaged_configuration_goes_first() -> None:
+    Path("outdet_wads.yaml").touch()
+    arguments = ["fit", "--config", "outdet_wads.yaml"]
+    assert with_packaged_configs(arguments) == arguments
+
+
+def test_an_unknown_configuration_is_one_line_with_the_known_ones(run_derain) -> None:
+    outcome = run_derain("fit", "--config", "outdet_mars.yaml", "--data.root", "MARS")
+    assert outcome.code == 2
+    (line,) = outcome.err.splitlines()
+    assert line.startswith("derain: outdet_mars.yaml: no such configuration. Packaged are ")
+    assert all(name in line for name in packaged_configs())
+    with pytest.raises(InputError, match="no such configuration"):
+        with_packaged_configs(["fit", "--config=outdet_mars.yaml"])
+
+
+@pytest.fixture
+def bad_checkpoints(checkpoint: Path) -> None:
+    content = torch.load(checkpoint, weights_only=True)
+    parameters = content["hyper_parameters"]
+    spec = {**parameters["spec"], "network": "resnet"}
+    torch.save({**content, "hyper_parameters": {**parameters, "spec": spec}}, "resnet.ckpt")
+    torch.save(content["state_dict"], "weights.ckpt")
+    Path("cut.ckpt").write_bytes(checkpoint.read_bytes()[:1000])
+
+
+@pytest.mark.usefixtures("bad_checkpoints")
+@pytest.mark.parametrize("command", ["fit", "test"])
+@pytest.mark.parametrize(
+    ("path", "reason"),
+    [
+        ("https://example.org/outdet.ckpt", "is an address. Download it and give the file."),
+        ("s3://bucket/outdet.ckpt", "is an address. Download it and give the file."),
+        ("none.ckpt", "no such file"),
+        ("cut.ckpt", "damaged"),
+        ("weights.ckpt", "not a checkpoint of derain"),
+        ("resnet.ckpt", "a checkpoint of 'resnet'"),
+    ],
+)
+def test_a_checkpoint_that_cannot_be_used_is_one_line(
+    run_derain, wads: list[str], command: str, path: str, reason: str
+) -> None:
+    outcome = run_derain(command, *wads, "--ckpt_path", path)
+    assert (outcome.code, outcome.out) == (2, "")
+    (line,) = outcome.err.splitlines()
+    assert line.startswith(f"derain: {path}: ")
+    assert reason in line
+    assert not Path("runs").exists()
+
+
+def test_no_training_goes_on_from_weights_alone(
+    run_derain, wads: list[str], checkpoint: Path
+) -> None:
+    outcome = run_derain("fit", *wads, "--ckpt_path", checkpoint)
+    assert (outcome.code, outcome.out) == (2, "")
+    (line,) = outcome.err.splitlines()
+    reason = "holds weights alone, no state of a training to go on from"
+    assert line.startswith(f"derain: {checkpoint}: {reason}. Go on from the last.ckpt of a run")
+    assert not Path("runs").exists()
+
+
+@pytest.mark.parametrize("command", ["validate", "test", "predict"])
+def test_a_model_without_training_is_not_measured(
+    run_derain, wads: list[str], command: str
+) -> None:
+    outcome = run_derain(command, *wads)
+    assert outcome.code == 2
+    assert "Give a checkpoint: --ckpt_path." in outcome.err.splitlines()[-1]
+
+
+SPOILS: dict[str, tuple[Callable[[Path], None], str]] = {
+    "unknown ids": (
+        lambda path: np.full(300, 77, "<u4").tofile(path),
+        "ids [77] are no classes of WADS. Name them in the data card.",
+    ),
+    "another length": (
+        lambda path: np.zeros(299, "<u4").tofile(path),
+        "holds 299 labels of 4 bytes for a scan of 300 points. Give the label file that belongs",
+    ),
+    "missing": (lambda path: path.unlink(), "Add them or leave the scan out."),
+}
+
+
+@pytest.mark.parametrize("workers", ["0", "1"])
+@pytest.mark.parametrize(("change", "reason"), SPOILS.values(), ids=SPOILS.keys())
+def test_labels_that_cannot_be_used_are_named_with_the_remedy(
+    run_derain,
+    wads: list[str],
+    checkpoint: Path,
+    tmp_path: Path,
+    change: Callable[[Path], None],
+    reason: str,
+    workers: str,
+) -> None:
+    label = tmp_path / "WADS/sequences/02/labels/0.label"
+    change(label)
+    options = ["--ckpt_path", checkpoint, "--data.loading.workers", workers]
+    outcome = run_derain("test", *wads, *options)
+    assert outcome.code == 2
+    assert "Traceback" not in outcome.err
+    line = outcome.err.splitlines()[-1]
+    assert line.startswith("derain: ")
+    assert str(label) in line
+    assert reason in line
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["outdet_wads.yaml", "--data.root", "none"], "no such folder, though the split names"),
+        (["outdet_wads36.yaml", "--data.root", "none"], "matches no scan. Check root and pattern."),
+        (["outdet_wads36.yaml", "--data.card", "mars"], "mars: no such data card. Give a YAML"),
+        (["outdet_simulated.yaml", "--data.campaign.scans", "0"], "scans: 0 is too few. Give 1"),
+    ],
+)
+def test_data_that_cannot_be_used_is_named_with_the_remedy(
+    run_derain, options: list[str], reason: str
+) -> None:
+    quiet = ["--trainer.enable_progress_bar", "false", "--data.loading.workers", "0"]
+    outcome = run_derain("fit", "--config", *options, *quiet)
+    assert outcome.code == 2
+    assert "Traceback" not in outcome.err
+    assert outcome.err.splitlines()[-1].startswith("derain: ")
+    assert reason in outcome.err.splitlines()[-1]
+
+
+def test_predictions_need_no_labels(
+    run_derain, wads: list[str], checkpoint: Path, tmp_path: Path
+) -> None:
+    for label in tmp_path.rglob("*.label"):
+        label.unlink()
+    options = ["--ckpt_path", checkpoint, "--predictions.folder", "found"]
+    assert run_derain("predict", *wads, *options).code == 0
+    assert np.fromfile("found/0.label", "<u4").shape == (300,)
+
+
+def test_intensities_of_another_unit_are_warned_of_and_scaled(
+    run_derain, wads: list[str], checkpoint: Path, tmp_path: Path
+) -> None:
+    predict = ["predict", *wads, "--ckpt_path", checkpoint, "--predictions.folder"]
+    assert not scan_warnings(run_derain(*predict, "whole"))
+    for scan in tmp_path.rglob("*.bin"):
+        points = np.fromfile(scan, np.float32).reshape(-1, 4)
+        (points / np.array([1, 1, 1, 256], np.float32)).tofile(scan)
+    (warning,) = scan_warnings(run_derain(*predict, "small"))
+    scan = tmp_path / "WADS/sequences/02/velodyne/0.bin"
+    assert warning.startswith(f"derain: warning: {scan}: mean intensity 0.")
+    assert warning.endswith("see --data.loading.intensity_scale")
+    scaled = ["--data.loading.intensity_scale", "256"]
+    assert not scan_warnings(run_derain(*predict, "scaled", *scaled))
+    whole, small, again = (
+        np.fromfile(f"{folder}/0.label", "<u4") for folder in ("whole", "small", "scaled")
+    )
+    np.testing.assert_array_equal(again, whole)
+    assert (small != whole).any()
+    quick = ["--panels.scans", "0", "--trainer.fast_dev_run", "true"]
+    for command, sequence in {"fit": "00", "validate": "01", "test": "02"}.items():
+        options = quick if command == "fit" else ["--ckpt_path", checkpoint]
+        (warning,) = scan_warnings(run_derain(command, *wads, *options))
+        assert f"sequences/{sequence}/velodyne/0.bin: mean intensity 0." in warning
+
+
+def scan_warnings(outcome: Any) -> list[str]:
+    """What was said of scans before the first batch."""
+    assert outcome.code == 0, outcome.err
+    return [line for line in outcome.err.splitlines() if line.startswith("derain: warning: ")]
+
+
+def test_predictions_that_cannot_be_written_are_reported(
+    run_derain, wads: list[str], checkpoint: Path
+) -> None:
+    Path("file").touch()
+    options = ["--ckpt_path", checkpoint, "--predictions.folder", "file/below"]
+    outcome = run_derain("predict", *wads, *options)
+    assert outcome.code == 2
+    assert "file/below/0.label: cannot be written" in outcome.err.splitlines()[-1]
+
+
+def test_nothing_but_derain_reports_on_a_run(
+    run_derain, wads: list[str], checkpoint: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level("INFO", "lightning.pytorch.utilities.rank_zero"):
+        trained = run_derain("fit", *wads, "--trainer.max_epochs", "1", "--panels.scans", "0")
+        tested = run_derain("test", *wads, "--ckpt_path", checkpoint)
+    assert (trained.code, tested.code) == (0, 0)
+    said = trained.out + trained.err + tested.out + tested.err
+    assert "Trainable params" not in said
+    assert "DataLoader 0" not in said
+    assert tested.out.count("pooled over points") == 1
+    assert "max_epochs=1" in caplog.text  # its news do come through
+    assert "Tip" not in caplog.text
+
+
+def test_training_goes_on_from_a_checkpoint(run_derain, wads: list[str]) -> None:
+    last = Path("runs/outdet_wads/version_0/checkpoints/last.ckpt")
+    short = ["--panels.scans", "0", "--trainer.max_epochs"]
+    assert run_derain("fit", *wads, *short, "1").code == 0
+    assert run_derain("fit", *wads, *short, "2", "--ckpt_path", last).code == 0
+    first = torch.load(last, weights_only=True)
+    second = torch.load(str(last).replace("version_0", "version_1"), weights_only=True)
+    assert (first["epoch"], second["epoch"]) == (0, 1)
+    assert second["global_step"] == 2 * first["global_step"] == 2
+    assert load_model(last).spec.data == "WADS"
+
+
+def test_a_run_that_goes_on_keeps_what_was_best_before(run_derain, wads: list[str]) -> None:
+    first, second = (Path(f"runs/outdet_wads/version_{n}/checkpoints") for n in (0, 1))
+    # The earlier the better, as where a training goes wrong.
+    earliest = ["--checkpoint.monitor", "epoch", "--checkpoint.mode", "min", "--panels.scans", "0"]
+    fit = ["fit", *wads, *earliest, "--trainer.max_epochs"]
+    assert run_derain(*fit, "1").code == 0
+    outcome = run_derain(*fit, "2", "--ckpt_path", first / "last.ckpt")
+    assert outcome.code == 0
+    assert "derain: warning" not in outcome.err
+    assert torch.load(second / "last.ckpt", weights_only=True)["epoch"] == 1
+    assert (second / "best.ckpt").read_bytes() == (first / "best.ckpt").read_bytes()
+    assert run_derain("test", *wads, "--ckpt_path", first / "last.ckpt").code == 0
+    assert not Path("runs/outdet_wads/version_2/checkpoints").exists()  # nothing was trained

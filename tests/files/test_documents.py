@@ -1,0 +1,148 @@
+"""Small documents are read within bounds, and say what is wrong with them."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from derain.errors import LONGEST_REASON, InputError
+from derain.files.documents import LARGEST_DOCUMENT, Entry, shown
+
+ALIASES = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n"
+    for before, name in zip("abcdefgh", "bcdefghi", strict=True)
+)
+
+BAD_YAML = {
+    "aliases": ALIASES,
+    "deep": "[" * 10_000,
+    "deep_mapping": "{a: " * 500 + "1" + "}" * 500,
+    "tag": "!!python/object/apply:os.system [true]",
+    "empty_int": "!!int ''",
+    "date": "2001-13-45",
+    "timestamp": "!!timestamp nothing",
+    "sixties": ":".join(["1"] * 200) + ".0",
+    "digits": "9" * 5000,
+    "control": "a: \x07",
+}
+
+
+@pytest.mark.parametrize("name", BAD_YAML)
+def test_bad_yaml_is_one_short_line(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "document.yaml"
+    path.write_text(BAD_YAML[name])
+    with pytest.raises(InputError) as caught:
+        Entry.of_yaml(path)
+    assert str(path) in str(caught.value)
+    assert len(str(caught.value)) < LONGEST_REASON + 500
+    assert str(caught.value).isprintable()
+
+
+def test_a_document_that_is_too_large_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "document.yaml"
+    path.write_text("a: 1\n" + "#" * LARGEST_DOCUMENT)
+    with pytest.raises(InputError, match="more than 1,048,576 bytes"):
+        Entry.of_yaml(path)
+    with pytest.raises(InputError, match="1,048,578 characters"):
+        Entry.of_json('"' + "a" * LARGEST_DOCUMENT + '"', "metadata")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[" * 100_000, "[" * 40 + "]" * 40, "9" * 5000])
+def test_bad_json_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="metadata: not JSON"):
+        Entry.of_json(text, "metadata")
+
+
+@pytest.mark.parametrize(
+    "value", [10**400, -(10**400), float("nan"), float("inf"), True, "1", None, [1], {"a": 1}]
+)
+def test_a_number_is_finite_and_no_truth_value(value: object) -> None:
+    with pytest.raises(InputError, match=r"file: a\.b: "):
+        Entry("file", "a.b", value).number()
+
+
+def test_many_small_values_in_a_document_are_too_many(tmp_path: Path) -> None:
+    path = tmp_path / "document"
+    path.write_text("[" + "[]," * 100_000 + "0]")  # 300 kB, and 10 MB in memory
+    for read in (Entry.of_yaml, Entry.of_json_file):
+        with pytest.raises(InputError, match="more than 65,536 values"):
+            read(path)
+    assert len(Entry.of_json_file(path, 100 * LARGEST_DOCUMENT).items()) == 100_001
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("4e-6", 4e-6),
+        ("-1E3", -1e3),
+        ("+.5e+2", 50.0),
+        ("2.5e1", 25.0),
+        ("1.5", 1.5),
+        ("12", 12),
+        ("'4e-6'", "4e-6"),
+        ("4e-6 m", "4e-6 m"),
+        ("e5", "e5"),
+        ("0e1f", "0e1f"),
+    ],
+)
+def test_a_number_with_an_exponent_is_one_with_and_without_a_point(
+    text: str, value: object, tmp_path: Path
+) -> None:
+    path = tmp_path / "document.yaml"
+    path.write_text(f"a: {text}")
+    read = Entry.of_yaml(path).value["a"]
+    assert (type(read), read) == (type(value), value)
+
+
+def test_a_mapping_may_have_numbers_for_keys() -> None:
+    entry = Entry("file", "classes", {0: "ground", 3: "rain"})
+    assert {id_: name.text() for id_, name in entry.numbered(0, 9).items()} == entry.value
+    for wrong in ([], {"0": "a"}, {10: "a"}, {True: "a"}, {1.0: "a"}, {None: "a"}, {16**5000: "a"}):
+        with pytest.raises(InputError, match="file: classes: "):
+            Entry("file", "classes", wrong).numbered(0, 9)
+
+
+@pytest.mark.parametrize("value", ["text", 5, -2.5, True, False])
+def test_a_scalar_is_text_a_finite_number_or_a_truth_value(value: object) -> None:
+    read = Entry("file", "a", value).scalar()
+    assert (type(read), read) == (type(value), value)
+
+
+@pytest.mark.parametrize("value", [None, [], {}, float("inf"), 10**400, "null\0"])
+def test_anything_else_is_no_scalar(value: object) -> None:
+    with pytest.raises(InputError, match="file: a: "):
+        Entry("file", "a", value).scalar()
+
+
+def test_values_are_cut_in_messages() -> None:
+    nested: object = "x"
+    for _ in range(8):
+        nested = [nested] * 9  # as aliases stand for one another: 43 million, were it written out
+    assert len(shown(nested)) < 400
+    assert len(shown({str(n): "y" * 10_000 for n in range(100)})) < 400
+    assert shown(16**10_000) == "a number of very many digits"
+
+
+def test_a_document_comes_back(tmp_path: Path) -> None:
+    content = {"a": [1, 2.5, "text", None, True], "b": {"c": {"d": []}}}
+    path = tmp_path / "document.json"
+    path.write_text(json.dumps(content))
+    assert Entry.of_json_file(path).value == content
+    assert Entry.of_yaml(path).value == content
+    assert Entry.of_json(json.dumps(content), "text").value == content
+
+
+def test_kinds_of_values_are_told_apart() -> None:
+    entry = Entry("file", "", {"flag": True, "name": "x", "share": 0.5, "count": 3})
+    parts = entry.members()
+    assert parts["flag"].truth() is True
+    assert parts["name"].text() == "x"
+    assert parts["share"].within(0, 1) == 0.5
+    assert parts["count"].whole(1, 3) == 3
+    for part, read in (("name", Entry.truth), ("flag", Entry.text), ("share", Entry.items)):
+        with pytest.raises(InputError, match=part):
+            read(parts[part])
+    with pytest.raises(InputError, match="within"):
+        parts["count"].within(0, 1)
+    with pytest.raises(InputError, match="whole number"):
+        parts["flag"].whole(0, 1)

@@ -1,0 +1,132 @@
+"""Batches of scans: packed together, taken apart again."""
+
+import pickle
+
+import numpy as np
+import pytest
+import torch
+
+from derain.cards.card import DataCard
+from derain.evaluation.hard_cases import scene
+from derain.learning.batch import Batch, Sample
+from derain.scan import Scan
+from derain.views.neighbours import Neighbourhoods, NeighbourView
+from derain.views.range_image import RangeView
+from derain.views.spherical_grid import SphericalGrid
+from derain.views.view import IGNORED, View
+
+SIZES = (12, 0, 1, 30)
+
+
+def sample(points: int, labelled: bool = True) -> Sample:
+    rng = np.random.default_rng(points)
+    scan = Scan.of(rng.normal(size=(points, 4)))
+    view = NeighbourView(5)(scan)
+    target = torch.from_numpy(view.target(rng.random(points) < 0.5))
+    return Sample(scan, view, target if labelled else None)
+
+
+SAMPLES = [sample(points) for points in SIZES]
+
+
+def test_a_batch_is_its_scans_one_after_the_other() -> None:
+    batch = Batch.of(SAMPLES)
+    assert list(batch.inputs) == ["points", "distances", "neighbours"]
+    inputs = [batch.split(tensor) for tensor in batch.inputs.values()]
+    assert batch.target is not None
+    for own, points, distances, neighbours, target in zip(
+        SAMPLES, *inputs, batch.split(batch.target), strict=True
+    ):
+        np.testing.assert_array_equal(points, own.view.points)
+        np.testing.assert_array_equal(distances, own.view.distances)
+        assert torch.equal(target, own.target)
+        # Wherever they lie in the batch, neighbours are at the coordinates they were at alone.
+        np.testing.assert_array_equal(
+            batch.inputs["points"][neighbours], own.view.points[own.view.neighbours]
+        )
+
+
+def test_scores_are_split_by_the_points_of_each_scan() -> None:
+    scores = torch.rand(sum(SIZES), 2)
+    parts = Batch.of(SAMPLES).split(scores)
+    assert [len(part) for part in parts] == list(SIZES)
+    assert torch.equal(torch.cat(parts), scores)
+
+
+def test_a_batch_of_an_empty_scan_is_an_empty_batch() -> None:
+    batch = Batch.of([sample(0)])
+    assert {len(tensor) for tensor in batch.inputs.values()} == {0}
+    assert [len(part) for part in batch.split(torch.zeros(0, 2))] == [0]
+
+
+@pytest.mark.parametrize("unlabelled", [1, 2])
+def test_a_batch_has_targets_only_if_every_scan_has(unlabelled: int) -> None:
+    samples = [sample(9, labelled=False)] * unlabelled + [sample(5)] * (2 - unlabelled)
+    assert Batch.of(samples).target is None
+
+
+@pytest.mark.parametrize(
+    "view",
+    [NeighbourView(5), RangeView(SphericalGrid.even(8, 30, (-30, 30)))],
+    ids=["neighbours", "range"],
+)
+def test_cells_of_unknown_points_are_not_to_be_judged(view: View) -> None:
+    card = DataCard("ours", {0: "ground", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))
+    rng = np.random.default_rng(0)
+    scan = Scan.of(scene(200)).with_label(rng.choice([0, 3, 9], 200))
+    viewed = view(scan)
+    target = Sample.of(scan, viewed, card).target
+    assert target is not None
+    # Rows as cells see them: the first of those at one position, the nearest in a pixel.
+    row = viewed.first if isinstance(viewed, Neighbourhoods) else viewed.winner
+    expected = np.array([0, 0, 0, 1, 0, 0, 0, 0, 0, IGNORED])[scan.label[row]]
+    np.testing.assert_array_equal(target, np.where(row >= 0, expected, IGNORED))
+    assert set(expected.tolist()) == {0, 1, IGNORED}
+
+
+@pytest.mark.parametrize(
+    "view",
+    [NeighbourView(5), RangeView(SphericalGrid.even(8, 30, (-30, 30)))],
+    ids=["neighbours", "range"],
+)
+def test_a_batch_that_is_measured_carries_the_scans_and_one_that_is_not_tensors_alone(
+    view: View,
+) -> None:
+    scans = [Scan.of(scene(size, seed=size)) for size in (200, 0, 90)]
+    seen = [view(scan) for scan in scans]
+
+    def batch(measured: bool) -> Batch:
+        pairs = zip(scans, seen, strict=True)
+        return Batch.of([Sample(scan, viewed, None, measured) for scan, viewed in pairs])
+
+    told, untold = batch(measured=True), batch(measured=False)
+    sent: Batch = pickle.loads(pickle.dumps(told))
+    scores = sent.split(torch.rand(sum(told.cells)))
+    for scan, viewed, score, measured in zip(scans, seen, scores, sent.measured, strict=True):
+        np.testing.assert_array_equal(measured.scan.xyz, scan.xyz)
+        np.testing.assert_array_equal(
+            measured.way_to_rows(score.numpy()), viewed.back(score.numpy())
+        )
+    assert not untold.measured
+    assert untold.cells == told.cells
+    tensors = sum(tensor.nbytes for tensor in untold.inputs.values())
+    assert len(pickle.dumps(untold)) < tensors + 2000  # names, shapes and types
+    # Of a point its coordinates, intensity, range and the way back, of a pixel what it shows.
+    most = sum(44 * len(scan) + 4 * viewed.size for scan, viewed in zip(scans, seen, strict=True))
+    assert len(pickle.dumps(told)) < tensors + most + 5000
+
+
+def test_a_scan_without_labels_has_no_target() -> None:
+    scan = Scan.of(scene(20))
+    card = DataCard("ours", {3: "rain"}, rain=(3,))
+    assert Sample.of(scan, NeighbourView(5)(scan), card).target is None
+
+
+def test_tensors_follow_to_another_device_and_scans_stay() -> None:
+    batch = Batch.of(SAMPLES)
+    moved = batch.to(torch.device("meta"))
+    assert moved.target is not None
+    assert {tensor.device.type for tensor in [*moved.inputs.values(), moved.target]} == {"meta"}
+    assert moved.cells == batch.cells
+    assert moved.measured is batch.measured
+    assert Batch.of([sample(3, labelled=False)]).to(torch.device("meta")).target is None

@@ -1,0 +1,164 @@
+"""A run that goes on in another folder keeps what was best as one that never stopped."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import lightning
+import pytest
+import torch
+from lightning.pytorch.callbacks import ModelCheckpoint
+from torch import Tensor
+
+from derain.models.callbacks.best_checkpoint import BestCheckpoint
+
+MakeTrainer = Callable[..., lightning.Trainer]
+Fit = Callable[..., ModelCheckpoint]
+
+
+class Counter(lightning.LightningModule):
+    """Its weight is the number of epochs it was trained, and its scores are given."""
+
+    def __init__(self, scores: tuple[float, ...]) -> None:
+        super().__init__()
+        self.scores = scores
+        self.weight = torch.nn.Parameter(torch.zeros(1))
+
+    def training_step(self, batch: Tensor) -> Tensor:
+        return -(self.weight * batch).sum()
+
+    def on_train_epoch_end(self) -> None:
+        self.log("score", self.scores[self.current_epoch])
+
+    def configure_optimizers(self) -> torch.optim.Optimizer:
+        return torch.optim.SGD(self.parameters(), lr=1)
+
+
+@pytest.fixture
+def fit(make_trainer: MakeTrainer, tmp_path: Path) -> Fit:
+    """Trains up to an epoch in a folder, from the last checkpoint of another one if it is named."""
+
+    def run(
+        folder: str,
+        epochs: int,
+        scores: tuple[float, ...],
+        earlier: str = "",
+        kind: type[ModelCheckpoint] = BestCheckpoint,
+        **options: Any,
+    ) -> ModelCheckpoint:
+        best = kind(tmp_path / folder, monitor="score", **{"filename": "best", **options})
+        last = ModelCheckpoint(tmp_path / folder, filename="last")
+        trainer = make_trainer(
+            epochs, callbacks=[best, last], enable_checkpointing=True, log_every_n_steps=1
+        )
+        data = torch.utils.data.DataLoader(torch.ones(1))
+        path = tmp_path / earlier / "last.ckpt" if earlier else None
+        trainer.fit(Counter(scores), data, ckpt_path=path)
+        return best
+
+    return run
+
+
+def weights(folder: Path) -> dict[str, float]:
+    """Of every checkpoint in a folder but the last."""
+    return {
+        path.name: torch.load(path, weights_only=True)["state_dict"]["weight"].item()
+        for path in folder.glob("*.ckpt")
+        if path.name != "last.ckpt"
+    }
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.ckpt")}
+
+
+@pytest.mark.parametrize(
+    ("mode", "top", "writer"),
+    [
+        ("max", 1, BestCheckpoint),
+        ("max", 1, ModelCheckpoint),  # what derain wrote its checkpoints with at first
+        ("max", 2, BestCheckpoint),
+        ("min", 2, BestCheckpoint),
+        ("min", -1, BestCheckpoint),
+    ],
+)
+@pytest.mark.parametrize("scores", [(3.0, 1.0, 2.0), (2.0, 3.0, 1.0)])
+def test_the_best_epochs_are_those_of_an_unbroken_run(
+    fit: Fit,
+    tmp_path: Path,
+    scores: tuple[float, ...],
+    mode: str,
+    top: int,
+    writer: type[ModelCheckpoint],
+) -> None:
+    options = {"mode": mode, "save_top_k": top, "filename": "{epoch}"}
+    unbroken = fit("unbroken", 3, scores, **options)
+    fit("first", 1, scores, kind=writer, **options)
+    before = contents(tmp_path / "first")
+    resumed = fit("second", 3, scores, earlier="first", **options)
+    assert weights(tmp_path / "second") == weights(tmp_path / "unbroken")
+    assert contents(tmp_path / "first") == before
+    assert resumed.best_model_score == unbroken.best_model_score
+    assert resumed.kth_value == unbroken.kth_value
+    for one, other in (
+        (resumed.best_model_path, unbroken.best_model_path),
+        (resumed.kth_best_model_path, unbroken.kth_best_model_path),
+    ):
+        assert one == other.replace("unbroken", "second")
+
+
+def test_nothing_of_the_earlier_run_is_removed_from_a_folder_within(
+    fit: Fit, tmp_path: Path
+) -> None:
+    scores = (1.0, 2.0, 3.0)
+    options = {"mode": "max", "filename": "{epoch}"}
+    fit("runs/first", 1, scores, **options)
+    before = contents(tmp_path / "runs/first")
+    fit("runs", 3, scores, earlier="runs/first", **options)
+    assert contents(tmp_path / "runs/first") == before
+    assert weights(tmp_path / "runs") == {"epoch=2.ckpt": 3}
+
+
+def test_a_run_that_was_moved_goes_on_with_its_best(fit: Fit, tmp_path: Path) -> None:
+    scores = (3.0, 1.0, 2.0)
+    fit("first", 1, scores, mode="max")
+    (tmp_path / "first").rename(tmp_path / "moved")
+    fit("second", 3, scores, earlier="moved", mode="max")
+    assert weights(tmp_path / "second") == {"best.ckpt": 1}
+
+
+def test_a_run_whose_best_is_gone_starts_anew_and_says_so(
+    fit: Fit, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scores = (3.0, 2.0, 1.0)
+    gone = Path(fit("first", 1, scores, mode="max").best_model_path)
+    gone.unlink()
+    resumed = fit("second", 3, scores, earlier="first", mode="max")
+    assert weights(tmp_path / "second") == {"best.ckpt": 2}
+    assert resumed.best_model_score == 2
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("derain: ")]
+    assert len(said) == 1
+    assert said[0].startswith(f"derain: warning: {gone}: not found; the best checkpoint is chosen")
+
+
+def test_a_run_that_keeps_fewer_goes_on_with_the_best_of_them(fit: Fit, tmp_path: Path) -> None:
+    scores = (2.0, 3.0, 1.0)
+    fit("first", 2, scores, mode="max", save_top_k=2, filename="{epoch}")
+    fit("second", 3, scores, earlier="first", mode="max", filename="{epoch}")
+    assert weights(tmp_path / "second") == {"epoch=1.ckpt": 2}
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_only_the_first_process_copies(fit: Fit, tmp_path: Path, first: bool) -> None:
+    state = fit("first", 1, (3.0,), mode="max").state_dict()
+    best = BestCheckpoint(tmp_path / "second", filename="best", monitor="score", mode="max")
+    best.load_state_dict(state)
+    told = SimpleNamespace(broadcast=lambda _: True)
+    trainer = SimpleNamespace(
+        is_global_zero=first, ckpt_path=None, fast_dev_run=False, strategy=told
+    )
+    best.on_train_start(trainer, None)
+    assert (tmp_path / "second/best.ckpt").exists() == first
+    assert (best.best_model_score, best.kth_value) == (3, 3)
+    assert best.best_model_path == str(tmp_path / "second/best.ckpt")

@@ -1,0 +1,111 @@
+"""Predictions are written as they come, and nothing of them is kept."""
+
+import weakref
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import lightning
+import numpy as np
+import pytest
+
+from derain.datamodules.folder import Folder
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.models.callbacks.prediction import PredictionWriter
+from derain.models.outdet import OutDet
+
+MakeTrainer = Callable[..., lightning.Trainer]
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Folder:
+    for name in ("a/0.bin", "a/1.bin", "a/2.bin", "b/0.bin"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        scene(50, seed=sum(name.encode())).tofile(tmp_path / name)
+    return Folder(str(tmp_path), "wads", test=["*/*.bin"])
+
+
+class Alive(lightning.Callback):
+    """Counts at every batch the probabilities of earlier ones that are still in memory."""
+
+    def __init__(self) -> None:
+        self.seen: list[weakref.ref[Any]] = []
+        self.counts: list[int] = []
+
+    def on_predict_batch_end(self, trainer: Any, model: Any, outputs: Any, *_: Any) -> None:
+        self.counts.append(sum(one() is not None for one in self.seen))
+        self.seen += map(weakref.ref, outputs)
+
+
+def test_what_is_written_is_not_kept(
+    make_trainer: MakeTrainer,
+    data: Folder,
+    outdet: Callable[..., OutDet],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    model, alive, out = outdet(), Alive(), tmp_path / "labels"
+    returned = make_trainer(1, callbacks=[alive, PredictionWriter(str(out))]).predict(model, data)
+    assert returned is None
+    assert len(alive.counts) == 4
+    assert max(alive.counts) <= 1  # that of the batch before may wait for this one's
+    assert f"Wrote 4 label files to {out}\n" in capsys.readouterr().out
+    kept = make_trainer(1).predict(model, data)  # who writes nothing is given what was found
+    for file, (probability,) in zip(data.files("predict"), kept, strict=True):
+        label = out / file.scan.relative_to(data.root).with_suffix(".label")
+        expected = probability > model.spec.threshold
+        np.testing.assert_array_equal(np.fromfile(label, "<u4"), expected)
+
+
+@pytest.mark.parametrize("place", ["beside", "in the folder of labels"])
+def test_labels_are_not_overwritten_by_what_is_found(
+    make_trainer: MakeTrainer,
+    data: Folder,
+    outdet: Callable[..., OutDet],
+    tmp_path: Path,
+    place: str,
+) -> None:
+    label, out = {
+        "beside": (tmp_path / "a/2.label", tmp_path),
+        "in the folder of labels": (tmp_path / "labels/2.label", tmp_path / "a/../labels"),
+    }[place]
+    if place == "in the folder of labels":
+        data.patterns["predict"] = ["a/*.bin"]
+    label.parent.mkdir(exist_ok=True)
+    label.write_bytes(b"truth")
+    files = sorted(tmp_path.rglob("*"))
+    with pytest.raises(InputError, match=r"overwrite the labels .* another folder\.") as refused:
+        make_trainer(1, callbacks=[PredictionWriter(str(out))]).predict(outdet(), data)
+    assert refused.value.subject == out
+    assert label.name in refused.value.reason
+    assert sorted(tmp_path.rglob("*")) == files  # nor is there anything of the scans before it
+    assert label.read_bytes() == b"truth"
+
+
+def test_scans_whose_labels_would_have_one_name_are_refused(
+    make_trainer: MakeTrainer, data: Folder, outdet: Callable[..., OutDet], tmp_path: Path
+) -> None:
+    scene(50).tofile(tmp_path / "a/1.BIN")
+    data.patterns["predict"] = ["a/*.bin", "a/1.*"]  # which finds a/1.bin twice
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match="would both be") as refused:
+        make_trainer(1, callbacks=[PredictionWriter(str(out))]).predict(outdet(), data)
+    assert f"{tmp_path / 'a/1.bin'} and for {tmp_path / 'a/1.BIN'}" in refused.value.reason
+    assert not out.exists()
+
+
+def test_without_labels_predictions_may_lie_beside_the_scans(
+    make_trainer: MakeTrainer,
+    data: Folder,
+    outdet: Callable[..., OutDet],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    data.patterns["predict"] = ["*/*.bin", "a/0.bin"]  # a scan that is found twice is one scan
+    out = tmp_path / "\N{RIGHT-TO-LEFT OVERRIDE}" / ".."
+    out.parent.mkdir()
+    make_trainer(1, callbacks=[PredictionWriter(str(out))]).predict(outdet(), data)
+    labels = {label.relative_to(tmp_path).as_posix() for label in tmp_path.rglob("*.label")}
+    assert labels == {"a/0.label", "a/1.label", "a/2.label", "b/0.label"}
+    assert f"to {tmp_path}/\\u202e/..\n" in capsys.readouterr().out

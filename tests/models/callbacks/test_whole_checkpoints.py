@@ -1,0 +1,68 @@
+"""Checkpoints of training runs are written whole or not at all."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import lightning
+import pytest
+import torch
+from lightning.pytorch.plugins.io import TorchCheckpointIO
+
+from derain.models.callbacks.whole_checkpoints import WholeCheckpoints, save_whole
+from derain.models.checkpoint import load_model, save_model
+from derain.models.outdet import OutDet
+
+
+def test_nothing_is_written_outside_the_folder(
+    outdet: Callable[..., OutDet], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    save_model(outdet(), tmp_path / "runs" / "model.ckpt")
+    assert list((tmp_path / "runs").iterdir()) == [tmp_path / "runs" / "model.ckpt"]
+    load_model(tmp_path / "runs" / "model.ckpt")
+
+
+def test_the_checkpoint_that_is_there_stays_until_the_next_is_whole(
+    outdet: Callable[..., OutDet], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "model.ckpt"
+    save_model(outdet(seed=0), path)
+    before = path.read_bytes()
+
+    def cut_short(file: Path, content: memoryview) -> int:
+        with file.open("wb") as stream:
+            stream.write(content[:1000])
+        assert path.read_bytes() == before
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "write_bytes", cut_short)
+    with pytest.raises(KeyboardInterrupt):
+        save_model(outdet(seed=1), path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_address_is_left_to_lightning() -> None:
+    checkpoints = WholeCheckpoints()
+    checkpoints.save_checkpoint({"epoch": 3}, "memory://runs/model.ckpt")
+    assert checkpoints.load_checkpoint("memory://runs/model.ckpt") == {"epoch": 3}
+
+
+class Own(TorchCheckpointIO):
+    """A way of writing checkpoints that somebody has chosen."""
+
+
+@pytest.mark.parametrize(("plugins", "expected"), [([], WholeCheckpoints), ([Own()], Own)])
+def test_only_lightnings_own_way_of_writing_is_replaced(
+    plugins: list[TorchCheckpointIO], expected: type
+) -> None:
+    trainer = lightning.Trainer(accelerator="cpu", logger=False, plugins=plugins)
+    assert type(save_whole(trainer).strategy.checkpoint_io) is expected
+
+
+def test_a_checkpoint_holds_what_lightning_would_write(tmp_path: Path) -> None:
+    content = {"state_dict": {"weight": torch.arange(3.0)}, "epoch": 2}
+    for writer, name in ((WholeCheckpoints(), "ours"), (TorchCheckpointIO(), "lightning")):
+        writer.save_checkpoint(content, tmp_path / name)
+    assert (tmp_path / "ours").read_bytes() == (tmp_path / "lightning").read_bytes()

@@ -1,0 +1,444 @@
+"""LiSnowNet as it is trained: its rule for rain, its losses, and that it reads no label."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import lightning
+import numpy as np
+import pytest
+import torch
+from lightning.pytorch.callbacks import ModelCheckpoint
+from numpy.typing import NDArray
+from torch import Tensor
+
+from derain.cards.card import load_card
+from derain.datamodules import base
+from derain.datamodules.base import Loading
+from derain.datamodules.folder import Folder
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.files.labels import write_labels
+from derain.learning.batch import Batch, Sample
+from derain.models.checkpoint import load_model, save_model
+from derain.models.lisnownet import LiSnowNet
+from derain.models.lisnownet.module import cube_roots, select
+from derain.models.lisnownet.network import LiSnowNetwork, published_key
+from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule
+from derain.models.lisnownet.sparsity import sparsity_loss
+from derain.models.measured import MERIT
+from derain.scan import Scan
+from derain.views.probability import probability_of_rain
+from derain.views.spherical_grid import grid_of
+
+MakeModel = Callable[..., LiSnowNet]
+MakeSample = Callable[..., Sample]
+MakeTrainer = Callable[..., lightning.Trainer]
+WADS = load_card("wads")
+PUBLISHED = SelectionRule(residual=0.008, ground=-1.8, intensity=2 / 255, near=2.5)
+
+# Calls so much of a scene rain that its IoU says something.
+LENIENT = {"residual": 1e-6, "ground": -10.0, "intensity": 1.0}
+
+
+def published(network: LiSnowNetwork) -> dict[str, Tensor]:
+    """The network's tensors under the published keys."""
+    return {published_key(name): tensor for name, tensor in network.state_dict().items()}
+
+
+def test_the_spec_says_how_the_network_is_used() -> None:
+    model = LiSnowNet(grid="wads", rule={"residual": 0.008, "near": 2.5}, threshold=0.25)
+    spec = model.spec_for(WADS)
+    assert (spec.network, spec.threshold) == ("lisnownet", 0.25)
+    assert spec.channels == ("range", "z", "intensity")
+    assert spec.units == ("m", "m", "0..255")
+    assert spec.mean_intensity == WADS.mean[3]
+    assert spec.view["grid"] == grid_of("wads", "").as_dict()
+    assert SelectionRule(**spec.rule) == PUBLISHED
+    assert (spec.data, spec.licence, spec.rain) == ("WADS", WADS.licence, (110,))
+
+
+def test_the_rule_is_fitted_to_the_scans_where_it_is_not_stated() -> None:
+    scans = [Scan.of(scene(3000, seed)) for seed in range(3)]
+    model = LiSnowNet(grid="wads", rule={"ground": -0.5})
+    model.adopt(model.spec_for(WADS, scans))
+    assert model.selection == SelectionRule.fitted({"ground": -0.5}, scans)
+    assert (model.selection.ground, model.selection.full_scale) == (-0.5, 255.0)
+    assert LiSnowNet(grid="wads").rule(scans)["ground"] == pytest.approx(-1.4, abs=0.1)
+
+
+def test_a_constant_that_the_rule_does_not_have_is_refused() -> None:
+    with pytest.raises(InputError, match=r"rule: \['height'\] are no constants of it"):
+        LiSnowNet(rule={"height": -1.8})
+
+
+def test_the_rule_travels_in_the_checkpoint(image_network: MakeModel, tmp_path: Path) -> None:
+    model = image_network(LiSnowNet, rule={"residual": 0.5, "near": 3.0})
+    save_model(model, tmp_path / "model.ckpt")
+    copy = load_model(tmp_path / "model.ckpt")
+    assert isinstance(copy, LiSnowNet)
+    assert copy.spec == model.spec
+    assert copy.selection == model.selection
+    assert (copy.selection.residual, copy.selection.near) == (0.5, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("distance", "intensity", "full_scale", "seen"),
+    [
+        (8.0, 0.125 * 255, 255.0, (2.0, 0.5)),
+        (1000.0, 255.0, 255.0, (10.0, 1.0)),
+        (1e-6, 300.0, 255.0, (0.01, 1.0)),
+        (0.0, -5.0, 255.0, (0.0, 0.0)),
+        (27.0, 0.125, 1.0, (3.0, 0.5)),
+        (27.0, 65_535.0, 65_535.0, (3.0, 1.0)),
+    ],
+)
+def test_the_network_sees_cube_roots(
+    distance: float, intensity: float, full_scale: float, seen: tuple[float, float]
+) -> None:
+    image = torch.tensor([distance, -1.0, intensity])[None, :, None, None]
+    roots = cube_roots(image, SelectionRule(full_scale=full_scale))
+    np.testing.assert_allclose(roots.flatten(), seen, rtol=1e-6)
+
+
+def says_snow(
+    image: NDArray[np.float64], change: NDArray[np.float64], rule: SelectionRule
+) -> NDArray[np.bool_]:
+    """The published rule, word for word (Source: M.-Y. Yu et al., IROS 2022)."""
+    distance, height, intensity = image
+    of_range, of_intensity = change
+    snow = of_range * of_intensity**3 > rule.residual
+    snow &= height > rule.ground
+    snow &= intensity < rule.intensity * rule.full_scale
+    return snow | (distance < rule.near)
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [PUBLISHED, SelectionRule(), SelectionRule(0.012, -0.5, 0.3, 1.0, 1.0)],
+    ids=["published", "default", "share"],
+)
+def test_a_probability_above_one_half_is_what_the_published_rule_says(rule: SelectionRule) -> None:
+    rng = np.random.default_rng(0)
+    size = (40, 50)
+    intensity = rng.choice([0.0, 1.0, 2.0, 3.0, 200.0], size) / 255 * rule.full_scale
+    image = np.stack([rng.gamma(2, 4, size), rng.normal(-1.5, 1, size), intensity])
+    image = image.astype(np.float32)
+    seen = cube_roots(torch.from_numpy(image)[None], rule)
+    denoised = seen + torch.from_numpy(rng.normal(0.2, 0.5, (1, 2, *size)).astype(np.float32))
+    returned = torch.from_numpy(rng.random((1, 1, *size)) < 0.9)
+    logits = select(torch.from_numpy(image)[None], returned, seen, denoised, rule)
+    probability = probability_of_rain(logits.numpy()).reshape(size)
+    change = (denoised - seen)[0].numpy()
+    snow = says_snow(image.astype(np.float64), change.astype(np.float64), rule)
+    snow &= returned.numpy()[0, 0]
+    assert 0.05 < snow.mean() < 0.95
+    np.testing.assert_array_equal(probability > 0.5, snow)
+
+
+@pytest.mark.parametrize(
+    ("change", "pixel", "rain"),
+    [
+        ((1.0, 0.5), (10.0, 0.0, 1.0), False),  # exactly the limit
+        ((1.001, 0.5), (10.0, 0.0, 1.0), True),
+        ((-1.0, -0.6), (10.0, 0.0, 1.0), True),
+        ((-1.0, 0.6), (10.0, 0.0, 1.0), False),
+        ((2.0, 0.6), (10.0, -1.8, 1.0), False),  # on the ground
+        ((2.0, 0.6), (10.0, -1.79, 1.0), True),
+        ((2.0, 0.6), (10.0, 0.0, 2.0), False),  # too bright
+        ((2.0, 0.6), (10.0, 0.0, 1.99), True),
+        ((0.0, 0.0), (2.49, -5.0, 200.0), True),  # near, whatever else
+        ((0.0, 0.0), (2.5, 0.0, 1.0), False),
+    ],
+)
+def test_the_limits_of_the_rule_are_where_they_were_published(
+    change: tuple[float, float], pixel: tuple[float, float, float], rain: bool
+) -> None:
+    rule = SelectionRule(residual=0.125, near=2.5)
+    image = torch.tensor(pixel)[None, :, None, None]
+    seen = torch.zeros(1, 2, 1, 1)
+    returned = torch.ones(1, 1, 1, 1, dtype=torch.bool)
+    logits = select(image, returned, seen, torch.tensor(change)[None, :, None, None], rule)
+    assert (probability_of_rain(logits.numpy())[0] > 0.5) == rain
+
+
+def test_the_probability_rises_with_the_residual() -> None:
+    changes = torch.linspace(-2, 2, 101)
+    denoised = torch.stack([changes, torch.full_like(changes, 0.5)])[None, :, None]
+    image = torch.tensor([10.0, 0.0, 0.0])[None, :, None, None].expand(1, 3, 1, 101)
+    seen, rule = torch.zeros(1, 2, 1, 101), SelectionRule(residual=0.125)
+    logits = select(image, image[:, :1] > 0, seen, denoised, rule)
+    margin = logits[:, 1] - logits[:, 0]
+    # At twice the limit the margin is 4: a probability of .98.
+    assert margin[100].item() == pytest.approx(4.0)
+    assert (margin.diff() >= 0).all()
+    assert margin.min() >= -20
+
+
+@torch.no_grad()
+def test_the_model_applies_its_rule_to_what_the_network_changed(
+    image_network: MakeModel, image_sample: MakeSample
+) -> None:
+    model = image_network(LiSnowNet, rule={"residual": 1.0, "near": 6.0})
+    one = image_sample(model, scene())
+    inputs = Batch.of([one]).inputs
+    image = inputs["image"][0].double().numpy()
+    share = np.clip(image[2] / 255, 0, 1)
+    seen = torch.from_numpy(np.cbrt([image[0], share]).astype(np.float32))[None]
+    change = (model.network(seen, inputs["valid"]) - seen)[0].double().numpy()
+    snow = says_snow(image, change, model.selection)
+    valid = one.view.valid
+    assert 0.05 < snow[valid].mean() < 0.95
+    probability = probability_of_rain(model(**inputs).numpy()).reshape(18, 60)
+    np.testing.assert_array_equal((probability > 0.5)[valid], snow[valid])
+
+
+@torch.no_grad()
+@pytest.mark.parametrize(("alpha", "beta"), [(5.5, 0.5), (3.0, 0.2)])
+def test_the_losses_are_those_of_what_the_network_saw(
+    image_network: MakeModel, image_sample: MakeSample, alpha: float, beta: float
+) -> None:
+    model = image_network(LiSnowNet, alpha=alpha, beta=beta)
+    batch = Batch.of([image_sample(model, scene(3000, seed)) for seed in range(2)])
+    losses, logits = model.losses(batch)
+    image, valid = batch.inputs["image"], batch.inputs["valid"]
+    seen = torch.stack([image[:, 0], (image[:, 2] / 255).clamp(0, 1)], dim=1).pow(1 / 3)
+    expected = sparsity_loss(model.network(seen, valid), seen, valid, alpha, beta)
+    assert set(losses) == {"loss", "wavelet", "fourier", "residual"}
+    torch.testing.assert_close(losses["loss"], expected.total)
+    for part in ("wavelet", "fourier", "residual"):
+        torch.testing.assert_close(losses[part], getattr(expected, part))
+    torch.testing.assert_close(logits, model(**batch.inputs))
+
+
+@pytest.mark.parametrize("prefix", ["", "module."])
+@torch.no_grad()
+def test_published_weights_are_taken_over(
+    image_network: MakeModel, image_sample: MakeSample, prefix: str
+) -> None:
+    own = image_network(LiSnowNet)
+    weights = {prefix + key: tensor for key, tensor in published(own.network).items()}
+    model = LiSnowNet.from_published(weights, WADS, "wads").eval()
+    assert (model.hparams["width"], model.spec.data) == (4, "WADS")
+    assert model.spec.view["grid"] == grid_of("wads", "").as_dict()
+    inputs = Batch.of([image_sample(own, scene())]).inputs
+    seen = cube_roots(inputs["image"], SelectionRule(full_scale=255.0))
+    assert torch.equal(model.network(seen, inputs["valid"]), own.network(seen, inputs["valid"]))
+    # The rule is not in the weights: what no scan says is as it is by default.
+    assert model.selection == SelectionRule()
+
+
+def test_weights_need_a_grid_and_a_network_that_fits(image_network: MakeModel) -> None:
+    weights = published(image_network(LiSnowNet).network)
+    with pytest.raises(InputError, match=r"what grid they were trained on\. Give --grid\."):
+        LiSnowNet.from_published(weights, WADS)
+    with pytest.raises(InputError, match="LiSnowNet: the state_dict is of another network"):
+        LiSnowNet.from_published({"logits.bias": torch.ones(2)}, WADS, "wads")
+
+
+def test_weights_of_more_channels_than_the_model_sees_are_refused() -> None:
+    weights = published(LiSnowNetwork(channels=3, width=2))
+    with pytest.raises(InputError, match="channels"):
+        LiSnowNet.from_published(weights, WADS, "wads")
+
+
+class Progress(lightning.Callback):
+    """Keeps what every validation measured."""
+
+    def __init__(self) -> None:
+        self.merit: list[float] = []
+        self.loss: list[float] = []
+        self.iou: list[float] = []
+
+    def on_validation_end(self, trainer: lightning.Trainer, *_: Any) -> None:
+        if not trainer.sanity_checking:
+            metrics = trainer.callback_metrics
+            self.merit.append(metrics[MERIT].item())
+            self.loss.append(metrics["val/loss"].item())
+            if "val/iou" in metrics:
+                self.iou.append(metrics["val/iou"].item())
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished training."""
+
+    model: LiSnowNet
+    progress: Progress
+    best: dict[str, Any]
+
+
+@pytest.fixture
+def train(
+    make_trainer: MakeTrainer, small_grid: dict[str, Any], tmp_path: Path
+) -> Callable[..., Run]:
+    """Trains on the scenes in a folder, from the same seed unless it is given another."""
+    for number in range(4):
+        scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
+        write_labels(tmp_path / f"{number}.label", 110 * (np.arange(300) >= 270))
+
+    def fit(card: str = "wads", rule: dict[str, float] = LENIENT, seed: int = 0) -> Run:
+        lightning.seed_everything(seed)
+        parts = {"train": ["[012].bin"], "validation": ["3.bin"]}
+        data = Folder(str(tmp_path), card, **parts, loading=Loading(batch_size=3))
+        model = LiSnowNet(small_grid, width=2, learning_rate=0.05, decay=0.5, rule=rule)
+        progress = Progress()
+        best = ModelCheckpoint(tmp_path / "runs", "best", monitor=MERIT, mode="max")
+        trainer = make_trainer(epochs=4, callbacks=[progress, best], enable_checkpointing=True)
+        trainer.fit(model, data)
+        content = torch.load(best.best_model_path, weights_only=True)
+        Path(best.best_model_path).unlink()
+        return Run(model, progress, content)
+
+    return fit
+
+
+def assert_same(one: dict[str, Tensor], other: dict[str, Tensor]) -> None:
+    for name, tensor in one.items():
+        assert torch.equal(tensor, other[name]), name
+
+
+def test_garbage_in_place_of_training_labels_changes_nothing(
+    train: Callable[..., Run], tmp_path: Path
+) -> None:
+    first = train()
+    (tmp_path / "0.label").write_bytes(b"garbage")
+    write_labels(tmp_path / "1.label", np.full(300, 7777))
+    (tmp_path / "2.label").unlink()
+    second = train()
+    assert_same(first.model.state_dict(), second.model.state_dict())
+    assert first.progress.iou == second.progress.iou
+    assert first.model.spec == second.model.spec
+
+
+def test_training_opens_no_label_file_and_validation_only_its_own(
+    train: Callable[..., Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened, read = set(), base.read_labels
+
+    def recorded(path: Path, points: int) -> NDArray[np.uint32]:
+        opened.add(path)
+        return read(path, points)
+
+    monkeypatch.setattr(base, "read_labels", recorded)
+    train()
+    assert opened == {tmp_path / "3.label"}
+
+
+def test_validation_labels_measure_and_choose_nothing(
+    train: Callable[..., Run], tmp_path: Path
+) -> None:
+    first = train()
+    label = np.fromfile(tmp_path / "3.label", "<u4")
+    write_labels(tmp_path / "3.label", np.where(label == 110, 0, 110))
+    second = train()
+    assert first.progress.iou != second.progress.iou
+    assert len(set(first.progress.iou)) > 1
+    assert first.progress.merit == second.progress.merit
+    assert first.progress.merit == [-loss for loss in first.progress.loss]
+    assert first.best["epoch"] == second.best["epoch"] == int(np.argmax(first.progress.merit))
+    assert_same(first.best["state_dict"], second.best["state_dict"])
+
+
+def test_a_run_needs_no_labels_at_all(train: Callable[..., Run], tmp_path: Path) -> None:
+    labelled = train()
+    for label in tmp_path.glob("*.label"):
+        label.unlink()
+    run = train()
+    assert run.progress.iou == []
+    assert run.progress.merit == labelled.progress.merit
+    assert_same(run.best["state_dict"], labelled.best["state_dict"])
+
+
+@pytest.fixture
+def dense(train: Callable[..., Run], tmp_path: Path) -> None:
+    """Gives the validation scan so many points that a residual can be fitted to them."""
+    scene(3000, seed=3).tofile(tmp_path / "3.bin")
+    write_labels(tmp_path / "3.label", 110 * (np.arange(3000) >= 2700))
+
+
+# From this seed a network comes that moves many returns nearer and makes them brighter at once, so
+# that a residual can be fitted to them.
+SEED = 2
+
+# The constants that leave every return to the residual.
+UNSTATED = {"ground": -10.0, "intensity": 1.0}
+
+
+@pytest.mark.usefixtures("dense")
+def test_the_residual_is_fitted_to_what_the_network_changes_in_the_validation_scans(
+    train: Callable[..., Run], tmp_path: Path
+) -> None:
+    run = train(rule=UNSTATED, seed=SEED)
+    best = LiSnowNet(**run.best["hyper_parameters"]).eval()
+    best.load_state_dict(run.best["state_dict"])
+    scan = Scan.of(np.fromfile(tmp_path / "3.bin", np.float32).reshape(-1, 4))
+    view = best.spec.make_view()(scan)
+    image, valid = (torch.from_numpy(array) for array in view.inputs().values())
+    with torch.no_grad():
+        seen = cube_roots(image, best.selection)
+        of_range, of_intensity = (best.network(seen, valid) - seen)[0].numpy()
+    products = (of_range * of_intensity**3)[view.valid]
+    assert np.count_nonzero(products > 0) > FEWEST
+    expected = SelectionRule(**best.spec.rule).with_residual_of(products).residual
+    assert best.selection.residual == pytest.approx(expected, rel=1e-3)
+    assert best.selection.residual != SelectionRule().residual
+    label = np.fromfile(tmp_path / "3.label", "<u4")
+    write_labels(tmp_path / "3.label", np.where(label == 110, 0, 110))
+    again = train(rule=UNSTATED, seed=SEED)
+    assert again.best["hyper_parameters"]["spec"] == run.best["hyper_parameters"]["spec"]
+
+
+@pytest.mark.usefixtures("dense")
+def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(
+    train: Callable[..., Run], tmp_path: Path
+) -> None:
+    run = train(rule=UNSTATED, seed=SEED)
+    best = LiSnowNet(**run.best["hyper_parameters"]).eval()
+    best.load_state_dict(run.best["state_dict"])
+    view = best.spec.make_view()(Scan.of(np.fromfile(tmp_path / "3.bin", "<f4").reshape(-1, 4)))
+    with torch.no_grad():
+        logits = best(**{name: torch.from_numpy(array) for name, array in view.inputs().items()})
+    found = view.back(probability_of_rain(logits.numpy())) > best.spec.threshold
+    rain = np.fromfile(tmp_path / "3.label", "<u4") == 110
+    iou = (found & rain).sum() / (found | rain).sum()
+    assert 0 < iou < 1
+    assert run.progress.iou[run.best["epoch"]] == pytest.approx(iou)
+
+
+def test_a_stated_residual_is_not_fitted(train: Callable[..., Run]) -> None:
+    assert train().model.selection.residual == LENIENT["residual"]
+
+
+def test_measuring_a_model_leaves_its_rule_as_it_is(
+    train: Callable[..., Run], make_trainer: MakeTrainer, tmp_path: Path
+) -> None:
+    model = train(rule={}).model
+    spec = model.spec
+    scene(300, seed=9).tofile(tmp_path / "9.bin")
+    data = Folder(str(tmp_path), "wads", validation=["9.bin"])
+    make_trainer(epochs=1).validate(model, data, verbose=False)
+    assert model.spec == spec
+
+
+def test_statistics_are_measured_without_labels(train: Callable[..., Run], tmp_path: Path) -> None:
+    for label in tmp_path.glob("*.label"):
+        label.unlink()
+    spec = train(card="simulated").model.spec
+    points = np.concatenate([scene(300, seed=number) for number in range(3)]).astype(np.float64)
+    distance = np.linalg.norm(points[:, :3], axis=1)
+    np.testing.assert_allclose(spec.mean, (distance.mean(), *points[:, 2:].mean(axis=0)))
+    np.testing.assert_allclose(spec.std, (distance.std(), *points[:, 2:].std(axis=0)))
+
+
+def test_the_learning_rate_falls_after_every_epoch(
+    make_trainer: MakeTrainer, small_grid: dict[str, Any], tmp_path: Path
+) -> None:
+    scene(300).tofile(tmp_path / "0.bin")
+    data = Folder(str(tmp_path), "wads", train=["0.bin"])
+    trainer = make_trainer(epochs=3, limit_val_batches=0)
+    trainer.fit(LiSnowNet(small_grid, width=2, learning_rate=0.01, decay=0.5), data)
+    (optimizer,) = trainer.optimizers
+    assert isinstance(optimizer, torch.optim.Adam)
+    assert [group["lr"] for group in optimizer.param_groups] == [pytest.approx(0.01 * 0.5**3)]

@@ -1,0 +1,254 @@
+"""LiSnowNet's network computes what was published, for images of any size and content."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+import torch
+from torch import Tensor, nn
+
+from derain.errors import InputError
+from derain.models.lisnownet.network import LiSnowNetwork, published_key
+from derain.models.lisnownet.sparsity import sparsity_loss
+
+from ..oracle_weights import recipe_weights
+
+
+def published(network: nn.Module) -> dict[str, Tensor]:
+    """The network's tensors under the published keys."""
+    return {published_key(name): tensor for name, tensor in network.state_dict().items()}
+
+
+def small(channels: int = 2, width: int = 4, seed: int = 0) -> LiSnowNetwork:
+    """A network with weights and statistics that leave no BatchNorm without effect."""
+    shapes = {
+        key: tensor.shape for key, tensor in published(LiSnowNetwork(channels, width)).items()
+    }
+    return LiSnowNetwork.from_published(recipe_weights(shapes, seed)).eval()
+
+
+def scene(height: int, width: int, share: float = 0.7, scans: int = 1) -> tuple[Tensor, Tensor]:
+    """Random images and which of their pixels are valid."""
+    generator = torch.Generator().manual_seed(height * 1000 + width)
+    image = 4 * torch.rand(scans, 2, height, width, generator=generator)
+    return image, torch.rand(scans, 1, height, width, generator=generator) < share
+
+
+def hard_images(height: int, width: int) -> Iterator[tuple[str, Tensor, Tensor]]:
+    """Images that break networks."""
+    image, valid = scene(height, width)
+    nothing, everything = torch.zeros_like(valid), torch.ones_like(valid)
+    one_return = nothing.clone()
+    one_return[..., 7, 0] = True
+    empty_rows = valid.clone()
+    empty_rows[..., 5:12, :] = False
+    yield "ordinary", image, valid
+    yield "empty", image, nothing
+    yield "NaN where empty", torch.where(valid, image, torch.nan), valid
+    yield "one return", image, one_return
+    yield "empty rows", image, empty_rows
+    yield "one hole", image, ~one_return
+    yield "constant with holes", torch.full_like(image, 2.5), valid
+    yield "constant", torch.full_like(image, 2.5), everything
+    yield "constant but for one hole", torch.full_like(image, 2.5), ~one_return
+    yield "next to constant", 2.5 + 1e-4 * image, everything
+    yield "zero", torch.zeros_like(image), everything
+    yield "10 km", torch.full_like(image, 1e4 ** (1 / 3)), valid
+
+
+# Of a size that fits the halvings, where a constant image stays constant, and of one that does not.
+FITTING = {name: (image, valid) for name, image, valid in hard_images(32, 48)}
+ODD = {name: (image, valid) for name, image, valid in hard_images(20, 40)}
+
+
+@torch.no_grad()
+def test_the_image_is_that_of_the_published_network(shared: Path) -> None:
+    oracle = np.load(shared / "oracles" / "lisnownet.npz")
+    shapes = json.loads((shared / "oracles" / "shapes.json").read_text())["lisnownet"]
+    assert sorted(published(LiSnowNetwork())) == list(oracle["keys"])
+    network = LiSnowNetwork.from_published(recipe_weights(shapes, int(oracle["seed"]))).eval()
+    image = torch.from_numpy(oracle["x"])
+    denoised = network(image, (image >= 0).any(dim=1, keepdim=True))
+    np.testing.assert_allclose(denoised, oracle["y"], rtol=0, atol=1e-4)
+
+
+def test_it_has_as_many_parameters_and_tensors_as_published() -> None:
+    network = LiSnowNetwork()
+    assert sum(parameter.numel() for parameter in network.parameters()) == 1_462_450
+    assert len(network.state_dict()) == 272
+
+
+@pytest.mark.parametrize("prefix", ["", "module."])
+@pytest.mark.parametrize(("channels", "width"), [(2, 4), (3, 2), (1, 1)])
+@torch.no_grad()
+def test_its_size_is_read_from_published_weights(channels: int, width: int, prefix: str) -> None:
+    network = small(channels, width)
+    state_dict = {prefix + key: tensor for key, tensor in published(network).items()}
+    read = LiSnowNetwork.from_published(state_dict).eval()
+    image, valid = torch.rand(1, channels, 16, 32), torch.rand(1, 1, 16, 32) < 0.5
+    assert torch.equal(read(image, valid), network(image, valid))
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"dec0.2.bias": None}, "1 keys missing"),
+        ({"another.weight": torch.zeros(3)}, "another.weight"),
+        ({"enc2.1.shortcut.conv.weight": torch.zeros(4, 4, 3, 3)}, "encoder.2.1.shortcut"),
+        ({"dec0.2.bias": torch.zeros(0)}, "at least 1"),
+        ({"dec0.2.bias": torch.zeros(3)}, "another network"),
+    ],
+)
+def test_weights_of_another_network_are_refused(
+    change: dict[str, Tensor | None], reason: str
+) -> None:
+    tensors = {**published(small()), **change}
+    state_dict = {key: tensor for key, tensor in tensors.items() if tensor is not None}
+    with pytest.raises(InputError, match=reason):
+        LiSnowNetwork.from_published(state_dict)
+
+
+@pytest.mark.parametrize("size", [{"width": 0}, {"channels": 0}, {"width": -8}])
+def test_a_network_without_channels_is_refused(size: dict[str, int]) -> None:
+    with pytest.raises(InputError, match="at least 1"):
+        LiSnowNetwork(**size)
+
+
+@pytest.mark.parametrize(
+    ("height", "width"), [(1, 1), (2, 17), (15, 16), (16, 16), (20, 37), (32, 48)]
+)
+@torch.no_grad()
+def test_an_image_of_any_size_counts_as_continued_by_empty_pixels(height: int, width: int) -> None:
+    network, (image, valid) = small(), scene(height, width)
+    size = (-(-height // 16) * 16, -(-width // 16) * 16)
+    padded, padded_valid = torch.full((1, 2, *size), -1.0), torch.zeros(1, 1, *size).bool()
+    padded[..., :height, :width], padded_valid[..., :height, :width] = image, valid
+    denoised = network(image, valid)
+    assert denoised.isfinite().all()
+    assert torch.equal(denoised, network(padded, padded_valid)[..., :height, :width])
+
+
+@torch.no_grad()
+def test_a_turn_of_the_sensor_turns_the_image() -> None:
+    network, (image, valid) = small(), scene(32, 64)
+    turned = network(image.roll(16, dims=-1), valid.roll(16, dims=-1))
+    torch.testing.assert_close(turned, network(image, valid).roll(16, dims=-1))
+
+
+@torch.no_grad()
+def test_what_empty_pixels_hold_does_not_matter() -> None:
+    network, (image, valid) = small(), scene(32, 48)
+    expected = network(torch.where(valid, image, -1), valid)
+    assert torch.equal(network(torch.where(valid, image, torch.nan), valid), expected)
+
+
+def test_channels_are_dropped_in_training_alone() -> None:
+    network, seen = small().train(), scene(32, 48, scans=2)
+    assert not torch.equal(network(*seen), network(*seen))
+    undropped = LiSnowNetwork(width=4, dropout=0).train()
+    assert torch.equal(undropped(*seen), undropped(*seen))
+    network.eval()
+    assert torch.equal(network(*seen), network(*seen))
+
+
+@pytest.mark.parametrize("case", FITTING)
+@pytest.mark.parametrize("bfloat16", [False, True], ids=["float32", "bfloat16"])
+def test_a_training_step_on_a_hard_image_is_small(case: str, bfloat16: bool) -> None:
+    network, (image, valid) = small().train(), FITTING[case]
+    with torch.autocast("cpu", dtype=torch.bfloat16, enabled=bfloat16):
+        denoised = network(image, valid)
+        loss = sparsity_loss(denoised, image, valid, alpha=5, beta=0.5)
+    loss.total.backward()
+    assert denoised.dtype == torch.float32
+    assert all(part.isfinite() for part in loss)
+    # NaN is not below anything, either.
+    assert all(parameter.grad.abs().max() < 1e3 for parameter in network.parameters())
+
+
+def test_an_image_without_variation_leaves_the_others_their_gradient() -> None:
+    network, (image, valid) = small(), scene(32, 48)
+    constant, everything = torch.full_like(image, 2.5), torch.ones_like(valid)
+    gradients = []
+    for images, valids in [
+        ([image], [valid]),
+        ([image, constant], [valid, everything]),
+        ([constant, image], [everything, valid]),
+    ]:
+        # In evaluation mode scans do not see each other, and yet the step is a training one.
+        network.zero_grad()
+        network.training = True
+        network(torch.cat(images), torch.cat(valids)).mean().mul(len(images)).backward()
+        gradients.append([parameter.grad.clone() for parameter in network.parameters()])
+    torch.testing.assert_close(gradients[1], gradients[0], rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(gradients[2], gradients[0], rtol=1e-4, atol=1e-5)
+
+
+def test_one_pixel_at_the_smallest_size_can_be_trained_on() -> None:
+    network, (image, valid) = small().train(), scene(16, 16)
+    denoised = network(image, valid)
+    sparsity_loss(denoised, image, valid, alpha=5, beta=0.5).total.backward()
+    assert denoised.isfinite().all()
+    assert all(parameter.grad.isfinite().all() for parameter in network.parameters())
+
+
+def test_the_gradient_reaches_every_parameter() -> None:
+    network, (image, valid) = small(), scene(64, 64, scans=2)
+    sparsity_loss(network(image, valid), image, valid, alpha=5, beta=0.5).total.backward()
+    for name, parameter in network.named_parameters():
+        assert parameter.grad.any(), name
+
+
+def test_a_few_steps_lower_the_loss() -> None:
+    torch.manual_seed(0)
+    network, (image, valid) = LiSnowNetwork(width=4, dropout=0).train(), scene(32, 64)
+    optimizer = torch.optim.Adam(network.parameters(), 1e-2)
+    losses = []
+    for _ in range(15):
+        loss = sparsity_loss(network(image, valid), image, valid, alpha=5, beta=0.5).total
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        losses.append(loss.item())
+    assert losses[-1] < 0.8 * losses[0]
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small network as ONNX, for images that do not fit its halvings."""
+    path = tmp_path_factory.mktemp("onnx") / "lisnownet.onnx"
+    torch.onnx.export(
+        small(),
+        ODD["ordinary"],
+        path,
+        input_names=["image", "valid"],
+        opset_version=18,
+        dynamo=True,
+        external_data=False,
+        verbose=False,
+    )
+    return path
+
+
+@pytest.mark.filterwarnings("ignore")  # the exporter's own parts warn of each other
+@torch.no_grad()
+def test_the_exported_network_gives_the_same_images(exported: Path) -> None:
+    network = small()
+    session = onnxruntime.InferenceSession(exported, providers=["CPUExecutionProvider"])
+    for case, (image, valid) in ODD.items():
+        (denoised,) = session.run(None, {"image": image.numpy(), "valid": valid.numpy()})
+        expected = network(image, valid)
+        np.testing.assert_allclose(denoised, expected, rtol=0, atol=1e-4, err_msg=case)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_exported_network_holds_what_opset_18_knows_and_runs_fast(exported: Path) -> None:
+    proto = onnx.load(exported)
+    onnx.checker.check_model(proto, full_check=True)
+    operators = {node.op_type for node in proto.graph.node}
+    assert not operators & {"BatchNormalization", "NonZero", "ScatterND", "ScatterElements"}
+    attributes = [a for node in proto.graph.node if node.op_type == "Pad" for a in node.attribute]
+    assert {a.s for a in attributes} <= {b"constant"}  # the checker lets opset 19's "wrap" pass

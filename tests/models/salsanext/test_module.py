@@ -1,0 +1,280 @@
+"""SalsaNext as it is trained: its Spec, its losses, its learning rate, published weights."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import lightning
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from derain.cards.card import load_card
+from derain.datamodules.base import Loading
+from derain.datamodules.folder import Folder
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.files.labels import write_labels
+from derain.learning.batch import Batch, Sample
+from derain.learning.losses import class_weights, segmentation_loss
+from derain.models.salsanext import SalsaNext
+from derain.models.salsanext.network import PUBLISHED_KEYS, SalsaNextNetwork
+from derain.views.probability import probability_of_rain
+from derain.views.spherical_grid import grid_of
+from derain.views.view import IGNORED
+
+MakeModel = Callable[..., SalsaNext]
+MakeSample = Callable[..., Sample]
+MakeTrainer = Callable[..., lightning.Trainer]
+WADS = load_card("wads")
+
+
+def published(network: SalsaNextNetwork) -> dict[str, Tensor]:
+    """The network's tensors under the published keys."""
+    return {PUBLISHED_KEYS[name]: tensor for name, tensor in network.state_dict().items()}
+
+
+def test_the_spec_says_how_the_network_is_used() -> None:
+    spec = SalsaNext(grid="wads", threshold=0.25).spec_for(WADS)
+    assert (spec.network, spec.threshold) == ("salsanext", 0.25)
+    assert spec.channels == ("range", "x", "y", "z", "intensity")
+    assert spec.units == ("m", "m", "m", "m", "0..255")
+    assert spec.mean == (26.6, *WADS.mean)
+    assert spec.std == (19.7, *WADS.std)
+    assert spec.view["grid"] == grid_of("wads", "").as_dict()
+    assert spec.rule == {}
+    assert (spec.data, spec.licence) == ("WADS", WADS.licence)
+    assert (spec.classes, spec.rain) == (WADS.classes, (110,))
+
+
+def test_fewer_channels_will_do(image_network: MakeModel, image_sample: MakeSample) -> None:
+    model = image_network(SalsaNext, channels=("intensity", "range"))
+    assert model.spec.mean == (WADS.mean[3], 26.6)
+    one = image_sample(model, scene())
+    assert Batch.of([one]).inputs["image"].shape == (1, 2, 18, 60)
+    assert model(**Batch.of([one]).inputs).shape == (18 * 60, 2)
+
+
+def test_a_channel_that_there_is_not_is_refused() -> None:
+    with pytest.raises(InputError, match="no statistics of colour"):
+        SalsaNext(grid="wads", channels=("range", "colour")).spec_for(WADS)
+
+
+@pytest.mark.parametrize("prefix", ["", "module."])
+@torch.no_grad()
+def test_published_weights_give_the_logits_of_the_network_on_normalised_images(
+    image_network: MakeModel, image_sample: MakeSample, small_grid: dict[str, Any], prefix: str
+) -> None:
+    network = image_network(SalsaNext).network
+    weights = {prefix + key: tensor for key, tensor in published(network).items()}
+    model = SalsaNext.from_published(weights, WADS, "semantickitti").eval()
+    assert (model.spec.data, model.hparams["width"]) == ("WADS", 4)
+    assert model.spec.view["grid"] == grid_of("semantickitti", "").as_dict()
+    inputs = Batch.of([image_sample(image_network(SalsaNext), scene())]).inputs
+    image = np.empty((1, 5, 18, 60), np.float32)
+    for channel, (mean, std) in enumerate(zip((26.6, *WADS.mean), (19.7, *WADS.std), strict=True)):
+        image[0, channel] = (inputs["image"][0, channel].numpy() - mean) / std
+    image *= inputs["valid"].numpy()
+    expected = network(torch.from_numpy(image)).permute(0, 2, 3, 1).reshape(-1, 2)
+    torch.testing.assert_close(model(**inputs), expected, rtol=1e-4, atol=1e-4)
+
+
+def test_weights_need_a_grid_and_a_card_with_statistics_of_range(image_network: MakeModel) -> None:
+    weights = published(image_network(SalsaNext).network)
+    with pytest.raises(InputError, match=r"what grid they were trained on\. Give --grid\."):
+        SalsaNext.from_published(weights, WADS)
+    with pytest.raises(InputError, match="there is no grid named 'mars'"):
+        SalsaNext.from_published(weights, WADS, "mars")
+    with pytest.raises(InputError, match="SemanticSpray: the data card has no statistics of range"):
+        SalsaNext.from_published(weights, load_card("spray"), "semantickitti")
+
+
+@pytest.mark.parametrize(
+    ("size", "reason"),
+    [
+        ({"classes": 20}, "20 classes from 5 channels"),
+        ({"channels": 4}, "2 classes from 4 channels"),
+    ],
+)
+def test_weights_that_do_not_tell_rain_are_refused(size: dict[str, int], reason: str) -> None:
+    weights = published(SalsaNextNetwork(width=4, **size))
+    with pytest.raises(InputError, match=reason):
+        SalsaNext.from_published(weights, WADS, "wads")
+
+
+@pytest.fixture
+def pixels() -> tuple[Tensor, Tensor]:
+    """Logits and targets of 500 pixels, a third of them empty and a sixth rain."""
+    generator = torch.Generator().manual_seed(0)
+    logits = torch.randn(500, 2, generator=generator)
+    return logits, torch.tensor([IGNORED, 0, 0, IGNORED, 0, 1]).repeat(84)[:500]
+
+
+def losing(published_loss: bool, weight: tuple[float, float] = (1.5, 6.0)) -> SalsaNext:
+    model = SalsaNext(width=4, published_loss=published_loss)
+    model.class_weight.copy_(torch.tensor(weight))
+    return model
+
+
+def as_numbers(logits: Tensor) -> NDArray[np.float64]:
+    """Probabilities of the two classes."""
+    rain = probability_of_rain(logits.numpy()).astype(np.float64)
+    return np.stack([1 - rain, rain], axis=1)
+
+
+def test_the_published_loss_trains_empty_pixels_and_knows_no_false_alarm(
+    pixels: tuple[Tensor, Tensor],
+) -> None:
+    logits, target = pixels
+    loss = losing(published_loss=True).segmentation_loss(logits, target)
+    probability, rain = as_numbers(logits), target.numpy() == 1
+    assert loss.lovasz.item() == pytest.approx((1 - probability[rain, 1]).mean(), rel=1e-5)
+    weight = np.where(rain, 6.0, 1.5)
+    surprise = -np.log(probability[np.arange(500), rain.astype(int)])
+    expected = (weight * surprise).sum() / weight.sum()
+    assert loss.cross_entropy.item() == pytest.approx(expected, rel=1e-5)
+    assert loss.total.item() == pytest.approx((loss.cross_entropy + loss.lovasz).item())
+
+
+def test_the_corrected_loss_leaves_empty_pixels_out(pixels: tuple[Tensor, Tensor]) -> None:
+    logits, target = pixels
+    model, empty = losing(published_loss=False), target == IGNORED
+    loss = model.segmentation_loss(logits, target)
+    expected = segmentation_loss(logits[~empty], target[~empty], model.class_weight)
+    assert [part.item() for part in loss] == [part.item() for part in expected]
+    changed = torch.where(empty[:, None], 100 * logits + 7, logits)
+    again = model.segmentation_loss(changed, target)
+    assert [part.item() for part in again] == [part.item() for part in loss]
+    as_published = losing(published_loss=True)
+    assert not torch.equal(
+        as_published.segmentation_loss(changed, target).total,
+        as_published.segmentation_loss(logits, target).total,
+    )
+
+
+def test_false_alarms_cost_in_the_corrected_lovasz_loss_alone(
+    pixels: tuple[Tensor, Tensor],
+) -> None:
+    _, target = pixels
+    everything_rain = torch.tensor([[-50.0, 50.0]]).repeat(len(target), 1)
+    share = (target == 1).sum() / (target != IGNORED).sum()
+    corrected = losing(published_loss=False).segmentation_loss(everything_rain, target)
+    # 1 - IoU is 1 for the pixels that are no rain, and what is not rain's share for rain.
+    assert corrected.lovasz.item() == pytest.approx((1 + (1 - share.item())) / 2)
+    as_published = losing(published_loss=True).segmentation_loss(everything_rain, target)
+    assert as_published.lovasz.item() == 0
+
+
+@pytest.mark.parametrize("published_loss", [False, True])
+@pytest.mark.parametrize("of", [IGNORED, 0, 1], ids=["empty", "no rain", "nothing but rain"])
+def test_both_losses_are_defined_for_one_kind_of_pixel(of: int, published_loss: bool) -> None:
+    logits = torch.randn(40, 2, generator=torch.Generator().manual_seed(0), requires_grad=True)
+    loss = losing(published_loss).segmentation_loss(logits, torch.full((40,), of)).total
+    loss.backward()
+    assert loss.isfinite()
+    assert logits.grad is not None
+    assert logits.grad.isfinite().all()
+
+
+def test_the_loss_of_a_batch_is_that_of_its_pixels(
+    image_network: MakeModel, image_sample: MakeSample
+) -> None:
+    model = image_network(SalsaNext)
+    batch = Batch.of([image_sample(model, scene(3000, seed)) for seed in range(2)])
+    losses, logits = model.losses(batch)
+    torch.testing.assert_close(logits, model(**batch.inputs))
+    expected = model.segmentation_loss(logits, batch.target)
+    assert losses == {
+        "loss": expected.total,
+        "cross_entropy": expected.cross_entropy,
+        "lovasz": expected.lovasz,
+    }
+
+
+@pytest.fixture
+def scenes(tmp_path: Path) -> Callable[..., Folder]:
+    """Makes a data module of four small labelled scenes."""
+    for number in range(4):
+        scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
+        write_labels(tmp_path / f"{number}.label", 110 * (np.arange(300) >= 270))
+
+    def make(**loading: Any) -> Folder:
+        parts = {"train": ["[012].bin"], "validation": ["3.bin"], "test": ["3.bin"]}
+        return Folder(str(tmp_path), "wads", **parts, loading=Loading(**loading))
+
+    return make
+
+
+class LearningRates(lightning.Callback):
+    """Keeps the learning rate of every step of the optimiser."""
+
+    def __init__(self) -> None:
+        self.values: list[float] = []
+
+    def on_before_optimizer_step(
+        self, trainer: lightning.Trainer, model: SalsaNext, optimizer: torch.optim.Optimizer
+    ) -> None:
+        self.values.append(optimizer.param_groups[0]["lr"])
+
+
+@pytest.mark.parametrize("warm_up", [1, 2])
+@pytest.mark.parametrize(("batches_a_step", "steps"), [(1, 3), (2, 2), (3, 1)])
+def test_the_learning_rate_rises_and_falls_at_every_step_as_published(
+    make_trainer: MakeTrainer,
+    scenes: Callable[..., Folder],
+    small_grid: dict[str, Any],
+    warm_up: int,
+    batches_a_step: int,
+    steps: int,
+) -> None:
+    rates, decay = LearningRates(), 0.5
+    accumulating = {"accumulate_grad_batches": batches_a_step, "limit_val_batches": 0}
+    trainer = make_trainer(epochs=4, callbacks=[rates], **accumulating)
+    trainer.fit(SalsaNext(small_grid, width=4, warm_up=warm_up, decay=decay), scenes())
+    # Source: TiagoCortinhal/SalsaNext, warmupLR.py: a CyclicLR, then an exponential decay.
+    rising = [0.01 * (step + 1) / (warm_up * steps) for step in range(warm_up * steps)]
+    falling = [0.01 * decay ** (step / steps) for step in range((4 - warm_up) * steps)]
+    assert rates.values == pytest.approx([*rising, *falling])
+
+
+def test_the_optimiser_is_the_published_one(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder], small_grid: dict[str, Any]
+) -> None:
+    trainer = make_trainer(epochs=1, limit_val_batches=0)
+    model = SalsaNext(small_grid, width=4)
+    trainer.fit(model, scenes())
+    (optimizer,) = trainer.optimizers
+    (group,) = optimizer.param_groups
+    assert isinstance(optimizer, torch.optim.SGD)
+    assert (group["momentum"], group["weight_decay"], group["nesterov"]) == (0.9, 1e-4, False)
+    assert len(group["params"]) == len(list(model.parameters()))
+
+
+def test_the_model_learns_grid_spec_and_class_weights_from_its_data(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder]
+) -> None:
+    model, data = SalsaNext(width=4), scenes(batch_size=3)
+    trainer = make_trainer(epochs=1, limit_val_batches=1)
+    trainer.fit(model, data)
+    fitted = SalsaNext(width=4).spec_for(WADS, list(data.training_scans(20)))
+    assert model.spec == replace(fitted, training=data.training_record())
+    assert torch.equal(model.class_weight, class_weights([1 - 0.11974, 0.11974]))
+    assert trainer.callback_metrics["val/merit"] == trainer.callback_metrics["val/iou"]
+
+
+@pytest.mark.parametrize("missing", ["0.label", "3.label"])
+def test_a_scan_without_labels_is_one_error_that_names_it(
+    make_trainer: MakeTrainer,
+    scenes: Callable[..., Folder],
+    small_grid: dict[str, Any],
+    tmp_path: Path,
+    missing: str,
+) -> None:
+    data = scenes()
+    (tmp_path / missing).unlink()
+    with pytest.raises(InputError, match=r"its labels are not at .*Add them or leave") as refusal:
+        make_trainer(epochs=1).fit(SalsaNext(small_grid, width=4), data)
+    assert refusal.value.subject == (tmp_path / missing).with_suffix(".bin")

@@ -1,0 +1,215 @@
+"""SalsaNext's network computes what was published, for images of any size."""
+
+import json
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import cross_entropy
+
+from derain.errors import InputError
+from derain.models.salsanext.network import PUBLISHED_KEYS, PixelBatchNorm, SalsaNextNetwork
+
+from ..oracle_weights import recipe_weights
+
+
+def published(network: nn.Module) -> dict[str, Tensor]:
+    """The network's tensors under the published keys."""
+    return {PUBLISHED_KEYS[name]: tensor for name, tensor in network.state_dict().items()}
+
+
+def small(channels: int = 5, width: int = 8, classes: int = 2, seed: int = 0) -> SalsaNextNetwork:
+    """A network with weights and statistics that leave no BatchNorm without effect."""
+    network = SalsaNextNetwork(channels, width, classes)
+    shapes = {key: tensor.shape for key, tensor in published(network).items()}
+    return SalsaNextNetwork.from_published(recipe_weights(shapes, seed)).eval()
+
+
+def image(height: int, width: int, channels: int = 5, scans: int = 1) -> Tensor:
+    generator = torch.Generator().manual_seed(height * 1000 + width)
+    return torch.randn(scans, channels, height, width, generator=generator)
+
+
+def loss_of(network: SalsaNextNetwork, batch: Tensor) -> Tensor:
+    target = (batch[:, 0] > 0).long()
+    return cross_entropy(network(batch).float(), target)
+
+
+@torch.no_grad()
+def test_the_probabilities_are_those_of_the_published_network(shared: Path) -> None:
+    oracle = np.load(shared / "oracles" / "salsanext.npz")
+    shapes = json.loads((shared / "oracles" / "shapes.json").read_text())["salsanext"]
+    assert sorted(PUBLISHED_KEYS.values()) == list(oracle["keys"])
+    network = SalsaNextNetwork.from_published(recipe_weights(shapes, int(oracle["seed"]))).eval()
+    probability = network(torch.from_numpy(oracle["x"])).softmax(dim=1)
+    np.testing.assert_allclose(probability, oracle["probability"], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("classes", "expected"), [(2, 6_710_978), (20, 6_711_572)])
+def test_it_has_the_published_number_of_parameters(classes: int, expected: int) -> None:
+    network = SalsaNextNetwork(classes=classes)
+    assert sum(parameter.numel() for parameter in network.parameters()) == expected
+    assert sum(buffer.numel() for buffer in network.buffers()) == 10_922
+
+
+@pytest.mark.parametrize(
+    ("channels", "width", "classes"), [(5, 8, 2), (2, 16, 2), (7, 2, 20), (1, 6, 1)]
+)
+@torch.no_grad()
+def test_its_size_is_read_from_published_weights(channels: int, width: int, classes: int) -> None:
+    network = small(channels, width, classes)
+    read = SalsaNextNetwork.from_published(published(network)).eval()
+    assert (read.channels, read.width, read.classes) == (channels, width, classes)
+    seen = image(16, 32, channels)
+    assert read(seen).shape == (1, classes, 16, 32)
+    torch.testing.assert_close(read(seen), network(seen), rtol=0, atol=0)
+
+
+@torch.no_grad()
+def test_weights_saved_from_several_devices_are_read() -> None:
+    network = small()
+    parallel = {f"module.{key}": tensor for key, tensor in published(network).items()}
+    read = SalsaNextNetwork.from_published(parallel).eval()
+    torch.testing.assert_close(read(image(16, 16)), network(image(16, 16)), rtol=0, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"logits.bias": None}, "1 keys missing"),
+        ({"another.weight": torch.zeros(3)}, "another.weight"),
+        ({"resBlock3.conv4.weight": torch.zeros(64, 64, 3, 3)}, "encoder.2.layers.2"),
+        ({"downCntx.conv1.weight": torch.zeros(8, 5)}, "context.0.shortcut.weight"),
+        ({"downCntx.conv1.bias": torch.zeros(0)}, "width"),
+        ({"downCntx.conv1.bias": torch.zeros(7)}, "width"),
+        ({"logits.bias": torch.zeros(3)}, "head.weight"),
+    ],
+)
+def test_weights_of_another_network_are_refused(
+    change: dict[str, Tensor | None], reason: str
+) -> None:
+    tensors = {**published(small()), **change}
+    state_dict = {key: tensor for key, tensor in tensors.items() if tensor is not None}
+    with pytest.raises(InputError, match=reason):
+        SalsaNextNetwork.from_published(state_dict)
+
+
+@pytest.mark.parametrize("width", [-2, 0, 1, 31])
+def test_a_width_that_cannot_be_halved_is_refused(width: int) -> None:
+    with pytest.raises(InputError, match=f"width: {width} is not"):
+        SalsaNextNetwork(width=width)
+
+
+@pytest.mark.parametrize(
+    ("height", "width"), [(1, 1), (2, 17), (15, 16), (20, 37), (32, 48), (64, 130)]
+)
+@torch.no_grad()
+def test_an_image_of_any_size_counts_as_continued_by_empty_pixels(height: int, width: int) -> None:
+    network, seen = small(), image(height, width)
+    padded = torch.zeros(1, 5, -(-height // 16) * 16, -(-width // 16) * 16)
+    padded[..., :height, :width] = seen
+    logits = network(seen)
+    assert logits.shape == (1, 2, height, width)
+    torch.testing.assert_close(logits, network(padded)[..., :height, :width], rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("training", [False, True], ids=["evaluation", "training"])
+@pytest.mark.parametrize("value", [0.0, 1.0, -1.0, 1e4])
+def test_a_constant_image_gives_finite_logits(value: float, training: bool) -> None:
+    network = small().train(training)
+    assert network(torch.full((1, 5, 32, 32), value)).isfinite().all()
+
+
+@pytest.mark.parametrize(
+    ("scans", "height", "width"), [(1, 1, 1), (1, 16, 16), (2, 16, 16), (1, 20, 37)]
+)
+def test_a_training_step_on_small_images_is_finite(scans: int, height: int, width: int) -> None:
+    network = small().train()
+    loss = loss_of(network, image(height, width, scans=scans))
+    loss.backward()
+    assert loss.isfinite()
+    assert all(parameter.grad.isfinite().all() for parameter in network.parameters())
+
+
+def test_the_gradient_reaches_every_parameter() -> None:
+    # At the bottleneck 3×3 pixels: in fewer, some taps of its kernels only ever see the padding.
+    network = small().train()
+    loss_of(network, image(48, 48, scans=2)).backward()
+    for name, parameter in network.named_parameters():
+        assert parameter.grad.isfinite().all(), name
+        assert parameter.grad.any(), name
+
+
+def test_features_are_dropped_everywhere_but_at_full_resolution() -> None:
+    network = SalsaNextNetwork(width=4, dropout=0.3).train()
+    dropped: list[tuple[int, float]] = []
+
+    def record(layer: nn.Dropout2d, inputs: tuple[Tensor], _: Tensor) -> None:
+        dropped.append((inputs[0].shape[-1], layer.p))
+
+    for layer in network.modules():
+        if isinstance(layer, nn.Dropout2d):
+            layer.register_forward_hook(record)
+    network(image(64, 64))
+    # Once on the way down; on the way up before, after and behind the joint; once at the bottom.
+    expected = {(32, 0.3): 4, (16, 0.3): 4, (8, 0.3): 4, (4, 0.3): 1}
+    assert Counter(drop for drop in dropped if drop[1] > 0) == expected
+    assert {size for size, rate in dropped if rate == 0} == {64}
+
+
+def test_a_single_pixel_is_normalised_by_the_running_statistics() -> None:
+    norm, features = PixelBatchNorm(3), image(1, 1, channels=3)
+    norm.running_mean.copy_(torch.tensor([1.0, -2.0, 0.5]))
+    norm.running_var.copy_(torch.tensor([4.0, 0.25, 1.0]))
+    kept = {name: buffer.clone() for name, buffer in norm.named_buffers()}
+    normalised = norm.train()(features)
+    torch.testing.assert_close(normalised, norm.eval()(features))
+    for name, buffer in norm.named_buffers():
+        torch.testing.assert_close(buffer, kept[name], rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("shape", [(2, 3, 1, 1), (1, 3, 1, 2), (2, 3, 4, 5)])
+def test_more_pixels_are_normalised_as_by_pytorch(shape: tuple[int, ...]) -> None:
+    norm, reference, features = PixelBatchNorm(3), nn.BatchNorm2d(3), torch.randn(shape)
+    torch.testing.assert_close(norm(features), reference(features))
+    for buffer, expected in zip(norm.buffers(), reference.buffers(), strict=True):
+        torch.testing.assert_close(buffer, expected)
+
+
+def test_a_training_step_in_bfloat16_is_finite() -> None:
+    network = small().train()
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        loss = loss_of(network, image(20, 40, scans=2))
+    loss.backward()
+    assert loss.isfinite()
+    assert all(parameter.grad.isfinite().all() for parameter in network.parameters())
+
+
+@pytest.mark.parametrize(("height", "width"), [(16, 32), (20, 37)])
+@pytest.mark.filterwarnings("ignore")  # the exporter's own parts warn of each other
+def test_the_exported_network_gives_the_same_logits(
+    height: int, width: int, tmp_path: Path
+) -> None:
+    network, seen, path = small(), image(height, width), tmp_path / "salsanext.onnx"
+    torch.onnx.export(
+        network,
+        (seen,),
+        path,
+        input_names=["image"],
+        opset_version=18,
+        dynamo=True,
+        external_data=False,
+        verbose=False,
+    )
+    session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+    (logits,) = session.run(None, {"image": seen.numpy()})
+    np.testing.assert_allclose(logits, network(seen).detach(), rtol=0, atol=1e-4)
+    operators = Counter(node.op_type for node in onnx.load(path).graph.node)
+    assert operators["Conv"] == 51
+    if (height, width) == (16, 32):  # nothing is spent on sizes that fit
+        assert not operators.keys() & {"Pad", "Slice"}

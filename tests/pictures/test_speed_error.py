@@ -1,0 +1,78 @@
+"""The picture of error against time: its front, and labels that can all be read."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.text import Text
+
+from derain.pictures.speed_error import LEAST_ERROR, Standing, speed_error_figure, unbeaten
+
+values = st.sampled_from([0.0, 0.1, 0.2, 0.5, 1.0])
+standings = st.lists(
+    st.builds(Standing, st.just("x"), values, values.map(lambda v: v + 1), st.just("filter")),
+    min_size=1,
+    max_size=8,
+)
+
+
+@given(standings)
+def test_the_front_is_what_no_other_beats(methods: list[Standing]) -> None:
+    def beats(a: Standing, b: Standing) -> bool:
+        no_worse = a.error <= b.error and a.milliseconds <= b.milliseconds
+        return no_worse and (a.error, a.milliseconds) != (b.error, b.milliseconds)
+
+    places = {(m.milliseconds, m.error) for m in methods if not any(beats(n, m) for n in methods)}
+    front = [(m.milliseconds, m.error) for m in unbeaten(methods)]
+    assert front == sorted(places)
+
+
+def crowd(seed: int) -> list[Standing]:
+    """Sixteen methods, half of them close together."""
+    chance = np.random.default_rng(seed)
+    error = np.concatenate([chance.uniform(0.02, 1, 8), chance.normal(0.2, 0.01, 8)])
+    milliseconds = np.concatenate([chance.uniform(5, 900, 8), chance.normal(120, 8, 8)])
+    groups = itertools.cycle(["network", "filter", "baseline"])
+    return [
+        Standing(f"method number {number}", *place, group)
+        for number, (*place, group) in enumerate(zip(error, milliseconds, groups, strict=False))
+    ]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_labels_cover_neither_each_other_nor_a_marker(seed: int) -> None:
+    methods = crowd(seed)
+    figure = speed_error_figure(methods, "a crowd")
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    assert [text.get_text() for text in axes.texts] == [method.title for method in methods]
+    # Of the letters alone, without the line that leads to them.
+    boxes = [Text.get_window_extent(text) for text in axes.texts]
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+    places = axes.transData.transform([(m.milliseconds, m.error) for m in methods])
+    assert not any(box.contains(*place) for box in boxes for place in places)
+
+
+def test_a_label_beside_a_marker_is_nearer_to_it_than_to_any_other() -> None:
+    methods = [
+        Standing("right", 0.211, 239, "network"),
+        Standing("left", 0.209, 227, "network"),
+        Standing("far", 0.9, 5, "baseline"),
+        Standing("farther", 0.1, 9000, "baseline"),
+    ]
+    figure = speed_error_figure(methods, "two close together")
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    places = axes.transData.transform([(m.milliseconds, m.error) for m in methods])
+    for number, text in enumerate(axes.texts):
+        box = Text.get_window_extent(text)
+        beyond = np.maximum(np.maximum(box.min - places, places - box.max), 0)
+        assert text.arrow_patch or np.argmin(np.hypot(*beyond.T)) == number
+
+
+def test_no_error_at_all_is_drawn_at_the_least() -> None:
+    figure = speed_error_figure([Standing("perfect", 0.0, 3.0, "network")], "one method")
+    (collection,) = figure.axes[0].collections
+    np.testing.assert_allclose(collection.get_offsets(), [[3.0, LEAST_ERROR]])

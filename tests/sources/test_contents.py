@@ -1,0 +1,168 @@
+"""What a data set holds, counted by class and by rain rate."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgba
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.files import write_scan
+from derain.files.labels import write_labels
+from derain.pictures.data_statistics import CLEAN, statistics_figure
+from derain.scan import Scan
+from derain.simulation.campaign import MAKER
+from derain.sources.contents import (
+    Tally,
+    count_scan,
+    find_layout,
+    find_sequences,
+    rate_name,
+)
+
+REHEARSE3D = ("lidar_radar_pcd", "lidar_radar_labels")
+COLUMNS = ("x", "y", "z", "intensity")
+
+
+def add_scan(sequence: Path, layout: tuple[str, str], stem: str, label: list[int]) -> None:
+    write_scan(sequence / layout[0] / f"{stem}.bin", Scan.of(scene(len(label))))
+    write_labels(sequence / layout[1] / f"{stem}.label", np.array(label))
+
+
+def record(sequence: Path, text: str, stem: str = "000000") -> None:
+    (sequence / "weather").mkdir(parents=True, exist_ok=True)
+    (sequence / "weather" / f"{stem}.csv").write_text(text)
+
+
+@pytest.mark.parametrize("layout", [REHEARSE3D, ("velodyne", "labels")])
+@pytest.mark.parametrize("root", ["", "sequences", "sequences/000", "sequences/000/{scans}"])
+def test_sequences_are_found_from_the_root_to_the_sequence(
+    tmp_path: Path, layout: tuple[str, str], root: str
+) -> None:
+    for name in ("001", "000"):
+        add_scan(tmp_path / "sequences" / name, layout, "000001", [0] * 10)
+        add_scan(tmp_path / "sequences" / name, layout, "000000", [0] * 10)
+    folder = tmp_path / root.format(scans=layout[0])
+    assert find_layout(folder) == layout
+    sequences = find_sequences(folder, layout)
+    expected = ["000"] if "000" in root else ["000", "001"]
+    assert [sequence.name for sequence in sequences] == expected
+    assert [scan.name for scan in sequences[0].scans] == ["000000.bin", "000001.bin"]
+    assert sequences[0].rain_rate is None
+
+
+def test_a_sequence_that_is_not_finished_is_not_counted(tmp_path: Path) -> None:
+    for name in ("000", ".001"):
+        add_scan(tmp_path / "sequences" / name, REHEARSE3D, "000000", [0])
+    assert [sequence.name for sequence in find_sequences(tmp_path, REHEARSE3D)] == ["000"]
+
+
+def test_a_folder_of_scans_is_one_sequence(tmp_path: Path) -> None:
+    write_scan(tmp_path / "scan.ply", Scan.of(scene(30)))
+    assert find_layout(tmp_path) is None
+    (sequence,) = find_sequences(tmp_path, None)
+    assert [scan.name for scan in sequence.scans] == ["scan.ply"]
+
+
+def test_other_folders_have_to_be_named(tmp_path: Path) -> None:
+    add_scan(tmp_path / "drive", ("lidar", "classes"), "0", [1, 2])
+    assert find_layout(tmp_path) is None
+    (sequence,) = find_sequences(tmp_path, ("lidar", "classes"))
+    assert sequence.name == "drive"
+    with pytest.raises(InputError, match="no sequence in it has a folder velodyne"):
+        find_sequences(tmp_path, ("velodyne", "labels"))
+
+
+def test_the_manifest_states_rain_rates_before_the_weather_does(tmp_path: Path) -> None:
+    for name in ("000", "001", "002"):
+        add_scan(tmp_path / "sequences" / name, REHEARSE3D, "000000", [0])
+        record(tmp_path / "sequences" / name, "rain_rate_mm_h,wind\n9.0,1\n")
+    record(tmp_path / "sequences/001", "rain_rate_mm_h,wind\n11.0,1\n12.0,1\n", "000001")
+    record(tmp_path / "sequences/002", "temperature\n9\n")
+    manifest = {"made_by": MAKER, "rain_rate_mm_h": {"000": 10.0}}
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest))
+    rates = [sequence.rain_rate for sequence in find_sequences(tmp_path, REHEARSE3D)]
+    assert rates == [10, 11, None]
+
+
+def test_a_rain_gauge_that_fails_is_not_heeded(tmp_path: Path) -> None:
+    for name, rates in {"000": "nan\n9\ninf", "001": "nan"}.items():
+        add_scan(tmp_path / name, REHEARSE3D, "000000", [0])
+        record(tmp_path / name, f"rain_rate_mm_h\n{rates}\n")
+    rates = [sequence.rain_rate for sequence in find_sequences(tmp_path, REHEARSE3D)]
+    assert rates == [9, None]
+
+
+def test_a_damaged_weather_record_is_named(tmp_path: Path) -> None:
+    add_scan(tmp_path / "000", REHEARSE3D, "000000", [0])
+    record(tmp_path / "000", "rain_rate_mm_h\nwet\n")
+    with pytest.raises(InputError, match=r"000000\.csv: cannot be read"):
+        find_sequences(tmp_path, REHEARSE3D)
+
+
+def test_points_are_counted_by_class_and_instances_are_not(tmp_path: Path) -> None:
+    add_scan(tmp_path, REHEARSE3D, "0", [3, 0, 3, 300, 7])
+    path = tmp_path / "lidar_radar_labels/0.label"
+    write_labels(path, np.array([3, 0, 3, 300, 7]), np.arange(5))
+    tally = count_scan(tmp_path / "lidar_radar_pcd/0.bin", REHEARSE3D, COLUMNS)
+    assert (tally.scans, tally.points) == (1, 5)
+    assert tally.labelled == {0: 1, 3: 2, 7: 1, 300: 1}
+    assert tally.as_dict({3: "rain", 0: "background", 7: "road"})["class_share"] == {
+        "background": 0.2,
+        "rain": 0.4,
+        "road": 0.2,
+        "class 300": 0.2,
+    }
+
+
+def test_a_scan_without_labels_gives_its_points(tmp_path: Path) -> None:
+    for suffix in ("bin", "pcd", "npz"):
+        write_scan(tmp_path / f"scan.{suffix}", Scan.of(scene(40)))
+        tally = count_scan(tmp_path / f"scan.{suffix}", None, COLUMNS)
+        assert (tally.points, tally.labelled.total()) == (40, 0)
+        assert tally.as_dict({})["class_share"] == {}
+
+
+def test_labels_beside_a_scan_are_found(tmp_path: Path) -> None:
+    write_scan(tmp_path / "scan.pcd", Scan.of(scene(40)))
+    write_labels(tmp_path / "scan.label", np.full(40, 110))
+    assert count_scan(tmp_path / "scan.pcd", None, COLUMNS).labelled == {110: 40}
+
+
+def test_labels_of_another_scan_are_refused(tmp_path: Path) -> None:
+    add_scan(tmp_path, REHEARSE3D, "0", [3, 0, 3])
+    with pytest.raises(InputError, match="3 labels of 4 bytes for a scan of 2 points"):
+        count_scan(tmp_path / "lidar_radar_pcd/0.bin", REHEARSE3D, [*COLUMNS, "ring", "time"])
+
+
+def test_real_scans_are_counted_as_numpy_counts_them(shared: Path) -> None:
+    root = shared / "data" / "wads"
+    assert find_layout(root) == ("velodyne", "labels")
+    (sequence,) = find_sequences(root, ("velodyne", "labels"))
+    assert (sequence.name, len(sequence.scans)) == ("36", 10)
+    tally = count_scan(sequence.scans[0], ("velodyne", "labels"), COLUMNS)
+    label = root / "sequences/36/labels" / f"{sequence.scans[0].stem}.label"
+    raw = np.fromfile(label, np.uint32) & 0xFFFF
+    assert tally.labelled[110] == (raw == 110).sum() > 0
+    assert tally.points == tally.labelled.total() == len(raw)
+
+
+def test_the_picture_has_a_bar_for_each_class_and_rate_and_a_slice_for_each_rate() -> None:
+    tallies: dict[float | None, Tally] = {}
+    for number, rate in enumerate((0.0, 10.0, 50.0, None)):
+        tallies[rate] = Tally(sequences=number + 1, scans=1, points=9)
+        tallies[rate].labelled.update({0: 5 + number, 3: 4})
+    figure = statistics_figure(tallies, {0: "background", 3: "rain"}, "data")
+    figure.draw_without_rendering()
+    shares, points = figure.axes
+    angles = [wedge.theta2 - wedge.theta1 for wedge in shares.patches]
+    assert np.abs(angles) == pytest.approx(np.arange(1, 5) * 36)
+    assert points.get_yscale() == "log"
+    assert [bar.get_height() for bar in points.patches] == [5, 4, 6, 4, 7, 4, 8, 4]
+    assert [tick.get_text() for tick in points.get_xticklabels()] == ["background", "rain"]
+    assert points.patches[0].get_facecolor() == to_rgba(CLEAN)
+    legend = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert legend == [rate_name(rate) for rate in tallies]
+    assert legend == ["clean", "10 mm/h", "50 mm/h", "rain unknown"]

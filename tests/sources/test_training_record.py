@@ -1,0 +1,75 @@
+"""What a network was trained on is recorded, and known again where it is measured."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.cards.card import load_card
+from derain.export.model_file import ModelFile
+from derain.sources.training_record import (
+    ENDS,
+    MOST_NAMES,
+    by_fingerprint,
+    by_name,
+    fingerprint,
+    overlap,
+)
+
+CARD = load_card("wads")
+SPEC = ModelFile.read(Path(__file__).parents[1] / "export/kept/outdet.onnx").spec
+
+
+@pytest.fixture
+def scans(tmp_path: Path) -> list[Path]:
+    """Two scans of a sequence and one of another, each of its own content."""
+    paths = [tmp_path / f"sequences/{name}.bin" for name in ("11/v/a", "11/v/b", "12/v/a")]
+    for number, path in enumerate(paths):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        np.full(4 * 10, number, "<f4").tofile(path)
+    return paths
+
+
+def test_a_sequence_is_known_by_its_name_where_the_data_are_the_same(scans: list[Path]) -> None:
+    spec = replace(SPEC, training=by_name(["10", "11"]))
+    note = overlap("mine", spec, CARD, scans)
+    assert note is not None
+    assert note.startswith(f"mine was trained on 2 of these 3 scans, such as {scans[0]}")
+    assert overlap("mine", replace(spec, training=by_name(["10", "13"])), CARD, scans) is None
+    # Sequences of other data may well be called the same.
+    assert overlap("mine", replace(spec, data="other data"), CARD, scans) is None
+
+
+def test_a_scan_is_known_by_its_content_wherever_it_lies(scans: list[Path], tmp_path: Path) -> None:
+    spec = replace(SPEC, training=by_fingerprint(scans[:1]), data="whatever")
+    moved = tmp_path / "elsewhere" / "other_name.bin"
+    moved.parent.mkdir()
+    moved.write_bytes(scans[0].read_bytes())
+    note = overlap("mine", spec, CARD, [scans[1], moved])
+    assert note is not None
+    assert note.startswith(f"mine was trained on 1 of these 2 scans, such as {moved}")
+    # One of the same name in a folder of the same name is another.
+    assert overlap("mine", spec, CARD, scans[1:]) is None
+
+
+def test_nothing_is_said_where_nothing_is_known(scans: list[Path]) -> None:
+    assert by_fingerprint([]) == by_name([]) == {}
+    assert overlap("mine", replace(SPEC, training={}), CARD, scans) is None
+
+
+def test_both_ends_and_the_length_of_a_file_tell_it_from_others(tmp_path: Path) -> None:
+    content = np.random.default_rng(0).bytes(3 * ENDS)
+    contents = [content, content[:-1], b"x" + content[1:], content[:-1] + b"x", b""]
+    prints = set()
+    for content in contents:
+        (tmp_path / "scan.bin").write_bytes(content)
+        prints.add(fingerprint(tmp_path / "scan.bin"))
+    assert len(prints) == len(contents)
+    assert all(len(print_) == 16 for print_ in prints)
+
+
+def test_a_record_stays_small(scans: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    assert len(by_name(map(str, range(2 * MOST_NAMES)))["sequences"]) == MOST_NAMES
+    monkeypatch.setattr("derain.sources.training_record.MOST_NAMES", 2)
+    assert by_fingerprint(scans) == {"scans": tuple(sorted(map(fingerprint, scans[::2])))}

@@ -1,0 +1,79 @@
+"""Cores that a process may use: those it may run on, within its share of their time."""
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+
+from derain.system import cores
+from derain.system.cores import usable_cores
+
+CoresIn = Callable[[str, Mapping[str, str]], int]
+
+
+@pytest.fixture
+def cores_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CoresIn:
+    """Says what a process finds that may run on eight cores."""
+    monkeypatch.setattr(cores, "_allowed_cores", lambda: 8)
+
+    def found(membership: str, files: Mapping[str, str]) -> int:
+        (tmp_path / "cgroup").write_bytes(membership.encode("latin-1"))
+        for name, content in files.items():
+            path = tmp_path / "groups" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(content)
+        return usable_cores(tmp_path / "cgroup", tmp_path / "groups")
+
+    return found
+
+
+def version_1(group: str, quota: int, period: int = 100_000) -> dict[str, str]:
+    return {f"{group}/cpu.cfs_quota_us": f"{quota}\n", f"{group}/cpu.cfs_period_us": f"{period}\n"}
+
+
+@pytest.mark.parametrize(
+    ("membership", "files", "expected"),
+    [
+        # Version 2, in a name space of its own, on the machine, and below a group with a quota.
+        ("0::/\n", {"cpu.max": "200000 100000\n"}, 2),
+        ("0::/a/b\n", {"a/b/cpu.max": "50000 10000\n"}, 5),
+        ("0::/a/b\n", {"a/b/cpu.max": "700000 100000", "a/cpu.max": "300000 100000"}, 3),
+        ("0::/a/b\n", {"a/b/cpu.max": "max 100000", "a/cpu.max": "300000 100000"}, 3),
+        ("0::/docker/1f\n", {"cpu.max": "400000 100000\n"}, 4),
+        ("0::/a:b\n", {"a:b/cpu.max": "200000 100000\n"}, 2),
+        # Part of a core's time takes one more core, and there is always one.
+        ("0::/\n", {"cpu.max": "250000 100000\n"}, 3),
+        ("0::/\n", {"cpu.max": "1000 100000\n"}, 1),
+        ("0::/\n", {"cpu.max": "6400000 100000\n"}, 8),
+        # Version 1, among other controllers.
+        ("5:memory:/a\n4:cpu,cpuacct:/a\n0::/\n", version_1("cpu,cpuacct/a", 300_000), 3),
+        ("4:cpu:/docker/1f\n", version_1("cpu", 150_000), 2),
+        ("4:cpu:/\n", version_1("cpu", -1), 8),
+        ("4:cpuset:/\n", version_1("cpuset", 100_000), 8),
+        # Absent or odd: no quota.
+        ("", {"cpu.max": "100000 100000\n"}, 8),
+        ("0::/\n", {}, 8),
+        ("\xff\xfe", {}, 8),
+        ("nonsense\n", {"cpu.max": "100000 100000\n"}, 8),
+        ("0::/\n", {"cpu.max": "100000\n"}, 8),
+        ("0::/\n", {"cpu.max": "100000 0\n"}, 8),
+        ("0::/\n", {"cpu.max": "-100000 100000\n"}, 8),
+        ("0::/\n", {"cpu.max": "9" * 5000 + " 1\n"}, 8),
+    ],
+)
+def test_a_share_of_time_limits_the_cores(
+    cores_in: CoresIn, membership: str, files: Mapping[str, str], expected: int
+) -> None:
+    assert cores_in(membership, files) == expected
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system has no affinity")
+def test_where_there_are_no_control_groups_it_is_the_cores_it_may_run_on(tmp_path: Path) -> None:
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(before)})
+    try:
+        assert usable_cores(tmp_path / "none", tmp_path / "none") == 1
+    finally:
+        os.sched_setaffinity(0, before)
+    assert usable_cores(tmp_path / "none", tmp_path / "none") == len(before)

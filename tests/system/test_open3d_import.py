@@ -1,0 +1,115 @@
+"""Open3D is imported, or the user is told what is missing; and TensorBoard starts beside it."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import derain.system.open3d_import
+from derain.errors import InputError
+from derain.system.open3d_import import LIBUSB, import_open3d, make_open3d_loadable
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """An Open3D and a libusb of our own, on a machine whose system has no libusb."""
+    library = tmp_path / "libusb_package/libusb-1.0.so"
+    folder = tmp_path / "open3d"
+    for path in (library, folder / "__init__.py"):
+        path.parent.mkdir()
+        path.touch()
+    loaded: list[str] = []
+
+    def load(name: str, mode: int = 0) -> None:
+        if name == LIBUSB:
+            raise OSError("cannot open shared object file")
+        loaded.append(name)
+
+    package = SimpleNamespace(get_library_path=lambda: library)
+    monkeypatch.setitem(sys.modules, "libusb_package", package)
+    spec = SimpleNamespace(origin=str(folder / "__init__.py"))
+    monkeypatch.setattr(derain.system.open3d_import, "find_spec", {"open3d": spec}.get)
+    monkeypatch.setattr(derain.system.open3d_import.ctypes, "CDLL", load)
+    monkeypatch.setattr(sys, "platform", "linux")
+    return SimpleNamespace(library=library, link=folder / LIBUSB, loaded=loaded)
+
+
+def test_the_library_lies_where_open3d_looks(installed: SimpleNamespace) -> None:
+    make_open3d_loadable()
+    make_open3d_loadable()
+    assert installed.link.samefile(installed.library)
+    assert not os.path.isabs(installed.link.readlink())  # an environment may be moved
+    assert installed.loaded == []
+
+
+def test_a_link_to_a_package_that_is_gone_is_made_again(installed: SimpleNamespace) -> None:
+    installed.link.symlink_to("gone/libusb-1.0.so")
+    make_open3d_loadable()
+    assert installed.link.samefile(installed.library)
+
+
+def test_where_no_link_can_be_made_this_process_loads_the_library(
+    installed: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*paths: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(Path, "symlink_to", refuse)
+    make_open3d_loadable()
+    assert installed.loaded == [str(installed.library)]
+    assert not installed.link.exists()
+
+
+def test_a_library_of_the_system_is_left_to_serve(
+    installed: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(derain.system.open3d_import.ctypes, "CDLL", lambda name: None)
+    make_open3d_loadable()
+    assert not installed.link.exists()
+
+
+def test_tensorboard_loads_its_plug_ins_once_derain_has_used_open3d() -> None:
+    try:
+        import_open3d()
+    except InputError as error:
+        pytest.skip(str(error))
+    load = "from tensorboard.default import get_dynamic_plugins; print(get_dynamic_plugins())"
+    finished = subprocess.run([sys.executable, "-c", load], capture_output=True, text=True)
+    assert finished.returncode == 0, finished.stderr
+    assert "Open3DPlugin" in finished.stdout
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["simulate", "--sequences", "3", "--scans", "1"],
+        ["fit", "--config", "outdet_simulated.yaml"],
+    ],
+)
+def test_without_open3d_a_command_says_what_to_install_and_leaves_nothing(
+    run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    where = "--data.root" if command[0] == "fit" else "--out"
+    outcome = run_derain(*command, where, "facility")
+    assert outcome.code == 2
+    line = outcome.err.splitlines()[-1]
+    assert line.startswith("derain: open3d: is not installed")
+    assert line.endswith("pip install 'derain[scene]'")
+    assert not list(tmp_path.glob("facility/*"))
+
+
+def test_an_open3d_that_lacks_a_library_is_reported_with_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "open3d/__init__.py"
+    package.parent.mkdir()
+    package.write_text("raise ImportError('libGL.so.1: cannot open shared object file')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "open3d", raising=False)
+    with pytest.raises(InputError, match=r"open3d: cannot be imported \(libGL\.so\.1: .*\)\."):
+        import_open3d()

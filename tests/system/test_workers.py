@@ -1,0 +1,74 @@
+"""Processes that work for another end with it."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+import pytest
+
+from derain.system.workers import LAUNCHER, end_with_launcher, worker_pool
+
+HAS_A_WORKER = """
+import time
+from derain.system.workers import worker_pool
+
+if __name__ == "__main__":
+    with worker_pool(1) as pool:
+        pool.submit(print, "at work", flush=True).result()
+        pool.submit(time.sleep, 600).result()
+"""
+
+HAS_A_RANK = """
+import os, subprocess, sys, time
+from derain.system.workers import end_with_launcher
+
+end_with_launcher()
+if "LOCAL_RANK" in os.environ:
+    print("at work", flush=True)
+    time.sleep(600)
+os.environ["LOCAL_RANK"] = "0"  # as Lightning does, which then starts the others
+subprocess.run([sys.executable, __file__], env={**os.environ, "LOCAL_RANK": "1"})
+"""
+
+
+@pytest.mark.parametrize("program", [HAS_A_WORKER, HAS_A_RANK], ids=["worker", "rank"])
+def test_no_process_outlives_the_one_that_it_works_for(tmp_path: Path, program: str) -> None:
+    (tmp_path / "program.py").write_text(program)
+    environment = {k: v for k, v in os.environ.items() if k != "LOCAL_RANK"}
+    environment[LAUNCHER] = "1"  # as in a run that another run has begun
+    command = [sys.executable, tmp_path / "program.py"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
+    ) as process:
+        assert process.stdout.readline() == b"at work\n"
+        process.kill()
+        process.communicate(timeout=30)  # returns when nobody holds the other end of the pipe
+
+
+def test_an_error_does_not_wait_for_what_workers_are_at() -> None:
+    work: list[Future[None]] = []
+
+    def fail() -> None:
+        with worker_pool(1) as pool:
+            pool.submit(int).result()  # the worker is there
+            work.append(pool.submit(time.sleep, 600))
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert isinstance(work[0].exception(), BrokenProcessPool)
+
+
+@pytest.mark.parametrize("environment", [{}, {"LOCAL_RANK": "1"}], ids=["alone", "by torchrun"])
+def test_a_process_that_nobody_of_ours_began_goes_on_without_its_parent(
+    monkeypatch: pytest.MonkeyPatch, environment: dict[str, str]
+) -> None:
+    monkeypatch.setattr(os, "environ", dict(environment))
+    threads = threading.active_count()
+    end_with_launcher()
+    assert threading.active_count() == threads

@@ -1,0 +1,213 @@
+"""The ways back against plain loops, at every border and in every tie."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from derain.views.back_projection import (
+    CHUNK,
+    WAYS_BACK,
+    ProjectedPoints,
+    copy,
+    nearest_range,
+    vote,
+)
+
+SHAPES = st.tuples(st.integers(1, 7), st.integers(1, 9))
+
+
+@st.composite
+def projections(draw: st.DrawFn) -> tuple[ProjectedPoints, NDArray[np.float32]]:
+    """Points on a small grid with few ranges, hence many ties, and a score per pixel."""
+    height, width = draw(SHAPES)
+    count = draw(st.integers(0, 60))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    pixel = rng.integers(0, height * width, count)
+    distance = rng.choice([1.0, 1.5, 2.0, 2.25, 7.0, 7.5, 30.0], count).astype(np.float32)
+    points = project(pixel, distance, (height, width), draw(st.booleans()))
+    return points, rng.random(height * width, np.float32)
+
+
+def project(
+    pixel: object, distance: object, shape: tuple[int, int], wraps: bool
+) -> ProjectedPoints:
+    pixel, distance = np.asarray(pixel, np.int64), np.asarray(distance, np.float32)
+    nearest = np.full(math.prod(shape), np.inf, np.float32)
+    for number, value in zip(pixel, distance, strict=True):
+        nearest[number] = min(nearest[number], value)
+    return ProjectedPoints(pixel, distance, nearest.reshape(shape), wraps)
+
+
+def window(points: ProjectedPoints, pixel: int) -> list[tuple[int, int]]:
+    """(squared distance, pixel) of a pixel's 5 x 5 window, its own first, then as ties are kept."""
+    height, width = points.nearest.shape
+    row, column = divmod(pixel, width)
+    found = []
+    for down in range(-2, 3):
+        for right in range(-2, 3):
+            there = (column + right) % width if points.wraps else column + right
+            if 0 <= row + down < height and 0 <= there < width:
+                found.append((down**2 + right**2, (down, right), (row + down) * width + there))
+    return [(squared, number) for squared, _, number in sorted(found)]
+
+
+def nearest_range_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -> list[float]:
+    shown, result = points.nearest.ravel(), []
+    for pixel, distance in zip(points.pixel, points.range, strict=True):
+        candidates = [number for _, number in window(points, pixel)]
+        result.append(score[min(candidates, key=lambda number: abs(shown[number] - distance))])
+    return result
+
+
+def vote_by_hand(points: ProjectedPoints, score: NDArray[np.float32]) -> list[float]:
+    shown, result = points.nearest.ravel(), []
+    total = sum(math.exp(-(a * a + b * b) / 2) for a in range(-2, 3) for b in range(-2, 3))
+    for pixel, distance in zip(points.pixel, points.range, strict=True):
+        candidates = []
+        for place, (squared, number) in enumerate(window(points, pixel)):
+            weight = np.float32(1 - math.exp(-squared / 2) / total)
+            difference = np.abs(shown[number] - distance) * weight if place else np.float32(0)
+            candidates.append((difference, place, number))
+        votes = [score[n] > 0.5 for difference, _, n in sorted(candidates)[:5] if difference <= 1]
+        result.append(sum(votes) / len(votes))
+    return result
+
+
+@settings(deadline=None)
+@given(projections())
+def test_nearest_range_equals_plain_loops(
+    projection: tuple[ProjectedPoints, NDArray[np.float32]],
+) -> None:
+    np.testing.assert_array_equal(nearest_range(*projection), nearest_range_by_hand(*projection))
+
+
+@settings(deadline=None)
+@given(projections())
+def test_the_vote_equals_plain_loops(
+    projection: tuple[ProjectedPoints, NDArray[np.float32]],
+) -> None:
+    np.testing.assert_allclose(vote(*projection), vote_by_hand(*projection), rtol=1e-6)
+
+
+@settings(deadline=None)
+@given(projections())
+def test_copying_gives_every_point_its_pixels_score(
+    projection: tuple[ProjectedPoints, NDArray[np.float32]],
+) -> None:
+    points, score = projection
+    assert copy(points, score).tolist() == [score[pixel] for pixel in points.pixel]
+
+
+@settings(deadline=None)
+@given(projections(), st.sampled_from(sorted(WAYS_BACK)), st.sampled_from([0.0, 1.0]))
+def test_a_unanimous_image_gives_every_point_its_answer(
+    projection: tuple[ProjectedPoints, NDArray[np.float32]], way_back: str, answer: float
+) -> None:
+    points, score = projection
+    result = WAYS_BACK[way_back](points, np.full_like(score, answer))
+    assert result.dtype == np.float32
+    assert result.tolist() == [answer] * len(points.pixel)
+
+
+@settings(deadline=None)
+@given(projections(), st.sampled_from(["nearest range", "copy"]))
+def test_points_that_are_shown_have_their_own_pixels_score(
+    projection: tuple[ProjectedPoints, NDArray[np.float32]], way_back: str
+) -> None:
+    points, score = projection
+    shown = points.range == points.nearest.ravel()[points.pixel]
+    np.testing.assert_array_equal(
+        WAYS_BACK[way_back](points, score)[shown], score[points.pixel[shown]]
+    )
+
+
+def test_a_wall_behind_a_drop_follows_the_wall() -> None:
+    pixel = [*range(25), 12]
+    wall_and_drop = project(pixel, [20.0] * 12 + [3.0] + [20.0] * 12 + [20.1], (5, 5), wraps=False)
+    rain = np.zeros(25, np.float32)
+    rain[12] = 1
+    assert nearest_range(wall_and_drop, rain)[[12, 25]].tolist() == [1, 0]
+    assert copy(wall_and_drop, rain)[[12, 25]].tolist() == [1, 1]
+    # The own pixel votes as if it showed the wall, but it is one of five.
+    assert vote(wall_and_drop, rain)[25] == pytest.approx(0.2)
+
+
+def test_the_window_closes_a_full_circle_and_ends_elsewhere() -> None:
+    # Two points in column 0, of which the farther finds its like only across the seam.
+    pixel, distance, score = [0, 0, 7], [3.0, 20.0, 20.0], np.arange(8, dtype=np.float32)
+    assert nearest_range(project(pixel, distance, (1, 8), True), score)[1] == 7
+    assert nearest_range(project(pixel, distance, (1, 8), False), score)[1] == 0
+
+
+def test_ties_go_to_the_own_pixel_then_the_nearest_then_row_major() -> None:
+    score = np.arange(25, dtype=np.float32)
+    # Own 10 and a neighbour's 14 are equally like 12.
+    assert nearest_range(project([12, 12, 13], [10, 12, 14], (5, 5), False), score)[1] == 12
+    # Two steps away, one step away, all at 12: the nearest wins.
+    assert nearest_range(project([12, 12, 2, 17], [10, 12, 12, 12], (5, 5), False), score)[1] == 17
+    # Above, left, right, below: the first in reading order wins.
+    cross = project([12, 12, 17, 13, 11, 7], [10, *[12] * 5], (5, 5), False)
+    assert nearest_range(cross, score)[1] == 7
+
+
+def test_a_tied_vote_is_not_rain_and_a_lone_return_decides_for_itself() -> None:
+    two = project([0, 1], [5.0, 5.0], (1, 8), False)
+    assert vote(two, np.array([1, 0, 0, 0, 0, 0, 0, 0], np.float32)).tolist() == [0.5, 0.5]
+    # The neighbour is farther off than the cutoff, so that only the own pixel votes.
+    far = project([0, 1], [5.0, 9.0], (1, 8), False)
+    assert vote(far, np.array([1, 0, 0, 0, 0, 0, 0, 0], np.float32)).tolist() == [1, 0]
+
+
+def test_the_vote_does_not_depend_on_how_many_vote_at_a_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(1)
+    points = project(rng.integers(0, 600, 900), rng.uniform(1, 9, 900), (20, 30), True)
+    score = rng.random(600, np.float32)
+    assert CHUNK > 900
+    whole = vote(points, score)
+    monkeypatch.setattr("derain.views.back_projection.CHUNK", 7)
+    np.testing.assert_array_equal(vote(points, score), whole)
+
+
+def test_away_from_the_borders_the_vote_is_the_published_one() -> None:
+    rng = np.random.default_rng(2)
+    height, width = 16, 40
+    pixel, distance = rng.integers(0, height * width, 4000), rng.uniform(1, 12, 4000)
+    points = project(pixel, distance, (height, width), False)
+    score = rng.random(height * width, np.float32)
+    row, column = pixel // width, pixel % width
+    inside = (row > 1) & (row < height - 2) & (column > 1) & (column < width - 2)
+    assert inside.sum() > 2000
+    ours, theirs = vote(points, score)[inside], published_vote(points, score)[inside]
+    # torch's topk settles a tied majority by the lower class, as ours does.
+    np.testing.assert_array_equal(ours > 0.5, theirs)
+
+
+def published_vote(points: ProjectedPoints, score: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """RangeNet++'s k-NN search as published: class 0 is void, 1 is other and 2 is rain."""
+    shown = torch.from_numpy(np.where(np.isinf(points.nearest), -1, points.nearest))
+    classes = torch.from_numpy(np.where(score > 0.5, 2, 1)).reshape(shown.shape)
+    classes[shown < 0] = 0
+
+    def patches(image: torch.Tensor) -> torch.Tensor:
+        unfolded = torch.nn.functional.unfold(image.float()[None, None], (5, 5), padding=2)
+        return unfolded[0][:, torch.from_numpy(points.pixel)]
+
+    ranges, labels = patches(shown), patches(classes)
+    ranges[ranges < 0] = torch.inf
+    ranges[12] = torch.from_numpy(points.range)
+    steps = torch.arange(5) - 2
+    bell = torch.exp(-(steps[:, None] ** 2 + steps[None, :] ** 2) / 2.0)
+    weighted = (ranges - torch.from_numpy(points.range)).abs()
+    weighted *= (1 - bell / bell.sum()).reshape(25, 1)
+    nearest, voters = weighted.topk(5, dim=0, largest=False)
+    votes = labels.gather(0, voters)
+    votes[nearest > 1.0] = 3
+    counts = torch.stack([(votes == name).sum(dim=0) for name in range(4)])
+    return (counts[1:-1].argmax(dim=0) + 1 == 2).numpy()

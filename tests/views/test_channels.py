@@ -1,0 +1,79 @@
+"""Channels: values where a scan has them, and one stand-in where it has not."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.typing import NDArray
+
+from derain.evaluation.hard_cases import hard_cases
+from derain.scan import Scan
+from derain.views.channels import (
+    USUAL_CHANNELS,
+    channel_values,
+    extra_channels,
+    filled_values,
+    with_columns,
+)
+
+HARD_CASES = dict(hard_cases(largest=3000))
+EVERYTHING = (*USUAL_CHANNELS, "radar", "doppler")
+
+
+def test_extra_are_all_but_the_usual_in_their_order() -> None:
+    assert extra_channels(["rcs", "x", "radar", "range", "ring", "intensity"]) == (
+        "rcs",
+        "radar",
+        "ring",
+    )
+    assert extra_channels(USUAL_CHANNELS) == ()
+
+
+@given(hnp.arrays(np.float64, st.integers(1, 20)), st.floats(-100, 100, width=32))
+def test_each_value_is_the_scans_or_else_the_stand_in(
+    column: NDArray[np.float64], mean: float
+) -> None:
+    scan = Scan(np.ones((len(column), 3), np.float32), fields={"doppler": column})
+    rows = np.arange(len(column))[::-1]
+    (filled,) = filled_values(scan, rows, ["doppler"], {"doppler": mean})
+    expected = [value if abs(value) <= 1e7 else mean for value in column[rows].tolist()]
+    np.testing.assert_array_equal(filled, np.float32(expected))
+
+
+def test_a_channel_without_a_stand_in_is_zero_where_it_is_missing() -> None:
+    scan = Scan(np.full((2, 3), 4, np.float32))
+    filled = filled_values(scan, np.array([1]), ["rcs", "y"], {"y": 7.0})
+    assert filled.tolist() == [[0], [4]]
+
+
+@pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
+def test_valid_points_of_a_hard_scan_have_finite_values(scan: Scan) -> None:
+    rows = np.flatnonzero(scan.valid)
+    filled = filled_values(scan, rows, EVERYTHING, {"intensity": 9.0})
+    assert filled.shape == (len(EVERYTHING), len(rows))
+    assert filled.dtype == np.float32
+    assert np.isfinite(filled).all()
+    # It is the scan's columns that are NaN, not what was made of them.
+    absent = [scan.channel(name) is None for name in EVERYTHING]
+    values = channel_values(scan, rows, EVERYTHING)
+    np.testing.assert_array_equal(np.isnan(values).any(axis=1), np.array(absent) & (len(rows) > 0))
+
+
+def test_the_scan_is_left_as_it_was() -> None:
+    column = np.array([np.nan, 1], np.float32)
+    scan = Scan(np.ones((2, 3), np.float32), fields={"rcs": column})
+    filled_values(scan, np.arange(2), ["x", "rcs"], {"rcs": 5.0})[:] = 8
+    assert np.isnan(column[0])
+    assert scan.xyz.max() == 1
+
+
+def test_columns_are_kept_by_name_and_all_others_left_behind() -> None:
+    fields = {"RCS": np.arange(3), "time": np.arange(3), "doppler": np.array([1.0, np.inf, 3.0])}
+    scan = Scan(np.ones((3, 3), np.float32), fields=fields, radar=np.array([True, False, True]))
+    kept = with_columns(scan, ["doppler", "rcs", "snr"])
+    assert set(kept.fields) == {"doppler", "rcs"}
+    for name in ("doppler", "rcs", "snr", "radar"):
+        np.testing.assert_equal(kept.channel(name), scan.channel(name))
+    assert {column.dtype for column in kept.fields.values()} == {np.dtype(np.float32)}
+    assert with_columns(scan, ()).fields == {}

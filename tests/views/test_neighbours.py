@@ -1,0 +1,192 @@
+"""The neighbour view against brute force, in every order and with every trouble."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.typing import NDArray
+
+from derain.scan import Scan
+from derain.views.morton import distinct_positions, distinct_rows, first_rows, morton_code
+from derain.views.neighbours import Neighbourhoods, NeighbourView, nearest_neighbours
+
+# Few values on a coarse grid: many duplicates and many equal distances.
+gridded = hnp.arrays(
+    np.float32,
+    st.tuples(st.integers(0, 60), st.just(3)),
+    elements=st.integers(-3, 3).map(float),
+)
+scattered = hnp.arrays(
+    np.float32,
+    st.tuples(st.integers(0, 60), st.just(3)),
+    elements=st.floats(-200, 200, width=32).map(lambda value: round(value, 3)),
+)
+
+
+def brute_force(xyz: NDArray[np.float32], k: int) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    squared = ((xyz[:, None].astype(np.float64) - xyz[None].astype(np.float64)) ** 2).sum(axis=2)
+    rank = np.broadcast_to(np.arange(len(xyz)), squared.shape)
+    order = np.lexsort((rank, squared))[:, : min(k, len(xyz))]
+    order = np.pad(order, ((0, 0), (0, k - order.shape[1])), mode="edge")
+    return order, np.sqrt(np.take_along_axis(squared, order, axis=1)).astype(np.float32)
+
+
+@pytest.mark.parametrize("clouds", [gridded, scattered], ids=["gridded", "scattered"])
+@settings(deadline=None)
+@given(data=st.data(), k=st.integers(1, 12))
+def test_neighbours_equal_brute_force(
+    clouds: st.SearchStrategy[NDArray[np.float32]], data: st.DataObject, k: int
+) -> None:
+    xyz = np.unique(data.draw(clouds), axis=0)
+    if not len(xyz):
+        assert nearest_neighbours(xyz, k)[0].shape == (0, k)
+        return
+    neighbours, distances = nearest_neighbours(xyz, k)
+    expected, expected_distances = brute_force(xyz, k)
+    np.testing.assert_array_equal(neighbours, expected)
+    np.testing.assert_allclose(distances, expected_distances, rtol=1e-6, atol=1e-12)
+
+
+@settings(deadline=None)
+@given(gridded, st.randoms(use_true_random=False))
+def test_the_answer_does_not_depend_on_the_order_inside(xyz: NDArray[np.float32], random) -> None:
+    xyz = np.unique(xyz, axis=0)
+    if not len(xyz):
+        return
+    shuffle = np.array(random.sample(range(len(xyz)), len(xyz)))
+    neighbours, _ = nearest_neighbours(xyz, 5)
+    shuffled, _ = nearest_neighbours(xyz[shuffle], 5, rank=shuffle)
+    np.testing.assert_array_equal(shuffle[shuffled], neighbours[shuffle])
+
+
+@settings(deadline=None)
+@given(st.one_of(gridded, scattered))
+def test_distinct_positions_are_those_of_numpy_unique(xyz: NDArray[np.float32]) -> None:
+    first, inverse = distinct_positions(xyz)
+    expected, expected_first = np.unique(xyz, axis=0, return_index=True)
+    assert sorted(first) == sorted(expected_first)
+    assert len(first) == len(expected)
+    np.testing.assert_array_equal(xyz[first][inverse], xyz)
+
+
+@settings(deadline=None)
+@given(gridded, st.randoms(use_true_random=False))
+def test_distinct_rows_are_those_of_the_rows_that_can_be_judged(
+    xyz: NDArray[np.float32], random
+) -> None:
+    lost = np.array([random.random() < 0.3 for _ in xyz], bool)
+    scan = Scan(np.where(lost[:, None], np.float32(np.nan), xyz))
+    seen: dict[bytes, int] = {}
+    for row in np.flatnonzero(scan.valid):
+        seen.setdefault((scan.xyz[row] + 0).tobytes(), row)
+    first, inverse = distinct_rows(scan)
+    assert sorted(first) == list(seen.values())
+    assert first_rows(scan).tolist() == list(seen.values())
+    np.testing.assert_array_equal(inverse < 0, ~scan.valid)
+    np.testing.assert_array_equal(scan.xyz[first][inverse[scan.valid]], scan.xyz[scan.valid])
+
+
+def test_equal_points_apart_in_one_crowded_cell_are_found() -> None:
+    # An outlier makes the cells 15 cm wide, so that all other points share one.
+    rng = np.random.default_rng(0)
+    cluster = rng.choice(np.linspace(0, 0.01, 5, dtype=np.float32), (500, 3))
+    xyz = np.vstack([cluster, [[1e4, 0, 0]]]).astype(np.float32)
+    assert len(np.unique(morton_code(xyz))) == 2
+    first, inverse = distinct_positions(xyz)
+    assert len(first) == len(np.unique(xyz, axis=0))
+    np.testing.assert_array_equal(xyz[first][inverse], xyz)
+
+
+def test_the_curve_follows_the_interleaved_bits() -> None:
+    corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], np.float32)
+    assert np.array_equal(np.argsort(morton_code(corners)), np.arange(8))
+
+
+def test_a_point_comes_first_in_its_own_neighbourhood_even_among_duplicates() -> None:
+    xyz = np.repeat(np.random.default_rng(1).normal(size=(40, 3)).astype(np.float32), 3, axis=0)
+    view = NeighbourView()(Scan.of(np.c_[xyz, np.ones(len(xyz))]))
+    assert len(view.points) == 40
+    np.testing.assert_array_equal(view.neighbours[:, 0], np.arange(40))
+    assert (view.distances[:, 1:] > 0).all()
+
+
+def test_rows_at_one_position_get_one_answer_and_invalid_rows_get_zero() -> None:
+    points = np.array(
+        [[1, 2, 3, 4], [np.nan, 0, 0, 0], [5, 6, 7, 8], [1, 2, 3, 4], [0, 0, 0, 9]], np.float32
+    )
+    view = NeighbourView()(Scan.of(points))
+    score = np.arange(1, 1 + len(view.points), dtype=np.float32)
+    back = view.back(score)
+    assert back[0] == back[3] > 0
+    assert back[2] > 0
+    assert back[2] != back[0]
+    assert back[1] == back[4] == 0
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 8])
+def test_fewer_points_than_neighbours_repeat_the_farthest(count: int) -> None:
+    xyz = np.c_[np.arange(1, count + 1), np.zeros((count, 2))].astype(np.float32)
+    view = NeighbourView(neighbours=9)(Scan.of(np.c_[xyz, np.ones(count)]))
+    assert view.neighbours.shape == view.distances.shape == (count, 9)
+    if count:
+        assert (np.diff(view.distances, axis=1) >= 0).all()
+        assert (view.distances[:, count - 1 :] == view.distances[:, -1:]).all()
+
+
+def test_points_hold_the_channels_asked_for_in_their_order_and_a_stand_in_for_gaps() -> None:
+    rng = np.random.default_rng(5)
+    xyz = rng.normal(size=(50, 3)).astype(np.float32)
+    rcs = np.where(np.arange(50) < 20, np.nan, rng.normal(size=50))
+    scan = Scan(xyz, fields={"rcs": rcs})
+    channels = ("rcs", "range", "z", "intensity")
+    view = NeighbourView(channels=channels, stand_in={"rcs": 7.5, "intensity": 9.5})(scan)
+    rows = view.first
+    np.testing.assert_array_equal(
+        view.points[:, 0], np.float32(np.where(rows < 20, 7.5, rcs[rows]))
+    )
+    np.testing.assert_array_equal(view.points[:, 1], scan.range[rows])
+    np.testing.assert_array_equal(view.points[:, 2], xyz[rows, 2])
+    np.testing.assert_array_equal(view.points[:, 3], 9.5)
+
+
+def test_channels_do_not_change_who_is_near() -> None:
+    scan = Scan.of(np.random.default_rng(6).normal(size=(500, 4)))
+    usual, other = NeighbourView()(scan), NeighbourView(channels=("intensity",))(scan)
+    np.testing.assert_array_equal(usual.neighbours, other.neighbours)
+    np.testing.assert_array_equal(usual.distances, other.distances)
+
+
+def test_packing_keeps_every_scan_to_itself() -> None:
+    rng = np.random.default_rng(2)
+    views = [NeighbourView(4)(Scan.of(rng.normal(size=(n, 4)))) for n in (10, 0, 3, 7)]
+    packed = Neighbourhoods.pack(views)
+    start = 0
+    for view in views:
+        rows = slice(start, start + len(view.points))
+        np.testing.assert_array_equal(packed["neighbours"][rows], view.neighbours + start)
+        np.testing.assert_array_equal(packed["points"][rows], view.points)
+        start = rows.stop
+    assert len(packed["distances"]) == start
+
+
+def test_threads_do_not_change_the_view() -> None:
+    scan = Scan.of(np.random.default_rng(3).normal(size=(2000, 4)))
+    one, two = NeighbourView(threads=1)(scan), NeighbourView(threads=2)(scan)
+    np.testing.assert_array_equal(one.neighbours, two.neighbours)
+    np.testing.assert_array_equal(one.distances, two.distances)
+
+
+def test_a_real_scan_agrees_with_scikit_learn(shared: Path) -> None:
+    from sklearn.neighbors import KDTree
+
+    points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)
+    view = NeighbourView()(Scan.of(points))
+    assert sorted(view.first) == list(range(len(points)))
+    some = np.random.default_rng(4).choice(len(points), 3000, replace=False)
+    distances, neighbours = KDTree(points[:, :3]).query(points[some, :3], 9)
+    rows = view.inverse[some]
+    np.testing.assert_allclose(view.distances[rows], distances, atol=1e-5)
+    assert (view.first[view.neighbours[rows]] == neighbours).mean() > 0.9999

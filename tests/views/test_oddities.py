@@ -1,0 +1,159 @@
+"""What is odd about a scan: missing, constant and mistaken intensities, and what lies outside."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.cards.card import load_card
+from derain.evaluation.hard_cases import scene
+from derain.evaluation.intensity_rule import OneLineRule
+from derain.files import read_scan
+from derain.filters import DROR, SSR, FilterDerainer
+from derain.models.outdet import OutDet
+from derain.scan import Scan
+from derain.spec import Spec
+from derain.system.notices import Notices
+from derain.views.oddities import (
+    HEAVIEST_RAIN,
+    MOST_OUTSIDE,
+    Judge,
+    Oddity,
+    much_removed,
+    oddities,
+    outside_view,
+)
+
+
+@pytest.fixture(scope="module")
+def spec() -> Spec:
+    """That of a network on the points of WADS, whose mean intensity is 9.88 of 0..255."""
+    return OutDet().spec_for(load_card("wads"))
+
+
+def with_intensity(values: float | np.ndarray, points: int = 300) -> Scan:
+    xyzi = scene(points)
+    xyzi[:, 3] = values
+    return Scan.of(xyzi)
+
+
+def kinds(scan: Scan, judge: Judge) -> list[str]:
+    return [oddity.kind for oddity in oddities(scan, judge)]
+
+
+def test_an_ordinary_scan_is_not_odd(spec: Spec) -> None:
+    for judge in (spec, SSR(), DROR(), OneLineRule(1.0, 20.0), None):
+        assert kinds(Scan.of(scene(300)), judge) == []
+
+
+@pytest.mark.parametrize("value", [0.0, 7.0, 255.0, 65_535.0])
+def test_one_intensity_everywhere_was_not_measured(spec: Spec, value: float) -> None:
+    scan = with_intensity(value)
+    (oddity,) = oddities(scan, spec)
+    assert oddity.kind == "intensity not measured"
+    assert oddity.detail == (
+        f"intensity {value:g} at every point, so that it was not measured: "
+        "the mean of WADS, 9.88, stands in"
+    )
+    for judge in (SSR(), OneLineRule(1e6, 1e6)):
+        assert kinds(scan, judge) == ["intensity not measured"]
+    assert kinds(scan, DROR()) == []  # it looks at places alone
+
+
+def test_intensities_that_are_no_numbers_were_not_measured(spec: Spec) -> None:
+    for values in (np.nan, np.resize([np.nan, np.inf, 1e9], 300)):
+        (oddity,) = oddities(with_intensity(values), spec)
+        assert oddity.detail.startswith("no intensity is a number that sensors measure: the mean")
+
+
+def test_every_channel_that_is_missing_is_an_oddity_of_its_own(spec: Spec) -> None:
+    seeing = replace(
+        spec,
+        channels=("intensity", "doppler"),
+        units=("0..255", "m/s"),
+        mean=(9.0, 2.0),
+        std=(1, 1),
+    )
+    assert kinds(Scan(scene(300)[:, :3].copy()), seeing) == ["no intensity", "no doppler"]
+
+
+@pytest.mark.parametrize(("full_scale", "unit"), [(1.0, "smaller"), (65_535.0, "larger")])
+def test_intensities_of_another_unit_are_told_from_those_of_a_bright_scene(
+    spec: Spec, full_scale: float, unit: str
+) -> None:
+    # Bright enough for the means to be no farther apart than those of two scenes may be.
+    shares = np.random.default_rng(0).beta(*((8, 4) if full_scale == 1 else (0.05, 20)), 3000)
+    scan = with_intensity(np.maximum(shares, 0.01) * full_scale, 3000)
+    for judge in (spec, SSR()):
+        assert kinds(scan, judge) == [f"intensity of a {unit} unit"]
+        assert kinds(scan.with_intensity_times(255 / full_scale), judge) == []
+
+
+def test_real_scans_are_odd_only_where_their_intensities_are_shares(
+    spec: Spec, shared: Path
+) -> None:
+    units = {
+        "clean/kitti_hdl64.bin": ["intensity of a smaller unit"],
+        "clean/kitti_front.bin": ["intensity of a smaller unit"],
+        "clean/hesai_at128_front.pcd": ["no intensity"],
+        "clean/ouster_os1_128.npz": [],
+        "clean/pandaset_pandar64.pcd": [],
+        "clean/velodyne_vlp16_dual.pcd": [],
+        "snowykitti/velodyne/000000.bin": [],
+        "wads/sample.bin": [],
+    }
+    scans = {name: read_scan(shared / "data" / name) for name in units}
+    for judge in (spec, SSR()):
+        assert {name: kinds(scan, judge) for name, scan in scans.items()} == units
+
+
+def test_a_unit_that_is_not_stated_is_told_by_the_mean_alone(spec: Spec) -> None:
+    unknown = replace(spec, units=("m", "m", "m", "not stated"))
+    assert kinds(with_intensity(scene(300)[:, 3] / 255), unknown) == ["intensity of a smaller unit"]
+    assert kinds(with_intensity(scene(300)[:, 3] * 2), unknown) == []
+
+
+def test_a_scan_without_a_point_is_not_odd(spec: Spec) -> None:
+    for points in (np.zeros((0, 4), np.float32), np.full((200, 4), np.nan, np.float32)):
+        assert kinds(Scan.of(points), spec) == []
+        assert list(outside_view(Scan.of(points), np.zeros(len(points), bool), spec)) == []
+
+
+def test_points_outside_the_view_are_odd_where_they_are_many(spec: Spec) -> None:
+    scan = Scan.of(scene(1000))
+    few = np.arange(1000) >= 1000 * MOST_OUTSIDE
+    assert list(outside_view(scan, few, spec)) == []
+    (oddity,) = outside_view(scan, np.arange(1000) >= 250, spec)
+    assert oddity.detail == "25% of the points lie outside the grid of WADS, and stay"
+
+
+def test_twice_the_heaviest_rain_is_too_much() -> None:
+    assert not list(much_removed(2 * HEAVIEST_RAIN))
+    (oddity,) = much_removed(0.35)
+    assert oddity.detail.startswith("35% of the points are called rain")
+
+
+def test_ssr_and_the_rule_find_nothing_where_intensity_was_not_measured() -> None:
+    scan = with_intensity(0)
+    assert not FilterDerainer(SSR(threshold=1e9))(scan).any()
+    assert not OneLineRule(1e6, 1e6)(scan).any()
+    assert OneLineRule(1e6, 1e6)(with_intensity(0, 99)).all()
+
+
+def test_each_kind_is_told_with_its_first_scan_and_counted(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    notices = Notices()
+    none, unit = Oddity("no intensity", "no intensity here"), Oddity("another unit", "0..1")
+    notices.tell("a", [none])
+    notices.tell("b", [none, unit])
+    notices.tell("c\x1b[2J", [Oddity("no intensity", "nor here")])
+    notices.tell("d", [none], method="outdet")
+    notices.tell_how_many_more()
+    assert capsys.readouterr().err.splitlines() == [
+        "derain: warning: a: no intensity here",
+        "derain: warning: b: 0..1",
+        "derain: warning: d: outdet: no intensity here",
+        "derain: warning: 2 more scans: no intensity",
+    ]

@@ -1,0 +1,52 @@
+"""The probability of rain is the softmax's, whatever the logits."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.typing import NDArray
+from scipy.special import softmax
+
+from derain.views.probability import probability_of_rain
+
+
+def logits(reach: float) -> st.SearchStrategy[NDArray[np.float32]]:
+    return hnp.arrays(
+        np.float32,
+        st.tuples(st.integers(0, 20), st.just(2)),
+        elements=st.floats(-reach, reach, width=32),
+    )
+
+
+LARGEST = float(np.finfo(np.float32).max)
+
+
+@given(logits(50.0))
+def test_it_is_the_softmax(logits: NDArray[np.float32]) -> None:
+    probability = probability_of_rain(logits)
+    assert probability.dtype == np.float32
+    expected = softmax(logits.astype(np.float64), axis=1)[:, 1]
+    np.testing.assert_allclose(probability, expected, atol=1e-7)
+
+
+@given(logits(LARGEST))
+def test_no_logit_overflows(logits: NDArray[np.float32]) -> None:
+    with np.errstate(all="raise", under="ignore"):
+        probability = probability_of_rain(logits)
+    assert ((probability >= 0) & (probability <= 1)).all()
+
+
+@given(logits(LARGEST))
+def test_rain_and_not_rain_share_the_whole(logits: NDArray[np.float32]) -> None:
+    other = probability_of_rain(logits[:, ::-1])
+    np.testing.assert_allclose(probability_of_rain(logits) + other, 1, atol=1e-7)
+
+
+@given(logits(LARGEST))
+def test_more_than_half_means_the_greater_logit(logits: NDArray[np.float32]) -> None:
+    probability = probability_of_rain(logits)
+    margin = logits[:, 1].astype(np.float64) - logits[:, 0]
+    # Nearer to one half than this, float32 cannot tell the probability from it.
+    told_apart = np.abs(margin) > 1e-6
+    np.testing.assert_array_equal((probability > 0.5)[told_apart], (margin > 0)[told_apart])
+    assert (probability[margin == 0] == 0.5).all()

@@ -1,0 +1,243 @@
+"""The range view against brute force, with every trouble, and on every real scan."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases
+from derain.files import DEFAULT_COLUMNS, read_scan
+from derain.files.labels import label_beside, read_labels, semantic
+from derain.scan import Scan
+from derain.views.back_projection import WAYS_BACK
+from derain.views.grid_fit import fit_grid
+from derain.views.range_image import CHANNELS, RangeImage, RangeView
+from derain.views.spherical_grid import SphericalGrid, grid_of
+from derain.views.view import IGNORED
+
+FULL = SphericalGrid.even(6, 12, (-40, 40))
+FRONT = SphericalGrid.even(6, 12, (-40, 40), (-60, 60))
+HARD_CASES = dict(hard_cases())
+
+# Few positions: many duplicates, many equal ranges, points at the origin and on borders.
+clouds = hnp.arrays(
+    np.float32,
+    st.tuples(st.integers(0, 80), st.just(4)),
+    elements=st.sampled_from([-4.0, -2.0, -1.0, -0.0, 0.0, 1.0, 3.0, float("nan")]),
+)
+
+
+def shown_by_hand(scan: Scan, pixel: NDArray[np.int64], size: int) -> list[int]:
+    """Row of the nearest return of each pixel, the first of equally near ones."""
+    winner = [-1] * size
+    for row in np.lexsort((np.arange(len(scan)), scan.range)):
+        if pixel[row] >= 0 and winner[pixel[row]] < 0:
+            winner[pixel[row]] = int(row)
+    return winner
+
+
+@pytest.mark.parametrize("grid", [FULL, FRONT], ids=["full circle", "front"])
+@settings(deadline=None)
+@given(points=clouds)
+def test_every_pixel_shows_the_nearest_of_its_points(
+    grid: SphericalGrid, points: NDArray[np.float32]
+) -> None:
+    scan = Scan.of(points)
+    image = RangeView(grid)(scan)
+    expected = np.full(len(scan), -1)
+    expected[scan.valid] = grid.pixel(scan.xyz[scan.valid])
+    np.testing.assert_array_equal(image.pixel, expected)
+    winner = shown_by_hand(scan, image.pixel, image.size)
+    assert image.winner.tolist() == winner
+    for number, row in enumerate(winner):
+        content = image.image.reshape(len(CHANNELS), -1)[:, number]
+        held = np.zeros(5) if row < 0 else [scan.range[row], *points[row]]
+        np.testing.assert_array_equal(content, np.float32(held))
+    np.testing.assert_array_equal(image.valid.ravel(), np.array(winner) >= 0)
+
+
+@settings(deadline=None)
+@given(points=clouds, random=st.randoms(use_true_random=False))
+def test_the_order_of_the_rows_changes_nothing_but_ties(
+    points: NDArray[np.float32], random: st.randoms
+) -> None:
+    # Ranges of their own for all points: there are no ties.
+    points[:, :3] *= np.linspace(1, 1.1, len(points), dtype=np.float32)[:, None]
+    order = np.array(random.sample(range(len(points)), len(points)), np.int64)
+    view, score = RangeView(FULL), np.random.default_rng(0).random(72, np.float32)
+    image, shuffled = view(Scan.of(points)), view(Scan.of(points[order]))
+    distances = image.range[image.pixel >= 0]
+    if len(np.unique(distances)) == len(distances):
+        np.testing.assert_array_equal(shuffled.image, image.image)
+        np.testing.assert_array_equal(shuffled.back(score), image.back(score)[order])
+    np.testing.assert_array_equal(shuffled.image[0], image.image[0])
+
+
+def test_row_0_is_not_lost() -> None:
+    image = RangeView(FULL)(Scan.of([[5, 0, 0, 9]]))
+    assert image.valid.sum() == 1
+    assert image.winner[image.pixel[0]] == 0
+    assert image.image[:, image.valid].ravel().tolist() == [5, 5, 0, 0, 9]
+
+
+def test_a_view_has_the_channels_it_is_asked_for_in_their_order() -> None:
+    scan = Scan.of([[3, 0, 4, 7]])
+    view = RangeView(SphericalGrid.even(1, 1, (-90, 90)), channels=("intensity", "z", "range"))
+    assert view(scan).image.ravel().tolist() == [7, 4, 5]
+    assert view(scan).image.dtype == np.float32
+
+
+def test_a_scan_without_intensity_takes_the_stand_in_and_empty_pixels_stay_zero() -> None:
+    view = RangeView(FULL, channels=("intensity",), stand_in={"intensity": 9.5})
+    image = view(Scan.of(np.ones((1, 3), np.float32)))
+    assert sorted(image.image.ravel())[-2:] == [0, 9.5]
+
+
+def test_a_pixel_shows_the_columns_of_its_nearest_point_and_a_stand_in_for_gaps() -> None:
+    columns = {"doppler": np.array([1.0, 2.0, np.nan]), "radar": np.array([0, 1, 1], np.uint8)}
+    xyz = np.array([[9, 0, 0], [3, 0, 0], [0, 9, 0]], np.float32)
+    view = RangeView(FULL, channels=("doppler", "radar"), stand_in={"doppler": -0.5})
+    image = view(Scan(xyz, fields=columns))
+    shown = image.image.reshape(2, -1)
+    assert shown[:, image.pixel].T.tolist() == [[2, 1], [2, 1], [-0.5, 1]]
+    assert not shown[:, image.winner < 0].any()
+
+
+def test_the_farthest_point_that_is_valid_has_a_finite_range() -> None:
+    image = RangeView(FULL)(Scan.of(np.full((1, 3), 1e6) * [1, 1, 0.5]))
+    assert image.image[0].max() == pytest.approx(1.5e6)
+
+
+def test_the_target_ignores_empty_pixels_and_takes_the_truth_of_what_is_shown() -> None:
+    # A drop before a wall, both in one pixel; and a wall alone.
+    scan = Scan.of([[9, 0, 0, 1], [3, 0, 0, 1], [0, 9, 0, 1]])
+    image = RangeView(FULL)(scan)
+    target = image.target(np.array([False, True, False]))
+    assert target[image.pixel].tolist() == [1, 1, 0]
+    assert (target == IGNORED).sum() == image.size - 2
+    assert target.dtype == np.int64
+
+
+def test_hidden_are_the_points_behind_a_nearer_one_and_not_its_copies() -> None:
+    scan = Scan.of([[3, 0, 0, 1], [9, 0, 0, 1], [3, 0, 0, 1], [0, 0, 0, 1], [0, 0, 9, 1]])
+    image = RangeView(FULL)(scan)
+    assert image.hidden.tolist() == [False, True, False, False, False]
+    assert image.pixel[3:].tolist() == [-1, -1]
+
+
+def test_invalid_rows_and_points_outside_get_zero() -> None:
+    scan = Scan.of([[3, 0, 0, 1], [np.nan, 0, 0, 1], [-3, 0, 0, 1], [0, 0, 3, 1]])
+    image = RangeView(FRONT)(scan)
+    assert image.back(np.ones(image.size, np.float32)).tolist() == [1, 0, 0, 0]
+
+
+def test_packing_keeps_every_scan_to_its_own_image() -> None:
+    rng = np.random.default_rng(2)
+    views = [RangeView(FRONT)(Scan.of(rng.normal(size=(n, 4)))) for n in (10, 0, 300)]
+    packed = RangeImage.pack(views)
+    assert packed["image"].shape == (3, 5, 6, 12)
+    assert packed["valid"].shape == (3, 1, 6, 12)
+    for number, view in enumerate(views):
+        for name, array in view.inputs().items():
+            assert packed[name].dtype == array.dtype
+            np.testing.assert_array_equal(packed[name][number : number + 1], array)
+
+
+def test_an_unknown_way_back_is_refused() -> None:
+    with pytest.raises(InputError, match="no such way back: 'knn'"):
+        RangeView(FULL, way_back="knn")
+
+
+@pytest.mark.parametrize("way_back", WAYS_BACK)
+@pytest.mark.parametrize("case", HARD_CASES)
+def test_hard_cases_have_finite_images_and_every_judged_row_an_answer(
+    case: str, way_back: str
+) -> None:
+    scan = HARD_CASES[case]
+    for grid in (grid_of("semantickitti", "test"), FRONT):
+        image = RangeView(grid, way_back=way_back)(scan)
+        assert np.isfinite(image.image).all()
+        answered = image.back(np.ones(image.size, np.float32))
+        np.testing.assert_array_equal(answered, np.float32(image.pixel >= 0))
+        assert not answered[~scan.valid].any()
+
+
+RADAR = ("x", "y", "z", *(f"column {number}" for number in range(3, 10)))
+REAL_SCANS = [
+    "wads/sample.bin",
+    *(f"wads/sequences/36/velodyne/0422{number}.bin" for number in range(23, 43, 2)),
+    *(f"snowykitti/velodyne/00000{number}.bin" for number in range(3)),
+    "clean/kitti_hdl64.bin",
+    "clean/kitti_front.bin",
+    "clean/pandaset_pandar64.pcd",
+    "clean/ouster_os1_128.npz",
+    "clean/ouster_os0_32_dual.npz",
+    "clean/hesai_at128_front.pcd",
+    "clean/velodyne_vlp16_dual.pcd",
+    "radar/ars548_detections.npy",
+]
+
+
+@pytest.mark.parametrize("name", REAL_SCANS)
+def test_scores_come_back_to_every_point_of_every_real_scan(shared: Path, name: str) -> None:
+    scan = read_scan(shared / "data" / name, RADAR if name.endswith(".npy") else DEFAULT_COLUMNS)
+    view = RangeView(fit_grid([scan]).grid)
+    image = view(scan)
+    np.testing.assert_array_equal(image.pixel >= 0, scan.valid)
+    # A constant comes back by every way; a vote makes it the share of votes.
+    for way_back in WAYS_BACK:
+        back = replace(image, way_back=way_back).back(np.full(image.size, 0.75, np.float32))
+        constant = np.float32(1 if way_back == "vote" else 0.75)
+        np.testing.assert_array_equal(back, np.where(scan.valid, constant, 0))
+    # So does a score of its own for every point that is shown, or is a copy of one.
+    of_pixel = np.random.default_rng(0).random(image.size, np.float32)
+    back = image.back(of_pixel)
+    assert back.shape == (len(scan),)
+    seen = scan.valid & ~image.hidden
+    np.testing.assert_array_equal(back[seen], of_pixel[image.pixel[seen]])
+    winner = image.winner[image.winner >= 0]
+    np.testing.assert_array_equal(image.image[0][image.valid], scan.range[winner])
+
+
+def labelled(path: Path, snow: int = 110) -> tuple[Scan, NDArray[np.bool_]]:
+    scan = read_scan(path)
+    return scan, semantic(read_labels(label_beside(path), len(scan))) == snow
+
+
+def iou_of_perfect_pixels(view: RangeView, scan: Scan, rain: NDArray[np.bool_]) -> float:
+    image = view(scan)
+    called = image.back((image.target(rain) == 1).astype(np.float32)) > 0.5
+    return float((called & rain).sum() / (called | rain).sum())
+
+
+@pytest.mark.parametrize("fitted_to", ["sample.bin", "sequences/36/velodyne/042223.bin"])
+def test_a_perfect_labelling_of_a_fitted_grid_is_nearly_perfect_for_the_points(
+    shared: Path, fitted_to: str
+) -> None:
+    wads = shared / "data/wads"
+    view = RangeView(fit_grid([read_scan(wads / fitted_to)]).grid)
+    assert iou_of_perfect_pixels(view, *labelled(wads / "sample.bin")) >= 0.99
+    assert iou_of_perfect_pixels(view, *labelled(wads / "sequences/36/velodyne/042241.bin")) >= 0.99
+
+
+@pytest.mark.parametrize(
+    ("grid", "way_back", "iou"),
+    [
+        (SphericalGrid.even(64, 2048, (-25, 15)), "copy", 0.403),
+        (SphericalGrid.even(64, 2048, (-25, 15)), "nearest range", 0.935),
+        (grid_of("wads", "test"), "copy", 0.613),
+        (grid_of("wads", "test"), "nearest range", 0.991),
+    ],
+)
+def test_what_published_grids_allow_is_as_measured_elsewhere(
+    shared: Path, grid: SphericalGrid, way_back: str, iou: float
+) -> None:
+    sample = labelled(shared / "data/wads/sample.bin")
+    found = iou_of_perfect_pixels(RangeView(grid, way_back=way_back), *sample)
+    assert found == pytest.approx(iou, abs=0.001)
