@@ -120,7 +120,7 @@ def test_a_filter_is_found_by_its_name_and_takes_its_parameters() -> None:
 @pytest.mark.parametrize(
     ("name", "parameters", "message"),
     [
-        ("rorr", {}, "rorr: no such filter. Give one of ror, sor, dror, dsor, ssr."),
+        ("rorr", {}, "rorr: no such filter. Give one of dror, dsor, ror, sor, ssr."),
         (
             "ror",
             {"radios": 1},
