@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import Counts, intersection_over_union
-from derain.filters import FILTERS, PointFilter, filter_from, filter_view
-from derain.filters.point_filter import Span
+from derain.filters import FILTERS, PointFilter, Span, filter_from, filter_view
 from derain.scan import Scan
 from derain.views.neighbours import Neighbourhoods
 

@@ -16,7 +16,7 @@ from derain.filters.derainer import FilterDerainer, filter_view
 from derain.filters.dror import DROR
 from derain.filters.dsor import DSOR
 from derain.filters.parameters import read_parameters
-from derain.filters.point_filter import PointFilter
+from derain.filters.point_filter import PointFilter, Span
 from derain.filters.registry import FILTERS, filter_from
 from derain.filters.ror import ROR
 from derain.filters.sor import SOR
@@ -31,6 +31,7 @@ __all__ = [
     "SSR",
     "FilterDerainer",
     "PointFilter",
+    "Span",
     "filter_from",
     "filter_view",
     "read_parameters",

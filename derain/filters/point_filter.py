@@ -37,8 +37,8 @@ class PointFilter(ABC):
     """A derainer that learns nothing: it looks at each point's nearest neighbours.
 
     A subclass is a frozen dataclass; its parameters besides ``neighbours`` are numbers, or names.
-    It is found by the name that it is registered by, and brings with it all that there is to know
-    of it::
+    It is found by the name that it is registered by, in which there is no dot, for what has a
+    suffix is a file. It brings with it all that there is to know of it::
 
         @FILTERS.add("near")
         @dataclass(frozen=True)

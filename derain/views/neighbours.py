@@ -26,8 +26,8 @@ MOST_NETWORK_NEIGHBOURS = 64
 class Neighbourhoods:
     """One or more scans as a point network sees them.
 
-    The M points are the distinct valid positions of the scan, along a Morton curve; of points at
-    one position the first row speaks for all.
+    The M points are the distinct valid positions of the scan, along a Morton curve. Of several rows
+    at one position the first one gives the point its channels.
 
     Attributes:
         points: The view's channels, each in its own unit, float32 (M, C).

@@ -27,8 +27,7 @@ from derain.export.tuning import (
     tune_filter,
     tune_threshold,
 )
-from derain.filters import FILTERS, FilterDerainer, PointFilter, filter_from
-from derain.filters.point_filter import Span
+from derain.filters import FILTERS, FilterDerainer, PointFilter, Span, filter_from
 from derain.scan import Scan
 from derain.views.neighbours import Neighbourhoods
 

@@ -7,8 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.filters import FILTERS, PointFilter
-from derain.filters.point_filter import Span
+from derain.filters import FILTERS, PointFilter, Span
 from derain.scan import Scan
 from derain.views.neighbours import Neighbourhoods
 from derain.views.oddities import Oddity

@@ -14,12 +14,10 @@ from derain.filters import DROR, SSR, FilterDerainer
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.spec import Spec
-from derain.system.notices import Notices
 from derain.views.oddities import (
     HEAVIEST_RAIN,
     MOST_OUTSIDE,
     Examiner,
-    Oddity,
     left_out,
     much_removed,
     outside_view,
@@ -154,21 +152,3 @@ def test_ssr_and_the_rule_find_nothing_where_intensity_was_not_measured() -> Non
     assert not FilterDerainer(SSR(threshold=1e9))(scan).any()
     assert not IntensityRule(1e6, 1e6)(scan).any()
     assert IntensityRule(1e6, 1e6)(with_intensity(0, 99)).all()
-
-
-def test_each_kind_is_told_with_its_first_scan_and_counted(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    notices = Notices()
-    none, unit = Oddity("no intensity", "no intensity here"), Oddity("another unit", "0..1")
-    notices.tell("a", [none])
-    notices.tell("b", [none, unit])
-    notices.tell("c\x1b[2J", [Oddity("no intensity", "nor here")])
-    notices.tell("d", [none], method="outdet")
-    notices.tell_how_many_more()
-    assert capsys.readouterr().err.splitlines() == [
-        "derain: warning: a: no intensity here",
-        "derain: warning: b: 0..1",
-        "derain: warning: d: outdet: no intensity here",
-        "derain: warning: 2 more scans: no intensity",
-    ]
