@@ -33,6 +33,15 @@ class PointHeader(Protocol):
         """The same of some points only, by their row numbers or a bool mask of shape (N,)."""
 
 
+@runtime_checkable
+class PartialHeader(Protocol):
+    """A header that knows which parts of its file are not in the scan, and so are not written."""
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Their names; none where nothing is lost."""
+
+
 @dataclass(frozen=True, eq=False)
 class Scan:
     """One point cloud, in the order of its file; rows are never dropped or reordered.
@@ -49,7 +58,7 @@ class Scan:
         name: Where the scan came from, for messages.
         header: What the file says besides its columns, such as the encoding of a PCD. Only the
             writer of the same format looks into it. One that speaks of single points is a
-            PointHeader.
+            PointHeader, one that says what will not be written a PartialHeader.
 
     Raises:
         InputError: Columns of different lengths.

@@ -1,7 +1,7 @@
 """The Spec: everything needed to use a trained network besides its weights."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from derain.files.labels import LARGEST_ID
 from derain.scan import Scan
 from derain.views.channels import MOST_CHANNELS
 from derain.views.neighbours import NeighbourView
+from derain.views.oddities import Oddity, intensity_unlike_training, missing_channels
 from derain.views.range_image import RangeView
 from derain.views.view import View
 
@@ -97,6 +98,17 @@ class Spec:
     def missing_channels(self, scan: Scan) -> dict[str, float]:
         """Channels that a scan has not got, and the means that stand in for them, by name."""
         return {name: mean for name, mean in self.means.items() if scan.channel(name) is None}
+
+    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+        """What is odd about a scan for the network, before it is judged.
+
+        Args:
+            scan: The scan, its intensities in the unit of the training data.
+        """
+        yield from missing_channels(scan, self.missing_channels(scan), self.data)
+        yield from intensity_unlike_training(
+            scan, self.mean_intensity, self.intensity_unit, self.data
+        )
 
     def make_view(self, threads: int = 0) -> View:
         """The view that the network sees a scan through.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tqdm import tqdm
 
 from derain.cli.arguments import command_line, count, threads
+from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
 from derain.errors import InputError
@@ -17,7 +18,6 @@ from derain.files.atomic import replacing
 from derain.sources.training_record import overlap
 from derain.spec import Spec
 from derain.system.notices import Notices
-from derain.views.oddities import oddities
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule
@@ -42,8 +42,8 @@ and one picture of error against time (speed_error.png).
   derain bench --paper table3 --data REHEARSE3D_PUBLIC --rain-rates rates.yaml \\
       --methods outdet.onnx dsor.yaml position all none --out table3
 
-A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), a filter (ror, sor, dror,
-dsor, ssr), or a baseline: position and intensity, learnt from the training scans, all and none.
+A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), a filter (below), or a
+baseline: position and intensity, learnt from the training scans, all and none.
 Scoring runs all methods in this process, where filters share one search for neighbours; then each
 is timed alone, in a process of its own.
 """
@@ -55,6 +55,7 @@ MOST_TRAINING_SCANS = 200
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     add_data_arguments(parser, part="test")
+    list_filters(parser)
     parser.add_argument("--methods", nargs="+", required=True, metavar="[TITLE=]METHOD")
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument(
@@ -171,7 +172,8 @@ def _read(
     """Reads a scan, and warns of what is odd about it for each method."""
     read = data.read(files[scan])
     for method in methods:
-        notices.tell(str(scan), oddities(read, method.judge), method.title)
+        if method.judge is not None:
+            notices.tell(str(scan), method.judge.oddities(read), method.title)
     return read
 
 

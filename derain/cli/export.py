@@ -9,7 +9,6 @@ from derain.cli.arguments import count, threads
 from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.system.notices import Notices
-from derain.views.oddities import oddities
 
 if TYPE_CHECKING:
     from derain.scan import Scan
@@ -102,7 +101,7 @@ def _warn_of_odd(scans: Iterable["Scan"], spec: "Spec") -> None:
     notices = Notices()
 
     def tell(scan: "Scan") -> None:
-        notices.tell(scan.name, oddities(scan, spec))
+        notices.tell(scan.name, spec.oddities(scan))
 
     # Mapped, not looped over: a loop would hold on to one scan while the next is read.
     for _ in map(tell, scans):

@@ -17,16 +17,17 @@ from derain.views.morton import distinct_rows
 from derain.views.spherical_grid import ALL_AROUND
 from derain.views.view import WayToRows
 
-# Seven times as many as 3D-OutDet looks at. A hundred thousand points have 80 MB of them.
-MOST_NEIGHBOURS = 64
+# The most that the Spec of a network may ask for, seven times as many as 3D-OutDet looks at. A
+# hundred thousand points have 80 MB of them.
+MOST_NETWORK_NEIGHBOURS = 64
 
 
 @dataclass(frozen=True, eq=False)
 class Neighbourhoods:
     """One or more scans as a point network sees them.
 
-    The M points are the distinct valid positions of the scan, along a Morton curve; of points at
-    one position the first row speaks for all.
+    The M points are the distinct valid positions of the scan, along a Morton curve. Of several rows
+    at one position the first one gives the point its channels.
 
     Attributes:
         points: The view's channels, each in its own unit, float32 (M, C).
@@ -130,7 +131,7 @@ class NeighbourView:
             InputError: Something that does not describe it.
         """
         found = entry.record(
-            {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NEIGHBOURS)},
+            {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NETWORK_NEIGHBOURS)},
             required=("neighbours",),
         )
         return cls(found["neighbours"], channels, stand_in, threads)

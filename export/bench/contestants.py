@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError, printable
 from derain.evaluation.baselines import PositionPrior, all_points, no_points
-from derain.evaluation.intensity_rule import OneLineRule
+from derain.evaluation.intensity_rule import IntensityRule
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
 from derain.filters import FilterDerainer, PointFilter
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import Judge
+from derain.views.oddities import Examiner
 
 # Judges a scan, bool (N,), and gives the stopwatch its stages.
 Method = Callable[[Scan, Stopwatch], NDArray[np.bool_]]
@@ -56,7 +56,7 @@ class Contestant:
     ready: Callable[[int], Method]
     facts: dict[str, Any] = field(default_factory=dict)
     filter: PointFilter | None = None
-    judge: Judge = None
+    judge: Examiner | None = None
 
 
 def contestants(texts: Sequence[str], learn_from: LearnFrom | None = None) -> list[Contestant]:
@@ -125,7 +125,7 @@ def _learnt(title: str, name: str, learn_from: LearnFrom | None) -> Contestant:
     if name == "position":
         prior = PositionPrior.learn(learn_from())
         return Contestant(title, name, partial(_timed_rule, prior), {"voxel": prior.voxel})
-    rule = OneLineRule.best(learn_from())
+    rule = IntensityRule.best(learn_from())
     limits = f"intensity <= {rule.intensity:.4g} and range <= {rule.range:.4g} m"
     return Contestant(title, name, partial(_timed_rule, rule), {"rule": limits}, judge=rule)
 

@@ -19,7 +19,7 @@ from derain.datamodules.folder import Folder
 from derain.datamodules.simulated import Simulated
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.evaluation.intensity_rule import OneLineRule
+from derain.evaluation.intensity_rule import IntensityRule
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.learning.losses import class_weights
@@ -95,7 +95,7 @@ def test_the_loss_falls(run: Run) -> None:
 
 
 def test_a_trained_network_beats_rules_that_need_no_network(run: Run) -> None:
-    rule = OneLineRule.best(truths(run.data, "train"))
+    rule = IntensityRule.best(truths(run.data, "train"))
     ((scan, rain),) = truths(run.data, "test")
     everything = iou(np.ones(len(scan), bool), rain)
     assert run.scores["test/iou"] > iou(rule(scan), rain) > everything
