@@ -33,6 +33,15 @@ class PointHeader(Protocol):
         """The same of some points only, by their row numbers or a bool mask of shape (N,)."""
 
 
+@runtime_checkable
+class PartialHeader(Protocol):
+    """What a file says besides its points, where a part of the file is not written with them."""
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Names of the parts that are not written; empty if all are."""
+
+
 @dataclass(frozen=True, eq=False)
 class Scan:
     """One point cloud, in the order of its file; rows are never dropped or reordered.
@@ -49,7 +58,7 @@ class Scan:
         name: Where the scan came from, for messages.
         header: What the file says besides its columns, such as the encoding of a PCD. Only the
             writer of the same format looks into it. One that speaks of single points is a
-            PointHeader.
+            PointHeader; one that knows of parts that will not be written is a PartialHeader.
 
     Raises:
         InputError: Columns of different lengths.

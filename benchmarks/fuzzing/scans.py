@@ -19,7 +19,7 @@ from benchmarks.fuzzing.reader import Reader
 from derain import files
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.files.formats import FORMATS
+from derain.files.format import FORMATS
 from derain.files.labels import read_labels, semantic
 from derain.scan import Scan
 

@@ -4,6 +4,7 @@ import argparse
 
 from derain.cli.arguments import factor
 from derain.files import DEFAULT_COLUMNS
+from derain.files.format import FORMATS
 
 
 def column_names(text: str) -> tuple[str, ...]:
@@ -30,8 +31,8 @@ def add_columns(
         type=column_names,
         metavar="NAMES",
         default=default,
-        help=f"names of the columns of {of}files that do not name them: .bin, .npy, .npz of one "
-        f"array, text without a line of names (default: {','.join(DEFAULT_COLUMNS)})",
+        help=f"names of the columns of {of}files that do not name them: {', '.join(_unnamed())} "
+        f"(default: {','.join(DEFAULT_COLUMNS)})",
     )
 
 
@@ -49,3 +50,18 @@ def add_intensity_scale(parser: argparse.ArgumentParser, of: str = "") -> None:
         metavar="FACTOR",
         help=f"what takes the {of}scans' intensities to the method's unit, e.g. 255 (default: 1)",
     )
+
+
+def formats_of_scans() -> str:
+    """The formats of scan files that there are, a line each, for the help of a command."""
+    suffixes: dict[str, list[str]] = {}
+    for suffix, format_ in FORMATS.items():
+        needs = f" (needs derain[{format_.EXTRA.name}])" if format_.EXTRA else ""
+        suffixes.setdefault(format_.HELP + needs, []).append(suffix)
+    lines = [f"  {', '.join(names):<24}{what}" for what, names in suffixes.items()]
+    return "\n".join(("scans may be, each of them also compressed as .gz:", *lines))
+
+
+def _unnamed() -> list[str]:
+    """Which files do not name their columns, format by format."""
+    return sorted({format_.UNNAMED for format_ in FORMATS.values()} - {""})

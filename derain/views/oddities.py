@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.evaluation.intensity_rule import OneLineRule
-from derain.files.ply import PlyHeader
 from derain.filters import SSR, PointFilter
-from derain.scan import FEWEST_ALIKE, Scan
+from derain.scan import FEWEST_ALIKE, PartialHeader, Scan
 from derain.spec import Spec
 from derain.views.full_scale import FULL_SCALES
 
@@ -104,7 +103,7 @@ def much_removed(share: float) -> Iterator[Oddity]:
 
 def left_out(scan: Scan) -> Iterator[Oddity]:
     """Whether a scan's file holds what is not written with the cleaned scan."""
-    if isinstance(scan.header, PlyHeader) and scan.header.left_out:
+    if isinstance(scan.header, PartialHeader) and scan.header.left_out:
         yield Oddity(
             "parts of the file that are not written",
             f"the cleaned file is without its {', '.join(scan.header.left_out)}",

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.files.ply_header import Element, Property, read_rows
+from derain.files.formats.ply.header import Element, Property, read_rows
 from derain.files.text import filled_lines, format_rows
 
 # What programs call the list of a face's vertices.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.files.content import Room
-from derain.files.pcd_header import PADDING, PcdHeader
+from derain.files.formats.pcd.header import PADDING, PcdHeader
 from derain.files.text import format_rows, parse_rows
 
 
