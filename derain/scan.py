@@ -16,9 +16,10 @@ from derain.errors import InputError
 LARGEST_COORDINATE = 1e6
 LARGEST_VALUE = 1e7
 
-# So many points of one intensity were not measured. Of a real scan as much as 80 % may share one
-# value, such as 0: that a hundred points share it by chance happens once in 10⁹ draws (.8¹⁰⁰), that
-# ten do once in ten. Fewer than a hundred say nothing by being alike.
+# Where all of at least so many points have one intensity, it was not measured but filled in. Of a
+# real scan as much as 80 % may share one value, such as 0: that a hundred points share it by chance
+# happens once in 10⁹ draws (.8¹⁰⁰), that ten do once in ten. From fewer than a hundred points of
+# one intensity nothing follows.
 FEWEST_ALIKE = 100
 
 # SemanticKITTI-style range images mark a cell without a return by -1 in every column.
@@ -27,7 +28,7 @@ SENTINEL = -1.0
 
 @runtime_checkable
 class PointHeader(Protocol):
-    """What a file says of single points besides its columns, such as the faces of a mesh."""
+    """A header that describes single points, such as by the faces of a mesh."""
 
     def take(self, rows: NDArray[Any]) -> "PointHeader":
         """The same of some points only, by their row numbers or a bool mask of shape (N,)."""
@@ -35,7 +36,7 @@ class PointHeader(Protocol):
 
 @runtime_checkable
 class PartialHeader(Protocol):
-    """What a file says besides its points, where a part of the file is not written with them."""
+    """A header of a file of which parts are not written again, such as a PLY's further elements."""
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -57,8 +58,8 @@ class Scan:
         shape: (height, width) of an organised cloud, rows in row-major order; else None.
         name: Where the scan came from, for messages.
         header: What the file says besides its columns, such as the encoding of a PCD. Only the
-            writer of the same format looks into it. One that speaks of single points is a
-            PointHeader; one that knows of parts that will not be written is a PartialHeader.
+            writer of the same format looks into it, but for what PointHeader and PartialHeader
+            say, which any header may be.
 
     Raises:
         InputError: Columns of different lengths.
@@ -192,10 +193,10 @@ class Scan:
     def with_intensity_times(self, factor: float) -> "Scan":
         """The same scan with its intensities in another unit; what was read stays in `fields`.
 
-        The mark of a cell without a return is none of them, and stays.
+        Cells without a return, which hold −1, keep it: that is a mark and no intensity.
 
         Args:
-            factor: What takes them there, such as 255 from 0..1 to 0..255.
+            factor: What every intensity is multiplied by, such as 255 to go from 0..1 to 0..255.
 
         Raises:
             InputError: A factor that is not a finite number above 0.

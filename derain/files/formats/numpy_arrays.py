@@ -19,7 +19,7 @@ from derain.files.format import FORMATS, Format
 from derain.files.reading import reading
 from derain.scan import Scan
 
-# NumPy parses an array's header as Python code, and lets out whatever that raises on damaged bytes.
+# NumPy parses an array's header as Python code, which may raise anything on damaged bytes.
 _DAMAGE = Exception
 
 # What stands before each member in the directory of a ZIP file.

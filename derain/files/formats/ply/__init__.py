@@ -28,7 +28,7 @@ class PlyHeader:
     Attributes:
         encoding: One of BYTE_ORDERS.
         comments: Lines of comments and object information, first word included.
-        faces: Faces of the vertices, if there are and if they can follow them.
+        faces: Faces of the vertices, if there are any and if they can be renumbered.
         left_out: Names of the other elements, which are not written.
     """
 
@@ -38,7 +38,7 @@ class PlyHeader:
     left_out: tuple[str, ...] = ()
 
     def take(self, rows: NDArray[Any]) -> "PlyHeader":
-        """What it says of some of the vertices only."""
+        """The header of a file of some of the vertices only."""
         return self if self.faces is None else replace(self, faces=self.faces.take(rows))
 
 
@@ -68,7 +68,7 @@ class Ply(Format):
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as vertices, encoded like the PLY it came from, else binary.
 
-        Of other elements there are only the faces of vertices that all are still there.
+        Of other elements only faces are written, and of them those whose vertices are all there.
 
         Raises:
             InputError: A column that no PLY can hold.
