@@ -36,11 +36,11 @@ class PointHeader(Protocol):
 
 @runtime_checkable
 class PartialHeader(Protocol):
-    """A header of a file of which parts are not written again, such as a PLY's further elements."""
+    """A header that knows which parts of its file are not in the scan, and so are not written."""
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """Names of the parts that are not written; empty if all are."""
+        """Their names; none where nothing is lost."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +58,8 @@ class Scan:
         shape: (height, width) of an organised cloud, rows in row-major order; else None.
         name: Where the scan came from, for messages.
         header: What the file says besides its columns, such as the encoding of a PCD. Only the
-            writer of the same format looks into it, but for what PointHeader and PartialHeader
-            say, which any header may be.
+            writer of the same format looks into it. One that speaks of single points is a
+            PointHeader, one that says what will not be written a PartialHeader.
 
     Raises:
         InputError: Columns of different lengths.

@@ -27,7 +27,7 @@ class Format(ABC):
         mine = "my_package.my_format"
 
     Attributes:
-        HELP: What it is, for the help of commands.
+        HELP: What it is, for ``derain info --formats``.
         UNNAMED: Which of its files do not name their columns, for the help of ``--columns``; empty
             where every file does.
         EXTRA: What must be installed for it besides what derain always needs, if anything.

@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -104,17 +105,18 @@ def test_an_installed_format_is_known_to_the_commands(
     assert run.returncode == 0, run.stderr
     assert_cleaned(file, tmp_path / "out")
     assert "without its remarks" in run.stderr
-    told = derain("info", "--help", path=installed).stdout
-    assert ".pts                    points under a line with their number\n" in told
+    told = derain("info", "--formats", path=installed).stdout
+    assert "  .pts                    points under a line with their number\n" in told
 
 
-def test_a_format_that_cannot_be_loaded_is_named(
+def test_a_format_that_cannot_be_imported_is_named(
     file: Path, installed: Path, tmp_path: Path
 ) -> None:
     (installed / "points_format.py").write_text("import a_module_that_is_not_there\n")
     run = derain("run", "dror", file.parent, "--out", tmp_path / "out", path=installed)
     assert run.returncode == 2
-    assert run.stderr.startswith("derain: derain.formats: points: points_format cannot be loaded")
+    assert "derain.formats: points: points_format cannot be imported" in run.stderr
+    assert "holds no scans" in run.stderr
     assert not (tmp_path / "out").exists()
 
 
@@ -124,6 +126,25 @@ def test_a_suffix_is_taken_once() -> None:
         @FORMATS.add(".pcd")
         class Another(Format):
             """Another format of this suffix."""
+
+
+def test_help_says_which_files_do_not_name_their_columns(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["run", "--help"])
+    told = " ".join(capsys.readouterr().out.split())
+    unnamed = ".bin, .npy, .npz of one array, text without a line of names"
+    assert f"files that do not name them: {unnamed} (default: x,y,z,intensity)" in told
+
+
+def test_the_formats_are_listed_with_what_they_need(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["info", "--formats"])
+    assert end.value.code == 0
+    told = capsys.readouterr().out
+    assert all(suffix in told for suffix in FORMATS)
+    assert re.search(r"^  \.las, \.laz +laser surveys \(needs derain\[las\]\)$", told, re.M)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
