@@ -3,6 +3,7 @@
 import pytest
 
 from derain.datamodules.base import ScanDataModule
+from derain.files.format import Format
 from derain.filters.point_filter import PointFilter
 from derain.filters.radius_filter import RadiusFilter
 from derain.models.base import DerainingModule
@@ -13,6 +14,7 @@ DEMANDED = {
     DerainingModule: MODEL,
     SupervisedModule: tuple(name for name in MODEL if name != "losses"),
     ScanDataModule: ("find",),
+    Format: ("decode", "encode"),
     PointFilter: ("judge",),
     RadiusFilter: ("radius_at",),
 }

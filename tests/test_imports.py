@@ -57,10 +57,10 @@ def test_the_root_of_the_package_needs_numpy_alone() -> None:
     assert loaded_by("import derain") == {"derain", "numpy"}
 
 
-def test_the_runtime_needs_onnxruntime_the_knn_library_and_what_reads_files() -> None:
+def test_the_runtime_needs_onnxruntime_the_knn_library_and_what_reads_a_spec() -> None:
     loaded = loaded_by("import derain.export.runtime")
     of_yaml = {name for name in loaded if "cython" in name}
-    assert loaded - of_yaml == {"derain", "numpy", "onnxruntime", "small_gicp", "yaml", "lzf"}
+    assert loaded - of_yaml == {"derain", "numpy", "onnxruntime", "small_gicp", "yaml"}
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["info", "--help"]])

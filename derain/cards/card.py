@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
 
@@ -13,7 +12,7 @@ from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
 from derain.files.labels import LARGEST_ID
-from derain.files.reading import is_file
+from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
 from derain.views.channels import UNITS
 
@@ -148,8 +147,7 @@ class DataCard:
 
 def packaged_cards() -> dict[str, Path]:
     """Files of the data cards that come with derain, by name."""
-    folder = Path(str(resources.files("derain.cards")))
-    return {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+    return packaged("derain.cards")
 
 
 def load_card(name: str | Path) -> DataCard:
@@ -161,13 +159,7 @@ def load_card(name: str | Path) -> DataCard:
     Raises:
         InputError: No such card, or a file that is not one.
     """
-    cards = packaged_cards()
-    path = cards.get(str(name), Path(name))
-    if not is_file(path):
-        raise InputError(
-            name, "no such data card", f"Give a YAML file or one of {', '.join(cards)}."
-        )
-    return _card(Entry.of_yaml(path))
+    return _card(Entry.of_yaml(packaged_or_own(name, packaged_cards(), "data card")))
 
 
 def _card(document: Entry) -> DataCard:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from derain import InputError, Scan
 from derain.files import DEFAULT_COLUMNS, read_scan, write_scan
-from derain.files.binary import count_rows
+from derain.files.formats.binary import Binary
 
 FIVE = (*DEFAULT_COLUMNS, "ring")
 SIX = (*FIVE, "time")
@@ -161,7 +161,7 @@ def test_float64_is_told_from_float32_and_written_back(
     file.write_bytes(rows.tobytes())
     scan = read_scan(file, columns)
     np.testing.assert_array_equal(np.stack(list(scan.fields.values()), axis=1), rows, strict=True)
-    assert count_rows(file, columns) == 2000
+    assert Binary().count(file, columns) == 2000
     write_scan(file, scan.take(np.arange(2000) % 2 == 0))
     assert file.read_bytes() == rows[::2].tobytes()
 
@@ -174,7 +174,7 @@ def test_float32_is_not_taken_for_float64(file: Path, columns: tuple[str, ...]) 
         assert {column.dtype for column in read_scan(file, columns).fields.values()} == {
             np.dtype("f4")
         }
-        assert count_rows(file, columns) == 2000
+        assert Binary().count(file, columns) == 2000
 
 
 def test_float64_that_makes_as_good_sense_as_float32_stays_float32(file: Path) -> None:
@@ -195,4 +195,4 @@ def test_real_scans_are_told_by_their_numbers(file: Path, shared: Path, name: st
         scan = read_scan(file)
         assert {column.dtype for column in scan.fields.values()} == {np.dtype(value)}
         np.testing.assert_array_equal(scan.xyz, rows[:, :3])
-        assert count_rows(file, DEFAULT_COLUMNS) == len(rows)
+        assert Binary().count(file, DEFAULT_COLUMNS) == len(rows)

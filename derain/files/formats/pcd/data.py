@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.files.content import Room
-from derain.files.pcd_header import PADDING, PcdHeader
+from derain.files.formats.pcd.header import PADDING, PcdHeader
 from derain.files.text import format_rows, parse_rows
 
 
@@ -62,8 +62,8 @@ def _columns_of_rows(header: PcdHeader, table: NDArray[Any]) -> dict[str, NDArra
 def _check_points(header: PcdHeader, points: int, rest: int) -> None:
     """Refuses data that are less than the header states, or too much to be whole points.
 
-    Where the header contradicts itself (WIDTH · HEIGHT is not POINTS), what the data agree with
-    counts; where the data are whole points in excess of the header, the data count.
+    A header may contradict itself (WIDTH · HEIGHT is not POINTS): one of the two numbers must be
+    that of the data. Data of more whole points than either are taken as they are.
     """
     stated = {header.points, header.width * header.height}
     if points not in stated and (points < max(stated) or rest):

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.files.columns import columns_of, name_columns, records, scan_of
 from derain.files.content import Content, check_columns
+from derain.files.format import FORMATS, Format
 from derain.files.reading import reading
 from derain.scan import Scan
 
-# NumPy parses an array's header as Python code, and lets out whatever that raises on damaged bytes.
+# NumPy parses an array's header as Python code, which may raise anything on damaged bytes.
 _DAMAGE = Exception
 
 # What stands before each member in the directory of a ZIP file.
@@ -49,91 +50,104 @@ class NpzHeader:
     structured: bool = False
 
 
-def decode_npy(content: Content, columns: Sequence[str]) -> Scan:
-    """Reads one array of points.
+@FORMATS.add(".npy")
+class Npy(Format):
+    """One array of NumPy's."""
 
-    Args:
-        content: The file: numbers (N, C), or (H, W, C) of an organised cloud; or a structured array
-            (N,) or (H, W).
-        columns: Names of the C columns; a structured array has its own.
+    HELP = "one array of NumPy's"
+    UNNAMED = ".npy"
 
-    Raises:
-        InputError: A file that is damaged, or an array of another shape.
-    """
-    with reading(content.path, _DAMAGE):
-        array = _array(content.data)
-    shape = _organised(content.path, _grid_of_table(array))
-    fields = _columns_of_table(content.path, array, columns)
-    return scan_of(content.path, fields, shape, NpyHeader(structured=bool(array.dtype.names)))
+    def decode(self, content: Content, columns: Sequence[str]) -> Scan:
+        """Reads one array of points.
 
+        Args:
+            content: The file: numbers (N, C), or (H, W, C) of an organised cloud; or a structured
+                array (N,) or (H, W).
+            columns: Names of the C columns; a structured array has its own.
 
-def encode_npy(_: Path, scan: Scan) -> bytes:
-    """A scan's columns as one array.
+        Raises:
+            InputError: A file that is damaged, or an array of another shape.
+        """
+        with reading(content.path, _DAMAGE):
+            array = _array(content.data)
+        shape = _organised(content.path, _grid_of_table(array))
+        fields = _columns_of_table(content.path, array, columns)
+        return scan_of(content.path, fields, shape, NpyHeader(structured=bool(array.dtype.names)))
 
-    Columns of one dtype become an array (N, C), unless the scan comes from a structured one;
-    columns of several become a structured array. Organised clouds stay organised.
-    """
-    named = isinstance(scan.header, NpyHeader) and scan.header.structured
-    columns = scan.fields if named else columns_of(scan)
-    return _to_bytes(_gridded(scan, _table(columns, named)))
+    def encode(self, path: Path, scan: Scan) -> bytes:
+        """A scan's columns as one array.
 
-
-def decode_npz(content: Content, columns: Sequence[str]) -> Scan:
-    """Reads named arrays.
-
-    Args:
-        content: The file. Coordinates are `xyz` (N, 3) or `x`, `y` and `z` (N,); in an organised
-            cloud `xyz` (H, W, 3) or `x`, `y` and `z` (H, W). Without them, `points` or the only
-            array is a table as in a .npy. Every array that begins with the same (N,) or (H, W) is a
-            column of the scan, flattened row-major. An array (W,) in an organised cloud, such as a
-            spinning sensor's timestamps, is repeated for each of the H rows.
-        columns: Names of the columns of such a table, unless it is structured.
-
-    Raises:
-        InputError: A file that is damaged, or that has no coordinates.
-    """
-    path = content.path
-    with reading(path, _DAMAGE):
-        arrays = _arrays(content)
-    table = _name_of_table(arrays)
-    grid = _grid(path, arrays) if table is None else _grid_of_table(arrays[table])
-    shape = _organised(path, grid)
-    fields, constants, structured = dict[str, NDArray[Any]](), {}, False
-    if table is not None:
-        structured = bool(arrays[table].dtype.names)
-        fields = _columns_of_table(path, arrays.pop(table), columns)
-    stated = tuple(fields)
-    for name, array in arrays.items():
-        if name in stated:
-            raise InputError(path, f"has an array {name} beside a column {name}", "Rename one.")
-        if array.shape[: len(grid)] == grid:
-            fields[name] = array.reshape(math.prod(grid), *array.shape[len(grid) :])
-        elif shape and array.shape == shape[1:]:
-            with reading(path, ValueError):
-                content.room.take(shape[0] * array.nbytes)
-            fields[name] = np.tile(array, shape[0])
-        else:
-            constants[name] = array
-    return scan_of(path, fields, shape, NpzHeader(constants, table, stated, structured))
+        Columns of one dtype become an array (N, C), unless the scan comes from a structured one;
+        columns of several become a structured array. Organised clouds stay organised.
+        """
+        named = isinstance(scan.header, NpyHeader) and scan.header.structured
+        columns = scan.fields if named else columns_of(scan)
+        return _to_bytes(_gridded(scan, _table(columns, named)))
 
 
-def encode_npz(_: Path, scan: Scan) -> bytes:
-    """A scan's columns as named arrays, compressed. Organised clouds stay organised."""
-    columns = dict(scan.fields or columns_of(scan))
-    header = scan.header if isinstance(scan.header, NpzHeader) else NpzHeader({})
-    arrays: dict[str, NDArray[Any]] = {}
-    if header.table is not None and columns.keys() >= set(header.columns):
-        table = {name: columns.pop(name) for name in header.columns}
-        arrays[header.table] = _gridded(scan, _table(table, header.structured))
-    arrays |= {name: _gridded(scan, column) for name, column in columns.items()}
-    arrays |= header.constants
-    file = io.BytesIO()
-    # Not numpy.savez, which cannot write an array named "file".
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+@FORMATS.add(".npz")
+class Npz(Format):
+    """Several arrays of NumPy's, each under its name."""
+
+    HELP = "several arrays of NumPy's, by name"
+    UNNAMED = ".npz of one array"
+
+    def decode(self, content: Content, columns: Sequence[str]) -> Scan:
+        """Reads named arrays.
+
+        Args:
+            content: The file. Coordinates are `xyz` (N, 3) or `x`, `y` and `z` (N,); in an
+                organised cloud `xyz` (H, W, 3) or `x`, `y` and `z` (H, W). Without them, `points`
+                or the only array is a table as in a .npy. Every array that begins with the same
+                (N,) or (H, W) is a column of the scan, flattened row-major. An array (W,) in an
+                organised cloud, such as a spinning sensor's timestamps, is repeated for each of the
+                H rows.
+            columns: Names of the columns of such a table, unless it is structured.
+
+        Raises:
+            InputError: A file that is damaged, or that has no coordinates.
+        """
+        path = content.path
+        with reading(path, _DAMAGE):
+            arrays = _arrays(content)
+        table = _name_of_table(arrays)
+        grid = _grid(path, arrays) if table is None else _grid_of_table(arrays[table])
+        shape = _organised(path, grid)
+        fields, constants, structured = dict[str, NDArray[Any]](), {}, False
+        if table is not None:
+            structured = bool(arrays[table].dtype.names)
+            fields = _columns_of_table(path, arrays.pop(table), columns)
+        stated = tuple(fields)
         for name, array in arrays.items():
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                member.write(_to_bytes(array))
-    return file.getvalue()
+            if name in stated:
+                raise InputError(path, f"has an array {name} beside a column {name}", "Rename one.")
+            if array.shape[: len(grid)] == grid:
+                fields[name] = array.reshape(math.prod(grid), *array.shape[len(grid) :])
+            elif shape and array.shape == shape[1:]:
+                with reading(path, ValueError):
+                    content.room.take(shape[0] * array.nbytes)
+                fields[name] = np.tile(array, shape[0])
+            else:
+                constants[name] = array
+        return scan_of(path, fields, shape, NpzHeader(constants, table, stated, structured))
+
+    def encode(self, path: Path, scan: Scan) -> bytes:
+        """A scan's columns as named arrays, compressed. Organised clouds stay organised."""
+        columns = dict(scan.fields or columns_of(scan))
+        header = scan.header if isinstance(scan.header, NpzHeader) else NpzHeader({})
+        arrays: dict[str, NDArray[Any]] = {}
+        if header.table is not None and columns.keys() >= set(header.columns):
+            table = {name: columns.pop(name) for name in header.columns}
+            arrays[header.table] = _gridded(scan, _table(table, header.structured))
+        arrays |= {name: _gridded(scan, column) for name, column in columns.items()}
+        arrays |= header.constants
+        file = io.BytesIO()
+        # Not numpy.savez, which cannot write an array named "file".
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, array in arrays.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                    member.write(_to_bytes(array))
+        return file.getvalue()
 
 
 def _array(data: bytes) -> NDArray[Any]:

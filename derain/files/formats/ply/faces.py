@@ -1,4 +1,4 @@
-"""The faces of a mesh in a PLY file, which follow the vertices that stay."""
+"""The faces of a mesh in a PLY file, renumbered where some of the vertices are taken away."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.files.ply_header import Element, Property, read_rows
+from derain.files.formats.ply.header import Element, Property, read_rows
 from derain.files.text import filled_lines, format_rows
 
 # What programs call the list of a face's vertices.
@@ -63,7 +63,7 @@ def read_faces(
         points: Number of vertices.
         encoding: Encoding of the file.
         data: Data of the file.
-        start: Where the element begins: lines of text, or bytes.
+        start: Where the element begins: how many lines of text or bytes come before.
 
     Returns:
         The faces; None for something else, or for what cannot be renumbered: faces of unequal

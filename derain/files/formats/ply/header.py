@@ -65,7 +65,7 @@ class Element:
         return "\n".join((f"element {self.name} {self.count}", *map(str, self.properties)))
 
     def size(self, encoding: str) -> int:
-        """Lines of text, or bytes, that an element without lists takes."""
+        """How many lines of text (ascii) or bytes (binary) an element without lists takes."""
         return self.count * (1 if encoding == "ascii" else self.row(encoding).itemsize)
 
     @property
@@ -74,7 +74,7 @@ class Element:
         return [each for each in self.properties if each.length is not None]
 
     def row(self, encoding: str, list_length: int | None = None) -> np.dtype[Any]:
-        """Dtype of a row; a list is a field of its length, named after it, and one of its values.
+        """Dtype of a row. A list has two fields: "length of <name>", and its values as <name>.
 
         Args:
             encoding: One of BYTE_ORDERS.
@@ -141,7 +141,7 @@ def read_rows(
         data: Data of the file.
         encoding: Its encoding.
         row: Dtype of a row.
-        start: Where they begin: lines of text, or bytes.
+        start: Where they begin: how many lines of text (ascii) or bytes (binary) come before.
         count: Number of rows.
 
     Raises:

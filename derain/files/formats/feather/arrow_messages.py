@@ -1,4 +1,4 @@
-"""What the messages of an Arrow stream expand to, which PyArrow allocates without asking.
+"""Checks what the messages of an Arrow stream expand to, for PyArrow allocates whatever they state.
 
 Source: Apache Arrow, "Arrow Columnar Format", version 1.5, and its format/Message.fbs: the numbers
 of the tables' members, and the eight bytes before a compressed buffer that say its size.

@@ -1,4 +1,4 @@
-"""What the chunks of a LAZ file expand to, which its library allocates without asking.
+"""Checks what the chunks of a LAZ file expand to, for its library allocates whatever they state.
 
 Source: LASzip, "LASzip compressed point data", the record of user id "laszip encoded" and the
 layered chunks of point formats 6 to 10.

@@ -5,7 +5,7 @@ Source: ASPRS, "LAS Specification", version 1.4 R15.
 
 import io
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +18,14 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.files.columns import columns_of, scan_of
 from derain.files.content import Content
-from derain.files.extras import import_extra
-from derain.files.laz_chunks import check_chunks
+from derain.files.extras import Extra
+from derain.files.format import FORMATS, Format
+from derain.files.formats.las.laz_chunks import check_chunks
 from derain.files.names import scan_suffix
 from derain.files.reading import reading
 from derain.scan import LARGEST_COORDINATE, Scan
+
+LASPY = Extra("las", "laspy")
 
 # Sizes of the header, up to version 1.3 and from 1.4 on.
 _HEADER, _HEADER_1_4 = 227, 375
@@ -50,61 +53,68 @@ class LasHeader:
     origin: NDArray[np.int64]
 
 
-def decode_las(content: Content) -> Scan:
-    """Reads a LAS or LAZ file.
+@FORMATS.add(".las", ".laz")
+class Las(Format):
+    """Laser surveys, version 1.0 to 1.4, as they are or compressed."""
 
-    Surveys have coordinates of millions of metres, which float32 holds to decimetres. The scan's
-    coordinates are therefore relative to the offset that the file states, or, where they would
-    still be farther than 100 km from it, to their median.
+    HELP = "laser surveys"
+    EXTRA = LASPY
 
-    Args:
-        content: The file, version 1.0 to 1.4.
+    def decode(self, content: Content, columns: Sequence[str]) -> Scan:
+        """Reads a LAS or LAZ file.
 
-    Returns:
-        The scan: x, y and z are float64, metres; every other column is as the file stores it, so
-        that a column may hold several values in its bits.
+        Surveys have coordinates of millions of metres, which float32 holds to decimetres. The
+        scan's coordinates are therefore relative to the offset that the file states, or, where they
+        would still be farther than 100 km from it, to their median.
 
-    Raises:
-        InputError: A file that is damaged, or laspy is not installed.
-    """
-    laspy = import_extra("laspy", "las", content.path)
-    with reading(content.path, Exception), _panics_as_errors():
-        header, raw = _points(laspy, content)
-        whole = np.stack([raw[axis] for axis in "XYZ"], axis=1).astype(np.int64)
-        origin = _origin(whole, header.scales)
-        near = (whole - origin) * header.scales
-    fields = {axis: near[:, place] for place, axis in enumerate("xyz")}
-    fields |= {name: raw[name] for name in raw.dtype.names or () if name not in ("X", "Y", "Z")}
-    return scan_of(content.path, fields, header=LasHeader(header, origin))
+        Args:
+            content: The file, version 1.0 to 1.4.
+            columns: Not used: a survey names its columns.
 
+        Returns:
+            The scan: x, y and z are float64, metres; every other column is as the file stores it,
+            so that a column may hold several values in its bits.
 
-def encode_las(path: Path, scan: Scan) -> bytes:
-    """A scan's columns as the points of the LAS file that it came from.
+        Raises:
+            InputError: A file that is damaged, or laspy is not installed.
+        """
+        laspy = LASPY.load(content.path)
+        with reading(content.path, Exception), _panics_as_errors():
+            header, raw = _points(laspy, content)
+            whole = np.stack([raw[axis] for axis in "XYZ"], axis=1).astype(np.int64)
+            origin = _origin(whole, header.scales)
+            near = (whole - origin) * header.scales
+        fields = {axis: near[:, place] for place, axis in enumerate("xyz")}
+        fields |= {name: raw[name] for name in raw.dtype.names or () if name not in ("X", "Y", "Z")}
+        return scan_of(content.path, fields, header=LasHeader(header, origin))
 
-    Raises:
-        InputError: A scan of another format, columns that its points have no place for, or
-            coordinates beyond its reach; laspy is not installed.
-    """
-    laspy = import_extra("laspy", "las", path)
-    columns = columns_of(scan)
-    if not isinstance(scan.header, LasHeader):
-        raise _refused(path)
-    header, origin = scan.header.header, scan.header.origin
-    points = laspy.ScaleAwarePointRecord.zeros(len(scan), header=header)
-    stored = points.array.dtype.names
-    if columns.keys() != {name.lower() if name in ("X", "Y", "Z") else name for name in stored}:
-        raise _refused(path)
-    for name, column in columns.items():
-        if name in ("x", "y", "z"):
-            place = "xyz".index(name)
-            numbers = column / header.scales[place] + origin[place]
-            points.array[name.upper()] = _stored(path, numbers)
-        else:
-            points.array[name] = column
-    try:
-        return _to_bytes(laspy, header, points, scan_suffix(path) == ".laz")
-    except laspy.errors.LaspyException as error:
-        raise InputError(path, f"laspy cannot write it ({error})", "Write .npz.") from error
+    def encode(self, path: Path, scan: Scan) -> bytes:
+        """A scan's columns as the points of the LAS file that it came from.
+
+        Raises:
+            InputError: A scan of another format, columns that its points have no place for, or
+                coordinates beyond its reach; laspy is not installed.
+        """
+        laspy = LASPY.load(path)
+        columns = columns_of(scan)
+        if not isinstance(scan.header, LasHeader):
+            raise _refused(path)
+        header, origin = scan.header.header, scan.header.origin
+        points = laspy.ScaleAwarePointRecord.zeros(len(scan), header=header)
+        stored = points.array.dtype.names
+        if columns.keys() != {name.lower() if name in ("X", "Y", "Z") else name for name in stored}:
+            raise _refused(path)
+        for name, column in columns.items():
+            if name in ("x", "y", "z"):
+                place = "xyz".index(name)
+                numbers = column / header.scales[place] + origin[place]
+                points.array[name.upper()] = _stored(path, numbers)
+            else:
+                points.array[name] = column
+        try:
+            return _to_bytes(laspy, header, points, scan_suffix(path) == ".laz")
+        except laspy.errors.LaspyException as error:
+            raise InputError(path, f"laspy cannot write it ({error})", "Write .npz.") from error
 
 
 @contextmanager

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from derain.files import read_scan, write_scan
-from derain.files.ply import PlyHeader
-from derain.files.ply_header import BYTE_ORDERS
+from derain.files.formats.ply import PlyHeader
+from derain.files.formats.ply.header import BYTE_ORDERS
 
 POINTS = np.arange(18, dtype=np.float32).reshape(6, 3)
 TRIANGLES = [(0, 1, 2), (2, 3, 4), (5, 4, 3), (1, 3, 5)]

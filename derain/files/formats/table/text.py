@@ -1,4 +1,4 @@
-"""Lines of numbers, perhaps under a line of names: what such a text says."""
+"""Parses lines of numbers, perhaps under a line of names."""
 
 import csv
 import io
@@ -34,7 +34,7 @@ class Line(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TableText:
-    """What a text says.
+    """A parsed table.
 
     Attributes:
         separator: What stands between the values of a line; None for white space.
@@ -163,7 +163,7 @@ def _rows(lines: Iterable[str], separator: str | None) -> Iterator[list[str]]:
 
 
 def _number(text: str) -> float:
-    """The number that a text says; nothing says NaN."""
+    """The number that a text stands for; an empty one is NaN."""
     return float(text.strip() or "nan")
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from derain import InputError, Scan
 from derain.files import read_scan, write_scan
-from derain.files.ply import PlyHeader
-from derain.files.ply_header import BYTE_ORDERS
+from derain.files.formats.ply import PlyHeader
+from derain.files.formats.ply.header import BYTE_ORDERS
 
 HEADER = """\
 ply
