@@ -18,8 +18,9 @@ from derain.views.registry import VIEWS
 from derain.views.spherical_grid import ALL_AROUND
 from derain.views.view import BackProjection, SeenScan, View
 
-# Points of a neighbourhood: seven times 3D-OutDet's nine. Those of 100,000 points take 80 MB.
-LARGEST_NEIGHBOURHOOD = 64
+# The most that the Spec of a network may ask for, seven times as many as 3D-OutDet looks at. A
+# hundred thousand points have 80 MB of them.
+MOST_NETWORK_NEIGHBOURS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +120,7 @@ class NeighbourView(View):
             InputError: Something that does not describe it.
         """
         found = entry.record(
-            {"kind": Entry.text, "neighbours": lambda e: e.whole(1, LARGEST_NEIGHBOURHOOD)},
+            {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NETWORK_NEIGHBOURS)},
             required=("neighbours",),
         )
         return cls(found["neighbours"], channels, stand_in, threads)
