@@ -83,6 +83,16 @@ def test_the_rule_travels_in_the_checkpoint(image_network: MakeModel, tmp_path: 
     assert (copy.selection.residual, copy.selection.near) == (0.5, 3.0)
 
 
+def test_a_checkpoint_whose_rule_lacks_a_constant_is_refused(
+    image_network: MakeModel, tmp_path: Path
+) -> None:
+    model = image_network(LiSnowNet)
+    del model.hparams["spec"]["rule"]["near"]
+    save_model(model, tmp_path / "model.ckpt")
+    with pytest.raises(InputError, match=r"model\.ckpt: .*checkpoint: rule: near is missing"):
+        load_model(tmp_path / "model.ckpt")
+
+
 @pytest.mark.parametrize(
     ("distance", "intensity", "full_scale", "seen"),
     [
