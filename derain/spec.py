@@ -11,9 +11,8 @@ from derain.files.documents import Entry, shown
 from derain.files.labels import LARGEST_ID
 from derain.scan import Scan
 from derain.views.channels import MOST_CHANNELS
-from derain.views.neighbours import NeighbourView
 from derain.views.oddities import Oddity, intensity_unlike_training, missing_channels
-from derain.views.range_image import RangeView
+from derain.views.registry import VIEWS
 from derain.views.view import View
 
 SCHEMA = 1
@@ -130,12 +129,9 @@ class Spec:
 def _view_of(entry: Entry, spec: Spec, threads: int = 0) -> View:
     """The view that an entry describes, with the channels of a Spec."""
     kind = entry.members().get("kind", Entry(entry.source, f"{entry.key}.kind", None))
-    match kind.value:
-        case NeighbourView.KIND:
-            return NeighbourView.of(entry, spec.channels, spec.means, threads)
-        case RangeView.KIND:
-            return RangeView.of(entry, spec.channels, spec.means)
-    raise kind.fault(f"unknown view {shown(kind.value)}", "Upgrade derain.")
+    if not isinstance(kind.value, str) or kind.value not in VIEWS:
+        raise kind.fault(f"unknown view {shown(kind.value)}", "Upgrade derain.")
+    return VIEWS[kind.value].of(entry, spec.channels, spec.means, threads)
 
 
 def _refuse_newer(entry: Entry) -> None:

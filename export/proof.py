@@ -15,7 +15,7 @@ from torch import Tensor
 from derain.export.runtime import Derainer
 from derain.scan import Scan
 from derain.views.probability import probability_of_rain
-from derain.views.view import ViewedScan
+from derain.views.view import SeenScan
 
 THREADS = (1, 2)
 
@@ -181,7 +181,7 @@ def _compared(
 
 def _case(
     name: str,
-    view: ViewedScan,
+    view: SeenScan,
     returned: NDArray[np.bool_],
     expected: NDArray[np.float32],
     derainer: Derainer,

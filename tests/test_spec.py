@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from derain.errors import InputError
 from derain.scan import Scan
 from derain.spec import SCHEMA, Spec
-from derain.views.back_projection import WAYS_BACK
+from derain.views.back_projection import BACK_PROJECTIONS
 from derain.views.channels import MOST_CHANNELS
 from derain.views.neighbours import MOST_NETWORK_NEIGHBOURS, NeighbourView
 from derain.views.range_image import RangeView
@@ -168,7 +168,7 @@ def of_range_view(**changes: Any) -> Spec:
     return replace(SPEC, network="salsanext", view=view, channels=("z", "x", "range", "intensity"))
 
 
-@pytest.mark.parametrize("way_back", WAYS_BACK)
+@pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
 def test_a_range_view_survives_json_with_its_grid_and_way_back(way_back: str) -> None:
     spec = of_range_view(way_back=way_back)
     read = Spec.from_dict(json.loads(json.dumps(spec.as_dict())), "model")

@@ -23,7 +23,7 @@ Parsed = TypeVar("Parsed")
 FoldersTell = Literal["nothing", "classes", "rain"]
 
 # What mean and std are of, in their order.
-CHANNELS = ("x", "y", "z", "intensity")
+CHANNELS_OF_STATISTICS = ("x", "y", "z", "intensity")
 
 
 @dataclass(frozen=True)
@@ -87,8 +87,8 @@ class DataCard:
         if channel == "range" and self.range is not None:
             mean, std = self.range
             return mean, std
-        if channel in CHANNELS and self.mean is not None and self.std is not None:
-            number = CHANNELS.index(channel)
+        if channel in CHANNELS_OF_STATISTICS and self.mean is not None and self.std is not None:
+            number = CHANNELS_OF_STATISTICS.index(channel)
             return self.mean[number], self.std[number]
         if channel in self.extra:
             return self.extra[channel]
@@ -170,7 +170,7 @@ def _card(document: Entry) -> DataCard:
         "unknown": _ids,
         "licence": Entry.text,
         "intensity_unit": Entry.text,
-        "mean": _if_known(lambda entry: entry.numbers(len(CHANNELS))),
+        "mean": _if_known(lambda entry: entry.numbers(len(CHANNELS_OF_STATISTICS))),
         "std": _if_known(_deviations),
         "range": _if_known(_mean_and_deviation),
         "extra": lambda entry: _each(entry, _mean_and_deviation),
@@ -209,7 +209,7 @@ def _ids(entry: Entry) -> tuple[int, ...]:
 def _deviations(entry: Entry) -> tuple[float, ...]:
     for item in entry.items():
         item.positive()
-    return entry.numbers(len(CHANNELS))
+    return entry.numbers(len(CHANNELS_OF_STATISTICS))
 
 
 def _mean_and_deviation(entry: Entry) -> tuple[float, ...]:

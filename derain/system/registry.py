@@ -32,11 +32,16 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
     Args:
         package: Package whose modules bring members, such as ``derain.filters``.
         group: Name of the entry points of other packages; by default the package's.
+        attribute: Attribute of a member that is set to the first of its names, so that it knows
+            what it is called; by default none is.
     """
 
-    def __init__(self, package: str, group: str | None = None) -> None:
+    def __init__(
+        self, package: str, group: str | None = None, attribute: str | None = None
+    ) -> None:
         self.package = package
         self.group = group or package
+        self.attribute = attribute
         self._members: dict[str, Kind] = {}
         self._has_own = False
         self._has_others = False
@@ -59,6 +64,8 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
                     )
             # Where a module was imported anew, its members take the place of the former ones.
             self._members.update(dict.fromkeys(names, cast(Kind, member)))
+            if self.attribute:
+                setattr(member, self.attribute, names[0])
             return member
 
         return added

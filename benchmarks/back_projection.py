@@ -1,8 +1,8 @@
-"""What the grid and the way back from its pixels allow: rain IoU of a perfect labelling.
+"""What the grid and the back-projection from its pixels allow: rain IoU of a perfect labelling.
 
-    python benchmarks/way_back.py WADS/sample.bin
-    python benchmarks/way_back.py WADS/sequences/36/velodyne/*.bin
-    python benchmarks/way_back.py WADS/sequences/36/velodyne/*.bin --beams
+    python benchmarks/back_projection.py WADS/sample.bin
+    python benchmarks/back_projection.py WADS/sequences/36/velodyne/*.bin
+    python benchmarks/back_projection.py WADS/sequences/36/velodyne/*.bin --beams
 
 Every pixel is labelled with the truth of the return that it shows; no network can do better.
 """
@@ -20,7 +20,7 @@ from derain.cards.card import load_card
 from derain.evaluation.counts import Counts
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
-from derain.views.back_projection import WAYS_BACK
+from derain.views.back_projection import BACK_PROJECTIONS
 from derain.views.grid_fit import fit_grid
 from derain.views.range_image import RangeView
 from derain.views.spherical_grid import SphericalGrid, grid_of
@@ -28,7 +28,7 @@ from derain.views.spherical_grid import SphericalGrid, grid_of
 
 @dataclass
 class Tally:
-    """Counts of one grid and one way back, over all scans."""
+    """Counts of one grid and one back-projection, over all scans."""
 
     points: int = 0
     hidden: int = 0
@@ -94,7 +94,7 @@ def _print_table(grids: dict[str, SphericalGrid], scans: Sequence[Scan], repeats
     print("| grid | size | way back | points hidden | pixels empty | IoU | view ms | back ms |")
     print("|---|---|---|---:|---:|---:|---:|---:|")
     for name, grid in grids.items():
-        for way_back in WAYS_BACK:
+        for way_back in BACK_PROJECTIONS:
             view, tally = RangeView(grid, way_back=way_back), Tally()
             for _ in range(repeats):
                 for scan, truth in zip(scans, rain, strict=True):
