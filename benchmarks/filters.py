@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from turns import milliseconds_in_turns
 
 from derain.errors import InputError
-from derain.export.latency import versions
+from derain.export.machine import versions
 from derain.files import read_scan
 from derain.filters import DROR, DSOR, ROR, SOR, FilterDerainer, PointFilter
 from derain.system.open3d_import import import_open3d

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from published_outdet import PublishedPipeline
 
 from derain.cards.card import load_card
-from derain.export.latency import versions
+from derain.export.machine import versions
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.models.outdet import OutDet

@@ -16,7 +16,7 @@ import small_gicp
 from numpy.typing import NDArray
 from turns import milliseconds_in_turns
 
-from derain.export.latency import versions
+from derain.export.machine import versions
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.files import read_scan

@@ -99,12 +99,6 @@ def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
     return rates_of_sequences(Entry.of_yaml(file))
 
 
-def full_name(card: DataCard) -> str:
-    """Name of a card, which says so where the rain is simulated."""
-    told = "simulated" in card.name or not card.simulated
-    return card.name if told else f"{card.name} (simulated)"
-
-
 def _layout_of(root: Path) -> Layout:
     for layout in (REHEARSE3D, SEMANTIC_KITTI):
         if next(root.glob(f"{layout.sequences}/*/{layout.scans}"), None):

@@ -13,6 +13,12 @@ from derain.cli.arguments import command_line, count, threads
 from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
 from derain.errors import InputError
+from derain.evaluation.published_tables import (
+    TABLES,
+    beside_published,
+    paper_table,
+    scans_by_group,
+)
 from derain.files.atomic import replacing
 from derain.sources.training_record import overlap
 from derain.spec import Spec
@@ -22,9 +28,9 @@ from derain.views.oddities import oddities
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule
     from derain.datamodules.scan_dataset import ScanFile
-    from derain.export.bench.contestants import Contestant
+    from derain.export.bench.bench import Labelled
+    from derain.export.bench.contestant import Contestant
     from derain.export.bench.rows import Row
-    from derain.export.bench.scores import Labelled
     from derain.scan import Scan
 
 SUMMARY = "compare methods on labelled scans: error, time and memory"
@@ -77,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="YAML",
         help='rain rate of each sequence in mm/h, as "005": 25 (default: a simulation\'s own)',
     )
-    parser.add_argument("--paper", choices=("table2", "table3"), help="print beside this table")
+    parser.add_argument("--paper", choices=TABLES, help="print beside this table")
     parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
     parser.add_argument(
         "--timed", type=count, default=10, help="scans to time on (default: %(default)s)"
@@ -90,9 +96,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
+    from derain.cards.layout import sequence_of
     from derain.datamodules.labelled import rain_rates
     from derain.export.bench.contestants import contestants
-    from derain.export.bench.paper import beside_published, files_by_group, paper_table
     from derain.export.bench.report import main_table
 
     data = labelled(arguments, arguments.data)
@@ -105,9 +111,14 @@ def main(arguments: argparse.Namespace) -> int:
         return 0
     _require_split(arguments, data)
     table = paper_table(arguments.paper)
+    groups = scans_by_group(
+        table,
+        lambda part: data.files(part),  # type: ignore[arg-type]
+        lambda file: rates.get(sequence_of(file.scan)),
+    )
     ours = {
         group: _bench(arguments, data, files, rates, methods, arguments.out / group)
-        for group, files in files_by_group(table, data, rates).items()
+        for group, files in groups.items()
     }
     text = beside_published(table, ours, data.card)
     with replacing(arguments.out / f"{arguments.paper}.md") as temporary:
@@ -127,10 +138,9 @@ def _bench(
     """Benches the methods on some scans, and writes tables and picture."""
     from derain.cards.layout import sequence_of
     from derain.datamodules.statistics import evenly_spaced
-    from derain.export.bench.bench import provenance, run_bench
+    from derain.export.bench.bench import Labelled, provenance, run_bench
     from derain.export.bench.cost import Timing
     from derain.export.bench.report import write_report
-    from derain.export.bench.scores import Labelled
     from derain.export.bench.speed_error import draw_speed_error
 
     notices = Notices()
@@ -171,7 +181,7 @@ def _read(
     """Reads a scan, and warns of what is odd about it for each method."""
     read = data.read(files[scan])
     for method in methods:
-        notices.tell(str(scan), oddities(read, method.judge), method.title)
+        notices.tell(str(scan), oddities(read, method.judges_by), method.title)
     return read
 
 
@@ -180,8 +190,8 @@ def _notes(methods: Sequence["Contestant"], scans: "Labelled") -> list[str]:
     notes = [
         note
         for method in methods
-        if isinstance(method.judge, Spec)
-        and (note := overlap(method.title, method.judge, scans.card, scans.scans))
+        if isinstance(method.judges_by, Spec)
+        and (note := overlap(method.title, method.judges_by, scans.card, scans.scans))
     ]
     for note in notes:
         tqdm.write(f"derain: warning: {note}", sys.stderr)

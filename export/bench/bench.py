@@ -1,7 +1,8 @@
 """Runs a bench, and says what it depends on."""
 
 import platform
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -9,14 +10,35 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from derain.cards.card import DataCard
 from derain.datamodules.base import ScanDataModule
-from derain.datamodules.labelled import full_name
 from derain.datamodules.scan_dataset import ScanFile
-from derain.export.bench.contestants import Contestant
+from derain.evaluation.scores import score
+from derain.export.bench.contestant import Contestant
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.rows import Row, joined
-from derain.export.bench.scores import Labelled, score
-from derain.export.latency import processor, versions
+from derain.export.bench.shared_search import scored_methods
+from derain.export.machine import processor, versions
+from derain.scan import Scan
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """Labelled scans, ready to be judged.
+
+    Attributes:
+        card: Says which labels are rain.
+        scans: Files of the scans.
+        read: Reads one of them, with its labels.
+        rain_rate: Rain rate of each scan in mm/h, as far as it is known.
+        distinct: Count points at one position once.
+    """
+
+    card: DataCard
+    scans: Sequence[Path]
+    read: Callable[[Path], Scan]
+    rain_rate: Mapping[Path, float] = field(default_factory=dict)
+    distinct: bool = False
 
 
 def run_bench(
@@ -36,7 +58,14 @@ def run_bench(
     Raises:
         InputError: A scan that cannot be read. A method that fails is told in its row.
     """
-    scores = score(contestants, data, timing.threads)
+    scans = tqdm(data.scans, desc="scoring", unit="scan", disable=None)
+    scores = score(
+        scored_methods(contestants, timing.threads),
+        map(data.read, scans),
+        data.card,
+        data.distinct,
+        [data.rain_rate.get(path) for path in data.scans],
+    )
     costs = [
         measure_cost(contestant, timing)
         for contestant in tqdm(contestants, desc="timing", unit="method", disable=None)
@@ -59,7 +88,7 @@ def provenance(
     card = module.card
     scans = "1 scan" if len(files) == 1 else f"{len(files):,} scans"
     return {
-        "title": f"{full_name(card)}, {scans}",
+        "title": f"{card.title}, {scans}",
         "command": command,
         "data": card.name,
         "simulated": card.simulated,

@@ -1,8 +1,8 @@
 """What the grid and the way back from its pixels allow: rain IoU of a perfect labelling.
 
-    python benchmarks/way_back.py WADS/sample.bin
-    python benchmarks/way_back.py WADS/sequences/36/velodyne/*.bin
-    python benchmarks/way_back.py WADS/sequences/36/velodyne/*.bin --beams
+    python benchmarks/back_projection.py WADS/sample.bin
+    python benchmarks/back_projection.py WADS/sequences/36/velodyne/*.bin
+    python benchmarks/back_projection.py WADS/sequences/36/velodyne/*.bin --beams
 
 Every pixel is labelled with the truth of the return that it shows; no network can do better.
 """
