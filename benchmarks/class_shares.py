@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from derain.cards.card import load_card
-from derain.cards.layout import REHEARSE3D
 from derain.datamodules.simulated import Simulated
 from derain.sources.contents import Tally, count_scan, find_sequences
 
-LAYOUT = (REHEARSE3D.scans, REHEARSE3D.labels)
+LAYOUT = (load_card("simulated").layout.scans, load_card("simulated").layout.labels)
 COLUMNS = ("x", "y", "z", "intensity")
 
 # Source: data_cfg.yaml of the SalsaNext model published with REHEARSE-3D.

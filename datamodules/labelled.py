@@ -5,14 +5,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from derain.cards.card import DataCard, load_card, packaged_cards
-from derain.cards.layout import REHEARSE3D, SEMANTIC_KITTI, Layout
+from derain.cards.known import card_by_folders, known_layouts, label_of
+from derain.cards.layout import Layout
 from derain.datamodules.base import Loading, Part, ScanDataModule
 from derain.datamodules.scan_dataset import ScanFile
 from derain.datamodules.sequences import SequenceDataModule
 from derain.errors import InputError
 from derain.files import find_scans
 from derain.files.documents import Entry
-from derain.files.labels import label_of
 from derain.simulation.manifest import RAIN_RATE, rates_of_sequences, read_manifest
 
 
@@ -53,10 +53,10 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> S
         InputError: A root whose sequences hold no folder of scans that is known.
     """
     root = paths[0]
-    if len(paths) > 1 or not os.path.isdir(root / SEMANTIC_KITTI.sequences):
+    if len(paths) > 1 or not os.path.isdir(root / card.layout.sequences):
         return NamedScans(paths, card, loading)
     split = read_manifest(root).get("split")
-    return SequenceDataModule(str(root), card, _layout_of(root), split, loading)
+    return SequenceDataModule(str(root), card, _layout_of(root, card), split, loading)
 
 
 def card_of(paths: Sequence[Path], name: str | None) -> DataCard:
@@ -75,8 +75,9 @@ def card_of(paths: Sequence[Path], name: str | None) -> DataCard:
     root = paths[0]
     if read_manifest(root):
         return load_card("simulated")
-    if any(root.glob(f"{REHEARSE3D.sequences}/*/{REHEARSE3D.scans}")):
-        return load_card("rehearse3d")
+    layout = _layout_in(root)
+    if layout is not None and (card := card_by_folders(layout, "rain")):
+        return card
     raise InputError(
         root,
         "nothing in it says which labels are rain",
@@ -99,12 +100,22 @@ def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
     return rates_of_sequences(Entry.of_yaml(file))
 
 
-def _layout_of(root: Path) -> Layout:
-    for layout in (REHEARSE3D, SEMANTIC_KITTI):
-        if next(root.glob(f"{layout.sequences}/*/{layout.scans}"), None):
-            return layout
-    raise InputError(
-        root / SEMANTIC_KITTI.sequences,
-        f"no sequence has a folder {REHEARSE3D.scans} or {SEMANTIC_KITTI.scans}",
-        "Name the folders of scans themselves.",
+def _layout_in(root: Path, first: Layout | None = None) -> Layout | None:
+    """The layout of a data set's folders; None where none is known."""
+    layouts = dict.fromkeys([*([first] if first else []), *known_layouts()])
+    return next(
+        (layout for layout in layouts if any(root.glob(f"{layout.sequences}/*/{layout.scans}"))),
+        None,
     )
+
+
+def _layout_of(root: Path, card: DataCard) -> Layout:
+    layout = _layout_in(root, card.layout)
+    if layout is None:
+        folders = dict.fromkeys(known.scans for known in (card.layout, *known_layouts()))
+        raise InputError(
+            root / card.layout.sequences,
+            f"no sequence has a folder {' or '.join(folders)}",
+            "Name the folders of scans themselves, or say in --card what they are called.",
+        )
+    return layout

@@ -1,7 +1,7 @@
 """REHEARSE-3D: emulated rain, a MEMS LiDAR fused with a 4D radar."""
 
 from derain.cards.card import load_card
-from derain.cards.layout import REHEARSE3D, Layout
+from derain.cards.layout import Layout
 from derain.datamodules.base import Loading
 from derain.datamodules.sequences import SequenceDataModule
 
@@ -23,7 +23,7 @@ class Rehearse3D(SequenceDataModule):
     def __init__(
         self,
         root: str,
-        layout: Layout = REHEARSE3D,
+        layout: Layout = load_card("rehearse3d").layout,
         split: dict[str, list[str]] | None = None,
         loading: Loading = Loading(),
     ) -> None:

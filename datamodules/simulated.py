@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from derain.cards.card import load_card
-from derain.cards.layout import REHEARSE3D
 from derain.datamodules.base import Loading, Part
 from derain.datamodules.scan_dataset import ScanFile
 from derain.datamodules.sequences import SequenceDataModule
@@ -37,7 +36,8 @@ class Simulated(SequenceDataModule):
         loading: Loading = Loading(),
     ) -> None:
         split = campaign.split if make else _split_of(Path(root))
-        super().__init__(root, load_card("simulated"), REHEARSE3D, split, loading)
+        card = load_card("simulated")
+        super().__init__(root, card, card.layout, split, loading)
         self.campaign = campaign
         self.make = make
 

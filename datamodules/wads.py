@@ -1,7 +1,7 @@
 """WADS: real snow on a 64-beam LiDAR."""
 
 from derain.cards.card import load_card
-from derain.cards.layout import SEMANTIC_KITTI, Layout
+from derain.cards.layout import Layout
 from derain.datamodules.base import Loading
 from derain.datamodules.sequences import SequenceDataModule
 
@@ -25,7 +25,7 @@ class Wads(SequenceDataModule):
     def __init__(
         self,
         root: str,
-        layout: Layout = SEMANTIC_KITTI,
+        layout: Layout = load_card("wads").layout,
         split: dict[str, list[str]] | None = None,
         loading: Loading = Loading(),
     ) -> None:

@@ -4,11 +4,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
 from derain.files.labels import LARGEST_ID
@@ -17,6 +18,10 @@ from derain.scan import Scan
 from derain.views.channels import UNITS
 
 Parsed = TypeVar("Parsed")
+
+# What the names of a data set's folders tell of scans that lie in such: nothing, what their classes
+# are called, or also which of the classes are rain.
+FoldersTell = Literal["nothing", "classes", "rain"]
 
 # What mean and std are of, in their order.
 CHANNELS = ("x", "y", "z", "intensity")
@@ -43,6 +48,10 @@ class DataCard:
         deduplicate: Whether results on it count points at one position once, as those of a sensor
             that writes many points twice are published.
         split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
+        layout: Where its scans and labels lie.
+        folders_tell: What may be concluded where folders are called as ``layout`` says and nobody
+            names a card: ``nothing``; ``classes``, the names of the classes; or ``rain``, all that
+            the card says.
     """
 
     name: str
@@ -59,6 +68,8 @@ class DataCard:
     simulated: bool = False
     deduplicate: bool = False
     split: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    layout: Layout = field(default_factory=Layout)
+    folders_tell: FoldersTell = "nothing"
 
     @property
     def title(self) -> str:
@@ -181,6 +192,8 @@ def _card(document: Entry) -> DataCard:
         "simulated": Entry.truth,
         "deduplicate": Entry.truth,
         "split": lambda entry: _each(entry, Entry.texts),
+        "layout": Layout.of,
+        "folders_tell": _folders_tell,
     }
     card = DataCard(**document.record(parsers, required=["name", "classes", "rain"]))
     members = document.members()
@@ -221,6 +234,13 @@ def _mean_and_deviation(entry: Entry) -> tuple[float, ...]:
 
 def _if_known(parser: Callable[[Entry], Parsed]) -> Callable[[Entry], Parsed | None]:
     return lambda entry: None if entry.value is None else parser(entry)
+
+
+def _folders_tell(entry: Entry) -> FoldersTell:
+    if entry.value not in get_args(FoldersTell):
+        raise entry.fault(f"is {shown(entry.value)}", f"Give {', '.join(get_args(FoldersTell))}.")
+    told: FoldersTell = entry.value
+    return told
 
 
 def _each(entry: Entry, parser: Callable[[Entry], Parsed]) -> dict[str, Parsed]:

@@ -3,29 +3,49 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from derain.files.documents import Entry
+
 
 @dataclass(frozen=True)
 class Layout:
     """Where scans and labels lie: ``root/<sequences>/<sequence>/<scans>/<frame>.bin``.
 
+    Its defaults are the names of SemanticKITTI, which most data sets have taken over.
+
     Attributes:
         sequences: Name of the folder of sequences.
         scans: Name of a sequence's folder of scans.
         labels: Name of a sequence's folder of labels, ``<frame>.label``.
+        lidar: Name of the folder of the LiDAR's own scans, where ``scans`` holds them merged with
+            a radar's; empty where there is none.
+
+    Source: github.com/PRBonn/semantic-kitti-api, README.
     """
 
     sequences: str = "sequences"
     scans: str = "velodyne"
     labels: str = "labels"
+    lidar: str = ""
 
+    @classmethod
+    def of(cls, entry: Entry) -> "Layout":
+        """The layout that stands on a data card.
 
-# Source: github.com/PRBonn/semantic-kitti-api, README; WADS has it as well.
-SEMANTIC_KITTI = Layout()
-
-# Source: sporsho/sporsho.github.io, REHEARSE3D.md.
-REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels")
+        Raises:
+            InputError: Something that is not a layout.
+        """
+        names = dict.fromkeys(("sequences", "scans", "labels", "lidar"), _folder)
+        return cls(**entry.record(names, required=()))
 
 
 def sequence_of(scan: Path) -> str:
     """Name of the sequence that a scan lies in: ``<sequence>/<folder of scans>/<frame>.bin``."""
     return scan.absolute().parent.parent.name
+
+
+def _folder(entry: Entry) -> str:
+    """The name of a folder, which leads nowhere else."""
+    name = entry.text()
+    if name in ("", ".", "..") or "/" in name or "\\" in name or "\0" in name:
+        raise entry.fault("is not the name of a folder", "Give one name, such as velodyne.")
+    return name

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from derain.cards.layout import REHEARSE3D
+from derain.cards.card import load_card
 from derain.cli.arguments import factor
 from derain.cli.outputs import refuse_clashes, say
 from derain.cli.scan_options import add_columns
@@ -48,7 +48,7 @@ frame (its name), timestamp (in seconds). The label of a radar point is that of 
 point, {UNKNOWN} (unknown) if none is near. A LiDAR scan without a radar frame stays alone.
 """
 
-SCANS, LABELS = REHEARSE3D.scans, REHEARSE3D.labels
+LAYOUT = load_card("rehearse3d").layout
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -96,7 +96,7 @@ def main(arguments: argparse.Namespace) -> int:
     _refuse_overwriting(arguments)
     extrinsics = read_extrinsics(arguments.extrinsics)
     scans, frames = find_scans([arguments.lidar]), find_scans([arguments.radar])
-    refuse_clashes(scans, arguments.out / SCANS)
+    refuse_clashes(scans, arguments.out / LAYOUT.scans)
     times = read_frame_times(scans, arguments.metadata_columns)
     frame_times = read_frame_times(frames, arguments.metadata_columns)
     nearest = nearest_in_time(times, frame_times, arguments.within)
@@ -109,9 +109,10 @@ def main(arguments: argparse.Namespace) -> int:
     partners = [frames[number] if number >= 0 else None for number in nearest]
     for scan, frame in tqdm(zip(scans, partners, strict=True), total=len(scans), disable=None):
         _fuse(scan, frame, extrinsics, arguments)
-    _write_metadata(arguments.out / SCANS / METADATA, scans, times, partners)
+    _write_metadata(arguments.out / LAYOUT.scans / METADATA, scans, times, partners)
     alone = partners.count(None)
-    say(f"{len(scans)} scans in {arguments.out / SCANS}, {alone} of them without a radar frame")
+    folder = arguments.out / LAYOUT.scans
+    say(f"{len(scans)} scans in {folder}, {alone} of them without a radar frame")
     return 0
 
 
@@ -128,10 +129,14 @@ def _fuse(
         radar = _read(frame, "radar", arguments)
     extra = list(filter(None, arguments.extra.split(",")))
     fused = fuse(lidar, radar, extrinsics, arguments.label_within, extra)
-    write_scan(arguments.out / SCANS / f"{scan_stem(scan)}{'.npz' if extra else '.bin'}", fused)
+    write_scan(
+        arguments.out / LAYOUT.scans / f"{scan_stem(scan)}{'.npz' if extra else '.bin'}", fused
+    )
     if fused.label is not None and raw is not None:
         instances = np.pad(instance(raw), (0, len(radar)))  # the radar's points are of none
-        write_labels(arguments.out / LABELS / f"{scan_stem(scan)}{LABEL}", fused.label, instances)
+        write_labels(
+            arguments.out / LAYOUT.labels / f"{scan_stem(scan)}{LABEL}", fused.label, instances
+        )
 
 
 def _read(path: Path, sensor: str, arguments: argparse.Namespace) -> Scan:
@@ -145,7 +150,7 @@ def _read(path: Path, sensor: str, arguments: argparse.Namespace) -> Scan:
 
 
 def _refuse_overwriting(arguments: argparse.Namespace) -> None:
-    written = {(arguments.out / name).resolve() for name in (SCANS, LABELS)}
+    written = {(arguments.out / name).resolve() for name in (LAYOUT.scans, LAYOUT.labels)}
     for folder in (arguments.lidar, arguments.radar, arguments.labels):
         if folder is not None and folder.resolve() in written:
             raise InputError(arguments.out, f"would overwrite {folder}", "Give another --out.")

@@ -9,7 +9,8 @@ from typing import Any
 from tqdm import tqdm
 
 from derain.cards.card import DataCard, load_card
-from derain.cards.layout import REHEARSE3D, SEMANTIC_KITTI
+from derain.cards.known import card_by_folders
+from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.evaluation.text_tables import plain_table
 from derain.sources.contents import (
@@ -21,10 +22,6 @@ from derain.sources.contents import (
     manifest_of,
     rate_name,
 )
-
-# The data card that explains labels, by the folder of their scans. Both WADS and SemanticKITTI have
-# velodyne; WADS's card has the classes of both.
-CARDS = {REHEARSE3D.scans: "rehearse3d", SEMANTIC_KITTI.scans: "wads"}
 
 
 @dataclass(frozen=True)
@@ -144,5 +141,5 @@ def _card(folder: Path, layout: tuple[str, str] | None, name: str | None) -> Dat
     if name is None and manifest_of(folder):
         name = "simulated"
     elif name is None and layout is not None:
-        name = CARDS.get(layout[0])
+        return card_by_folders(Layout(scans=layout[0], labels=layout[1]), "classes")
     return None if name is None else load_card(name)

@@ -104,7 +104,8 @@ def _truth(
 ) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]] | None":
     """Which points are rain, and of which it is known; None where no card says what labels mean."""
     from derain.cards.card import load_card
-    from derain.files.labels import label_of, read_labels, semantic
+    from derain.cards.known import label_of
+    from derain.files.labels import read_labels, semantic
 
     if arguments.card is None:
         return None

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.cards.layout import REHEARSE3D
 from derain.errors import InputError
 from derain.files.atomic import replacing
-from derain.files.names import beside, scan_stem
+from derain.files.names import beside
 from derain.files.reading import file_size, read_bytes, reading
 
 LABEL = ".label"
@@ -26,13 +25,6 @@ def label_beside(scan: Path) -> Path:
     label = beside(scan, LABEL)
     # Not Path.is_file, which raises where the name has become too long by its suffix.
     return label if os.path.isfile(label) else _sequence(scan) / "labels" / label.name
-
-
-def label_of(scan: Path) -> Path:
-    """Where a scan's labels lie: beside it, or in the folder that its layout has for them."""
-    if scan.absolute().parent.name == REHEARSE3D.scans:
-        return _sequence(scan) / REHEARSE3D.labels / f"{scan_stem(scan)}{LABEL}"
-    return label_beside(scan)
 
 
 def _sequence(scan: Path) -> Path:

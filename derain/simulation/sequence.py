@@ -21,7 +21,7 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
 
-from derain.cards.layout import REHEARSE3D
+from derain.cards.card import load_card
 from derain.files import write_scan
 from derain.files.atomic import replacing
 from derain.files.frame_times import FRAME_COLUMNS, METADATA
@@ -38,6 +38,9 @@ from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
 from derain.simulation.sensor import Sensor
 from derain.simulation.track import Track
 from derain.simulation.weather import Weather, draw_wind
+
+# What the folders of a sequence are called.
+FOLDERS = load_card("simulated").layout
 
 LAYOUTS = {"street": lay_out_track, "facility": lay_out_facility}
 
@@ -88,11 +91,11 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
         scan = sensor.measure(detected, of_lidar)
         joined = fuse(scan, frame, mounting)
         assert joined.label is not None  # as both of its parts are labelled
-        write_scan(folder / "innoviz" / f"{stem}.bin", scan)
-        write_scan(folder / REHEARSE3D.scans / f"{stem}.bin", joined)
-        write_labels(folder / REHEARSE3D.labels / f"{stem}.label", joined.label)
+        write_scan(folder / FOLDERS.lidar / f"{stem}.bin", scan)
+        write_scan(folder / FOLDERS.scans / f"{stem}.bin", joined)
+        write_labels(folder / FOLDERS.labels / f"{stem}.label", joined.label)
         _write_table(folder / "weather" / f"{stem}.csv", asdict(scene.weather))
-    for kind in ("innoviz", REHEARSE3D.scans, REHEARSE3D.labels, "weather"):
+    for kind in (FOLDERS.lidar, FOLDERS.scans, FOLDERS.labels, "weather"):
         _write_times(folder / kind, times)
 
 

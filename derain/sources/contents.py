@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from derain.cards.layout import REHEARSE3D, SEMANTIC_KITTI
+from derain.cards.known import known_layouts
 from derain.errors import InputError
 from derain.files import find_scans, read_scan
 from derain.files.binary import count_rows
@@ -21,8 +21,8 @@ from derain.files.names import scan_stem
 from derain.files.reading import reading
 from derain.simulation.manifest import RAIN_RATE, read_manifest
 
-# Folders of scans and of their labels: those of REHEARSE-3D, and those of SemanticKITTI and WADS.
-LAYOUTS = tuple((layout.scans, layout.labels) for layout in (REHEARSE3D, SEMANTIC_KITTI))
+# Folders of scans and of their labels, as the packaged data cards have them.
+LAYOUTS = tuple((layout.scans, layout.labels) for layout in known_layouts())
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ def test_the_split_of_the_card_serves_where_there_is_no_manifest(
 
 def test_a_root_whose_sequences_hold_no_scans_is_refused(tmp_path: Path) -> None:
     (tmp_path / "sequences/00/other").mkdir(parents=True)
-    with pytest.raises(InputError, match="no sequence has a folder lidar_radar_pcd or velodyne"):
+    with pytest.raises(InputError, match="no sequence has a folder velodyne or lidar"):
         labelled_scans([tmp_path], load_card("kitti"), Loading())
 
 

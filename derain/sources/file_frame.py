@@ -1,0 +1,96 @@
+"""A scan in a file, with what lies beside it."""
+
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files import DEFAULT_COLUMNS, read_scan
+from derain.files.binary import count_rows
+from derain.files.labels import read_labels, semantic
+from derain.files.names import scan_stem
+from derain.files.reading import file_size, read_bytes, reading
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.records import Records
+
+# Bytes at either end of a file that tell it from others; no two scans begin and end alike.
+ENDS = 2**16
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FileFrame(Frame):
+    """A scan in a file.
+
+    Attributes:
+        path: The file.
+        columns: Names of its columns, where it does not name them itself.
+        records: Times and poses of the scans in its folder; None where nobody is to look for them.
+    """
+
+    path: Path
+    columns: tuple[str, ...] = DEFAULT_COLUMNS
+    records: Records | None = None
+
+    @property
+    def name(self) -> str:
+        """What messages call it: its path."""
+        return str(self.path)
+
+    @property
+    def suffix(self) -> str:
+        """What follows the stem in the name of its file."""
+        return self.path.name[len(scan_stem(self.path)) :]
+
+    @property
+    def time(self) -> float | None:
+        """When it was taken, seconds: see :class:`~derain.sources.records.Records`."""
+        return None if self.records is None else self.records.time_of(self.path)
+
+    @property
+    def pose(self) -> NDArray[np.float64] | None:
+        """Sensor to world, float64 (4, 4): see :class:`~derain.sources.records.Records`."""
+        return None if self.records is None else self.records.pose_of(self.path)
+
+    @property
+    def has_labels(self) -> bool:
+        """Whether a file of labels is where they should be."""
+        return self.label_path is not None and self.label_path.is_file()
+
+    def read(self) -> Scan:
+        """Reads the scan, without labels."""
+        return read_scan(self.path, self.columns)
+
+    def read_label(self, points: int) -> NDArray[np.int64]:
+        """Reads the semantic class ids of its points, int64 (N,)."""
+        if self.label_path is None:
+            raise InputError(self.path, "it has no labels", "Give its label file.")
+        return semantic(read_labels(self.label_path, points))
+
+    def count_points(self) -> int:
+        """Number of points of the scan; the size of a file of plain rows tells it."""
+        plain = self.path.suffix.lower() == ".bin"
+        counted = count_rows(self.path, self.columns) if plain else None
+        return len(self.read()) if counted is None else counted
+
+    def fingerprint(self) -> str:
+        """What tells the content of its file from that of others, 16 hexadecimal digits."""
+        with reading(self.path):
+            size = file_size(self.path)
+            with self.path.open("rb") as file:
+                ends = file.read(ENDS)
+                file.seek(max(size - ENDS, 0))
+                ends += file.read(ENDS)
+        return sha256(size.to_bytes(8, "little") + ends).hexdigest()[:16]
+
+    def checksums(self) -> tuple[str, str | None]:
+        """SHA-256 of its file and of that of its labels, in hexadecimal digits."""
+        return _sha256(self.path), _sha256(self.label_path) if self.label_path else None
+
+
+def _sha256(path: Path) -> str:
+    with reading(path):
+        return sha256(read_bytes(path, file_size(path))).hexdigest()

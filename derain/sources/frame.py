@@ -1,0 +1,184 @@
+"""One scan in its sequence: what is known of it before it is read."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.scan import Scan
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Frame(ABC):
+    """A scan that a source can give, in its place in time and space.
+
+    Attributes:
+        key: What is made of it is named by this: a relative path without a suffix, such as
+            ``000012`` or ``03/velodyne/000012``, which no other frame of its source has.
+        sequence: Name of the recording that it belongs to; frames of one sequence are of one
+            sensor, one after the other.
+        number: Its place in its sequence, from 0.
+        label_path: Where its labels are, or should be; None where none are to be read.
+    """
+
+    key: str
+    sequence: str = ""
+    number: int = 0
+    label_path: Path | None = None
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What messages call it, such as the path of its file."""
+
+    @property
+    @abstractmethod
+    def suffix(self) -> str:
+        """Suffix of its file's format, such as ``.pcd`` or ``.bin.gz``; empty where it has none."""
+
+    @property
+    def time(self) -> float | None:
+        """When it was taken, seconds of the recording's clock; None where nothing says so.
+
+        Raises:
+            InputError: A record of times that is damaged or does not fit the scans.
+        """
+        return None
+
+    @property
+    def pose(self) -> NDArray[np.float64] | None:
+        """From the sensor's frame to one that stays where it is, float64 (4, 4), metres.
+
+        None where nothing says so.
+
+        Raises:
+            InputError: A record of poses that is damaged or does not fit the scans.
+        """
+        return None
+
+    @property
+    @abstractmethod
+    def has_labels(self) -> bool:
+        """Whether its labels are there to be read."""
+
+    @abstractmethod
+    def read(self) -> Scan:
+        """Reads the scan, without labels.
+
+        Raises:
+            InputError: A file that cannot be read.
+        """
+
+    @abstractmethod
+    def read_label(self, points: int) -> NDArray[np.int64]:
+        """Reads the semantic class ids of its points, int64 (N,).
+
+        Args:
+            points: N, the number of points of the scan.
+
+        Raises:
+            InputError: Labels that are missing, damaged, or not one for each point.
+        """
+
+    @abstractmethod
+    def count_points(self) -> int:
+        """Number of points of the scan, without reading more than that takes.
+
+        Raises:
+            InputError: A file that cannot be read.
+        """
+
+    @abstractmethod
+    def fingerprint(self) -> str:
+        """What tells its points from those of other scans, 16 hexadecimal digits.
+
+        Raises:
+            InputError: A file that cannot be read.
+        """
+
+    @abstractmethod
+    def checksums(self) -> tuple[str, str | None]:
+        """SHA-256 of the scan and of its labels, where it has any, in hexadecimal digits.
+
+        Raises:
+            InputError: A file that cannot be read.
+        """
+
+    def without_labels(self) -> Self:
+        """The same frame, whose labels nobody reads."""
+        return replace(self, label_path=None)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MemoryFrame(Frame):
+    """A scan that is in memory already, with its labels if it has any.
+
+    Attributes:
+        scan: The scan.
+        seconds: When it was taken, seconds; None where that is not known.
+        sensor_to_world: Its pose, float64 (4, 4), metres; None where that is not known.
+        reads_labels: Whether its labels are to be read.
+    """
+
+    scan: Scan
+    seconds: float | None = None
+    sensor_to_world: NDArray[np.float64] | None = None
+    reads_labels: bool = True
+
+    @property
+    def name(self) -> str:
+        """What messages call it: as its scan is called."""
+        return self.scan.name
+
+    @property
+    def suffix(self) -> str:
+        """Nothing: it came from no file."""
+        return ""
+
+    @property
+    def time(self) -> float | None:
+        """When it was taken, as it was told."""
+        return self.seconds
+
+    @property
+    def pose(self) -> NDArray[np.float64] | None:
+        """Its pose, as it was told, float64 (4, 4)."""
+        return self.sensor_to_world
+
+    @property
+    def has_labels(self) -> bool:
+        """Whether its scan has labels that are to be read."""
+        return self.reads_labels and self.scan.label is not None
+
+    def read(self) -> Scan:
+        """The scan, without labels."""
+        return replace(self.scan, label=None)
+
+    def read_label(self, points: int) -> NDArray[np.int64]:
+        """The semantic class ids of its points, int64 (N,)."""
+        assert self.scan.label is not None  # has_labels was asked
+        return self.scan.label
+
+    def count_points(self) -> int:
+        """Number of points of the scan."""
+        return len(self.scan)
+
+    def fingerprint(self) -> str:
+        """What tells its points from those of other scans, 16 hexadecimal digits."""
+        return self.checksums()[0][:16]
+
+    def checksums(self) -> tuple[str, str | None]:
+        """SHA-256 of coordinates and intensities, and of the labels, in hexadecimal digits."""
+        columns = (self.scan.xyz, self.scan.intensity)
+        points = b"".join(np.ascontiguousarray(c).tobytes() for c in columns if c is not None)
+        label = self.scan.label if self.has_labels else None
+        of_label = None if label is None else sha256(label.astype("<i8").tobytes()).hexdigest()
+        return sha256(points).hexdigest(), of_label
+
+    def without_labels(self) -> Self:
+        """The same frame, whose labels nobody reads."""
+        return replace(self, label_path=None, reads_labels=False)

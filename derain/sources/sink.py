@@ -1,0 +1,96 @@
+"""Where what is made of frames goes."""
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files import write_scan
+from derain.files.labels import LABEL, label_beside, write_labels
+from derain.files.names import beside
+from derain.scan import Scan
+from derain.sources.file_frame import FileFrame
+from derain.sources.frame import Frame
+
+
+class Sink(ABC):
+    """Takes what was made of the frames of a source, each by the key of its frame."""
+
+    @abstractmethod
+    def refuse_clashes(self, source: Iterable[Frame]) -> None:
+        """Refuses, before any work, a source whose own files would be overwritten.
+
+        Raises:
+            InputError: What is made of one frame would take the place of a scan, of labels, or of
+                what is made of another frame.
+        """
+
+    @abstractmethod
+    def write(self, frame: Frame, scan: Scan | None, label: NDArray[Any]) -> None:
+        """Takes what was made of one frame.
+
+        Args:
+            frame: The frame.
+            scan: What is left of the scan; None where only labels are of interest.
+            label: Class ids or a bool mask of the scan that the labels are for, (N,).
+
+        Raises:
+            InputError: It cannot be written.
+        """
+
+
+class FolderSink(Sink):
+    """A folder of files: ``<key>`` with the suffix of the frame's file, and ``<key>.label``.
+
+    Args:
+        folder: The folder, made if missing.
+        option: What a user calls it, for messages.
+    """
+
+    def __init__(self, folder: Path, option: str = "--out") -> None:
+        self.folder = folder
+        self.option = option
+
+    def scan_path(self, frame: Frame) -> Path:
+        """Where a scan is written; one that came from no file is written as a PCD."""
+        return self.folder / f"{frame.key}{frame.suffix or '.pcd'}"
+
+    def path(self, frame: Frame, suffix: str) -> Path:
+        """Where anything else that is made of a scan is written, such as its labels."""
+        return self.folder / f"{frame.key}{suffix}"
+
+    def refuse_clashes(self, source: Iterable[Frame]) -> None:
+        """Refuses to overwrite a scan or labels of the source, or one result by another."""
+        written: dict[str, Frame] = {}
+        for frame in source:
+            if isinstance(frame, FileFrame):
+                self._refuse_own_files(frame)
+            target = self.path(frame, LABEL)
+            other = written.setdefault(os.path.realpath(target), frame)
+            if other.name != frame.name:  # patterns may well find a scan twice
+                raise InputError(
+                    frame.name,
+                    f"another scan has the same name: what is made of it and of {other.name} would "
+                    f"both be {target}",
+                    f"Take them in two runs, each to its {self.option}.",
+                )
+
+    def write(self, frame: Frame, scan: Scan | None, label: NDArray[Any]) -> None:
+        """Writes the scan, then the labels: where there are labels, the scan is complete."""
+        if scan is not None:
+            write_scan(self.scan_path(frame), scan)
+        write_labels(self.path(frame, LABEL), label)
+
+    def _refuse_own_files(self, frame: FileFrame) -> None:
+        remedy = f"Give {self.option} another folder."
+        if os.path.realpath(self.scan_path(frame)) == os.path.realpath(frame.path):
+            raise InputError(self.folder, f"would overwrite {frame.path}", remedy)
+        target = self.path(frame, LABEL)
+        for labels in (frame.label_path, label_beside(frame.path), beside(frame.path, LABEL)):
+            # Results that lie where labels are looked for would be taken for the truth.
+            if labels and os.path.realpath(target) == os.path.realpath(labels):
+                raise InputError(self.folder, f"holds the labels of {frame.path}", remedy)

@@ -1,0 +1,74 @@
+"""Where scans come from: frames in time order."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from typing import overload
+
+from derain.scan import Scan
+from derain.sources.frame import Frame, MemoryFrame
+
+
+class Source(Sequence[Frame], ABC):
+    """Frames in time order, one sequence after the other.
+
+    It knows how many there are and can be asked again for any of them; nothing is read before a
+    frame is told to.
+    """
+
+    @abstractmethod
+    def frame(self, number: int) -> Frame:
+        """One of the frames, by its place among all of them, from 0."""
+
+    @overload
+    def __getitem__(self, place: int) -> Frame: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> "Frames": ...
+
+    def __getitem__(self, place: int | slice) -> "Frame | Frames":
+        numbers = range(len(self))[place]
+        if isinstance(numbers, int):
+            return self.frame(numbers)
+        return Frames(map(self.frame, numbers))
+
+    def map(self, change: Callable[[Frame], Frame]) -> "Frames":
+        """The same frames, each changed, such as to be without labels."""
+        return Frames(map(change, self))
+
+
+class Frames(Source):
+    """Frames that are known one by one.
+
+    Example:
+        >>> import numpy as np
+        >>> scans = [np.random.default_rng(number).normal(size=(100, 4)) for number in range(3)]
+        >>> source = Frames.of_scans([Scan.of(points) for points in scans])
+        >>> len(source), source[1].key, len(source[1].read())
+        (3, '000001', 100)
+
+    Args:
+        frames: The frames.
+    """
+
+    def __init__(self, frames: Iterable[Frame]) -> None:
+        self._frames = tuple(frames)
+
+    @classmethod
+    def of_scans(cls, scans: Iterable[Scan], sequence: str = "") -> "Frames":
+        """Scans in memory as one sequence, with the labels that they have.
+
+        Args:
+            scans: The scans, in time order.
+            sequence: What the sequence is called.
+        """
+        return cls(
+            MemoryFrame(key=f"{number:06d}", sequence=sequence, number=number, scan=scan)
+            for number, scan in enumerate(scans)
+        )
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def frame(self, number: int) -> Frame:
+        """One of the frames, by its place among all of them, from 0."""
+        return self._frames[number]
