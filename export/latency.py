@@ -9,7 +9,8 @@ from derain.evaluation.hard_cases import scene
 from derain.export.machine import versions
 from derain.export.runtime import Derainer
 from derain.export.timing import RunTimes, timed_runs
-from derain.files import DEFAULT_COLUMNS, read_scan
+from derain.files import DEFAULT_COLUMNS
+from derain.sources.file_frame import FileFrame
 
 PERCENTILES = (50, 90, 99)
 
@@ -66,5 +67,6 @@ def measure_latency(
             scan, columns = Path(folder) / "scene.bin", DEFAULT_COLUMNS
             scene(100_000).tofile(scan)
         derainer = Derainer(model, threads)
-        times = timed_runs(derainer.probability, [scan], columns, repeats)
-        return Latency(times, len(read_scan(scan, columns)), derainer.threads, versions())
+        frame = FileFrame(key=scan.stem, path=scan, columns=tuple(columns))
+        times = timed_runs(derainer.probability, [frame], repeats)
+        return Latency(times, frame.count_points(), derainer.threads, versions())

@@ -2,13 +2,12 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.files import read_scan
 from derain.scan import Scan
+from derain.sources.frame import Frame
 from derain.system.stopwatch import Stopwatch
 
 STAGES = ("read", "view", "network", "back")
@@ -53,8 +52,7 @@ class RunTimes:
 
 def timed_runs(
     method: Callable[[Scan, Stopwatch], object],
-    scans: Sequence[Path],
-    columns: Sequence[str],
+    frames: Sequence[Frame],
     repeats: int,
 ) -> RunTimes:
     """Reads and judges every scan, in turns, again and again.
@@ -63,22 +61,21 @@ def timed_runs(
 
     Args:
         method: Judges a scan, and gives the stopwatch its stages.
-        scans: Files of the scans, one or more.
-        columns: Names of the columns of scans that do not name them.
+        frames: The scans, one or more.
         repeats: Timed runs on each scan.
 
     Raises:
         InputError: A scan that cannot be read.
     """
 
-    def timed(path: Path) -> dict[str, float]:
+    def timed(frame: Frame) -> dict[str, float]:
         stopwatch = Stopwatch()
         with stopwatch.stage("read"):
-            scan = read_scan(path, columns)
+            scan = frame.read()
         method(scan, stopwatch)
         return stopwatch.milliseconds
 
     for _ in range(WARM_UP):
-        timed(scans[0])
-    runs = [timed(path) for _ in range(repeats) for path in scans]
+        timed(frames[0])
+    runs = [timed(frame) for _ in range(repeats) for frame in frames]
     return RunTimes({stage: np.array([run.get(stage, 0.0) for run in runs]) for stage in STAGES})

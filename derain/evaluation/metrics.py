@@ -133,8 +133,10 @@ class RainMetrics(Metric):
             predicted: True for the points called rain, bool (N,).
 
         Raises:
-            InputError: A label that is no class.
+            InputError: A scan without labels, or a label that is no class.
         """
+        if scan.label is None:
+            raise InputError(scan.name, "it has no labels", "Give its label file.")
         self.update(
             predicted=torch.from_numpy(predicted).to(self.device),
             label=torch.from_numpy(scan.label).to(self.device),

@@ -61,8 +61,8 @@ def score(
         The scores of each method, in the order of the methods.
 
     Raises:
-        InputError: A scan that cannot be read, or a label that is no class of the card. A method
-            that fails is noted in its scores.
+        InputError: A scan that cannot be read, one without labels, or a label that is no class of
+            the card. A method that fails is noted in its scores.
     """
     scorings = [_Scoring(card) for _ in methods]
     for scan in scans:

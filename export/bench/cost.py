@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from derain.export.bench.contestant import Contestant
 from derain.export.timing import RunTimes, timed_runs
-from derain.files import DEFAULT_COLUMNS
 from derain.scan import Scan
+from derain.sources.frame import Frame
 from derain.system.stopwatch import Stopwatch
 from derain.system.workers import main_left_out, worker_pool
 
@@ -24,15 +24,13 @@ class Timing:
     """How methods are timed.
 
     Attributes:
-        scans: Scans to time them on, one or more.
-        columns: Names of the columns of scans that do not name them.
+        frames: Scans to time them on, one or more.
         threads: Threads of view and network; 0 takes every core this process may use.
         repeats: Timed runs on each scan.
         intensity_scale: What takes the scans' intensities to the unit of the methods.
     """
 
-    scans: Sequence[Path]
-    columns: Sequence[str] = DEFAULT_COLUMNS
+    frames: Sequence[Frame]
     threads: int = 0
     repeats: int = 3
     intensity_scale: float = 1.0
@@ -81,7 +79,7 @@ def timed_here(contestant: Contestant, timing: Timing) -> Cost:
     def judge(scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
         return method(scan.with_intensity_times(timing.intensity_scale), stopwatch)
 
-    times = timed_runs(judge, timing.scans, timing.columns, timing.repeats)
+    times = timed_runs(judge, timing.frames, timing.repeats)
     return Cost(times, _peak_memory())
 
 

@@ -8,8 +8,9 @@ import pytest
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export.timing import STAGES, WARM_UP, RunTimes, timed_runs
-from derain.files import DEFAULT_COLUMNS
 from derain.scan import Scan
+from derain.sources.file_frame import FileFrame
+from derain.sources.folders import named_frames
 from derain.system.stopwatch import Stopwatch
 
 
@@ -29,7 +30,7 @@ def test_scans_take_turns_after_the_first_has_warmed_up(tmp_path: Path) -> None:
     for path in scans:
         scene(int(path.stem)).tofile(path)
     method = Recorder()
-    times = timed_runs(method, scans, DEFAULT_COLUMNS, repeats=2)
+    times = timed_runs(method, named_frames(scans), repeats=2)
     assert method.points == [30] * WARM_UP + [30, 40, 30, 40]
     stages = times.stages
     assert tuple(stages) == STAGES
@@ -53,4 +54,4 @@ def test_times_of_no_runs_are_not_known() -> None:
 
 def test_a_scan_that_cannot_be_read_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.bin: there is no such file"):
-        timed_runs(Recorder(), [tmp_path / "none.bin"], DEFAULT_COLUMNS, repeats=1)
+        timed_runs(Recorder(), [FileFrame(key="none", path=tmp_path / "none.bin")], repeats=1)
