@@ -1,4 +1,4 @@
-"""What the grid and the back-projection from its pixels allow: rain IoU of a perfect labelling.
+"""What a grid and the back-projection of its pixels allow: rain IoU of a perfect labelling.
 
     python benchmarks/back_projection.py WADS/sample.bin
     python benchmarks/back_projection.py WADS/sequences/36/velodyne/*.bin
@@ -27,7 +27,7 @@ from derain.views.spherical_grid import SphericalGrid, grid_of
 
 
 @dataclass
-class Tally:
+class GridCounts:
     """Counts of one grid and one back-projection, over all scans."""
 
     points: int = 0
@@ -95,12 +95,12 @@ def _print_table(grids: dict[str, SphericalGrid], scans: Sequence[Scan], repeats
     print("|---|---|---|---:|---:|---:|---:|---:|")
     for name, grid in grids.items():
         for way_back in BACK_PROJECTIONS:
-            view, tally = RangeView(grid, way_back=way_back), Tally()
+            view, counts = RangeView(grid, way_back=way_back), GridCounts()
             for _ in range(repeats):
                 for scan, truth in zip(scans, rain, strict=True):
-                    tally.add(view, scan, truth)
+                    counts.add(view, scan, truth)
             size = f"{grid.rows}x{grid.columns}"
-            print("|", " | ".join([name, size, way_back, *tally.cells()]), "|")
+            print("|", " | ".join([name, size, way_back, *counts.cells()]), "|")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import lightning
 from lightning.pytorch.trainer.states import TrainerFn
 
 from derain.datamodules.base import Part, ScanDataModule
-from derain.datamodules.statistics import evenly_spaced
+from derain.sources.spread import evenly_spaced
 from derain.system.notices import Notices
 
 

@@ -1,7 +1,6 @@
 """Statistics of training scans: what a network's input is normalised by."""
 
 from collections.abc import Iterable, Sequence
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,16 +10,8 @@ from derain.errors import InputError
 from derain.scan import Scan
 from derain.views.channels import USUAL_CHANNELS, channel_values
 
-Item = TypeVar("Item")
-
 # A variance below this share of the squared mean is what rounding leaves of a constant.
 ROUNDING = 1e-12
-
-
-def evenly_spaced(items: Sequence[Item], most: int) -> list[Item]:
-    """At most so many items, spread over the whole sequence."""
-    numbers = np.linspace(0, len(items) - 1, min(most, len(items))).round().astype(int)
-    return [items[number] for number in numbers]
 
 
 def measured(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -> DataCard:

@@ -71,6 +71,12 @@ class DataCard:
     folders_tell: FoldersTell = "nothing"
 
     @property
+    def title(self) -> str:
+        """Its name, which says so where the rain is simulated."""
+        told = "simulated" in self.name or not self.simulated
+        return self.name if told else f"{self.name} (simulated)"
+
+    @property
     def has_statistics(self) -> bool:
         """True where the statistics of every channel and the rain share are known."""
         return None not in (self.mean, self.std, self.range, self.rain_share)

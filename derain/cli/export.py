@@ -80,10 +80,10 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _calibration(arguments: argparse.Namespace) -> Collection["Scan"]:
     """Scans that an eight-bit model is scaled by; none for one in float32."""
-    from derain.datamodules.statistics import evenly_spaced
     from derain.errors import InputError
     from derain.export.quantisation import CALIBRATION_SCANS, CalibrationScans
     from derain.files import find_scans
+    from derain.sources.spread import evenly_spaced
 
     if arguments.int8 != bool(arguments.calibration):
         raise InputError(

@@ -15,7 +15,7 @@ from tqdm import tqdm
 from derain import __version__
 from derain.cli.arguments import command_line, count, threads
 from derain.cli.filter_help import list_filters
-from derain.cli.labelled_data import add_data_arguments, labelled
+from derain.cli.labelled_data import add_data_arguments, frames_of_files, labelled
 from derain.cli.outputs import refuse_unwritable, say
 from derain.errors import InputError
 from derain.files.atomic import replacing
@@ -133,7 +133,7 @@ def _tuned_model(
             notices.tell(str(file.scan), outside)
             yield judgement.probability[known], data.card.rain_of(scan)[known]
 
-    note = overlap(arguments.method, derainer.spec, data.card, [file.scan for file in files])
+    note = overlap(arguments.method, derainer.spec, data.card, frames_of_files(data, files))
     if note is not None:
         tqdm.write(f"derain: warning: {note}", sys.stderr)
     scans = list(judged())

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from derain.export.bench.contestants import Contestant
+    from derain.export.bench.contestant import Contestant
     from derain.scan import Scan
 
 SUMMARY = "draw a scan as several methods clean it"
@@ -62,8 +62,8 @@ def main(arguments: argparse.Namespace) -> int:
     scan = scan.with_intensity_times(arguments.intensity_scale)
     notices = Notices()
     for method in methods:
-        if method.judge is not None:
-            notices.tell(str(arguments.scan), method.judge.oddities(scan), method.title)
+        if method.judges_by is not None:
+            notices.tell(str(arguments.scan), method.judges_by.oddities(scan), method.title)
     truth = _truth(scan, arguments)
     predicted = {
         method.title: _rain(scan, method, arguments.threads, notices) for method in methods

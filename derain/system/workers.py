@@ -2,11 +2,13 @@
 
 import multiprocessing
 import os
+import sys
 import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from types import ModuleType
 
 # Tells the processes that Lightning starts for a run on several devices which process began it.
 LAUNCHER = "DERAIN_LAUNCHER"
@@ -32,6 +34,22 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
             for worker in set(multiprocessing.active_children()) - others:
                 worker.kill()
             raise
+
+
+@contextmanager
+def main_left_out() -> Iterator[None]:
+    """Keeps processes that are started here from running the user's script once more.
+
+    A new process loads the module that the program began with, for what may be defined there.
+    Where nothing of it is needed, that would only take time and memory; and a script that does not
+    guard its work by ``if __name__ == "__main__"`` would do all of it again.
+    """
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def end_with_launcher() -> None:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.track_scene import scene_of_track
 from derain.annotation.scene import Scene
 from derain.annotation.steps import annotate, road_plane
-from derain.annotation.track_scene import scene_of_track
 from derain.fusion.label_transfer import UNKNOWN
 from derain.simulation import objects
 from derain.simulation.classes import TrackClass

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from derain.export.bench import bootstrap as module
-from derain.export.bench.bootstrap import bootstrap
+from derain.evaluation import bootstrap as module
+from derain.evaluation.bootstrap import bootstrap
 
 
 def test_intervals_agree_with_drawing_scans_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "DRAWS", 20_000)
-    chance = np.random.default_rng(1)
-    found, errors = chance.integers(0, 1000, (2, 3, 12))
+    draws = generator(1)
+    found, errors = draws.integers(0, 1000, (2, 3, 12))
     drawn = bootstrap(found, errors, np.random.default_rng(2))
 
-    rows = chance.integers(0, 12, (20_000, 12))
+    rows = draws.integers(0, 12, (20_000, 12))
     hits, misses = found[:, rows].sum(axis=2), errors[:, rows].sum(axis=2)
     iou = hits / (hits + misses)
     pooled = found.sum(axis=1) / (found + errors).sum(axis=1)

@@ -1,23 +1,19 @@
-"""How good methods are: counted over the points of all scans, and over many a part of them."""
+"""What methods score: counted over the points of all scans, and over many a part of them."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from derain.cards.card import DataCard
 from derain.evaluation.counts import Counts
 from derain.evaluation.metrics import ClassCounts, RainMetrics
-from derain.export.bench.contestants import Contestant, Method
-from derain.filters import PointFilter
-from derain.filters.derainer import filter_view
 from derain.scan import Scan
-from derain.system.stopwatch import Stopwatch
 from derain.views.morton import first_rows
+
+# Says which points of a scan are rain, bool (N,).
+Method = Callable[[Scan], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -45,65 +41,38 @@ class Scores:
     failures: Mapping[str, str]
 
 
-@dataclass(frozen=True)
-class Labelled:
-    """Labelled scans, ready to be judged.
-
-    Attributes:
-        card: Says which labels are rain.
-        scans: Files of the scans.
-        read: Reads one of them, with its labels.
-        rain_rate: Rain rate of each scan in mm/h, as far as it is known.
-        distinct: Count points at one position once.
-    """
-
-    card: DataCard
-    scans: Sequence[Path]
-    read: Callable[[Path], Scan]
-    rain_rate: Mapping[Path, float] = field(default_factory=dict)
-    distinct: bool = False
-
-
-def score(rows: Sequence[Contestant], data: Labelled, threads: int) -> list[Scores]:
-    """Judges every scan by every method; filters share one search for neighbours.
+def score(
+    methods: Sequence[Method],
+    scans: Iterable[Scan],
+    card: DataCard,
+    distinct: bool = False,
+    rain_rates: Sequence[float | None] | None = None,
+) -> list[Scores]:
+    """Judges every scan by every method.
 
     Args:
-        rows: The methods.
-        data: The scans.
-        threads: Threads of views and networks; 0 takes every core this process may use.
+        methods: The methods.
+        scans: Labelled scans. One is in memory at a time, if they are read as they are asked for.
+        card: Their data card, which says what of them is rain.
+        distinct: Count points at one position once.
+        rain_rates: Rain rate of each scan in mm/h, None where it is not known; None knows of none.
+
+    Returns:
+        The scores of each method, in the order of the methods.
 
     Raises:
-        InputError: A scan that cannot be read. A method that fails is noted in its scores.
+        InputError: A scan that cannot be read, one without labels, or a label that is no class of
+            the card. A method that fails is noted in its scores.
     """
-    shared = _SharedView([row.filter for row in rows if row.filter], threads)
-    methods: list[Method] = [
-        partial(shared, row.filter) if row.filter else row.ready(threads) for row in rows
-    ]
-    tallies = [_Tally(data.card) for _ in rows]
-    for path in tqdm(data.scans, desc="scoring", unit="scan", disable=None):
-        scan = data.read(path)
-        counted = first_rows(scan) if data.distinct else np.arange(len(scan))
-        for method, tally in zip(methods, tallies, strict=True):
-            tally.update(method, scan, counted)
-    rates = [data.rain_rate.get(path) for path in data.scans]
-    return [tally.scores(rates) for tally in tallies]
+    scorings = [_Scoring(card) for _ in methods]
+    for scan in scans:
+        counted = first_rows(scan) if distinct else np.arange(len(scan))
+        for method, scoring in zip(methods, scorings, strict=True):
+            scoring.judge(method, scan, counted)
+    return [scoring.scores(rain_rates) for scoring in scorings]
 
 
-class _SharedView:
-    """One search for neighbours a scan, for as many as the most demanding filter looks at."""
-
-    def __init__(self, filters: Sequence[PointFilter], threads: int) -> None:
-        most = max((filter.neighbours for filter in filters), default=0)
-        self.view = filter_view(most, threads)
-        self.scan: Scan | None = None
-
-    def __call__(self, filter: PointFilter, scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
-        if scan is not self.scan:
-            self.scan, self.seen = scan, self.view(scan)
-        return self.seen.back(filter.judge(self.seen).astype(np.float32)) > 0
-
-
-class _Tally:
+class _Scoring:
     """Counts what one method makes of the scans."""
 
     def __init__(self, card: DataCard) -> None:
@@ -112,10 +81,10 @@ class _Tally:
         self.by_sensor: dict[str, list[Counts]] = {}
         self.failures: dict[str, str] = {}
 
-    def update(self, method: Method, scan: Scan, counted: NDArray[np.int64]) -> None:
+    def judge(self, method: Method, scan: Scan, counted: NDArray[np.int64]) -> None:
         """Judges a whole scan, and counts some of its rows."""
         try:
-            predicted = method(scan, Stopwatch())
+            predicted = method(scan)
         except Exception as error:  # whatever its libraries raise is told in the method's row
             self.failures[scan.name] = str(error)
             predicted = np.zeros(len(scan), bool)
@@ -127,9 +96,10 @@ class _Tally:
                 rows = known & points
                 self.by_sensor.setdefault(sensor, []).append(Counts.of(predicted[rows], rain[rows]))
 
-    def scores(self, rain_rates: Sequence[float | None]) -> Scores:
+    def scores(self, rain_rates: Sequence[float | None] | None) -> Scores:
         """The counts so far, given the rain rate of each scan in mm/h."""
         per_scan = self.metrics.per_scan()
+        rain_rates = [None] * len(per_scan) if rain_rates is None else rain_rates
         by_rate: dict[float, list[Counts]] = {}
         for rate, counts in zip(rain_rates, per_scan, strict=True):
             if rate is not None:
