@@ -65,12 +65,16 @@ def constants(module: ast.Module) -> Iterator[tuple[str, str]]:
 def generators(module: ast.Module) -> Iterator[str]:
     """Names that a module gives to random generators: variables, attributes and parameters."""
     for node in ast.walk(module):
-        if isinstance(node, ast.arg) and node.annotation is not None:
-            if ast.unparse(node.annotation) == "np.random.Generator":
-                yield node.arg
+        if isinstance(node, ast.arg) and _is_of_a_generator(node):
+            yield node.arg
         for name, value in assigned(node):
             if MAKES_A_GENERATOR.match(ast.unparse(value)):
                 yield name
+
+
+def _is_of_a_generator(parameter: ast.arg) -> bool:
+    annotation = parameter.annotation
+    return annotation is not None and ast.unparse(annotation) == "np.random.Generator"
 
 
 def twice(named: Iterable[tuple[str, str]]) -> dict[str, set[str]]:
