@@ -39,7 +39,7 @@ from derain.simulation.sensor import Sensor
 from derain.simulation.track import Track
 from derain.simulation.weather import Weather, draw_wind
 
-LAY_OUT = {"street": lay_out_track, "facility": lay_out_facility}
+LAYOUTS = {"street": lay_out_track, "facility": lay_out_facility}
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class SimulatedScene:
         sprinkled = campaign.layout == "facility" and nominal > 0
         rain = SprinkledRain(nominal, wind) if sprinkled else UniformRain(nominal)
         at_sensor = float(rain.rate(np.zeros(1), np.zeros(1))[0])
-        track = LAY_OUT[campaign.layout](generator)
+        track = LAYOUTS[campaign.layout](generator)
         return cls(track, rain, Weather.of(nominal, at_sensor, wind))
 
 
