@@ -50,11 +50,11 @@ def rain_on_scan(
 
     Returns:
         The scan in the rain, with labels: TrackClass.RAIN for drops, and for all other rows the
-        label that the scan had, or 0. Rows come in the order of ``scan``. The row of a lost return
-        is left out; in an organised scan it stays and looks like the scan's other empty cells, or
-        is NaN if there are none. A drop on a beam that had returned nothing fills the beam's cell;
-        in a scan without cells it becomes a row at the end, whose other columns are those of the
-        return before it in its row of the sensor's grid.
+        label that the scan had, 0 if it had none or the return is lost. Rows come in the order of
+        ``scan``. The row of a lost return is left out; in an organised scan it stays and looks like
+        the scan's other empty cells, or is NaN if there are none. A drop on a beam that had
+        returned nothing fills the beam's cell; in a scan without cells it becomes a row at the end,
+        whose other columns are those of the return before it in its row of the sensor's grid.
     """
     beams = find_beams(scan, generator)
     exposed = _exposed(scan, beams, sensor)
