@@ -1,4 +1,4 @@
-"""The scene that a patient annotator would describe for a simulated track."""
+"""Describes a simulated track as a scene, as a person would who annotates it with patience."""
 
 from typing import Any
 
@@ -14,11 +14,12 @@ from derain.simulation.sensor import Sensor
 from derain.simulation.track import Track
 from derain.system.open3d_import import import_open3d
 
-# Corners as near to each other are one, and leaves as near are one bush's. Metres.
+# Corners of triangles this near to each other are one corner, and leaves this near to each other
+# belong to one bush, metres.
 SAME_CORNER = 1e-3
 LEAF_GAP = 0.3
 
-# A box ends this high above the road, so that it takes little of the road for its own. Metres.
+# Boxes end this high above the road, metres, so that few points of the road lie in them.
 BOX_CLEARANCE = 0.02
 
 # A box is this many standard deviations of the sensor's range noise wider than what is in it.
@@ -28,9 +29,10 @@ BOX_MARGIN = 3.0
 def scene_of_track(track: Track, sensor: Sensor, beside: float = 0.0) -> Scene:
     """Describes a simulated track: its road, and a box around each part of what stands there.
 
-    A part is what hangs together: a sprinkler's mast is one and its arm another, for a box around
-    both would hold much rain. Of the background only what is where it rains needs boxes; they come
-    last, for a bough's box may reach into a car.
+    A part is a set of triangles that hang together. A sprinkler's mast is one part and its arm
+    another, because a box around both would hold much rain. Of the background only what reaches
+    into the area of the rain gets boxes. They come last, so that a car's box counts where that of a
+    bough reaches into it.
 
     Args:
         track: The track.

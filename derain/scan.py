@@ -47,6 +47,13 @@ class PartialHeader(Protocol):
 class Scan:
     """One point cloud, in the order of its file; rows are never dropped or reordered.
 
+    Example:
+        >>> scan = Scan.of(np.array([[8.0, 6.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0]]))
+        >>> scan.range
+        array([10.,  0.], dtype=float32)
+        >>> scan.valid  # the second point, at the sensor itself, is a beam that met nothing
+        array([ True, False])
+
     Attributes:
         xyz: Coordinates, float32 (N, 3), metres in the sensor frame (x forward, y left, z up).
         intensity: Return intensity, float32 (N,), in the file's own unit; None where the file has

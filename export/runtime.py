@@ -42,8 +42,11 @@ class Derainer:
     """An exported model, ready to judge scans.
 
     Example:
-        >>> derainer = Derainer("model.onnx")  # doctest: +SKIP
-        >>> clean = points[~derainer(points)]  # doctest: +SKIP
+        >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)  # x, y, z, intensity
+        >>> derainer = Derainer("model.onnx")
+        >>> clean = points[~derainer(points)]
+        >>> derainer.spec.network, derainer.probability(points).shape
+        ('outdet', (820,))
 
     Args:
         model: ONNX file written by ``derain export``.

@@ -15,7 +15,7 @@ from derain.errors import InputError
 from derain.evaluation.metrics import RainMetrics
 from derain.files.documents import Entry, shown
 from derain.learning.batch import Batch
-from derain.learning.seeds import Draw, generator, run_seed
+from derain.learning.seeds import Draw, generator_of, run_seed
 from derain.models.measured import MeasuredModule
 from derain.scan import Scan
 from derain.spec import Spec
@@ -235,7 +235,7 @@ class DerainingModule(MeasuredModule):
     def on_train_batch_start(self, batch: Batch, batch_idx: int) -> None:
         """Draws dropout by seed, epoch, step and process, so that a resume changes nothing."""
         step = (self.current_epoch, batch_idx, self.global_rank)
-        torch.manual_seed(int(generator(Draw.NETWORK, run_seed(), *step).integers(2**63)))
+        torch.manual_seed(int(generator_of(Draw.NETWORK, run_seed(), *step).integers(2**63)))
 
     def training_step(self, batch: Batch) -> Tensor:
         """Loss of one batch."""

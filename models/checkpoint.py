@@ -20,12 +20,18 @@ from derain.spec import Spec
 STATE_OF_TRAINING = {"optimizer_states", "lr_schedulers", "loops"}
 
 
-def load_model(path: Path) -> DerainingModule:
+def load_model(path: Path | str) -> DerainingModule:
     """Reads a checkpoint that derain wrote. It is not trusted: only plain values are unpickled.
+
+    Example:
+        >>> model = load_model("model.ckpt")
+        >>> type(model).__name__, model.spec.data
+        ('OutDet', 'WADS')
 
     Raises:
         InputError: A missing or damaged file, or a checkpoint of something else.
     """
+    path = Path(path)
     return _model_of(read_checkpoint(path), path)
 
 

@@ -59,6 +59,13 @@ PUBLISHED_KEYS = {
 class OutDetNetwork(nn.Module):
     """The network as published, from normalised points to logits.
 
+    Example:
+        >>> network = OutDetNetwork(neighbours=3).eval()
+        >>> points, distances = torch.rand(6, 4), torch.rand(6, 3)
+        >>> neighbours = torch.randint(6, (6, 3))
+        >>> network(points, distances, neighbours).shape
+        torch.Size([6, 2])
+
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
         channels: Number of input channels, 4 as published.
@@ -200,6 +207,14 @@ def _constant(tensor: Tensor) -> nn.Parameter:
 @NETWORKS.add("outdet")
 class OutDet(SupervisedModule, Published):
     """Trains 3D-OutDet; the defaults are the published recipe for WADS.
+
+    Example:
+        >>> trainer = Trainer(max_epochs=2, logger=False, enable_progress_bar=False)
+        >>> data = derain.Folder(".", "wads", train=["scan.bin"], validation=["scan.bin"])
+        >>> model = OutDet(neighbours=5)
+        >>> trainer.fit(model, data)
+        >>> trainer.global_step, model.spec.data
+        (2, 'WADS')
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.

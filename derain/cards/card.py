@@ -30,6 +30,12 @@ CHANNELS_OF_STATISTICS = ("x", "y", "z", "intensity")
 class DataCard:
     """What must be known of a data set.
 
+    Example:
+        >>> card = DataCard("my garage", classes={0: "wall", 1: "spray"}, rain=(1,))
+        >>> scan = derain.Scan.of(np.ones((3, 4))).with_label(np.array([0, 1, 1]))
+        >>> card.rain_of(scan)
+        array([False,  True,  True])
+
     Attributes:
         name: Name of the data set, for tables and models.
         classes: Names of its semantic classes, by id.
@@ -158,6 +164,11 @@ def packaged_cards() -> dict[str, Path]:
 
 def load_card(name: str | Path) -> DataCard:
     """Reads a data card.
+
+    Example:
+        >>> card = load_card("wads")
+        >>> [card.classes[number] for number in card.rain]
+        ['falling-snow']
 
     Args:
         name: Name of a packaged card, or a YAML file with the attributes of :class:`DataCard`.

@@ -27,6 +27,11 @@ RECORDS = (METADATA, "calib.txt", "poses.txt", "times.txt", "timestamps.txt")
 def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Scan:
     """Reads one scan.
 
+    Example:
+        >>> scan = read_scan("scan.bin")
+        >>> len(scan), list(scan.fields)
+        (820, ['x', 'y', 'z', 'intensity'])
+
     Args:
         path: The file, in any of FORMATS; compressed as a whole if its name ends in .gz.
         columns: Names of the columns of a file that does not name them itself: .bin, .npy unless
@@ -63,6 +68,12 @@ def count_points(path: Path, columns: Sequence[str] = DEFAULT_COLUMNS) -> int:
 
 def write_scan(path: Path | str, scan: Scan) -> None:
     """Writes one scan: every column of the file it came from, else coordinates and intensity.
+
+    Example:
+        >>> scan = read_scan("scan.bin")
+        >>> write_scan("near.pcd", scan.take(scan.range < 15))
+        >>> len(read_scan("near.pcd"))
+        20
 
     Args:
         path: The file, in any of FORMATS; compressed as a whole if its name ends in .gz.

@@ -20,8 +20,11 @@ class FilterDerainer:
     """A filter, called as :class:`derain.export.runtime.Derainer` is.
 
     Example:
-        >>> derainer = FilterDerainer(DROR())  # doctest: +SKIP
-        >>> clean = points[~derainer(points)]  # doctest: +SKIP
+        >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)  # x, y, z, intensity
+        >>> derainer = FilterDerainer(derain.DROR())
+        >>> clean = points[~derainer(points)]
+        >>> len(points), len(clean)
+        (820, 800)
 
     Args:
         filter: The filter.

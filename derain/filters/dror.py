@@ -34,6 +34,12 @@ class DROR(RadiusFilter):
     finer than what spinning sensors step by: on the WADS sample it takes 40 % of the points that
     are no snow for snow, 0.16° takes 2 %.
 
+    Example:
+        >>> scan = derain.read_scan("scan.bin")  # a wall of 800 points and 20 drops before it
+        >>> rain = derain.FilterDerainer(DROR())(scan)
+        >>> int(rain.sum()), bool((scan.range[rain] < 15).all())
+        (20, True)
+
     Attributes:
         neighbours: Points to be found, the point itself included.
         radius_multiplier: Beam spacings that make a radius.

@@ -24,6 +24,12 @@ class DSOR(PointFilter):
     What is very near the sensor is rain by this definition. A scan of a single point says nothing
     of what is usual: not rain.
 
+    Example:
+        >>> scan = derain.read_scan("scan.bin")  # a wall of 800 points and 20 drops before it
+        >>> rain = derain.FilterDerainer(DSOR())(scan)
+        >>> int(rain.sum()), bool((scan.range[rain] < 15).all())
+        (20, True)
+
     Attributes:
         neighbours: Size of a neighbourhood, the point itself included.
         deviation_multiplier: s, standard deviations above the mean that are still usual.

@@ -21,6 +21,12 @@ class ROR(RadiusFilter):
     RadiusOutlierRemoval and Open3D's remove_radius_outlier decide alike, but count the point
     itself on neither side: their number is one less than ``neighbours``.
 
+    Example:
+        >>> scan = derain.read_scan("scan.bin")  # a wall of 800 points and 20 drops before it
+        >>> rain = derain.FilterDerainer(ROR())(scan)
+        >>> int(rain.sum()), bool((scan.range[rain] < 15).all())
+        (20, True)
+
     Attributes:
         neighbours: Points to be found, the point itself included.
         radius: Radius of the sphere, metres; a point on it is within.

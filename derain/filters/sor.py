@@ -27,6 +27,12 @@ class SOR(PointFilter):
     its means; that scales both sides alike and so decides the same, save that a point just at the
     limit goes.
 
+    Example:
+        >>> scan = derain.read_scan("scan.bin")  # a wall of 800 points and 20 drops before it
+        >>> rain = derain.FilterDerainer(SOR())(scan)
+        >>> int(rain.sum()), bool((scan.range[rain] < 15).all())
+        (20, True)
+
     Attributes:
         neighbours: Size of a neighbourhood, the point itself included.
         deviation_multiplier: Standard deviations above the mean that are still usual.

@@ -25,6 +25,12 @@ class SSR(PointFilter):
     spectrum of these k numbers, which the authors compute. Where the scan has fewer points, k is
     their number. Without intensity, nothing is found.
 
+    Example:
+        >>> scan = derain.read_scan("scan.bin")  # a wall of 800 points and 20 drops before it
+        >>> rain = derain.FilterDerainer(SSR())(scan)
+        >>> int(rain.sum()), bool((scan.range[rain] < 15).all())
+        (20, True)
+
     Attributes:
         neighbours: k, the size of a neighbourhood, the point itself included.
         threshold: In the unit of intensity; 2.5 is for WADS, whose intensities are 0..255.

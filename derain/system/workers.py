@@ -10,7 +10,8 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from types import ModuleType
 
-# Tells the processes that Lightning starts for a run on several devices which process began it.
+# Environment variable with the id of the process that began a run on several devices. It tells the
+# further processes that Lightning starts for the run whom to watch.
 LAUNCHER = "DERAIN_LAUNCHER"
 
 
@@ -18,14 +19,15 @@ LAUNCHER = "DERAIN_LAUNCHER"
 def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """Lends processes that share work.
 
-    When the block ends with an error, or by a signal, nobody waits for what they are at. When this
-    process is killed they end as well, instead of waiting for work for ever.
+    When the block ends with an error or by a signal they are killed, whatever they are doing. When
+    this process is killed they end as well, instead of waiting for work for ever.
 
     Args:
         workers: How many.
     """
     others = set(multiprocessing.active_children())
-    # Not forked: a fork would hold all that this process holds, but none of its threads.
+    # Not forked: a fork has the memory and the locks of this process, but none of the threads that
+    # would release them.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, context, _end_with_parent) as pool:
         try:

@@ -110,6 +110,11 @@ def possible(image: Tensor, rule: SelectionRule) -> Tensor:
 class LiSnowNet(DerainingModule, Published):
     """Trains LiSnowNet-L1 on scans without reading a label; the recipe is the published one.
 
+    Example:
+        >>> model = LiSnowNet(grid="rehearse3d", rule={"residual": 0.01})
+        >>> model.LEARNS_FROM_LABELS, model.selection.residual
+        (False, 0.01)
+
     Args:
         grid: The range image's grid: ``fitted`` to the training scans, the name of a published
             one, or its bounds.

@@ -71,6 +71,11 @@ def score_pixels(
 class SalsaNext(SupervisedModule, Published):
     """Trains SalsaNext; the optimiser and its schedule are the published ones.
 
+    Example:
+        >>> model = SalsaNext(grid="rehearse3d", width=8)
+        >>> model.network.width, model.channels
+        (8, ('range', 'x', 'y', 'z', 'intensity'))
+
     Args:
         grid: The range image's grid: ``fitted`` to the training scans, the name of a published
             one, or its bounds.

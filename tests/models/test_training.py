@@ -23,7 +23,7 @@ from derain.evaluation.intensity_rule import IntensityRule
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.learning.losses import class_weights
-from derain.learning.seeds import Draw, generator
+from derain.learning.seeds import Draw, generator_of
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
@@ -356,7 +356,7 @@ def test_accumulated_batches_make_one_step_on_the_mean_of_their_gradients(
     for number, batch in enumerate(steps.batches):
         epoch, step = divmod(number, 4)
         optimizer.param_groups[0]["lr"] = 1e-3 * 0.1**epoch
-        seed = generator(Draw.NETWORK, 0, epoch, step, 0).integers(2**63)
+        seed = generator_of(Draw.NETWORK, 0, epoch, step, 0).integers(2**63)
         torch.manual_seed(int(seed))  # of dropout
         losses, _ = by_hand.losses(batch)
         (losses["loss"] / 2).backward()
