@@ -31,8 +31,8 @@ sensor sees it.
   derain view scan.bin --methods outdet.onnx --window
 
 A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), a filter (below), all or
-none. --card says what the scan's labels mean; without it there is no truth, and
-with it points whose label says that they are unknown are left out.
+none. --card says what the scan's labels mean; without it there is no truth, and with it points
+whose label says that they are unknown are left out.
 """
 
 
