@@ -57,10 +57,18 @@ def test_the_root_of_the_package_needs_numpy_alone() -> None:
     assert loaded_by("import derain") == {"derain", "numpy"}
 
 
-def test_the_runtime_needs_onnxruntime_the_knn_library_and_what_reads_files() -> None:
-    loaded = loaded_by("import derain.export.runtime")
-    of_yaml = {name for name in loaded if "cython" in name}
-    assert loaded - of_yaml == {"derain", "numpy", "onnxruntime", "small_gicp", "yaml", "lzf"}
+def test_the_runtime_needs_onnxruntime_and_what_reads_files_and_a_model_the_knn_library(
+    onnx_model: Path,
+) -> None:
+    runtime = {"derain", "numpy", "onnxruntime", "yaml", "lzf"}
+    code = "from derain.export.runtime import Derainer"
+    made = f"{code}; Derainer(sys.argv[1])"
+    for loaded, needed in (
+        (loaded_by(code), runtime),
+        (loaded_by(made, onnx_model), runtime | {"small_gicp"}),
+    ):
+        of_yaml = {name for name in loaded if "cython" in name}
+        assert loaded - of_yaml == needed
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["info", "--help"]])
