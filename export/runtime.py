@@ -1,6 +1,7 @@
 """Runs an exported model on a CPU: NumPy, onnxruntime and the kNN library, nothing else."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,31 +12,17 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.export.model_file import METADATA_KEY, ModelFile
 from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
 from derain.system.cores import usable_cores
 from derain.system.stopwatch import Stopwatch
 from derain.views.probability import probability_of_rain
 from derain.views.view import View, ViewedScan
 
-__all__ = ["METADATA_KEY", "Derainer", "open_session"]
+__all__ = ["METADATA_KEY", "Derainer", "Judgement", "open_session"]
 
 # What onnxruntime calls the types of a view's inputs.
 TYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
-
-
-@dataclass(frozen=True, eq=False)
-class Judgement:
-    """What a model says of a scan, in input order.
-
-    Attributes:
-        probability: That each point is rain, float32 (N,); 0 for rows that were not judged.
-        rain: True for rain, bool (N,).
-        judged: True for rows that the model saw, bool (N,): not for those that cannot be judged,
-            nor for points outside the grid of an image.
-    """
-
-    probability: NDArray[np.float32]
-    rain: NDArray[np.bool_]
-    judged: NDArray[np.bool_]
 
 
 class Derainer:
@@ -122,7 +109,39 @@ class Derainer:
             self._refuse_senseless(logits, view, scan)
         with stopwatch.stage("back"):
             probability = view.back(probability_of_rain(logits))
-            return Judgement(probability, probability > self.spec.threshold, view.judged)
+            return Judgement(probability, probability > self.spec.threshold, view.judged, scan)
+
+    @property
+    def waiting(self) -> int:
+        """How many frames were pushed and not answered for: none, a view sees one at a time."""
+        return 0
+
+    def push(
+        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> Judgement | None:
+        """Takes the next frame of a recording.
+
+        Args:
+            frame: A frame, which is read; or points, as for calling the model.
+            stopwatch: Takes the times of the stages read, view, network and back.
+
+        Returns:
+            What the model says of it.
+
+        Raises:
+            InputError: A frame that cannot be read, a network that fails, or whose scores are not
+                finite.
+        """
+        stopwatch = stopwatch or Stopwatch()
+        if not isinstance(frame, Frame):
+            return self.judge(frame, stopwatch)
+        with stopwatch.stage("read"):
+            scan = frame.read()
+        return replace(self.judge(scan, stopwatch), frame=frame)
+
+    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
+        """Answers for the frames that wait for others after them: none do."""
+        return iter(())
 
     def logits(self, view: ViewedScan) -> NDArray[np.float32]:
         """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).

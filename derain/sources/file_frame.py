@@ -62,7 +62,7 @@ class FileFrame(Frame):
 
     def read(self) -> Scan:
         """Reads the scan, without labels."""
-        return read_scan(self.path, self.columns)
+        return read_scan(self.path, self.columns).with_intensity_times(self.intensity_scale)
 
     def read_label(self, points: int) -> NDArray[np.int64]:
         """Reads the semantic class ids of its points, int64 (N,)."""

@@ -92,9 +92,10 @@ class Records:
         """
         rows = self._times if record == TIMES else self._poses
         assert rows is not None
-        if len(rows) == len(self._scans):
+        if len(rows) == len(self._scans) and scan.name in self._places:
             return self._places[scan.name]
         stem = scan_stem(scan)
+        # Only ASCII: other scripts have digits too, and int() reads them.
         if not (stem.isascii() and stem.isdigit() and int(stem) < len(rows)):
             raise InputError(
                 self._beside(record) or self.folder / METADATA,
