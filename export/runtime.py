@@ -1,6 +1,6 @@
 """Runs an exported model on a CPU: NumPy, onnxruntime and the kNN library, nothing else."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.export.model_file import METADATA_KEY, ModelFile
 from derain.scan import Scan
-from derain.sources.frame import Frame
+from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.judgement import Judgement
+from derain.sources.recent_frames import FrameInWindow, RecentFrames
 from derain.system.cores import usable_cores
 from derain.system.stopwatch import Stopwatch
 from derain.views.probability import probability_of_rain
 from derain.views.view import View, ViewedScan
+from derain.views.window import Window, WindowOfScans
 
 __all__ = ["METADATA_KEY", "Derainer", "Judgement", "open_session"]
 
@@ -56,6 +58,7 @@ class Derainer:
         self.view = self.spec.make_view(self.threads)
         self.session = open_session(file, self.threads)
         _refuse_other_network(self.session, self.view, self.path)
+        self._recent = RecentFrames(getattr(self.view, "window", Window()))
 
     def __call__(
         self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
@@ -100,48 +103,68 @@ class Derainer:
         Raises:
             InputError: A network that fails, or whose scores are not finite.
         """
-        stopwatch = stopwatch or Stopwatch()
         scan = Scan.of(points)
-        with stopwatch.stage("view"):
-            view = self.view(scan)
-        with stopwatch.stage("network"):
-            logits = self.logits(view)
-            self._refuse_senseless(logits, view, scan)
-        with stopwatch.stage("back"):
-            probability = view.back(probability_of_rain(logits))
-            return Judgement(probability, probability > self.spec.threshold, view.judged, scan)
+        return self._judged(scan, lambda: self.view(scan), stopwatch or Stopwatch())
 
     @property
     def waiting(self) -> int:
-        """How many frames were pushed and not answered for: none, a view sees one at a time."""
-        return 0
+        """How many frames were pushed and are not answered for: they wait for frames after them."""
+        return self._recent.waiting
+
+    def starts_anew(self, frame: Frame) -> bool:
+        """Whether pushing a frame would let go of those that wait: it does not follow them."""
+        return self._recent.waiting > 0 and self._recent.starts_anew(frame)
 
     def push(
         self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
     ) -> Judgement | None:
         """Takes the next frame of a recording.
 
+        A model whose view asks for scans after the one that it judges answers for an earlier frame,
+        as many frames back. One of another sequence, or after a gap, starts anew: call
+        :meth:`flush` before it, or the frames that still wait are let go of.
+
         Args:
-            frame: A frame, which is read; or points, as for calling the model.
+            frame: A frame, which is read; or points, as for calling the model, of which each push
+                is taken for the next of one sequence.
             stopwatch: Takes the times of the stages read, view, network and back.
 
         Returns:
-            What the model says of it.
+            What the model says of the frame that has all of its window by now; None until there is
+            one.
 
         Raises:
             InputError: A frame that cannot be read, a network that fails, or whose scores are not
                 finite.
         """
         stopwatch = stopwatch or Stopwatch()
+        if isinstance(frame, Frame):
+            with stopwatch.stage("read"):
+                scan = frame.read()
+        else:
+            scan = Scan.of(frame)
+        if self._recent.window.is_one_scan:
+            judgement = self.judge(scan, stopwatch)
+            return replace(judgement, frame=frame) if isinstance(frame, Frame) else judgement
         if not isinstance(frame, Frame):
-            return self.judge(frame, stopwatch)
-        with stopwatch.stage("read"):
-            scan = frame.read()
-        return replace(self.judge(scan, stopwatch), frame=frame)
+            number = self._recent.next_number
+            frame = MemoryFrame(key=f"{number:06d}", number=number, scan=scan)
+        ready = self._recent.take(frame, scan)
+        return None if ready is None else self._judged_in_window(ready, stopwatch)
 
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
-        """Answers for the frames that wait for others after them: none do."""
-        return iter(())
+        """Answers for the frames that still wait, each with the scans after it that there are.
+
+        Where one cannot be judged, those after it go on waiting.
+
+        Args:
+            stopwatch: Takes the times of the stages view, network and back.
+
+        Raises:
+            InputError: A network that fails, or whose scores are not finite.
+        """
+        while self._recent.waiting:
+            yield self._judged_in_window(self._recent.give(), stopwatch or Stopwatch())
 
     def logits(self, view: ViewedScan) -> NDArray[np.float32]:
         """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).
@@ -155,6 +178,23 @@ class Derainer:
             raise InputError(
                 self.path, f"its network fails ({error})", "Export it with `derain export`."
             ) from error
+
+    def _judged_in_window(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
+        # Only views that ask for more than one scan come here, and those can see them.
+        see: Callable[[WindowOfScans], ViewedScan] = self.view.of_window  # type: ignore[attr-defined]
+        judgement = self._judged(ready.scans.scan, lambda: see(ready.scans), stopwatch)
+        return replace(judgement, frame=ready.frame)
+
+    def _judged(self, scan: Scan, see: Callable[[], ViewedScan], stopwatch: Stopwatch) -> Judgement:
+        """What the model says of a scan, once it sees it."""
+        with stopwatch.stage("view"):
+            view = see()
+        with stopwatch.stage("network"):
+            logits = self.logits(view)
+            self._refuse_senseless(logits, view, scan)
+        with stopwatch.stage("back"):
+            probability = view.back(probability_of_rain(logits))
+            return Judgement(probability, probability > self.spec.threshold, view.judged, scan)
 
     def _refuse_senseless(self, logits: NDArray[np.float32], view: ViewedScan, scan: Scan) -> None:
         """Refuses scores that would count as "not rain" because nothing compares with them."""

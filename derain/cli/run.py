@@ -113,15 +113,12 @@ def main(arguments: argparse.Namespace) -> int:
     source = named_frames(arguments.scans, arguments.columns)
     cleaning = _Cleaning(method, folder_sink(arguments.out, source), arguments)
     scans = ScanByScan(source)
-    previous: Frame | None = None
     for frame in scans:
-        if previous is not None and not frame.follows(previous):
-            cleaning.finish(scans, previous)
+        if method.starts_anew(frame):
+            cleaning.finish(scans)
         with scans.passing_over(frame):
             cleaning.clean(frame)
-        previous = frame
-    if previous is not None:
-        cleaning.finish(scans, previous)
+    cleaning.finish(scans)
     cleaning.notices.tell_how_many_more()
     if len(cleaning.done) > 1:
         print(_summary(cleaning.done), file=sys.stderr if arguments.json else sys.stdout)
@@ -148,10 +145,10 @@ class _Cleaning:
         if judgement is not None:
             self._write(judgement, stopwatch)
 
-    def finish(self, scans: ScanByScan, last: Frame) -> None:
-        """Writes what waits for scans after the last of a recording."""
-        while self.method.waiting:  # an error leaves those that follow
-            with scans.passing_over(last):
+    def finish(self, scans: ScanByScan) -> None:
+        """Writes what still waits for scans after the last of a recording."""
+        while self.method.waiting:  # where one fails, the others go on waiting
+            with scans.passing_over(scans.source[-1]):
                 stopwatch = Stopwatch()
                 for judgement in self.method.flush(stopwatch):
                     self._write(judgement, stopwatch)

@@ -78,6 +78,10 @@ class FilterDerainer:
         """How many frames were pushed and not answered for: none, a filter sees one at a time."""
         return 0
 
+    def starts_anew(self, frame: Frame) -> bool:
+        """Whether pushing a frame would let go of those that wait: none do."""
+        return False
+
     def push(
         self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
     ) -> Judgement:

@@ -20,7 +20,7 @@ class Judgement:
         judged: True for rows that the method saw, bool (N,): not for those that cannot be judged,
             nor for points outside the grid of an image.
         scan: The scan.
-        frame: Its frame, where one was pushed.
+        frame: Its frame; None where points were judged by themselves.
     """
 
     probability: NDArray[np.float32]
