@@ -13,13 +13,14 @@ from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.order import MeasuringOrder, TrainingOrder
 from derain.datamodules.scan_dataset import LateLoader, ScanDataset, ScanFile, packed
-from derain.datamodules.statistics import evenly_spaced, measured
+from derain.datamodules.statistics import measured
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.learning.batch import Batch, Sample
 from derain.learning.seeds import run_seed
 from derain.scan import Scan
+from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import by_fingerprint
 from derain.spec import Spec
 from derain.views.channels import extra_channels, with_columns

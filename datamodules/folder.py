@@ -13,6 +13,11 @@ from derain.files.labels import label_beside
 class Folder(ScanDataModule):
     """Scans picked by patterns; a scan's labels are ``<stem>.label`` beside it or in ``../labels``.
 
+    Example:
+        >>> data = Folder(".", card="wads", train=["*.bin"])
+        >>> [file.scan.name for file in data.files("train")]
+        ['scan.bin']
+
     Args:
         root: Folder that the patterns start from.
         card: Name of a packaged data card, or a YAML file: it maps label ids to class names and

@@ -7,9 +7,8 @@ import lightning
 from lightning.pytorch.trainer.states import TrainerFn
 
 from derain.datamodules.base import Part, ScanDataModule
-from derain.datamodules.statistics import evenly_spaced
+from derain.sources.spread import evenly_spaced
 from derain.system.notices import Notices
-from derain.views.oddities import oddities
 
 
 class ScanCheck(lightning.Callback):
@@ -47,7 +46,7 @@ class ScanCheck(lightning.Callback):
         data: ScanDataModule = trainer.datamodule  # type: ignore[attr-defined]
         notices = Notices()
         for file in evenly_spaced(data.files(part), self.scans):
-            found = oddities(data.read(file), model.spec)
+            found = model.spec.oddities(data.read(file))
             notices.tell(str(file.scan), [replace(o, detail=_here(o.detail)) for o in found])
         notices.tell_how_many_more()
 

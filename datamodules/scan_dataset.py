@@ -12,7 +12,7 @@ from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.order import Pick
 from derain.errors import InputError
 from derain.learning.batch import Batch, Sample
-from derain.learning.seeds import Draw, generator
+from derain.learning.seeds import Draw, generator_of
 from derain.scan import Scan
 from derain.views.view import View
 
@@ -68,8 +68,8 @@ class ScanDataset(Dataset[Sample | InputError]):
     def _sample(self, pick: Pick) -> Sample:
         scan = self.read(self.files[pick.number])
         if self.augmentation is not None:
-            chance = generator(Draw.AUGMENTATION, self.seed, pick.epoch, pick.number)
-            scan = self.augmentation(scan, chance, self.view.azimuth)
+            generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, pick.number)
+            scan = self.augmentation(scan, generator, self.view.azimuth)
         return Sample.of(scan, self.view(scan), self.card, pick.measured)
 
 

@@ -18,8 +18,7 @@ from derain.sources.recent_frames import FrameInWindow, RecentFrames
 from derain.system.cores import usable_cores
 from derain.system.stopwatch import Stopwatch
 from derain.views.probability import probability_of_rain
-from derain.views.view import View, ViewedScan
-from derain.views.window import Window, WindowOfScans
+from derain.views.view import SeenScan, View
 
 __all__ = ["METADATA_KEY", "Derainer", "Judgement", "open_session"]
 
@@ -31,8 +30,11 @@ class Derainer:
     """An exported model, ready to judge scans.
 
     Example:
-        >>> derainer = Derainer("model.onnx")  # doctest: +SKIP
-        >>> clean = points[~derainer(points)]  # doctest: +SKIP
+        >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)  # x, y, z, intensity
+        >>> derainer = Derainer("model.onnx")
+        >>> clean = points[~derainer(points)]
+        >>> derainer.spec.network, derainer.probability(points).shape
+        ('outdet', (820,))
 
     Args:
         model: ONNX file written by ``derain export``.
@@ -58,7 +60,7 @@ class Derainer:
         self.view = self.spec.make_view(self.threads)
         self.session = open_session(file, self.threads)
         _refuse_other_network(self.session, self.view, self.path)
-        self._recent = RecentFrames(getattr(self.view, "window", Window()))
+        self._recent = RecentFrames(self.view.window)
 
     def __call__(
         self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
@@ -166,7 +168,7 @@ class Derainer:
         while self._recent.waiting:
             yield self._judged_in_window(self._recent.give(), stopwatch or Stopwatch())
 
-    def logits(self, view: ViewedScan) -> NDArray[np.float32]:
+    def logits(self, view: SeenScan) -> NDArray[np.float32]:
         """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).
 
         Raises:
@@ -180,12 +182,11 @@ class Derainer:
             ) from error
 
     def _judged_in_window(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
-        # Only views that ask for more than one scan come here, and those can see them.
-        see: Callable[[WindowOfScans], ViewedScan] = self.view.of_window  # type: ignore[attr-defined]
-        judgement = self._judged(ready.scans.scan, lambda: see(ready.scans), stopwatch)
+        scans = ready.scans
+        judgement = self._judged(scans.scan, lambda: self.view.of_window(scans), stopwatch)
         return replace(judgement, frame=ready.frame)
 
-    def _judged(self, scan: Scan, see: Callable[[], ViewedScan], stopwatch: Stopwatch) -> Judgement:
+    def _judged(self, scan: Scan, see: Callable[[], SeenScan], stopwatch: Stopwatch) -> Judgement:
         """What the model says of a scan, once it sees it."""
         with stopwatch.stage("view"):
             view = see()
@@ -196,7 +197,7 @@ class Derainer:
             probability = view.back(probability_of_rain(logits))
             return Judgement(probability, probability > self.spec.threshold, view.judged, scan)
 
-    def _refuse_senseless(self, logits: NDArray[np.float32], view: ViewedScan, scan: Scan) -> None:
+    def _refuse_senseless(self, logits: NDArray[np.float32], view: SeenScan, scan: Scan) -> None:
         """Refuses scores that would count as "not rain" because nothing compares with them."""
         if logits.shape != (view.size, 2) or not np.isfinite(logits).all():
             raise InputError(

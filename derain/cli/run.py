@@ -8,24 +8,25 @@ from pathlib import Path
 from typing import Any
 
 from derain.cli.arguments import add_threads, share
+from derain.cli.filter_help import list_filters
 from derain.cli.outputs import folder_sink, tell
 from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError, printable
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
-from derain.filters import FILTERS, FilterDerainer, read_parameters
+from derain.filters import FilterDerainer, read_parameters
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.sink import Sink
 from derain.system.notices import Notices
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import Oddity, left_out, much_removed, oddities, outside_view
+from derain.views.oddities import Oddity, left_out, much_removed, outside_view
 
 SUMMARY = "clean scans on a CPU, without torch"
 
-DESCRIPTION = f"""\
+DESCRIPTION = """\
 Cleans scans: writes <stem>.label (1 = rain, one per row of the input) and the scan without its
 rain, in the input's format with every field kept.
 
@@ -37,7 +38,7 @@ rain, in the input's format with every field kept.
   derain run dsor scans/ --out cleaned --parameters best.yaml --set range_multiplier=0.08
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
-or a filter: {", ".join(FILTERS)}.
+or a filter (below).
 What is odd about a scan is warned of, each fault once. One of which more than --most-removed is
 called rain is left alone. It and a scan that cannot be read are reported and passed over; the exit
 code is then 2.
@@ -79,6 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "method", metavar="METHOD", help="ONNX file, YAML file of parameters, or name of a filter"
     )
+    list_filters(parser)
     parser.add_argument(
         "scans", nargs="+", type=Path, help="scans, folders of scans, or a data set's folder"
     )
@@ -179,9 +181,9 @@ class _Cleaning:
 def _oddities(judgement: Judgement, method: Derainer | FilterDerainer) -> Sequence[Oddity]:
     """What is odd about a scan for the method that judged it."""
     if isinstance(method, FilterDerainer):
-        return list(oddities(judgement.scan, method.filter))
-    outside = outside_view(judgement.scan, judgement.judged, method.spec)
-    return [*oddities(judgement.scan, method.spec), *outside]
+        return list(method.filter.oddities(judgement.scan))
+    outside = outside_view(judgement.scan, judgement.judged, method.spec.data)
+    return [*method.spec.oddities(judgement.scan), *outside]
 
 
 def _summary(done: Sequence[Cleaned]) -> str:

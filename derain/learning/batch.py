@@ -8,7 +8,7 @@ from torch import Tensor
 
 from derain.cards.card import DataCard
 from derain.scan import Scan
-from derain.views.view import IGNORED, ViewedScan, WayToRows
+from derain.views.view import IGNORED, BackProjection, SeenScan
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +24,12 @@ class Sample:
     """
 
     scan: Scan
-    view: ViewedScan
+    view: SeenScan
     target: Tensor | None
     measured: bool = True
 
     @classmethod
-    def of(cls, scan: Scan, view: ViewedScan, card: DataCard, measured: bool = True) -> "Sample":
+    def of(cls, scan: Scan, view: SeenScan, card: DataCard, measured: bool = True) -> "Sample":
         """Gives a view its target, by the labels of its scan if there are any.
 
         Cells of points of which it is not known whether they are rain are not judged.
@@ -47,11 +47,11 @@ class MeasuredScan:
 
     Attributes:
         scan: The whole scan, with its labels where they are known.
-        way_to_rows: Carries scores of its cells to its rows.
+        back_projection: Carries scores of its cells to its rows.
     """
 
     scan: Scan
-    way_to_rows: WayToRows
+    back_projection: BackProjection
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ class Batch:
             target=torch.cat(targets) if len(targets) == len(samples) else None,
             cells=[sample.view.size for sample in samples],
             measured=[
-                MeasuredScan(sample.scan, sample.view.way_to_rows())
+                MeasuredScan(sample.scan, sample.view.back_projection())
                 for sample in samples
                 if sample.measured
             ],

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files import DEFAULT_COLUMNS, read_scan
-from derain.files.binary import count_rows
+from derain.files import DEFAULT_COLUMNS, count_points, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.files.names import scan_stem
 from derain.files.reading import file_size, read_bytes, reading
@@ -72,9 +71,7 @@ class FileFrame(Frame):
 
     def count_points(self) -> int:
         """Number of points of the scan; the size of a file of plain rows tells it."""
-        plain = self.path.suffix.lower() == ".bin"
-        counted = count_rows(self.path, self.columns) if plain else None
-        return len(self.read()) if counted is None else counted
+        return count_points(self.path, self.columns)
 
     def fingerprint(self) -> str:
         """What tells the content of its file from that of others, 16 hexadecimal digits."""

@@ -8,11 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
-
 from derain.cards.card import DataCard
-from derain.cards.layout import sequence_of
 from derain.files.reading import file_size, reading
+from derain.sources.frame import Frame
+from derain.sources.spread import evenly_spaced
 from derain.spec import Spec
 
 # What a record holds: names of sequences, and fingerprints of scans.
@@ -40,8 +39,7 @@ def by_fingerprint(scans: Sequence[Path]) -> dict[str, tuple[str, ...]]:
     Raises:
         InputError: A file that cannot be read.
     """
-    chosen = np.linspace(0, len(scans) - 1, min(len(scans), MOST_NAMES)).round().astype(int)
-    prints = tuple(sorted({fingerprint(scans[number]) for number in chosen}))
+    prints = tuple(sorted(set(map(fingerprint, evenly_spaced(scans, MOST_NAMES)))))
     return {SCANS: prints} if prints else {}
 
 
@@ -60,7 +58,7 @@ def fingerprint(scan: Path) -> str:
     return sha256(size.to_bytes(8, "little") + ends).hexdigest()[:16]
 
 
-def overlap(title: str, spec: Spec, card: DataCard, scans: Sequence[Path]) -> str | None:
+def overlap(title: str, spec: Spec, card: DataCard, scans: Sequence[Frame]) -> str | None:
     """What is to be said of a model that was trained on some of the scans it is measured on.
 
     Args:
@@ -78,13 +76,11 @@ def overlap(title: str, spec: Spec, card: DataCard, scans: Sequence[Path]) -> st
     known = [scan for scan in scans if _trained_on(scan, spec.training, spec.data == card.name)]
     if not known:
         return None
-    return (
-        f"{title} was trained on {len(known):,} of these {len(scans):,} scans, such as {known[0]}: "
-        "its scores say little of others"
-    )
+    share = f"{len(known):,} of these {len(scans):,} scans, such as {known[0].name}"
+    return f"{title} was trained on {share}: its scores say little of others"
 
 
-def _trained_on(scan: Path, training: Mapping[str, tuple[str, ...]], same_data: bool) -> bool:
-    if same_data and sequence_of(scan) in training.get(SEQUENCES, ()):
+def _trained_on(scan: Frame, training: Mapping[str, tuple[str, ...]], same_data: bool) -> bool:
+    if same_data and scan.sequence in training.get(SEQUENCES, ()):
         return True
-    return bool(training.get(SCANS)) and fingerprint(scan) in training[SCANS]
+    return bool(training.get(SCANS)) and scan.fingerprint() in training[SCANS]

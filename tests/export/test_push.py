@@ -48,8 +48,8 @@ def windowed(monkeypatch: pytest.MonkeyPatch) -> None:
     def of_window(view: NeighbourView, scans: WindowOfScans) -> object:
         return view(as_seen(scans.scan, len(scans.before), len(scans.after)))
 
-    monkeypatch.setattr(NeighbourView, "window", Window(before=2, after=1), raising=False)
-    monkeypatch.setattr(NeighbourView, "of_window", of_window, raising=False)
+    monkeypatch.setattr(NeighbourView, "window", Window(before=2, after=1))
+    monkeypatch.setattr(NeighbourView, "of_window", of_window)
 
 
 def assert_seen(judgement: Judgement, derainer: Derainer, before: int, after: int) -> None:
@@ -148,7 +148,7 @@ def test_another_sequence_starts_anew(onnx_model: Path) -> None:
 def test_one_of_those_that_wait_does_not_take_the_others_with_it(
     onnx_model: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(NeighbourView, "window", Window(before=0, after=3), raising=False)
+    monkeypatch.setattr(NeighbourView, "window", Window(before=0, after=3))
     derainer = Derainer(onnx_model, 1)
     for seed in range(3):
         assert derainer.push(Scan.of(scene(POINTS, seed))) is None

@@ -8,6 +8,7 @@ import pytest
 
 from derain.cards.card import load_card
 from derain.export.model_file import ModelFile
+from derain.sources.folders import named_frames
 from derain.sources.training_record import (
     ENDS,
     MOST_NAMES,
@@ -33,12 +34,15 @@ def scans(tmp_path: Path) -> list[Path]:
 
 def test_a_sequence_is_known_by_its_name_where_the_data_are_the_same(scans: list[Path]) -> None:
     spec = replace(SPEC, training=by_name(["10", "11"]))
-    note = overlap("mine", spec, CARD, scans)
+    note = overlap("mine", spec, CARD, named_frames(scans))
     assert note is not None
     assert note.startswith(f"mine was trained on 2 of these 3 scans, such as {scans[0]}")
-    assert overlap("mine", replace(spec, training=by_name(["10", "13"])), CARD, scans) is None
+    assert (
+        overlap("mine", replace(spec, training=by_name(["10", "13"])), CARD, named_frames(scans))
+        is None
+    )
     # Sequences of other data may well be called the same.
-    assert overlap("mine", replace(spec, data="other data"), CARD, scans) is None
+    assert overlap("mine", replace(spec, data="other data"), CARD, named_frames(scans)) is None
 
 
 def test_a_scan_is_known_by_its_content_wherever_it_lies(scans: list[Path], tmp_path: Path) -> None:
@@ -46,16 +50,16 @@ def test_a_scan_is_known_by_its_content_wherever_it_lies(scans: list[Path], tmp_
     moved = tmp_path / "elsewhere" / "other_name.bin"
     moved.parent.mkdir()
     moved.write_bytes(scans[0].read_bytes())
-    note = overlap("mine", spec, CARD, [scans[1], moved])
+    note = overlap("mine", spec, CARD, named_frames([scans[1], moved]))
     assert note is not None
     assert note.startswith(f"mine was trained on 1 of these 2 scans, such as {moved}")
     # One of the same name in a folder of the same name is another.
-    assert overlap("mine", spec, CARD, scans[1:]) is None
+    assert overlap("mine", spec, CARD, named_frames(scans[1:])) is None
 
 
 def test_nothing_is_said_where_nothing_is_known(scans: list[Path]) -> None:
     assert by_fingerprint([]) == by_name([]) == {}
-    assert overlap("mine", replace(SPEC, training={}), CARD, scans) is None
+    assert overlap("mine", replace(SPEC, training={}), CARD, named_frames(scans)) is None
 
 
 def test_both_ends_and_the_length_of_a_file_tell_it_from_others(tmp_path: Path) -> None:
