@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from derain import InputError
+from derain.cards.known import label_of
 from derain.files.labels import instance, read_labels, semantic, write_labels
 
 LABELS = arrays(np.uint32, st.integers(0, 20))
