@@ -122,6 +122,13 @@ class Derainer:
     ) -> Judgement | None:
         """Takes the next frame of a recording.
 
+        Example:
+            >>> derainer = Derainer("model.onnx")
+            >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)
+            >>> judgement = derainer.push(points)  # and so on, with every scan that comes in
+            >>> len(judgement.rain), derainer.waiting
+            (820, 0)
+
         A model whose view asks for scans after the one that it judges answers for an earlier frame,
         as many frames back. One of another sequence, or after a gap, starts anew: call
         :meth:`flush` before it, or the frames that still wait are let go of.

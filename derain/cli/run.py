@@ -34,11 +34,12 @@ rain, in the input's format with every field kept.
   derain run model.onnx scans/ more/scan.pcd --out cleaned --threads 2 --json
   derain run model.onnx nuscenes/ --out cleaned --columns x,y,z,intensity,ring
   derain run dror scans/ --out cleaned
+  derain run dror WADS/ --out cleaned
   derain run best.yaml scans/ --out cleaned
   derain run dsor scans/ --out cleaned --parameters best.yaml --set range_multiplier=0.08
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
-or a filter (below).
+or a filter (below). Of a data set, results are named by their paths in it.
 What is odd about a scan is warned of, each fault once. One of which more than --most-removed is
 called rain is left alone. It and a scan that cannot be read are reported and passed over; the exit
 code is then 2.
