@@ -141,8 +141,8 @@ def read_numbers(path: Path, columns: int) -> NDArray[np.float64]:
     """
     with reading(path, ValueError):
         text = read_bytes(path, LARGEST_RECORD).decode("utf-8")
-    lines = [line.split() for line in text.splitlines() if line.strip()]
-    rows = [_numbers(path, place, line, columns) for place, line in enumerate(lines, 1)]
+    lines = enumerate(text.splitlines(), 1)
+    rows = [_numbers(path, place, line.split(), columns) for place, line in lines if line.strip()]
     return np.array(rows, np.float64).reshape(-1, columns)
 
 

@@ -138,6 +138,7 @@ def test_scans_whose_names_are_no_numbers_go_by_their_order(sequence: Path) -> N
     [
         ("times.txt", b"0\nsoon\n2\n", "line 2 is not 1 number"),
         ("times.txt", b"0\n1 2\n2\n", "line 2 is not 1 number"),
+        ("times.txt", b"0\n\n1 2\n2\n", "line 3 is not 1 number"),
         ("times.txt", b"0\nnan\n2\n", "line 2 is not 1 number"),
         ("times.txt", b"0\n1e999\n2\n", "line 2 is not 1 number"),
         ("times.txt", b"\xff\xfe\n", "cannot be read"),
