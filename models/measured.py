@@ -1,7 +1,7 @@
 """What every derainer says of scans, counted and logged: validation, test and prediction."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import lightning
@@ -9,9 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from derain.errors import InputError
 from derain.evaluation.metrics import RainMetrics
 from derain.learning.batch import Batch
 from derain.learning.mean_losses import MeanLosses
+from derain.learning.task import ReadableScans
+from derain.scan import Scan
 from derain.spec import Spec
 from derain.views.probability import probability_of_rain
 
@@ -41,6 +44,18 @@ class MeasuredModule(lightning.LightningModule, ABC):
     def spec(self) -> Spec:
         """How the network is used."""
 
+    def validation_scans(self, most: int) -> Iterator[Scan]:
+        """Reads some of the validation scans, spread over all of them, as they are in their files.
+
+        Args:
+            most: How many, where there are so many; none where their loader is not derain's.
+
+        Raises:
+            InputError: A scan that cannot be read.
+        """
+        dataset = getattr(self.trainer.val_dataloaders, "dataset", None)
+        return dataset.scans(most) if isinstance(dataset, ReadableScans) else iter(())
+
     @abstractmethod
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
         """What the network is to make small, and what it says.
@@ -49,6 +64,12 @@ class MeasuredModule(lightning.LightningModule, ABC):
             ``loss`` and what it is made of, each a scalar, by name; and the logits of "not rain"
             and "rain" of every cell, float (M, 2).
         """
+
+    def on_before_batch_transfer(self, batch: Batch | InputError, dataloader_idx: int) -> Batch:
+        """Raises what went wrong where the batch was made, perhaps in another process."""
+        if isinstance(batch, InputError):
+            raise batch
+        return batch
 
     def validation_step(self, batch: Batch) -> list[NDArray[np.float32]]:
         """Loss of one batch, its points counted, and the probability of each, as for predict."""

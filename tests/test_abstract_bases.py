@@ -12,7 +12,7 @@ MODEL = ("view_parameters", "losses", "folded", "from_published")
 DEMANDED = {
     DerainingModule: MODEL,
     SupervisedModule: tuple(name for name in MODEL if name != "losses"),
-    ScanDataModule: ("find",),
+    ScanDataModule: ("source",),
     PointFilter: ("judge",),
     RadiusFilter: ("radius_at",),
 }

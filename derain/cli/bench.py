@@ -20,12 +20,12 @@ from derain.system.notices import Notices
 from derain.views.oddities import oddities
 
 if TYPE_CHECKING:
+    from derain.cards.card import DataCard
     from derain.datamodules.base import ScanDataModule
-    from derain.datamodules.scan_dataset import ScanFile
     from derain.export.bench.contestants import Contestant
     from derain.export.bench.rows import Row
-    from derain.export.bench.scores import Labelled
     from derain.scan import Scan
+    from derain.sources.frame import Frame
 
 SUMMARY = "compare methods on labelled scans: error, time and memory"
 
@@ -100,7 +100,7 @@ def main(arguments: argparse.Namespace) -> int:
     methods = contestants(arguments.methods, _learn_from(arguments, data))
     refuse_unwritable(arguments.out / "bench.json")
     if arguments.paper is None:
-        rows = _bench(arguments, data, data.files(arguments.part), rates, methods, arguments.out)
+        rows = _bench(arguments, data, data.frames(arguments.part), rates, methods, arguments.out)
         say(main_table(rows))
         return 0
     _require_split(arguments, data)
@@ -119,7 +119,7 @@ def main(arguments: argparse.Namespace) -> int:
 def _bench(
     arguments: argparse.Namespace,
     data: "ScanDataModule",
-    files: Sequence["ScanFile"],
+    files: Sequence["Frame"],
     rates: Mapping[str, float],
     methods: Sequence["Contestant"],
     out: Path,
@@ -135,7 +135,7 @@ def _bench(
 
     notices = Notices()
     files = evenly_spaced(files, arguments.limit or len(files))
-    by_scan = {file.scan: file for file in files}
+    by_scan = {Path(frame.name): frame for frame in files}
     known_rates = {scan: rates[sequence_of(scan)] for scan in by_scan if sequence_of(scan) in rates}
     scans = Labelled(
         data.card,
@@ -151,7 +151,7 @@ def _bench(
         arguments.repeats,
         data.loading.intensity_scale,
     )
-    notes = _notes(methods, scans)
+    notes = _notes(methods, data.card, files)
     rows = run_bench(methods, scans, timing, arguments.seed)
     notices.tell_how_many_more()
     facts = provenance(command_line(arguments), data, files, timing, arguments.seed)
@@ -163,7 +163,7 @@ def _bench(
 
 def _read(
     data: "ScanDataModule",
-    files: Mapping[Path, "ScanFile"],
+    files: Mapping[Path, "Frame"],
     methods: Sequence["Contestant"],
     notices: Notices,
     scan: Path,
@@ -175,13 +175,15 @@ def _read(
     return read
 
 
-def _notes(methods: Sequence["Contestant"], scans: "Labelled") -> list[str]:
+def _notes(
+    methods: Sequence["Contestant"], card: "DataCard", frames: Sequence["Frame"]
+) -> list[str]:
     """Says, and gives back, which models were trained on what they are measured on."""
     notes = [
         note
         for method in methods
         if isinstance(method.judge, Spec)
-        and (note := overlap(method.title, method.judge, scans.card, scans.scans))
+        and (note := overlap(method.title, method.judge, card, frames))
     ]
     for note in notes:
         tqdm.write(f"derain: warning: {note}", sys.stderr)
@@ -199,7 +201,7 @@ def _learn_from(arguments: argparse.Namespace, data: "ScanDataModule") -> Any:
     training = data if arguments.train is None else labelled(arguments, arguments.train)
 
     def scans() -> Iterator[Any]:
-        for file in evenly_spaced(training.files("train"), MOST_TRAINING_SCANS):
+        for file in evenly_spaced(training.frames("train"), MOST_TRAINING_SCANS):
             yield known_truth(training.read_measured(file), training.card)
 
     return scans

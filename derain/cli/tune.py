@@ -3,7 +3,7 @@
 import argparse
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,9 +25,9 @@ from derain.views.oddities import Judge, oddities, outside_view
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule
-    from derain.datamodules.scan_dataset import ScanFile
     from derain.export.tuning import Tuned
     from derain.scan import Scan
+    from derain.sources.frame import Frame
 
 SUMMARY = "find a method's best parameters on labelled scans"
 
@@ -70,7 +70,7 @@ def main(arguments: argparse.Namespace) -> int:
 
     notices = Notices()
     data = labelled(arguments, arguments.data)
-    files = _drawn(data.files(arguments.part), arguments.scans, arguments.seed)
+    files = _drawn(data.frames(arguments.part), arguments.scans, arguments.seed)
     refuse_unwritable(arguments.out)
     tune = _tuned_filter if arguments.method in SPACES else _tuned_model
     tuned = tune(arguments, data, files, notices)
@@ -89,7 +89,7 @@ def main(arguments: argparse.Namespace) -> int:
 def _tuned_filter(
     arguments: argparse.Namespace,
     data: "ScanDataModule",
-    files: list["ScanFile"],
+    files: list["Frame"],
     notices: Notices,
 ) -> "Tuned":
     from derain.export.tuning import Search, ViewedScan, tune_filter
@@ -106,7 +106,7 @@ def _tuned_filter(
             arguments.trials,
             arguments.seed,
             arguments.storage,
-            [str(file.scan) for file in files],
+            [file.name for file in files],
             progress.update,
         )
         return tune_filter(arguments.method, scans, search)
@@ -115,7 +115,7 @@ def _tuned_filter(
 def _tuned_model(
     arguments: argparse.Namespace,
     data: "ScanDataModule",
-    files: list["ScanFile"],
+    files: list["Frame"],
     notices: Notices,
 ) -> "Tuned":
     from derain.export.methods import load_method
@@ -131,10 +131,10 @@ def _tuned_model(
             known = scan.valid & ~data.card.unknown_of(scan)
             judgement = derainer.judge(scan)
             outside = outside_view(scan, judgement.judged, derainer.spec)
-            notices.tell(str(file.scan), outside)
+            notices.tell(file.name, outside)
             yield judgement.probability[known], data.card.rain_of(scan)[known]
 
-    note = overlap(arguments.method, derainer.spec, data.card, [file.scan for file in files])
+    note = overlap(arguments.method, derainer.spec, data.card, files)
     if note is not None:
         tqdm.write(f"derain: warning: {note}", sys.stderr)
     scans = list(judged())
@@ -143,14 +143,14 @@ def _tuned_model(
     return tune_threshold(scans, derainer.spec.threshold)
 
 
-def _read(data: "ScanDataModule", judge: Judge, notices: Notices, file: "ScanFile") -> "Scan":
+def _read(data: "ScanDataModule", judge: Judge, notices: Notices, file: "Frame") -> "Scan":
     """Reads a scan, and warns of what is odd about it for the method."""
     scan = data.read_measured(file)
-    notices.tell(str(file.scan), oddities(scan, judge))
+    notices.tell(file.name, oddities(scan, judge))
     return scan
 
 
-def _drawn(files: list["ScanFile"], most: int, seed: int) -> list["ScanFile"]:
+def _drawn(files: Sequence["Frame"], most: int, seed: int) -> list["Frame"]:
     """At most so many of the scans, drawn at random, in their order."""
     chance = np.random.default_rng(seed)
     chosen = chance.choice(len(files), min(most, len(files)), replace=False)

@@ -2,8 +2,6 @@
 
 import platform
 from collections.abc import Sequence
-from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,12 +9,12 @@ from tqdm import tqdm
 
 from derain.datamodules.base import ScanDataModule
 from derain.datamodules.labelled import full_name
-from derain.datamodules.scan_dataset import ScanFile
 from derain.export.bench.contestants import Contestant
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.rows import Row, joined
 from derain.export.bench.scores import Labelled, score
 from derain.export.latency import processor, versions
+from derain.sources.frame import Frame
 
 
 def run_bench(
@@ -45,7 +43,7 @@ def run_bench(
 
 
 def provenance(
-    command: str, module: ScanDataModule, files: Sequence[ScanFile], timing: Timing, seed: int
+    command: str, module: ScanDataModule, files: Sequence[Frame], timing: Timing, seed: int
 ) -> dict[str, Any]:
     """Everything that a bench depends on besides its methods, as JSON-able primitives.
 
@@ -73,15 +71,9 @@ def provenance(
         "system": platform.platform(),
         "versions": versions(),
         "files": [
-            {
-                "scan": str(file.scan),
-                "sha256": _sha256(file.scan),
-                "label_sha256": _sha256(file.label) if file.label else None,
-            }
+            dict(
+                zip(("scan", "sha256", "label_sha256"), (file.name, *file.checksums()), strict=True)
+            )
             for file in files
         ],
     }
-
-
-def _sha256(path: Path) -> str:
-    return sha256(path.read_bytes()).hexdigest()

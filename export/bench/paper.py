@@ -8,14 +8,13 @@ from typing import Literal
 import yaml
 
 from derain.cards.card import DataCard
-from derain.cards.layout import sequence_of
 from derain.datamodules.base import ScanDataModule
 from derain.datamodules.labelled import full_name
-from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
 from derain.evaluation.counts import SCORES
 from derain.export.bench.rows import Row
 from derain.export.markdown import markdown_table
+from derain.sources.frame import Frame
 
 TABLES = ("table2", "table3")
 
@@ -74,7 +73,7 @@ def paper_table(name: str) -> PaperTable:
 
 def files_by_group(
     table: PaperTable, data: ScanDataModule, rates: Mapping[str, float]
-) -> dict[str, list[ScanFile]]:
+) -> dict[str, Sequence[Frame]]:
     """The scans that each group of a table is measured on.
 
     Args:
@@ -86,10 +85,10 @@ def files_by_group(
         InputError: No scan belongs to any group.
     """
     if all(isinstance(group, str) for group in table.groups.values()):
-        return {name: data.files(part) for name, part in table.groups.items()}  # type: ignore[arg-type]
-    files = data.files("test")
+        return {name: data.frames(part) for name, part in table.groups.items()}  # type: ignore[arg-type]
+    files = data.frames("test")
     groups = {
-        name: [file for file in files if rates.get(sequence_of(file.scan)) == rate]
+        name: [file for file in files if rates.get(file.sequence) == rate]
         for name, rate in table.groups.items()
     }
     if not any(groups.values()):

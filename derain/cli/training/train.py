@@ -25,6 +25,7 @@ from derain.datamodules.base import ScanDataModule
 from derain.datamodules.folder import Folder
 from derain.datamodules.rehearse3d import Rehearse3D
 from derain.datamodules.scan_check import ScanCheck
+from derain.datamodules.sequences import Sequences
 from derain.datamodules.simulated import Simulated
 from derain.datamodules.wads import Wads
 from derain.errors import InputError
@@ -57,6 +58,7 @@ __all__ = [
     "OutDet",
     "Rehearse3D",
     "SalsaNext",
+    "Sequences",
     "Simulated",
     "Wads",
     "train",
@@ -65,7 +67,7 @@ __all__ = [
 
 # What has options of its own, by the option that chooses it.
 CLASSES = {
-    "data": (Folder, Rehearse3D, Simulated, Wads),
+    "data": (Folder, Rehearse3D, Sequences, Simulated, Wads),
     "model": (LiSnowNet, OutDet, SalsaNext),
     "trainer.logger": (TensorBoardLogger,),
 }
