@@ -96,11 +96,15 @@ def with_needed_labels(source: Source, part: Part, reads_labels: bool) -> Source
         InputError: Labels missing where they are needed.
     """
     if part == "predict" or (part == "train" and not reads_labels):
-        return source.map(Frame.without_labels)
+        return source.map(_without_labels)
     if part == "validation" and not reads_labels:
-        return source.map(lambda frame: frame if frame.has_labels else frame.without_labels())
+        return source.map(lambda frame: frame if frame.has_labels else _without_labels(frame))
     for frame in source:
         if not frame.has_labels:
             where = f"its labels are not at {frame.label_path}" if frame.label_path else "no labels"
             raise InputError(frame.name, where, "Add them or leave the scan out.")
     return source
+
+
+def _without_labels(frame: Frame) -> Frame:
+    return frame.without_labels()
