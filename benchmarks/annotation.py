@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from benchmarks.track_scene import scene_of_track
 from derain.annotation.boxes import Correction
 from derain.annotation.picture import annotation_figure
 from derain.annotation.plane import Plane
 from derain.annotation.scene import Scene, inside
 from derain.annotation.steps import annotate, road_plane
-from derain.annotation.track_scene import scene_of_track
-from derain.evaluation.counts import ratio
+from derain.evaluation.counts import intersection_over_union
 from derain.fusion.label_transfer import UNKNOWN
 from derain.pictures.scan_pictures import save
 from derain.scan import Scan
@@ -90,7 +90,8 @@ class Findings:
     def iou(self) -> NDArray[np.float64]:
         """Intersection over union of each class; NaN for one that does not occur."""
         hits = self.table.diagonal()
-        return ratio(hits, self.table.sum(axis=0) + self.table.sum(axis=1) - hits, np.nan)
+        errors = self.table.sum(axis=0) + self.table.sum(axis=1) - 2 * hits
+        return intersection_over_union(hits, errors, np.nan)
 
 
 def _reasons(scan: Scan, label: NDArray[np.int64], scene: Scene, plane: Plane) -> dict[str, int]:

@@ -7,17 +7,16 @@ pip install scipy scikit-learn
 """
 
 import argparse
-import importlib
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
+from libraries import installed
 from numpy.typing import NDArray
 from turns import milliseconds_in_turns
 
 from derain.errors import InputError
-from derain.export.latency import versions
+from derain.export.machine import versions
 from derain.files import read_scan
 from derain.filters import DROR, DSOR, ROR, SOR, FilterDerainer, PointFilter
 from derain.system.open3d_import import import_open3d
@@ -53,12 +52,12 @@ def _dror(xyz: NDArray[np.float64], threads: int) -> dict[str, Method]:
     """DROR with searches by radius."""
     radius, enough = DROR().radius_at(xyz), DROR().neighbours
     rivals: dict[str, Method] = {}
-    if spatial := _module("scipy.spatial"):
+    if spatial := installed("scipy.spatial"):
         rivals["SciPy cKDTree by radius"] = lambda: (
             spatial.cKDTree(xyz).query_ball_point(xyz, radius, workers=threads, return_length=True)
             < enough
         )
-    if sklearn := _module("sklearn.neighbors"):
+    if sklearn := installed("sklearn.neighbors"):
         rivals["scikit-learn KDTree by radius, 1 thread"] = lambda: (
             sklearn.KDTree(xyz).query_radius(xyz, radius, count_only=True) < enough
         )
@@ -75,11 +74,11 @@ def _dsor(xyz: NDArray[np.float64], threads: int) -> dict[str, Method]:
         return mean >= usual * dsor.range_multiplier * np.linalg.norm(xyz, axis=1)
 
     rivals: dict[str, Method] = {}
-    if spatial := _module("scipy.spatial"):
+    if spatial := installed("scipy.spatial"):
         rivals["SciPy cKDTree"] = lambda: judge(
             spatial.cKDTree(xyz).query(xyz, dsor.neighbours, workers=threads)[0]
         )
-    if sklearn := _module("sklearn.neighbors"):
+    if sklearn := installed("sklearn.neighbors"):
         rivals["scikit-learn KDTree, 1 thread"] = lambda: judge(
             sklearn.KDTree(xyz).query(xyz, dsor.neighbours)[0]
         )
@@ -117,13 +116,6 @@ def _of_open3d(
         return rain
 
     return {"Open3D, all cores": removed}
-
-
-def _module(name: str) -> ModuleType | None:
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        return None
 
 
 def _report(filter_: PointFilter, methods: dict[str, Method]) -> None:

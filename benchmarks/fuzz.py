@@ -33,20 +33,20 @@ PORTION = 200
 
 
 @dataclass
-class Tally:
+class Verdicts:
     """What one reader made of its inputs.
 
     Attributes:
-        verdicts: How many of each kind; findings are one kind.
+        counts: How many of each kind; findings are one kind.
         peak: Most memory, MB.
     """
 
-    verdicts: Counter[str] = field(default_factory=Counter)
+    counts: Counter[str] = field(default_factory=Counter)
     peak: int = 0
 
     def add(self, outcome: Outcome) -> None:
         """Counts an input."""
-        self.verdicts["findings" if outcome.is_finding else outcome.verdict] += 1
+        self.counts["findings" if outcome.is_finding else outcome.verdict] += 1
         self.peak = max(self.peak, outcome.peak)
 
 
@@ -78,9 +78,9 @@ def main(words: list[str] | None = None) -> int:
             folder = Path(scratch) / "models"
             folder.mkdir()
             models.write_models(folder)
-        tallies = _fuzz(arguments, folder, Path(scratch))
-    _print_table(tallies)
-    return 1 if any(tally.verdicts["findings"] for tally in tallies.values()) else 0
+        verdicts = _fuzz(arguments, folder, Path(scratch))
+    _print_table(verdicts)
+    return 1 if any(each.counts["findings"] for each in verdicts.values()) else 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -99,7 +99,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _fuzz(arguments: argparse.Namespace, models_folder: Path, scratch: Path) -> dict[str, Tally]:
+def _fuzz(arguments: argparse.Namespace, models_folder: Path, scratch: Path) -> dict[str, Verdicts]:
     readers = partial(all_readers, models_folder)
     names = arguments.readers or list(readers())
     portions: SimpleQueue[tuple[str, range]] = SimpleQueue()
@@ -107,7 +107,7 @@ def _fuzz(arguments: argparse.Namespace, models_folder: Path, scratch: Path) -> 
     for name in names:
         for first in range(0, each, PORTION):
             portions.put((name, range(first, min(first + PORTION, each))))
-    tallies: dict[str, Tally] = defaultdict(Tally)
+    verdicts: dict[str, Verdicts] = defaultdict(Verdicts)
     counting = Lock()
     with tqdm(total=each * len(names), unit="input", disable=None) as progress:
 
@@ -118,7 +118,7 @@ def _fuzz(arguments: argparse.Namespace, models_folder: Path, scratch: Path) -> 
             try:
                 for name, outcome in _judged(worker, portions):
                     with counting:
-                        tallies[name].add(outcome)
+                        verdicts[name].add(outcome)
                         progress.update()
                     if outcome.is_finding:
                         _keep(name, outcome, folder, arguments)
@@ -127,7 +127,7 @@ def _fuzz(arguments: argparse.Namespace, models_folder: Path, scratch: Path) -> 
 
         with ThreadPoolExecutor(arguments.workers) as pool:
             list(pool.map(work, range(arguments.workers)))
-    return {name: tallies[name] for name in names}
+    return {name: verdicts[name] for name in names}
 
 
 def _judged(
@@ -165,14 +165,14 @@ def _replay(finding: Path) -> int:
     return 0
 
 
-def _print_table(tallies: dict[str, Tally]) -> None:
+def _print_table(verdicts: dict[str, Verdicts]) -> None:
     print(f"{'reader':<12}{'inputs':>9}{'right':>9}{'refused':>9}{'findings':>9}{'peak MB':>9}")
-    total = Tally()
-    for name, tally in [*tallies.items(), ("total", total)]:
-        counts = [tally.verdicts[kind] for kind in (RIGHT, REFUSED, "findings")]
-        print(f"{name:<12}" + "".join(f"{n:>9,}" for n in (sum(counts), *counts, tally.peak)))
-        total.verdicts.update(tally.verdicts)
-        total.peak = max(total.peak, tally.peak)
+    total = Verdicts()
+    for name, of_reader in [*verdicts.items(), ("total", total)]:
+        counts = [of_reader.counts[kind] for kind in (RIGHT, REFUSED, "findings")]
+        print(f"{name:<12}" + "".join(f"{n:>9,}" for n in (sum(counts), *counts, of_reader.peak)))
+        total.counts.update(of_reader.counts)
+        total.peak = max(total.peak, of_reader.peak)
 
 
 if __name__ == "__main__":

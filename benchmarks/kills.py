@@ -37,7 +37,7 @@ from tqdm import tqdm
 from benchmarks.small_inputs import COMMANDS, SmallInputs
 from benchmarks.whole_files import fault_of
 from derain.cli.signals import interrupting
-from derain.export.markdown import markdown_table
+from derain.evaluation.text_tables import markdown_table
 
 # The command as installed: Lightning starts it again for each further process.
 DERAIN = Path(sysconfig.get_path("scripts")) / "derain"

@@ -5,22 +5,21 @@ python benchmarks/outdet_end_to_end.py outdet_wads.pt sample.bin --threads 2
 
 import argparse
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from published_outdet import PublishedPipeline
+from turns import milliseconds_in_turns
 
 from derain.cards.card import load_card
-from derain.export.latency import versions
+from derain.export.machine import versions
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.models.outdet import OutDet
 from derain.models.published import read_state_dict
 
+# Runs of each method in a round.
 WARM_UP, RUNS = 2, 5
 
 
@@ -43,12 +42,8 @@ def main() -> None:
         ours = Derainer(model, arguments.threads)
     rival = PublishedPipeline(weights, card.mean, card.std, arguments.leaf_size)
 
-    methods = {"published": rival, "derain": ours}
-    times = {name: [] for name in methods}
-    # Turn and turn about, so that whatever else the machine does hits both alike.
-    for _ in range(arguments.rounds):
-        for name, method in methods.items():
-            times[name] += _milliseconds(method, points)
+    methods = {"published": lambda: rival(points), "derain": lambda: ours(points)}
+    times = milliseconds_in_turns(methods, arguments.rounds, RUNS, WARM_UP)
     differ = int((rival(points) != ours(points)).sum())
 
     print(f"{len(points):,} points, {arguments.threads} threads, {len(times['derain'])} runs each")
@@ -58,18 +53,6 @@ def main() -> None:
     print(f"ratio of medians {np.median(times['published']) / np.median(times['derain']):.1f}")
     print(f"masks differ on {differ} points ({differ / max(len(points), 1):.1e})")
     print(versions())
-
-
-def _milliseconds(
-    method: Callable[[NDArray[np.float32]], NDArray[np.bool_]], points: NDArray[np.float32]
-) -> list[float]:
-    """Times of some runs in a row, without those that warm up."""
-    times = []
-    for _ in range(WARM_UP + RUNS):
-        start = time.perf_counter()
-        method(points)
-        times.append(1e3 * (time.perf_counter() - start))
-    return times[WARM_UP:]
 
 
 if __name__ == "__main__":

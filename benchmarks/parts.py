@@ -6,17 +6,17 @@ Libraries that are not installed are left out: pip install scipy pykdtree
 """
 
 import argparse
-import importlib
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 import small_gicp
+from libraries import installed
 from numpy.typing import NDArray
 from turns import milliseconds_in_turns
 
-from derain.export.latency import versions
+from derain.export.machine import versions
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.files import read_scan
@@ -70,11 +70,11 @@ def _searches(xyz: NDArray[np.float32], threads: int) -> dict[str, Callable[[], 
         "small_gicp, along the curve": with_small_gicp(ordered),
         "small_gicp, with the ordering": ordering_too,
     }
-    if spatial := _module("scipy.spatial"):
+    if spatial := installed("scipy.spatial"):
         searches["SciPy cKDTree, along the curve"] = lambda: spatial.cKDTree(ordered).query(
             ordered, NEIGHBOURS, workers=threads
         )
-    if pykdtree := _module("pykdtree.kdtree"):  # takes its threads from OMP_NUM_THREADS
+    if pykdtree := installed("pykdtree.kdtree"):  # takes its threads from OMP_NUM_THREADS
         searches["pykdtree, along the curve"] = lambda: pykdtree.KDTree(ordered).query(
             ordered, NEIGHBOURS
         )
@@ -84,13 +84,6 @@ def _searches(xyz: NDArray[np.float32], threads: int) -> dict[str, Callable[[], 
 def _network(derainer: Derainer, scan: object) -> Callable[[], object]:
     inputs = derainer.view(scan).inputs()
     return lambda: derainer.session.run(None, inputs)
-
-
-def _module(name: str) -> object:
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        return None
 
 
 def _report(title: str, candidates: Mapping[str, Callable[[], object]]) -> None:

@@ -8,13 +8,13 @@ python benchmarks/rain_speed.py
 
 import argparse
 import resource
-import time
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from turns import milliseconds_in_turns
 
 from derain.simulation.layout import lay_out_track
 from derain.simulation.rain import rain_on_beams
@@ -50,21 +50,11 @@ def main() -> None:
     print(f"{len(beams):,} beams, {np.count_nonzero(clear.returned):,} returns in clear air")
     print("| step | s | beams/s | MiB |\n|---|---:|---:|---:|")
     for name, step in steps.items():
-        seconds, mebibytes = _seconds(step, arguments.runs), _mebibytes(step)
+        times = milliseconds_in_turns({name: step}, rounds=1, runs=arguments.runs)
+        seconds, mebibytes = np.median(times[name]) / 1e3, _mebibytes(step)
         print(f"| {name} | {seconds:.3f} | {len(beams) / seconds:,.0f} | {mebibytes:.0f} |")
     kibibytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # on Linux
     print(f"whole process at its peak: {kibibytes / 2**10:.0f} MiB")
-
-
-def _seconds(step: Callable[[], object], runs: int) -> float:
-    """Median time of a step, after one run that warms up."""
-    step()
-    taken = []
-    for _ in range(runs):
-        start = time.perf_counter()
-        step()
-        taken.append(time.perf_counter() - start)
-    return float(np.median(taken))
 
 
 def _mebibytes(step: Callable[[], object]) -> float:

@@ -14,6 +14,11 @@ from derain.sources.source import Source
 class Folder(ScanDataModule):
     """Scans picked by patterns; a scan's labels are ``<stem>.label`` beside it or in ``../labels``.
 
+    Example:
+        >>> data = Folder(".", card="wads", train=["*.bin"])
+        >>> [frame.path.name for frame in data.frames("train")]
+        ['scan.bin']
+
     Args:
         root: Folder that the patterns start from.
         card: Name of a packaged data card, or a YAML file: it maps label ids to class names and

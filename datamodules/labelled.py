@@ -100,12 +100,6 @@ def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
     return rates_of_sequences(Entry.of_yaml(file))
 
 
-def full_name(card: DataCard) -> str:
-    """Name of a card, which says so where the rain is simulated."""
-    told = "simulated" in card.name or not card.simulated
-    return card.name if told else f"{card.name} (simulated)"
-
-
 def _layout_in(root: Path, first: Layout | None = None) -> Layout | None:
     """The layout of a data set's folders; None where none is known."""
     layouts = dict.fromkeys([*([first] if first else []), *known_layouts()])

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from torch.utils.data import DistributedSampler
 
-from derain.learning.seeds import Draw, generator
+from derain.learning.seeds import Draw, generator_of
 
 if TYPE_CHECKING:
     from derain.datamodules.scan_dataset import ScanDataset
@@ -48,8 +48,8 @@ class TrainingOrder(DistributedSampler[Pick]):
         self.scans = len(scans)
 
     def __iter__(self) -> Iterator[Pick]:
-        chance = generator(Draw.ORDER, self.seed, self.epoch)
-        order = np.resize(chance.permutation(self.scans), self.total_size)
+        generator = generator_of(Draw.ORDER, self.seed, self.epoch)
+        order = np.resize(generator.permutation(self.scans), self.total_size)
         for number in order[self.rank :: self.num_replicas]:
             yield Pick(int(number), self.epoch, measured=False)
 

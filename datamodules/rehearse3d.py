@@ -11,6 +11,11 @@ class Rehearse3D(SequenceDataModule):
 
     The merged files hold x, y, z and intensity; which points are the radar's they do not say.
 
+    Example:
+        >>> data = Rehearse3D("REHEARSE3D_PUBLIC")
+        >>> data.card.name, len(data.split["train"])
+        ('REHEARSE-3D', 86)
+
     Args:
         root: Folder ``REHEARSE3D_PUBLIC``.
         layout: Names of its folders.

@@ -7,9 +7,8 @@ import lightning
 from lightning.pytorch.trainer.states import TrainerFn
 
 from derain.datamodules.base import Part, ScanDataModule
-from derain.datamodules.statistics import evenly_spaced
+from derain.sources.spread import evenly_spaced
 from derain.system.notices import Notices
-from derain.views.oddities import oddities
 
 
 class ScanCheck(lightning.Callback):
@@ -49,7 +48,7 @@ class ScanCheck(lightning.Callback):
             return
         notices = Notices()
         for frame in evenly_spaced(data.frames(part), self.scans):
-            found = oddities(data.read(frame), model.spec)
+            found = model.spec.oddities(data.read(frame))
             notices.tell(frame.name, [replace(o, detail=_here(o.detail)) for o in found])
         notices.tell_how_many_more()
 

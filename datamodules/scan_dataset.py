@@ -9,12 +9,12 @@ from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.order import Pick
 from derain.datamodules.reader import ScanReader
-from derain.datamodules.statistics import evenly_spaced
 from derain.errors import InputError
 from derain.learning.batch import Batch, Sample
-from derain.learning.seeds import Draw, generator
+from derain.learning.seeds import Draw, generator_of
 from derain.scan import Scan
 from derain.sources.frame import Frame
+from derain.sources.spread import evenly_spaced
 from derain.views.view import View
 
 
@@ -83,8 +83,8 @@ class ScanDataset(Dataset[Sample | InputError]):
         """The scan as training changes it in this epoch."""
         if self.augmentation is None:
             return scan
-        chance = generator(Draw.AUGMENTATION, self.seed, pick.epoch, pick.number)
-        return self.augmentation(scan, chance, self.view.azimuth)
+        generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, pick.number)
+        return self.augmentation(scan, generator, self.view.azimuth)
 
 
 class LateLoader(DataLoader[Sample | InputError]):

@@ -17,6 +17,11 @@ class Simulated(SequenceDataModule):
 
     Simulated rain is easy: a score on it says nothing about real rain.
 
+    Example:
+        >>> data = Simulated("rain")  # nothing is simulated before training asks for it
+        >>> data.split["validation"]
+        ['016', '017', '018', '019']
+
     Args:
         root: Folder of the data set.
         campaign: What is simulated where the folder does not hold it already.

@@ -1,26 +1,17 @@
 """Statistics of training scans: what a network's input is normalised by."""
 
 from collections.abc import Iterable, Sequence
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.cards.card import CHANNELS, DataCard
+from derain.cards.card import CHANNELS_OF_STATISTICS, DataCard
 from derain.errors import InputError
 from derain.scan import Scan
 from derain.views.channels import USUAL_CHANNELS, channel_values
 
-Item = TypeVar("Item")
-
 # A variance below this share of the squared mean is what rounding leaves of a constant.
 ROUNDING = 1e-12
-
-
-def evenly_spaced(items: Sequence[Item], most: int) -> list[Item]:
-    """At most so many items, spread over the whole sequence."""
-    numbers = np.linspace(0, len(items) - 1, min(most, len(items))).round().astype(int)
-    return [items[number] for number in numbers]
 
 
 def measured(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -> DataCard:
@@ -59,8 +50,8 @@ def measured(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -
     std = np.sqrt(np.where(variance > ROUNDING * mean**2, variance, 1.0))
     statistics = dict(zip(channels, zip(mean.tolist(), std.tolist(), strict=True), strict=True))
     return card.completed(
-        mean=tuple(statistics[name][0] for name in CHANNELS),
-        std=tuple(statistics[name][1] for name in CHANNELS),
+        mean=tuple(statistics[name][0] for name in CHANNELS_OF_STATISTICS),
+        std=tuple(statistics[name][1] for name in CHANNELS_OF_STATISTICS),
         range=statistics["range"],
         extra={name: statistics[name] for name in extra},
         rain_share=rain / max(judged, 1) if labelled else None,

@@ -12,6 +12,11 @@ class Wads(SequenceDataModule):
     Its raw scans hold about 40 % of their points twice. They are measured on distinct points, as
     the published results are and as its data card says; predictions are for every row of the file.
 
+    Example:
+        >>> data = Wads("WADS")
+        >>> data.card.deduplicate, data.split["validation"]
+        (True, ('11', '16'))
+
     Args:
         root: Folder of the data set.
         layout: Names of its folders.

@@ -14,6 +14,13 @@ class InputError(ValueError):
 
     The command line prints it on one line and exits with code 2.
 
+    Example:
+        >>> try:
+        ...     derain.read_scan("missing.pcd")
+        ... except InputError as error:
+        ...     print(error)
+        missing.pcd: there is no such file. Check the path.
+
     Args:
         subject: What it is about: a file, a folder or an option.
         reason: What is wrong with it.

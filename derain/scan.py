@@ -16,9 +16,10 @@ from derain.errors import InputError
 LARGEST_COORDINATE = 1e6
 LARGEST_VALUE = 1e7
 
-# So many points of one intensity were not measured. Of a real scan as much as 80 % may share one
-# value, such as 0: that a hundred points share it by chance happens once in 10⁹ draws (.8¹⁰⁰), that
-# ten do once in ten. Fewer than a hundred say nothing by being alike.
+# Where all of at least so many points have one intensity, it was not measured but filled in. Of a
+# real scan as much as 80 % may share one value, such as 0: that a hundred points share it by chance
+# happens once in 10⁹ draws (.8¹⁰⁰), that ten do once in ten. From fewer than a hundred points of
+# one intensity nothing follows.
 FEWEST_ALIKE = 100
 
 # SemanticKITTI-style range images mark a cell without a return by -1 in every column.
@@ -27,15 +28,31 @@ SENTINEL = -1.0
 
 @runtime_checkable
 class PointHeader(Protocol):
-    """What a file says of single points besides its columns, such as the faces of a mesh."""
+    """A header that describes single points, such as by the faces of a mesh."""
 
     def take(self, rows: NDArray[Any]) -> "PointHeader":
         """The same of some points only, by their row numbers or a bool mask of shape (N,)."""
 
 
+@runtime_checkable
+class PartialHeader(Protocol):
+    """A header that knows which parts of its file are not in the scan, and so are not written."""
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Their names; none where nothing is lost."""
+
+
 @dataclass(frozen=True, eq=False)
 class Scan:
     """One point cloud, in the order of its file; rows are never dropped or reordered.
+
+    Example:
+        >>> scan = Scan.of(np.array([[8.0, 6.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0]]))
+        >>> scan.range
+        array([10.,  0.], dtype=float32)
+        >>> scan.valid  # the second point, at the sensor itself, is a beam that met nothing
+        array([ True, False])
 
     Attributes:
         xyz: Coordinates, float32 (N, 3), metres in the sensor frame (x forward, y left, z up).
@@ -49,7 +66,7 @@ class Scan:
         name: Where the scan came from, for messages.
         header: What the file says besides its columns, such as the encoding of a PCD. Only the
             writer of the same format looks into it. One that speaks of single points is a
-            PointHeader.
+            PointHeader, one that says what will not be written a PartialHeader.
 
     Raises:
         InputError: Columns of different lengths.
@@ -183,10 +200,10 @@ class Scan:
     def with_intensity_times(self, factor: float) -> "Scan":
         """The same scan with its intensities in another unit; what was read stays in `fields`.
 
-        The mark of a cell without a return is none of them, and stays.
+        Cells without a return, which hold −1, keep it: that is a mark and no intensity.
 
         Args:
-            factor: What takes them there, such as 255 from 0..1 to 0..255.
+            factor: What every intensity is multiplied by, such as 255 to go from 0..1 to 0..255.
 
         Raises:
             InputError: A factor that is not a finite number above 0.

@@ -1,7 +1,7 @@
 """The Spec: everything needed to use a trained network besides its weights."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,8 @@ from derain.files.documents import Entry, shown
 from derain.files.labels import LARGEST_ID
 from derain.scan import Scan
 from derain.views.channels import MOST_CHANNELS
-from derain.views.neighbours import NeighbourView
-from derain.views.range_image import RangeView
+from derain.views.oddities import Oddity, intensity_unlike_training, missing_channels
+from derain.views.registry import VIEWS
 from derain.views.view import View
 
 SCHEMA = 1
@@ -98,6 +98,17 @@ class Spec:
         """Channels that a scan has not got, and the means that stand in for them, by name."""
         return {name: mean for name, mean in self.means.items() if scan.channel(name) is None}
 
+    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+        """What is odd about a scan for the network, before it is judged.
+
+        Args:
+            scan: The scan, its intensities in the unit of the training data.
+        """
+        yield from missing_channels(scan, self.missing_channels(scan), self.data)
+        yield from intensity_unlike_training(
+            scan, self.mean_intensity, self.intensity_unit, self.data
+        )
+
     def make_view(self, threads: int = 0) -> View:
         """The view that the network sees a scan through.
 
@@ -118,12 +129,9 @@ class Spec:
 def _view_of(entry: Entry, spec: Spec, threads: int = 0) -> View:
     """The view that an entry describes, with the channels of a Spec."""
     kind = entry.members().get("kind", Entry(entry.source, f"{entry.key}.kind", None))
-    match kind.value:
-        case NeighbourView.KIND:
-            return NeighbourView.of(entry, spec.channels, spec.means, threads)
-        case RangeView.KIND:
-            return RangeView.of(entry, spec.channels, spec.means)
-    raise kind.fault(f"unknown view {shown(kind.value)}", "Upgrade derain.")
+    if not isinstance(kind.value, str) or kind.value not in VIEWS:
+        raise kind.fault(f"unknown view {shown(kind.value)}", "Upgrade derain.")
+    return VIEWS[kind.value].of(entry, spec.channels, spec.means, threads)
 
 
 def _refuse_newer(entry: Entry) -> None:

@@ -40,7 +40,8 @@ def load_method(
         InputError: Neither a filter nor an exported model, a parameter that it does not have, or
             one out of its bounds.
     """
-    if name in FILTERS:
+    # What has a suffix is a file, for which other packages need not be asked.
+    if not Path(name).suffix and name in FILTERS:
         return FilterDerainer(filter_from(name, parameters), threads)
     if not is_file(Path(name)):
         raise InputError(

@@ -124,7 +124,7 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         program = torch.onnx.export(
-            model.folded().eval(),
+            model.deployed().eval(),
             kwargs=inputs,
             input_names=list(inputs),
             output_names=["logits"],

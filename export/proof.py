@@ -12,10 +12,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from derain.evaluation.counts import ratio
 from derain.export.runtime import Derainer
 from derain.scan import Scan
 from derain.views.probability import probability_of_rain
-from derain.views.view import ViewedScan
+from derain.views.view import SeenScan
 
 THREADS = (1, 2)
 
@@ -110,7 +111,7 @@ class Proof:
         """
         bounded = [case for case in self.cases if case.bounds.rain_iou is not None] or self.cases
         either = sum(case.either for case in bounded)
-        return sum(case.both for case in bounded) / either if either else 0.0
+        return float(ratio(sum(case.both for case in bounded), either, undefined=0.0))
 
     def as_dict(self) -> dict[str, Any]:
         """The proof as JSON-able primitives."""
@@ -181,7 +182,7 @@ def _compared(
 
 def _case(
     name: str,
-    view: ViewedScan,
+    view: SeenScan,
     returned: NDArray[np.bool_],
     expected: NDArray[np.float32],
     derainer: Derainer,

@@ -18,7 +18,7 @@ from onnxruntime.quantization import (
 from derain.errors import InputError
 from derain.files import read_scan
 from derain.scan import Scan
-from derain.views.view import View, ViewedScan
+from derain.views.view import SeenScan, View
 
 # Scans that the ranges of activations are taken from; they are held in memory one at a time.
 CALIBRATION_SCANS = 16
@@ -63,7 +63,7 @@ class ScanReader(CalibrationDataReader):  # type: ignore[misc]
 
     def __init__(self, view: View, scans: Iterable[Scan]) -> None:
         # Mapped, not looped over: a loop would hold on to one scan while the next is read.
-        self._views: Iterator[ViewedScan] = map(view, scans)
+        self._views: Iterator[SeenScan] = map(view, scans)
 
     def get_next(self) -> dict[str, NDArray[np.generic]] | None:
         """Inputs of the next scan; None after the last."""

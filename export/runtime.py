@@ -14,7 +14,7 @@ from derain.scan import Scan
 from derain.system.cores import usable_cores
 from derain.system.stopwatch import Stopwatch
 from derain.views.probability import probability_of_rain
-from derain.views.view import View, ViewedScan
+from derain.views.view import SeenScan, View
 
 __all__ = ["METADATA_KEY", "Derainer", "open_session"]
 
@@ -42,8 +42,11 @@ class Derainer:
     """An exported model, ready to judge scans.
 
     Example:
-        >>> derainer = Derainer("model.onnx")  # doctest: +SKIP
-        >>> clean = points[~derainer(points)]  # doctest: +SKIP
+        >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)  # x, y, z, intensity
+        >>> derainer = Derainer("model.onnx")
+        >>> clean = points[~derainer(points)]
+        >>> derainer.spec.network, derainer.probability(points).shape
+        ('outdet', (820,))
 
     Args:
         model: ONNX file written by ``derain export``.
@@ -124,7 +127,7 @@ class Derainer:
             probability = view.back(probability_of_rain(logits))
             return Judgement(probability, probability > self.spec.threshold, view.judged)
 
-    def logits(self, view: ViewedScan) -> NDArray[np.float32]:
+    def logits(self, view: SeenScan) -> NDArray[np.float32]:
         """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).
 
         Raises:
@@ -137,7 +140,7 @@ class Derainer:
                 self.path, f"its network fails ({error})", "Export it with `derain export`."
             ) from error
 
-    def _refuse_senseless(self, logits: NDArray[np.float32], view: ViewedScan, scan: Scan) -> None:
+    def _refuse_senseless(self, logits: NDArray[np.float32], view: SeenScan, scan: Scan) -> None:
         """Refuses scores that would count as "not rain" because nothing compares with them."""
         if logits.shape != (view.size, 2) or not np.isfinite(logits).all():
             raise InputError(

@@ -11,36 +11,12 @@ from numpy.typing import NDArray
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import Counts, intersection_over_union
-from derain.filters import PointFilter, filter_from
-from derain.filters.derainer import filter_view
+from derain.filters import FILTERS, PointFilter, Span, filter_from, filter_view
 from derain.scan import Scan
 from derain.views.neighbours import Neighbourhoods
 
 if TYPE_CHECKING:
     import optuna
-
-MOST_NEIGHBOURS = 12
-
-Bounds = tuple[int, int] | tuple[float, float]
-
-# Where each parameter is looked for; the others stay as they are by default. Whole numbers are
-# drawn evenly, all else evenly in its logarithm: what fits one sensor may be a tenth of what fits
-# another. Of DROR's multiplier and resolution only the product counts.
-SPACES: dict[str, dict[str, Bounds]] = {
-    "ror": {"neighbours": (2, MOST_NEIGHBOURS), "radius": (0.01, 3.0)},
-    "sor": {"neighbours": (2, MOST_NEIGHBOURS), "deviation_multiplier": (0.001, 10.0)},
-    "dror": {
-        "neighbours": (2, MOST_NEIGHBOURS),
-        "radius_multiplier": (0.3, 30.0),
-        "minimum_radius": (0.005, 1.0),
-    },
-    "dsor": {
-        "neighbours": (2, MOST_NEIGHBOURS),
-        "deviation_multiplier": (0.001, 10.0),
-        "range_multiplier": (0.002, 2.0),
-    },
-    "ssr": {"neighbours": (2, MOST_NEIGHBOURS), "threshold": (0.01, 1e6)},
-}
 
 
 @dataclass(frozen=True)
@@ -48,9 +24,9 @@ class Tuned:
     """What tuning found.
 
     Attributes:
-        parameters: The best parameters by name.
-        iou: IoU of rain with them, over the points of all scans.
-        default_iou: That with the method's own.
+        parameters: The parameters of the greatest IoU, by name.
+        iou: IoU of rain with them, over the points of all scans together.
+        default_iou: The same with the parameters that the method has by default.
     """
 
     parameters: Mapping[str, Any]
@@ -59,13 +35,13 @@ class Tuned:
 
 
 @dataclass(frozen=True, eq=False)
-class ViewedScan:
-    """A scan as filters see it: computed once, judged in every trial.
+class LabelledNeighbourhoods:
+    """What filters see of a scan, and its truth: found once, and judged in every trial.
 
     Attributes:
-        view: Its neighbourhoods, as wide as any trial looks.
+        view: Its neighbourhoods, M points with as many neighbours as any trial looks at.
         rain: Points of rain, bool (M,).
-        solid: Points of what is not rain, bool (M,); those not known are neither.
+        solid: Points of what is not rain, bool (M,). Points whose class is not known are neither.
     """
 
     view: Neighbourhoods
@@ -73,13 +49,22 @@ class ViewedScan:
     solid: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, scan: Scan, card: DataCard, threads: int) -> "ViewedScan":
-        """Views a labelled scan, with its distinct valid positions for points.
+    def of(
+        cls, scan: Scan, card: DataCard, neighbours: int, threads: int
+    ) -> "LabelledNeighbourhoods":
+        """Finds the neighbours of a labelled scan's distinct valid positions.
+
+        Args:
+            scan: The scan.
+            card: Says which of its labels are rain.
+            neighbours: How many of each point, the point itself included; see
+                :func:`neighbours_to_find`.
+            threads: Threads of the search; 0 takes every core this process may use.
 
         Raises:
             InputError: A scan without labels.
         """
-        view = filter_view(MOST_NEIGHBOURS, threads)(scan)
+        view = filter_view(neighbours, threads)(scan)
         rain, unknown = card.rain_of(scan)[view.first], card.unknown_of(scan)[view.first]
         return cls(view, rain, ~(rain | unknown))
 
@@ -89,10 +74,12 @@ class Search:
     """How the best parameters are looked for.
 
     Attributes:
-        trials: Trials in all, those of an earlier run included.
-        seed: Of the sampler.
-        storage: SQLite file that keeps the study; None forgets it.
-        data: Names of the scans: a study goes on only with the same ones, labelled alike.
+        trials: Trials in all, those that the storage holds already included.
+        seed: Of the sampler, which draws the parameters of each trial.
+        storage: SQLite file that keeps the trials, so that a later search goes on from them; None
+            keeps nothing.
+        data: Names of the scans. The trials in a storage count only for the same scans, labelled
+            alike.
         done: Called after each trial.
     """
 
@@ -103,20 +90,64 @@ class Search:
     done: Callable[[], object]
 
 
-def tune_filter(name: str, scans: Sequence[ViewedScan], search: Search) -> Tuned:
-    """Tunes a filter with Optuna's tree-structured Parzen estimator.
-
-    The first trial is that of the filter's default parameters. A search that was broken off, in
-    the midst of a trial even, goes on as if it had not been: the sampler draws all trials anew,
-    and those that the storage holds are not weighed again.
+def space_of(name: str) -> Mapping[str, Span]:
+    """Where the parameters of a filter are looked for.
 
     Args:
-        name: One of ``SPACES``.
-        scans: Scans with rain in them.
+        name: One of ``FILTERS``.
+
+    Raises:
+        InputError: A filter that does not say, and so cannot be tuned; or one that says it of what
+            is no parameter of it, or leaves out its own default, from which a search starts.
+    """
+    space, default = FILTERS[name].SPACE, filter_from(name, {}).as_dict()
+    if not space:
+        raise InputError(
+            name,
+            "it cannot be tuned, for it does not say where its parameters are to be looked for",
+            "Give its class a SPACE.",
+        )
+    for parameter, (low, high) in space.items():
+        if parameter not in default or not low <= default[parameter] <= high:
+            raise InputError(
+                name,
+                f"its SPACE has {parameter} from {low} to {high}, where its default is "
+                f"{default.get(parameter, 'missing')}",
+                "Mend the SPACE of its class.",
+            )
+    return space
+
+
+def neighbours_to_find(name: str) -> int:
+    """How many neighbours of every point a search for a filter's parameters needs at most.
+
+    Args:
+        name: One of ``FILTERS``.
+
+    Raises:
+        InputError: A filter that cannot be tuned.
+    """
+    default = filter_from(name, {}).neighbours
+    _, most = space_of(name).get("neighbours", (default, default))
+    return max(default, int(most))
+
+
+def tune_filter(name: str, scans: Sequence[LabelledNeighbourhoods], search: Search) -> Tuned:
+    """Tunes a filter with Optuna's tree-structured Parzen estimator.
+
+    The first trial is that of the filter's default parameters. A search may be broken off, even in
+    the midst of a trial, and started again: it then comes to the result that it would have come to.
+    For the sampler draws all trials from the first one again, and those that the storage holds are
+    given their stored IoU instead of being computed anew.
+
+    Args:
+        name: One of ``FILTERS``.
+        scans: Scans with rain in them, with as many neighbours as :func:`neighbours_to_find` says.
         search: How to search.
 
     Raises:
-        InputError: A storage that cannot be used, or holds a study of other scans or labels.
+        InputError: A filter that cannot be tuned; a storage that cannot be used, or holds trials on
+            other scans or labels.
 
     Source: J. Bergstra et al., "Algorithms for Hyper-Parameter Optimization", NeurIPS 2011; 100
         scans and 100 trials as in the REHEARSE-3D paper.
@@ -125,16 +156,17 @@ def tune_filter(name: str, scans: Sequence[ViewedScan], search: Search) -> Tuned
     from sqlalchemy.exc import SQLAlchemyError
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    default = filter_from(name, {})
+    space, default = space_of(name), filter_from(name, {})
 
     def objective(parameters: Mapping[str, Any]) -> float:
         return pooled_iou(filter_from(name, parameters), scans)
 
-    # What is stored is never less than a whole trial, whenever the process is killed.
+    # Trials are run in a study in memory, and stored one by one when they are complete: however the
+    # process is killed, the storage never holds half a trial.
     study = optuna.create_study(
         direction="maximize", sampler=optuna.samplers.TPESampler(seed=search.seed)
     )
-    study.enqueue_trial({key: getattr(default, key) for key in SPACES[name]})
+    study.enqueue_trial({parameter: getattr(default, parameter) for parameter in space})
     try:
         stored = _stored(name, scans, search)
         known = stored.get_trials(states=[optuna.trial.TrialState.COMPLETE])
@@ -142,7 +174,7 @@ def tune_filter(name: str, scans: Sequence[ViewedScan], search: Search) -> Tuned
             if number < len(known):
                 _repeat(study, known[number])
             else:
-                trial = study.ask(_distributions(SPACES[name]))
+                trial = study.ask(_distributions(space))
                 study.tell(trial, objective(trial.params))
                 stored.add_trial(study.trials[-1])
                 search.done()
@@ -155,11 +187,15 @@ def tune_filter(name: str, scans: Sequence[ViewedScan], search: Search) -> Tuned
 def tune_threshold(
     judged: Iterable[tuple[NDArray[np.float32], NDArray[np.bool_]]], threshold: float
 ) -> Tuned:
-    """Finds the best threshold of a model, exactly: every one that decides differently is weighed.
+    """Finds the best threshold of a model, exactly.
+
+    Between two neighbouring probabilities all thresholds decide alike, so that one for each gap
+    stands for all that there are; the IoU of each is computed.
 
     Args:
-        judged: Probabilities of rain of the points of each scan, float32 (N,), and which are rain.
-        threshold: The model's own.
+        judged: Probabilities of rain of the points of each scan, float32 (N,), and which are rain,
+            bool (N,).
+        threshold: The model's own, for comparison.
     """
     probabilities, rains = zip(*judged, strict=True)
     probability = np.concatenate(probabilities)
@@ -167,21 +203,23 @@ def tune_threshold(
     order = np.argsort(-probability, kind="stable")
     falling, hits = probability[order], np.cumsum(rain[order])
     called = np.arange(1, len(falling) + 1)
-    # Points of one probability are called alike: only the last of them ends a choice. No threshold
-    # is below 0, so that points of probability 0 are never called.
+    # Row i is what calls the i + 1 most probable points rain. Points of one probability are called
+    # rain together, so that only the row of the last of them is a choice. A point is rain where its
+    # probability is greater than the threshold, which is 0 at least: of probability 0 none is.
     last = np.append(falling[1:] < falling[:-1], True) & (falling > 0)
     errors = rain.sum() - hits + called - hits
     iou = np.where(last, intersection_over_union(hits, errors), 0.0)
     best = int(np.argmax(iou))
     following = falling[best + 1] if best + 1 < len(falling) else np.float32(0)
-    # Midway, so that a rounding of the last digit decides nothing, where there is a midway.
+    # Midway between the last probability that is called rain and the next one, so that a rounding
+    # of the last digit decides nothing; the next one itself where no number lies between them.
     middle = (falling[best] + following) / 2
     chosen = middle if middle < falling[best] else following
     default = Counts.of(probability > threshold, rain).iou
     return Tuned({"threshold": float(chosen)}, float(iou[best]), default)
 
 
-def pooled_iou(filter: PointFilter, scans: Sequence[ViewedScan]) -> float:
+def pooled_iou(filter: PointFilter, scans: Sequence[LabelledNeighbourhoods]) -> float:
     """IoU of rain over the points of all scans; 1 where there is none and none is found."""
     total = Counts()
     for scan in scans:
@@ -190,8 +228,12 @@ def pooled_iou(filter: PointFilter, scans: Sequence[ViewedScan]) -> float:
     return total.iou
 
 
-def _stored(name: str, scans: Sequence[ViewedScan], search: Search) -> "optuna.Study":
-    """The study that keeps the trials: a new one, or that of the same filter in the storage."""
+def _stored(name: str, scans: Sequence[LabelledNeighbourhoods], search: Search) -> "optuna.Study":
+    """The study that keeps the trials: a new one, or that of the same filter in the storage.
+
+    Raises:
+        InputError: The storage holds a study of the filter on other scans, labels or spans.
+    """
     import optuna
 
     study = optuna.create_study(
@@ -203,7 +245,7 @@ def _stored(name: str, scans: Sequence[ViewedScan], search: Search) -> "optuna.S
     facts = {
         "scans": list(search.data),
         "rain_and_solid": [[int(s.rain.sum()), int(s.solid.sum())] for s in scans],
-        "bounds": {k: list(v) for k, v in SPACES[name].items()},
+        "bounds": {k: list(v) for k, v in space_of(name).items()},
     }
     if study.trials and study.user_attrs != facts:
         raise InputError(
@@ -217,19 +259,19 @@ def _stored(name: str, scans: Sequence[ViewedScan], search: Search) -> "optuna.S
 
 
 def _repeat(study: "optuna.Study", known: "optuna.trial.FrozenTrial") -> None:
-    """Draws a trial whose value is known, so that the sampler comes to where it was."""
+    """Draws a trial again, and gives it the value that is stored instead of computing it."""
     import optuna
 
     trial = study.ask(known.distributions)
     if trial.params == known.params:
         study.tell(trial, known.value)
-    else:  # drawn by another seed
+    else:  # the stored one was drawn by another seed
         study.tell(trial, state=optuna.trial.TrialState.FAIL)
         study.add_trial(known)
 
 
 def _distributions(
-    space: Mapping[str, Bounds],
+    space: Mapping[str, Span],
 ) -> "dict[str, optuna.distributions.BaseDistribution]":
     from optuna.distributions import FloatDistribution, IntDistribution
 

@@ -2,42 +2,52 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import torch
 from lightning.pytorch.loggers import TensorBoardLogger
+from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor, nn
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.metrics import RainMetrics
-from derain.files.documents import shown
+from derain.files.documents import Entry, shown
 from derain.learning.batch import Batch
-from derain.learning.seeds import Draw, generator, run_seed
+from derain.learning.seeds import Draw, generator_of, run_seed
 from derain.learning.task import Task, TrainingData, agree
 from derain.models.measured import MeasuredModule
 from derain.scan import Scan
 from derain.spec import Spec
+from derain.views.view import View
 
 
 class DerainingModule(MeasuredModule):
     """A network with its loss and Spec.
 
+    A network enters derain by its file in ``derain/models``, or by an entry point
+    ``derain.networks`` of another package, and the decorator that gives it its name::
+
+        @NETWORKS.add("outdet")
+        class OutDet(SupervisedModule): ...
+
     The Spec comes from the first data the model is trained on and from then on travels in its
     checkpoints; so the input's normalisation is never configured twice.
 
     Attributes:
-        NAME: Name of the network in a Spec and on the command line.
+        NAME: Name of the network in a Spec and on the command line; the decorator sets it.
+        VIEW: Kind of the view that it sees a scan through.
         AMPLIFIES: How many times more than other networks' its logits amplify rounding.
         channels: Names of its input channels, as :meth:`Scan.channel` takes them.
         network: The network itself.
         card: Data card of the data it is trained or tested on, once that is agreed with them.
 
     Raises:
-        InputError: No channels, or one twice.
+        InputError: A network without a name; no channels, or one twice.
     """
 
     NAME: ClassVar[str]
+    VIEW: ClassVar[type[View]]
     AMPLIFIES: ClassVar[float] = 1.0
     network: nn.Module
     mean: Tensor
@@ -46,6 +56,12 @@ class DerainingModule(MeasuredModule):
 
     def __init__(self, channels: Sequence[str]) -> None:
         super().__init__()
+        if not hasattr(self, "NAME"):
+            raise InputError(
+                type(self).__name__,
+                "the network has no name",
+                'Put @NETWORKS.add("its name") before the class.',
+            )
         if not channels or len(set(channels)) < len(channels):
             raise InputError(
                 "channels", f"{list(channels)} is no choice", "Name each channel once."
@@ -73,8 +89,8 @@ class DerainingModule(MeasuredModule):
         return self._spec
 
     @abstractmethod
-    def view_parameters(self, scans: Sequence[Scan]) -> dict[str, Any]:
-        """Kind and parameters of the view that the network sees.
+    def view_for(self, scans: Sequence[Scan]) -> View:
+        """The view that the network sees a scan through.
 
         Args:
             scans: Training scans that it may be fitted to; none for published weights.
@@ -83,33 +99,43 @@ class DerainingModule(MeasuredModule):
             InputError: A view that needs scans to be fitted to, and none given.
         """
 
-    @abstractmethod
-    def sees_through(self, view: Mapping[str, Any]) -> bool:
-        """Whether the network can take what a Spec's view gives."""
+    def sees_through(self, view: View) -> bool:
+        """Whether the network can take what a Spec's view gives: by default, any of its kind."""
+        return isinstance(view, self.VIEW)
 
-    def rule(self, scans: Sequence[Scan]) -> dict[str, float]:
-        """Constants of the network's own rule for rain, fitted to training scans."""
+    def rule_for(self, scans: Sequence[Scan]) -> Mapping[str, float]:
+        """Constants of the network's own rule for rain, fitted to training scans.
+
+        By default there are none. A network that has some reads them back in :meth:`adopt_rule`.
+        """
         return {}
 
-    @abstractmethod
-    def folded(self) -> nn.Module:
-        """The network as it is deployed: raw inputs to logits, BatchNorm folded in."""
-
-    @classmethod
-    @abstractmethod
-    def from_published(
-        cls, state_dict: Mapping[str, Tensor], card: DataCard, grid: str | None = None
-    ) -> Self:
-        """Builds the model from published weights.
+    def adopt_rule(self, rule: Entry) -> None:
+        """Takes over the constants of the network's own rule, as its Spec says them.
 
         Args:
-            state_dict: Published tensors.
-            card: Data card whose statistics they were trained with.
-            grid: Name of the grid they were trained on, for networks that see range images.
+            rule: What stands under ``rule`` in the Spec. It is not trusted.
 
         Raises:
-            InputError: Weights of another network, or a grid missing or surplus.
+            InputError: Constants that the network does not know, or some of its own missing.
         """
+        if rule.members():
+            raise rule.fault(
+                f"{self.NAME} has no rule with constants {shown(rule.value)}",
+                f"Give a model of {self.NAME}.",
+            )
+
+    @abstractmethod
+    def configure_optimizers(self) -> OptimizerLRScheduler:
+        """What trains it, as Lightning takes it."""
+
+    def deployed(self) -> nn.Module:
+        """The network as it is exported, in evaluation mode: from raw inputs to logits.
+
+        By default the module itself. What can be computed once, such as a BatchNorm that follows a
+        convolution, a network may fold away here.
+        """
+        return self
 
     def adopt(self, spec: Spec | dict[str, Any] | None) -> None:
         """Takes over a Spec, its normalisation included.
@@ -126,10 +152,11 @@ class DerainingModule(MeasuredModule):
                 f"a model of {spec.network} on {', '.join(spec.channels)}",
                 f"Give one of {self.NAME} on {', '.join(self.channels)}.",
             )
-        if not self.sees_through(spec.view):
+        if not self.sees_through(spec.make_view()):
             raise InputError(
                 "checkpoint", f"its view is {shown(spec.view)}", f"Give a model of {self.NAME}."
             )
+        self.adopt_rule(Entry("checkpoint", "rule", dict(spec.rule)))
         self._spec = spec
         self.hparams["spec"] = spec.as_dict()
         self.mean.copy_(torch.tensor(spec.mean))
@@ -148,12 +175,12 @@ class DerainingModule(MeasuredModule):
         statistics = [card.statistics(channel) for channel in self.channels]
         return Spec(
             network=self.NAME,
-            view=self.view_parameters(scans),
+            view=self.view_for(scans).as_dict(),
             channels=self.channels,
             units=tuple(card.unit(channel) for channel in self.channels),
             mean=tuple(mean for mean, _ in statistics),
             std=tuple(std for _, std in statistics),
-            rule=self.rule(scans),
+            rule=self.rule_for(scans),
             classes=card.classes,
             rain=card.rain,
             threshold=self.hparams["threshold"],
@@ -225,7 +252,7 @@ class DerainingModule(MeasuredModule):
     def on_train_batch_start(self, batch: Batch, batch_idx: int) -> None:
         """Draws dropout by seed, epoch, step and process, so that a resume changes nothing."""
         step = (self.current_epoch, batch_idx, self.global_rank)
-        torch.manual_seed(int(generator(Draw.NETWORK, run_seed(), *step).integers(2**63)))
+        torch.manual_seed(int(generator_of(Draw.NETWORK, run_seed(), *step).integers(2**63)))
 
     def training_step(self, batch: Batch) -> Tensor:
         """Loss of one batch."""

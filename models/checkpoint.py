@@ -1,4 +1,4 @@
-"""Checkpoints on disk: every model of derain, by the name in its Spec."""
+"""Checkpoints on disk: written whole, and read without trust."""
 
 import logging
 from collections.abc import Iterator, Mapping
@@ -12,26 +12,26 @@ from derain.errors import InputError
 from derain.files.documents import shown
 from derain.models.base import DerainingModule
 from derain.models.callbacks.whole_checkpoints import save_whole
-from derain.models.lisnownet import LiSnowNet
-from derain.models.outdet import OutDet
 from derain.models.published import MISFITS, read_checkpoint, with_tensors
-from derain.models.salsanext import SalsaNext
+from derain.models.registry import NETWORKS
 from derain.spec import Spec
-
-MODELS: dict[str, type[DerainingModule]] = {
-    model.NAME: model for model in (OutDet, SalsaNext, LiSnowNet)
-}
 
 # What Lightning asks of a checkpoint that a training goes on from.
 STATE_OF_TRAINING = {"optimizer_states", "lr_schedulers", "loops"}
 
 
-def load_model(path: Path) -> DerainingModule:
+def load_model(path: Path | str) -> DerainingModule:
     """Reads a checkpoint that derain wrote. It is not trusted: only plain values are unpickled.
+
+    Example:
+        >>> model = load_model("model.ckpt")
+        >>> type(model).__name__, model.spec.data
+        ('OutDet', 'WADS')
 
     Raises:
         InputError: A missing or damaged file, or a checkpoint of something else.
     """
+    path = Path(path)
     return _model_of(read_checkpoint(path), path)
 
 
@@ -64,14 +64,14 @@ def _model_of(content: Mapping[str, Any], path: Path) -> DerainingModule:
             "Published weights become one through `derain import-weights`.",
         )
     spec = Spec.from_dict(parameters["spec"], path)
-    if spec.network not in MODELS:
+    if spec.network not in NETWORKS:
         raise InputError(
-            path, f"a checkpoint of {shown(spec.network)}", f"Known are {', '.join(MODELS)}."
+            path, f"a checkpoint of {shown(spec.network)}", f"Known are {', '.join(NETWORKS)}."
         )
     # Lightning's own entries begin with an underscore.
     arguments = {k: v for k, v in parameters.items() if not str(k).startswith("_")}
     try:
-        model = with_tensors(lambda: MODELS[spec.network](**arguments), weights)
+        model = with_tensors(lambda: NETWORKS[spec.network](**arguments), weights)
     except MISFITS as error:
         raise InputError(
             path,

@@ -18,9 +18,10 @@ from derain.scan import Scan
 from derain.spec import Spec
 from derain.views.probability import probability_of_rain
 
-# What the checkpoint of a run is chosen by, the more the better: the IoU of the validation scans
-# where a network learns from labels, and minus the loss where it does not.
-MERIT = "val/merit"
+# The monitor, by which the best checkpoint of a run is chosen, the more the better: the IoU of the
+# validation scans where a network learns from labels, and minus the loss where it does not. Logs,
+# checkpoints and configurations have it under this name.
+MONITOR = "val/merit"
 
 
 class MeasuredModule(lightning.LightningModule, ABC):
@@ -55,6 +56,14 @@ class MeasuredModule(lightning.LightningModule, ABC):
         """
         dataset = getattr(self.trainer.val_dataloaders, "dataset", None)
         return dataset.scans(most) if isinstance(dataset, ReadableScans) else iter(())
+
+    @abstractmethod
+    def forward(self, *_: Tensor, **inputs: Tensor) -> Tensor:
+        """Logits of "not rain" and "rain" of every cell, float (M, 2), of a view's raw inputs.
+
+        Args:
+            inputs: What the view gives, by the names that it has for them.
+        """
 
     @abstractmethod
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
@@ -95,7 +104,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
         losses = self.mean_losses.compute()
         self._log_alike({f"val/{name}": loss for name, loss in losses.items()})
         if not self.LEARNS_FROM_LABELS:
-            self._log_alike({MERIT: -losses["loss"]})
+            self._log_alike({MONITOR: -losses["loss"]})
         self._log_scores("val")
 
     def on_test_epoch_start(self) -> None:
@@ -119,7 +128,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
         if not batch.measured:
             return []
         return [
-            scan.way_to_rows(probability_of_rain(scores.float().cpu().numpy()))
+            scan.back_projection(probability_of_rain(scores.float().cpu().numpy()))
             for scan, scores in zip(batch.measured, batch.split(logits), strict=True)
         ]
 
@@ -137,8 +146,8 @@ class MeasuredModule(lightning.LightningModule, ABC):
         self._log_alike({f"{part}/{name}": score for name, score in scores.items()})
         self._log_alike({f"{part}_iou": scores["iou"]}, prog_bar=True, logger=False)
         if part == "val":
-            merit = {MERIT: scores["iou"]} if self.LEARNS_FROM_LABELS else {}
-            self._log_alike({"hp_metric": scores["iou"], **merit})
+            monitor = {MONITOR: scores["iou"]} if self.LEARNS_FROM_LABELS else {}
+            self._log_alike({"hp_metric": scores["iou"], **monitor})
 
     def _log_alike(self, values: Mapping[str, Tensor], **options: Any) -> None:
         """Logs what all processes have computed alike; the largest of equal numbers is exact."""

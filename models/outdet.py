@@ -16,12 +16,14 @@ from torch.nn import functional
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.models.layers.batch_norm import PointBatchNorm
-from derain.models.published import network_of, published_tensors
+from derain.models.published import Published, network_of, published_tensors
+from derain.models.registry import NETWORKS
 from derain.models.supervised import SupervisedModule
 from derain.scan import Scan
 from derain.views.neighbours import NeighbourView
+from derain.views.view import View
 
-CHANNELS = ("x", "y", "z", "intensity")
+# Features of every point in each layer.
 WIDTH = 32
 
 # The published network sees every distance one metre longer than it is; without that offset its
@@ -57,12 +59,19 @@ PUBLISHED_KEYS = {
 class OutDetNetwork(nn.Module):
     """The network as published, from normalised points to logits.
 
+    Example:
+        >>> network = OutDetNetwork(neighbours=3).eval()
+        >>> points, distances = torch.rand(6, 4), torch.rand(6, 3)
+        >>> neighbours = torch.randint(6, (6, 3))
+        >>> network(points, distances, neighbours).shape
+        torch.Size([6, 2])
+
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
         channels: Number of input channels, 4 as published.
     """
 
-    def __init__(self, neighbours: int = 9, channels: int = len(CHANNELS)) -> None:
+    def __init__(self, neighbours: int = 9, channels: int = 4) -> None:
         super().__init__()
         self.distance_weight = nn.Parameter(torch.ones(neighbours))
         self.weight1 = nn.Parameter(torch.empty(channels + 1, WIDTH, neighbours))
@@ -195,8 +204,17 @@ def _constant(tensor: Tensor) -> nn.Parameter:
     return nn.Parameter(tensor.float().contiguous(), requires_grad=False)
 
 
-class OutDet(SupervisedModule):
+@NETWORKS.add("outdet")
+class OutDet(SupervisedModule, Published):
     """Trains 3D-OutDet; the defaults are the published recipe for WADS.
+
+    Example:
+        >>> trainer = Trainer(max_epochs=2, logger=False, enable_progress_bar=False)
+        >>> data = derain.Folder(".", "wads", train=["scan.bin"], validation=["scan.bin"])
+        >>> model = OutDet(neighbours=5)
+        >>> trainer.fit(model, data)
+        >>> trainer.global_step, model.spec.data
+        (2, 'WADS')
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
@@ -212,7 +230,9 @@ class OutDet(SupervisedModule):
     Source: sporsho/3D_OutDet, train_wads.py.
     """
 
-    NAME: ClassVar[str] = "outdet"
+    VIEW: ClassVar[type[View]] = NeighbourView
+    # As published.
+    CHANNELS: ClassVar[tuple[str, ...]] = ("x", "y", "z", "intensity")
     network: OutDetNetwork
 
     def __init__(
@@ -248,20 +268,20 @@ class OutDet(SupervisedModule):
         model.adopt(model.spec_for(card))
         return model
 
-    def view_parameters(self, scans: Sequence[Scan]) -> dict[str, Any]:
-        """Kind and parameters of the view that the network sees, whatever the scans."""
-        return {"kind": NeighbourView.KIND, "neighbours": self.hparams["neighbours"]}
+    def view_for(self, scans: Sequence[Scan]) -> NeighbourView:
+        """The view that the network sees a scan through, whatever the scans."""
+        return NeighbourView(self.hparams["neighbours"], self.channels)
 
-    def sees_through(self, view: Mapping[str, Any]) -> bool:
+    def sees_through(self, view: View) -> bool:
         """Whether the network can take what a Spec's view gives: as many neighbours as it has."""
-        return view == self.view_parameters([])
+        return isinstance(view, NeighbourView) and view.neighbours == self.hparams["neighbours"]
 
     def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
         """Logits, float (M, 2), of raw points; arguments as for :class:`FoldedOutDet`."""
         return self.network((points - self.mean) / self.std, distances, neighbours)
 
-    def folded(self) -> nn.Module:
-        """The network as it is deployed."""
+    def deployed(self) -> FoldedOutDet:
+        """The network as it is exported, in fewer steps."""
         return FoldedOutDet(self.network, self.mean, self.std)
 
     def configure_optimizers(self) -> OptimizerLRScheduler:

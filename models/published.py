@@ -1,6 +1,7 @@
-"""Reading the weights that others published."""
+"""Weights that others published: which networks take them, and how they are read."""
 
 import warnings
+from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -11,6 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.serialization import safe_globals
 
+from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.files.reading import reading
 
@@ -18,6 +20,26 @@ Network = TypeVar("Network", bound=nn.Module)
 
 # What torch lets out where a network cannot be made with some arguments, or not with some tensors.
 MISFITS = (TypeError, ValueError, AttributeError, RuntimeError, ArithmeticError)
+
+
+class Published(ABC):
+    """A derainer whose weights somebody has published; ``derain import-weights`` asks for it."""
+
+    @classmethod
+    @abstractmethod
+    def from_published(
+        cls, state_dict: Mapping[str, Tensor], card: DataCard, grid: str | None = None
+    ) -> Self:
+        """Builds the derainer from published weights.
+
+        Args:
+            state_dict: Published tensors.
+            card: Data card whose statistics they were trained with.
+            grid: Name of the grid they were trained on, for networks that see range images.
+
+        Raises:
+            InputError: Weights of another network, or a grid missing or surplus.
+        """
 
 
 class Inert:

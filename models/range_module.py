@@ -16,20 +16,21 @@ FITTED = "fitted"
 
 
 def range_view(
-    grid: str | Mapping[str, Any], way_back: str, scans: Sequence[Scan]
-) -> dict[str, Any]:
-    """Kind and parameters of a view on a grid.
+    grid: str | Mapping[str, Any], channels: Sequence[str], way_back: str, scans: Sequence[Scan]
+) -> RangeView:
+    """A view on a grid that is stated, or fitted to scans.
 
     Args:
         grid: ``fitted`` for one that fits the scans; or the name of a published grid, or its
             bounds, as :func:`~derain.views.spherical_grid.grid_of` takes them.
-        way_back: How points that lost their pixel get a score, as :class:`RangeView` takes it.
+        channels: What a pixel holds, in order.
+        way_back: Name of the back-projection, as :class:`RangeView` takes it.
         scans: Training scans.
 
     Raises:
-        InputError: An unknown grid, or one to fit without scans.
+        InputError: An unknown grid or back-projection, or a grid to fit without scans.
     """
-    return {"kind": RangeView.KIND, "grid": _chosen(grid, scans).as_dict(), "way_back": way_back}
+    return RangeView(_chosen(grid, scans), tuple(channels), way_back)
 
 
 def _chosen(grid: str | Mapping[str, Any], scans: Sequence[Scan]) -> SphericalGrid:

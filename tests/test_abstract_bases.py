@@ -3,16 +3,23 @@
 import pytest
 
 from derain.datamodules.base import ScanDataModule
+from derain.files.format import Format
 from derain.filters.point_filter import PointFilter
 from derain.filters.radius_filter import RadiusFilter
 from derain.models.base import DerainingModule
+from derain.models.published import Published
 from derain.models.supervised import SupervisedModule
+from derain.views.view import SeenScan, View
 
-MODEL = ("view_parameters", "losses", "folded", "from_published")
+MODEL = ("view_for", "forward", "losses", "configure_optimizers")
 DEMANDED = {
     DerainingModule: MODEL,
     SupervisedModule: tuple(name for name in MODEL if name != "losses"),
+    Published: ("from_published",),
+    View: ("of", "as_dict", "azimuth", "__call__"),
+    SeenScan: ("size", "judged", "inputs", "target", "back_projection", "pack"),
     ScanDataModule: ("source",),
+    Format: ("decode", "encode"),
     PointFilter: ("judge",),
     RadiusFilter: ("radius_at",),
 }

@@ -7,7 +7,10 @@ import pytest
 from broken_readers import readers
 
 from benchmarks.fuzz import main
+from benchmarks.fuzzing import scans
+from benchmarks.fuzzing.format_inputs import INPUTS
 from benchmarks.fuzzing.worker import Worker
+from derain.files.format import FORMATS
 
 
 def test_every_reader_reads_refuses_and_never_breaks(
@@ -30,6 +33,17 @@ def test_every_reader_reads_refuses_and_never_breaks(
         assert int(refused.replace(",", "")) > 0, name
         assert int(right) + int(refused) == int(inputs)
         assert findings == "0"
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_every_format_has_hostile_and_sound_files_in_the_fuzzer(suffix: str) -> None:
+    assert suffix in INPUTS, f"add a file to benchmarks/fuzzing/formats for {suffix}"
+    extra = FORMATS[suffix].EXTRA
+    if extra is not None and not extra.installed:
+        pytest.skip(f"{extra.library} is not installed")
+    (reader,) = [reader for reader in scans.readers() if reader.file == f"scan{suffix}"]
+    assert reader.seeds()
+    assert len({make() for make in reader.hostile}) == len(reader.hostile) > 0
 
 
 @pytest.mark.parametrize(

@@ -53,14 +53,31 @@ def scan(tmp_path: Path) -> Path:
     return path
 
 
-def test_the_root_of_the_package_needs_numpy_alone() -> None:
-    assert loaded_by("import derain") == {"derain", "numpy"}
+def test_the_package_itself_loads_nothing_of_what_it_offers() -> None:
+    assert loaded_by("import derain, sys; assert 'derain.scan' not in sys.modules") == {"derain"}
 
 
-def test_the_runtime_needs_onnxruntime_the_knn_library_and_what_reads_files() -> None:
+@pytest.mark.parametrize(
+    ("used", "loaded"),
+    [
+        ("Scan, derain.InputError", {"derain", "numpy"}),
+        ("read_scan, derain.write_scan", {"derain", "numpy", "lzf"}),
+        ("FilterDerainer, derain.DROR", {"derain", "numpy", "small_gicp", "yaml", "lzf"}),
+        ("load_card, derain.DataCard", {"derain", "numpy", "yaml", "lzf"}),
+        ("Derainer", {"derain", "numpy", "onnxruntime", "small_gicp", "yaml", "lzf"}),
+    ],
+)
+def test_a_name_of_the_package_loads_what_it_needs(used: str, loaded: set[str]) -> None:
+    found = loaded_by(f"import derain; derain.{used}")
+    assert not found & HEAVY
+    of_yaml = {name for name in found if "cython" in name}
+    assert found - of_yaml == loaded
+
+
+def test_the_runtime_needs_onnxruntime_the_knn_library_and_what_reads_a_spec() -> None:
     loaded = loaded_by("import derain.export.runtime")
     of_yaml = {name for name in loaded if "cython" in name}
-    assert loaded - of_yaml == {"derain", "numpy", "onnxruntime", "small_gicp", "yaml", "lzf"}
+    assert loaded - of_yaml == {"derain", "numpy", "onnxruntime", "small_gicp", "yaml"}
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["info", "--help"]])

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from derain.errors import InputError
 from derain.scan import Scan
 from derain.spec import SCHEMA, Spec
-from derain.views.back_projection import WAYS_BACK
+from derain.views.back_projection import BACK_PROJECTIONS
 from derain.views.channels import MOST_CHANNELS
-from derain.views.neighbours import MOST_NEIGHBOURS, NeighbourView
+from derain.views.neighbours import MOST_NETWORK_NEIGHBOURS, NeighbourView
 from derain.views.range_image import RangeView
 from derain.views.spherical_grid import MOST_PIXELS, SphericalGrid
 
@@ -47,7 +47,7 @@ specs = st.builds(
     ),
     network=TEXTS,
     view=st.fixed_dictionaries(
-        {"kind": st.just("neighbours"), "neighbours": st.integers(1, MOST_NEIGHBOURS)}
+        {"kind": st.just("neighbours"), "neighbours": st.integers(1, MOST_NETWORK_NEIGHBOURS)}
     ),
     mean=four_numbers,
     std=st.tuples(*[st.floats(1e-6, 1e6)] * 4),
@@ -135,7 +135,7 @@ NAN, HUGE = float("nan"), 10**400
         ({"view": {"kind": "neighbours"}}, "view: neighbours is missing"),
         *(
             ({"view": {"kind": "neighbours", "neighbours": wrong}}, r"view\.neighbours")
-            for wrong in (-1, 0, MOST_NEIGHBOURS + 1, 10**9, HUGE, 9.0, True, "9", None)
+            for wrong in (-1, 0, MOST_NETWORK_NEIGHBOURS + 1, 10**9, HUGE, 9.0, True, "9", None)
         ),
         ({"view": {"kind": "neighbours", "neighbours": 9, "k": 9}}, r"view\.k: there is no"),
     ],
@@ -168,7 +168,7 @@ def of_range_view(**changes: Any) -> Spec:
     return replace(SPEC, network="salsanext", view=view, channels=("z", "x", "range", "intensity"))
 
 
-@pytest.mark.parametrize("way_back", WAYS_BACK)
+@pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
 def test_a_range_view_survives_json_with_its_grid_and_way_back(way_back: str) -> None:
     spec = of_range_view(way_back=way_back)
     read = Spec.from_dict(json.loads(json.dumps(spec.as_dict())), "model")

@@ -76,7 +76,7 @@ def readers() -> list[Reader]:
             _read_manifest,
             lambda: [as_json(manifest)],
             [lambda: b"[" * 100_000, lambda: b'{"made_by": ' + b"9" * 5000],
-            lambda draw: as_json(changed(manifest, draw)),
+            lambda generator: as_json(changed(manifest, generator)),
         ),
         Reader("times", "metadata.csv", _read_times, lambda: [TIMES.encode()]),
         Reader("weather", "weather.csv", _read_weather, lambda: [WEATHER.encode()]),
@@ -84,9 +84,9 @@ def readers() -> list[Reader]:
 
 
 def _of_yaml(name: str, read: Callable[[Path], object], texts: Sequence[str]) -> Reader:
-    def change(draw: Random) -> bytes:
-        content = changed(yaml.safe_load(draw.choice(texts)), draw)
-        if draw.random() < 0.5:
+    def change(generator: Random) -> bytes:
+        content = changed(yaml.safe_load(generator.choice(texts)), generator)
+        if generator.random() < 0.5:
             return as_json(content)
         return str(yaml.safe_dump(content, allow_unicode=True)).encode("utf-8", "surrogatepass")
 

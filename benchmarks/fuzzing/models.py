@@ -65,14 +65,14 @@ def readers(folder: Path) -> list[Reader]:
             _read_model,
             lambda: [path.read_bytes() for path in models],
             [partial(_saying, models[0], partial(_with_spec, spec)) for spec in HOSTILE],
-            change=lambda draw: _with_metadata(draw.choice(models), draw),
+            change=lambda generator: _with_metadata(generator.choice(models), generator),
         ),
         Reader(
             "ckpt",
             "model.ckpt",
             _read_checkpoint,
             lambda: [path.read_bytes() for path in checkpoints],
-            change=lambda draw: _with_content(draw.choice(checkpoints), draw),
+            change=lambda generator: _with_content(generator.choice(checkpoints), generator),
         ),
     ]
 
@@ -93,11 +93,11 @@ def _read_checkpoint(path: Path) -> None:
     model.spec.make_view(1)(Scan.of(scene(POINTS)))
 
 
-def _with_metadata(path: Path, draw: Random) -> bytes:
+def _with_metadata(path: Path, generator: Random) -> bytes:
     def say(metadata: dict[str, Any]) -> Any:
-        if draw.random() < 0.5:
-            return changed(metadata, draw)
-        return {**metadata, "spec": changed(metadata["spec"], draw)}
+        if generator.random() < 0.5:
+            return changed(metadata, generator)
+        return {**metadata, "spec": changed(metadata["spec"], generator)}
 
     return _saying(path, say)
 
@@ -118,16 +118,16 @@ def _saying(path: Path, say: Callable[[dict[str, Any]], Any]) -> bytes:
     return bytes(proto.SerializeToString())
 
 
-def _with_content(path: Path, draw: Random) -> bytes:
+def _with_content(path: Path, generator: Random) -> bytes:
     """A sound archive of odd values."""
     import torch
 
     content = torch.load(path, map_location="cpu", weights_only=True)
-    part = draw.choice(("hyper_parameters", "hyper_parameters", "state_dict", "all"))
+    part = generator.choice(("hyper_parameters", "hyper_parameters", "state_dict", "all"))
     if part == "all":
-        content = changed(content, draw)
+        content = changed(content, generator)
     else:
-        content[part] = changed(dict(content[part]), draw)
+        content[part] = changed(dict(content[part]), generator)
     file = io.BytesIO()
     torch.save(content, file)
     return file.getvalue()

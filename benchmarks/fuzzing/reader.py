@@ -51,7 +51,7 @@ class Reader:
             return self.hostile[number]()
         if self.must_read(number):
             return self._seeds[number - len(self.hostile)]
-        draw = Random(f"{seed} {self.name} {number}")
-        if self.change is not None and draw.random() < 0.5:
-            return self.change(draw)
-        return damaged(draw.choice(self._seeds), draw.choice(self._seeds), draw)
+        generator = Random(f"{seed} {self.name} {number}")
+        if self.change is not None and generator.random() < 0.5:
+            return self.change(generator)
+        return damaged(generator.choice(self._seeds), generator.choice(self._seeds), generator)

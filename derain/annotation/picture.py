@@ -14,8 +14,8 @@ from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.views.directions import directions
 
-# Bright on dark; what there is much of is dull.
-COLOURS = {
+# On a dark ground, classes of many points are dull and classes of few points bright.
+CLASS_COLOURS = {
     TrackClass.BACKGROUND: "#5c6773",
     TrackClass.ROAD: "#a79b8e",
     TrackClass.RAIN: "#39c5ff",
@@ -42,7 +42,7 @@ def annotation_figure(scan: Scan, label: NDArray[np.int64], scene: Scene, title:
     """
     seen = scan.valid
     points, colour = scan.xyz[seen], _colours(label[seen])
-    # What is rare is drawn last, on top.
+    # Points of rare classes are drawn last, so that none covers them.
     rarity = np.argsort(-np.bincount(label, minlength=UNKNOWN + 1)[label[seen]], kind="stable")
     points, colour = points[rarity], colour[rarity]
 
@@ -62,7 +62,7 @@ def annotation_figure(scan: Scan, label: NDArray[np.int64], scene: Scene, title:
 def _colours(label: NDArray[np.int64]) -> NDArray[np.float64]:
     """RGBA of each class id, (N, 4)."""
     palette = [UNKNOWN_COLOUR] * (UNKNOWN + 1)
-    for kind, colour in COLOURS.items():
+    for kind, colour in CLASS_COLOURS.items():
         palette[kind] = colour
     return ListedColormap(palette)(label)
 
@@ -71,7 +71,7 @@ def _legend(label: NDArray[np.int64]) -> list[Patch]:
     counts = np.bincount(label, minlength=UNKNOWN + 1)
     known = [
         Patch(color=colour, label=f"{kind.name.lower()} {counts[kind]:,}")
-        for kind, colour in COLOURS.items()
+        for kind, colour in CLASS_COLOURS.items()
         if counts[kind]
     ]
     unknown = [Patch(color=UNKNOWN_COLOUR, label=f"unknown {counts[UNKNOWN]:,}")]
@@ -87,13 +87,13 @@ def _scatter(
 
 
 def _draw_scene(axes: Axes, scene: Scene) -> None:
-    """Draws the outlines of road and boxes, from above, and looks at the road."""
+    """Draws the outlines of road and boxes from above, in axes that show the road."""
     axes.add_patch(Polygon(scene.road, fill=False, edgecolor="white", linewidth=0.8))
     if scene.rain_area is not None:
-        colour = COLOURS[TrackClass.RAIN]
+        colour = CLASS_COLOURS[TrackClass.RAIN]
         axes.add_patch(Polygon(scene.rain_area, fill=False, edgecolor=colour, linewidth=0.8))
     for box in scene.boxes.values():
-        colour = COLOURS[box.kind]
+        colour = CLASS_COLOURS[box.kind]
         axes.add_patch(
             Polygon(box.footprint.corners(), fill=False, edgecolor=colour, linewidth=0.6)
         )

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.system.open3d_import import import_open3d
 
-# A road leans less; a wall leans more.
+# A plane that leans more than this is a wall and not a road, degrees.
 STEEPEST = 30.0
 
-# RANSAC looks at all of its points in every iteration; so many give a plane to the millimetre.
+# RANSAC compares every candidate with all of its points. So it is given no more than this many,
+# drawn at random, which give a plane to the millimetre.
 MOST_POINTS = 50_000
 
 
@@ -21,16 +22,17 @@ class PlaneSearch:
     """How the plane of the road is sought.
 
     Attributes:
-        distance: A point this near to a plane lies in it, metres.
-        points: Points that each candidate is fitted to.
-        iterations: Candidates.
-        scans: Scans of a sequence that are looked at, evenly spread; the scene stands still.
-        seed: Seed of what is drawn.
+        distance: A point this near to a plane counts as lying in it, metres.
+        points: Number of points that each candidate plane is fitted to.
+        iterations: Number of candidate planes.
+        scans: Number of scans of a sequence that the plane is sought in, evenly spread. A few are
+            enough, because the scene does not move.
+        seed: Seed of the random generators.
 
     Source: distance and points as in the ground removal of sporsho/3DUnOutDet. Its 50,000
-    iterations search whole scans, less than half of which is road; over the road polygon most
-    points are road: were it only half of them, 1,000 candidates of 9 points would still hold one
-    of road alone with 86 %.
+    iterations search whole scans, less than half of which is road. Over the road polygon most
+    points are road. Even if only half of them were, one of 1,000 candidates of 9 points would be
+    fitted to points of the road alone with a probability of 86 %.
     """
 
     distance: float = 0.1
@@ -105,7 +107,8 @@ def _ransac(points: NDArray[np.float64], search: PlaneSearch) -> Plane:
     open3d = import_open3d()
     open3d.utility.random.seed(search.seed)
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
-    # Certainty keeps Open3D from stopping early, at a candidate that depends on its threads.
+    # With a probability of 1 Open3D tries all candidates. With less it would stop early, at a
+    # candidate that depends on how its threads happen to run.
     found, _ = cloud.segment_plane(
         search.distance, search.points, search.iterations, probability=1.0
     )

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-# Headings are found to this, degrees: 2 mm at 100 m.
+# Headings are found to this accuracy, degrees; at 100 m it makes 2 mm.
 FINEST_HEADING = 1e-3
 
 
@@ -39,7 +39,7 @@ class Rectangle:
         return cls((float(x), float(y)), (float(length), float(width)), heading)
 
     def widened(self, margin: float) -> "Rectangle":
-        """The same with a margin on every side, metres."""
+        """The same rectangle with a margin on every side, metres."""
         length, width = self.size
         return Rectangle(self.centre, (length + 2 * margin, width + 2 * margin), self.heading)
 
@@ -57,7 +57,7 @@ class Rectangle:
         return np.stack([cosine * x + sine * y, cosine * y - sine * x], axis=-1)
 
     def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which points, float64 (N, 2), metres, lie in it or on its outline; bool (N,)."""
+        """Which points, float64 (N, 2), metres, lie inside or on the outline; bool (N,)."""
         ahead, left = self.relative(points).T
         length, width = self.size
         inside: NDArray[np.bool_] = (np.abs(ahead) <= length / 2) & (np.abs(left) <= width / 2)

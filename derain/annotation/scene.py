@@ -21,10 +21,10 @@ class Scene:
         boxes: Boxes around the things in the scene, by name.
         rain_area: Corners x, y of the polygon that drops are labelled over, in order, metres; None
             takes the road, as the paper does. Drops beside the road are background then.
-        height: What is higher above the road's plane, over the rain's area and in no box, is rain;
-            metres. The paper does not state it. The default is the distance within which a point
-            counts as the plane's: a lower one makes rain of an uneven road, a higher one road of
-            low drops.
+        height: Height above the road's plane, metres. Points that are higher, lie over the area of
+            the rain and are in no box are rain. The paper does not state it. The default is the
+            distance within which a point counts as lying in the plane: with a smaller one parts of
+            an uneven road become rain, with a greater one low drops become road.
         plane: How the road's plane is sought.
         corrections: What is different about boxes in a sequence, by sequence and box.
     """

@@ -1,6 +1,6 @@
 """Scene files: a static scene as YAML.
 
-    height: 0.1                                  # metres above the road from which it is rain
+    height: 0.1                                  # metres; points higher above the road are rain
     road: [[2, -4], [60, -4], [60, 4], [2, 4]]   # corners x, y in order, metres, sensor frame
     boxes:
       car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
@@ -27,23 +27,25 @@ from derain.files.atomic import replacing
 from derain.files.documents import Entry, shown
 from derain.simulation.classes import TrackClass
 
-# Points of a candidate for the plane: more make it no better, and RANSAC less likely to find it.
+# Most points that a candidate for the plane may be fitted to. More would not make it better, and
+# would make it less likely that all of them are road.
 MOST_FITTED = 100
 
-# No LiDAR sees as far, metres, and a product of three such lengths is still a number.
+# Largest coordinate and length, metres: farther than any LiDAR sees, and so small that a product of
+# three does not overflow.
 FARTHEST = 1e6
 
 # Open3D's whole numbers have 32 bits.
-LARGEST = 2**31 - 1
+LARGEST_INTEGER = 2**31 - 1
 
-CLASSES = {kind.name.lower(): kind for kind in TrackClass}
+CLASS_BY_NAME = {kind.name.lower(): kind for kind in TrackClass}
 
 
 def read_scene(path: Path) -> Scene:
     """Reads a scene file.
 
     Raises:
-        InputError: A file that cannot be read, or a value in it that cannot be meant; the message
+        InputError: A file that cannot be read, or a value in it that makes no sense; the message
             names its key.
     """
     parsers = {
@@ -80,7 +82,7 @@ def write_scene(path: Path, scene: Scene) -> None:
 
 
 def as_dict(scene: Scene) -> dict[str, Any]:
-    """A scene as its file holds it, of what YAML and JSON know."""
+    """A scene as its file holds it: dictionaries, lists, texts and numbers."""
     area = {} if scene.rain_area is None else {"rain_area": _corners(scene.rain_area)}
     return {
         "height": scene.height,
@@ -136,9 +138,9 @@ def _plane_search(entry: Entry) -> PlaneSearch:
     parsers = {
         "distance": _length,
         "points": lambda value: value.whole(3, MOST_FITTED),
-        "iterations": lambda value: value.whole(1, LARGEST),
-        "scans": lambda value: value.whole(1, LARGEST),
-        "seed": lambda value: value.whole(0, LARGEST),
+        "iterations": lambda value: value.whole(1, LARGEST_INTEGER),
+        "scans": lambda value: value.whole(1, LARGEST_INTEGER),
+        "seed": lambda value: value.whole(0, LARGEST_INTEGER),
     }
     return PlaneSearch(**entry.record(parsers))
 
@@ -156,16 +158,16 @@ def _corrections(entry: Entry, boxes: Mapping[str, Box]) -> dict[str, Correction
 
 
 def _itself(entry: Entry) -> Entry:
-    """For a value that is read later: names of boxes are checked when the boxes are known."""
+    """Leaves a value to be read later: corrections name boxes, which have to be known first."""
     return entry
 
 
 def _class(entry: Entry) -> TrackClass:
-    if not isinstance(entry.value, str) or entry.value not in CLASSES:
+    if not isinstance(entry.value, str) or entry.value not in CLASS_BY_NAME:
         raise entry.fault(
-            f"there is no class {shown(entry.value)}", f"Known are {', '.join(CLASSES)}."
+            f"there is no class {shown(entry.value)}", f"Known are {', '.join(CLASS_BY_NAME)}."
         )
-    return CLASSES[entry.value]
+    return CLASS_BY_NAME[entry.value]
 
 
 def _triple(entry: Entry) -> Triple:

@@ -29,23 +29,23 @@ from derain.simulation.classes import TrackClass
 
 NO_BOX = -1
 
-# Wider than the rounding of a box's corners, metres.
-ROUNDING = 1e-6
+# More than what the corners of a box may be off by rounding, metres.
+CORNER_TOLERANCE = 1e-6
 
 
 def road_plane(scans: Sequence[Scan], scene: Scene) -> Plane:
     """Finds the plane of the road in the scans of one sequence.
 
-    The paper seeks it in all points. Here only those over the road polygon and outside boxes are
-    looked at, where the road is most of what there is: no wall can win.
+    The paper seeks it in all points. Here only points over the road polygon and outside boxes are
+    used, most of which are road, so that no wall can be found in its place.
 
     Args:
         scans: One or more scans of the sequence.
         scene: The scene as it is in that sequence.
 
     Raises:
-        InputError: Too few points over the road, or none of them a road's, or Open3D cannot be
-            imported.
+        InputError: Too few points over the road, or a plane too steep for a road, or Open3D cannot
+            be imported.
     """
     return find_plane(
         np.concatenate([_bare_road(scan, scene) for scan in scans]), scene.plane, scans[0].name
@@ -55,7 +55,7 @@ def road_plane(scans: Sequence[Scan], scene: Scene) -> Plane:
 def annotate(scan: Scan, scene: Scene, plane: Plane) -> NDArray[np.int64]:
     """Labels the points of a scan.
 
-    Where boxes overlap, a sprinkler's goes first, then the one named first.
+    Where boxes overlap, that of a sprinkler counts, else the one that the scene names first.
 
     Args:
         scan: The scan.
@@ -93,14 +93,15 @@ def _bare_road(scan: Scan, scene: Scene) -> NDArray[np.float64]:
 
 def _boxed(points: NDArray[np.float64], scene: Scene) -> NDArray[np.int64]:
     """Class of the box that each point is in, int64 (N,); NO_BOX where it is in none."""
-    # Each box looks at the points of its own stretch of x alone.
+    # The points are sorted by x, so that a box need only be compared with those in its span of x.
     order = np.argsort(points[:, 0])
     points = points[order]
     kind = np.full(len(points), NO_BOX, dtype=np.int64)
     by_rank = sorted(scene.boxes.values(), key=lambda box: box.kind is not TrackClass.SPRINKLER)
     for box in reversed(by_rank):  # the last to claim a point keeps it
         x = box.footprint.corners()[:, 0]
-        first, last = np.searchsorted(points[:, 0], [x.min() - ROUNDING, x.max() + ROUNDING])
+        span = x.min() - CORNER_TOLERANCE, x.max() + CORNER_TOLERANCE
+        first, last = np.searchsorted(points[:, 0], span)
         kind[first:last][box.contains(points[first:last])] = box.kind
     in_order = np.empty_like(kind)
     in_order[order] = kind

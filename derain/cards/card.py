@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
 
@@ -13,7 +12,7 @@ from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
 from derain.files.labels import LARGEST_ID
-from derain.files.reading import is_file
+from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
 from derain.views.channels import UNITS
 
@@ -24,12 +23,18 @@ Parsed = TypeVar("Parsed")
 FoldersTell = Literal["nothing", "classes", "rain"]
 
 # What mean and std are of, in their order.
-CHANNELS = ("x", "y", "z", "intensity")
+CHANNELS_OF_STATISTICS = ("x", "y", "z", "intensity")
 
 
 @dataclass(frozen=True)
 class DataCard:
     """What must be known of a data set.
+
+    Example:
+        >>> card = DataCard("my garage", classes={0: "wall", 1: "spray"}, rain=(1,))
+        >>> scan = derain.Scan.of(np.ones((3, 4))).with_label(np.array([0, 1, 1]))
+        >>> card.rain_of(scan)
+        array([False,  True,  True])
 
     Attributes:
         name: Name of the data set, for tables and models.
@@ -72,6 +77,12 @@ class DataCard:
     folders_tell: FoldersTell = "nothing"
 
     @property
+    def title(self) -> str:
+        """Its name, which says so where the rain is simulated."""
+        told = "simulated" in self.name or not self.simulated
+        return self.name if told else f"{self.name} (simulated)"
+
+    @property
     def has_statistics(self) -> bool:
         """True where the statistics of every channel and the rain share are known."""
         return None not in (self.mean, self.std, self.range, self.rain_share)
@@ -88,8 +99,8 @@ class DataCard:
         if channel == "range" and self.range is not None:
             mean, std = self.range
             return mean, std
-        if channel in CHANNELS and self.mean is not None and self.std is not None:
-            number = CHANNELS.index(channel)
+        if channel in CHANNELS_OF_STATISTICS and self.mean is not None and self.std is not None:
+            number = CHANNELS_OF_STATISTICS.index(channel)
             return self.mean[number], self.std[number]
         if channel in self.extra:
             return self.extra[channel]
@@ -148,12 +159,16 @@ class DataCard:
 
 def packaged_cards() -> dict[str, Path]:
     """Files of the data cards that come with derain, by name."""
-    folder = Path(str(resources.files("derain.cards")))
-    return {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+    return packaged("derain.cards")
 
 
 def load_card(name: str | Path) -> DataCard:
     """Reads a data card.
+
+    Example:
+        >>> card = load_card("wads")
+        >>> [card.classes[number] for number in card.rain]
+        ['falling-snow']
 
     Args:
         name: Name of a packaged card, or a YAML file with the attributes of :class:`DataCard`.
@@ -161,13 +176,7 @@ def load_card(name: str | Path) -> DataCard:
     Raises:
         InputError: No such card, or a file that is not one.
     """
-    cards = packaged_cards()
-    path = cards.get(str(name), Path(name))
-    if not is_file(path):
-        raise InputError(
-            name, "no such data card", f"Give a YAML file or one of {', '.join(cards)}."
-        )
-    return _card(Entry.of_yaml(path))
+    return _card(Entry.of_yaml(packaged_or_own(name, packaged_cards(), "data card")))
 
 
 def _card(document: Entry) -> DataCard:
@@ -178,7 +187,7 @@ def _card(document: Entry) -> DataCard:
         "unknown": _ids,
         "licence": Entry.text,
         "intensity_unit": Entry.text,
-        "mean": _if_known(lambda entry: entry.numbers(len(CHANNELS))),
+        "mean": _if_known(lambda entry: entry.numbers(len(CHANNELS_OF_STATISTICS))),
         "std": _if_known(_deviations),
         "range": _if_known(_mean_and_deviation),
         "extra": lambda entry: _each(entry, _mean_and_deviation),
@@ -217,7 +226,7 @@ def _ids(entry: Entry) -> tuple[int, ...]:
 def _deviations(entry: Entry) -> tuple[float, ...]:
     for item in entry.items():
         item.positive()
-    return entry.numbers(len(CHANNELS))
+    return entry.numbers(len(CHANNELS_OF_STATISTICS))
 
 
 def _mean_and_deviation(entry: Entry) -> tuple[float, ...]:

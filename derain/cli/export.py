@@ -9,7 +9,6 @@ from derain.cli.arguments import count, threads
 from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.system.notices import Notices
-from derain.views.oddities import oddities
 
 if TYPE_CHECKING:
     from derain.scan import Scan
@@ -81,10 +80,10 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _calibration(arguments: argparse.Namespace) -> Collection["Scan"]:
     """Scans that an eight-bit model is scaled by; none for one in float32."""
-    from derain.datamodules.statistics import evenly_spaced
     from derain.errors import InputError
     from derain.export.quantisation import CALIBRATION_SCANS, CalibrationScans
     from derain.files import find_scans
+    from derain.sources.spread import evenly_spaced
 
     if arguments.int8 != bool(arguments.calibration):
         raise InputError(
@@ -102,7 +101,7 @@ def _warn_of_odd(scans: Iterable["Scan"], spec: "Spec") -> None:
     notices = Notices()
 
     def tell(scan: "Scan") -> None:
-        notices.tell(scan.name, oddities(scan, spec))
+        notices.tell(scan.name, spec.oddities(scan))
 
     # Mapped, not looped over: a loop would hold on to one scan while the next is read.
     for _ in map(tell, scans):

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from derain.cli.outputs import say
+from derain.errors import InputError
 
 SUMMARY = "make a checkpoint from published weights"
 
@@ -26,7 +27,7 @@ the range images that the weights were trained on.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument("network", help="outdet, salsanext or lisnownet")
+    parser.add_argument("network", help="the network that they are weights of, such as outdet")
     parser.add_argument("weights", type=Path, help="the published state_dict or checkpoint")
     parser.add_argument(
         "--stats",
@@ -45,20 +46,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     from derain.cards.card import load_card
-    from derain.errors import InputError
-    from derain.models.checkpoint import MODELS, save_model
-    from derain.models.published import read_state_dict
+    from derain.models.checkpoint import save_model
+    from derain.models.published import Published, read_state_dict
+    from derain.models.registry import NETWORKS
     from derain.sources.training_record import by_name
 
-    if arguments.network not in MODELS:
-        raise InputError(arguments.network, "no such network", f"Known are {', '.join(MODELS)}.")
+    network = NETWORKS.get(arguments.network)
+    if network is None or not issubclass(network, Published):
+        raise _not_published(arguments.network)
     stats = load_card(arguments.stats)
     data = stats if arguments.data is None else load_card(arguments.data)
     if not data.rain:
         raise InputError(
             "--data", f"{data.name} has no rain that weights could know", "Say what theirs had."
         )
-    model = MODELS[arguments.network].from_published(
+    model = network.from_published(
         read_state_dict(arguments.weights), data.normalised_as(stats), arguments.grid
     )
     model.adopt(replace(model.spec, training=by_name(data.split.get("train", ()))))
@@ -68,3 +70,13 @@ def main(arguments: argparse.Namespace) -> int:
         f"with the statistics of {stats.name}"
     )
     return 0
+
+
+def _not_published(name: str) -> InputError:
+    """What is said of a network that there is not, or of which nothing was published."""
+    from derain.models.published import Published
+    from derain.models.registry import NETWORKS
+
+    known = [name for name, network in NETWORKS.items() if issubclass(network, Published)]
+    reason = "no weights of it were published" if name in NETWORKS else "no such network"
+    return InputError(name, reason, f"Known are {', '.join(known)}.")

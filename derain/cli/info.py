@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from derain.cli.info_folder import draw, facts_of_folder
 from derain.cli.outputs import say
-from derain.cli.scan_options import add_columns
+from derain.cli.scan_options import ListFormats, add_columns
 from derain.errors import InputError, printable
 from derain.files import find_scans, read_scan
 from derain.files.labels import read_labels, semantic
@@ -60,6 +60,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="names of a sequence's folders of scans and labels (default: those known)",
     )
     parser.add_argument("--picture", type=Path, help="PNG to draw of a folder's statistics")
+    parser.add_argument(
+        "--formats", action=ListFormats, nargs=0, help="list the formats of scans, and end"
+    )
     add_columns(parser)
 
 

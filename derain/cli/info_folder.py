@@ -12,6 +12,7 @@ from derain.cards.card import DataCard, load_card
 from derain.cards.known import card_by_folders
 from derain.cards.layout import Layout
 from derain.errors import InputError
+from derain.evaluation.text_tables import plain_table
 from derain.sources.contents import (
     Tally,
     class_name,
@@ -75,8 +76,7 @@ class FolderFacts:
             counts = [f"{tally.labelled[id_]:,}" for tally in columns]
             share = f"{total.labelled[id_] / total.labelled.total():.3%}"
             rows.append([class_name(id_, self.classes), counts[0], share, *counts[1:]])
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        return "\n".join([f"{self.folder} ({self._explained})", *(_line(r, widths) for r in rows)])
+        return f"{self.folder} ({self._explained})\n{plain_table(rows)}"
 
     @property
     def _explained(self) -> str:
@@ -143,11 +143,3 @@ def _card(folder: Path, layout: tuple[str, str] | None, name: str | None) -> Dat
     elif name is None and layout is not None:
         return card_by_folders(Layout(scans=layout[0], labels=layout[1]), "classes")
     return None if name is None else load_card(name)
-
-
-def _line(cells: list[str], widths: list[int]) -> str:
-    name, *numbers = (
-        cell.rjust(width) if column else cell.ljust(width)
-        for column, (cell, width) in enumerate(zip(cells, widths, strict=True))
-    )
-    return f"  {'  '.join([name, *numbers])}".rstrip()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.cli.arguments import share, threads
+from derain.cli.filter_help import list_filters
 from derain.cli.outputs import refuse_clashes
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError, printable
@@ -22,15 +23,15 @@ from derain.files import find_scans, read_scan, write_scan
 from derain.files.labels import LABEL, write_labels
 from derain.files.names import beside
 from derain.files.reading import reading
-from derain.filters import FILTERS, FilterDerainer, read_parameters
+from derain.filters import FilterDerainer, read_parameters
 from derain.scan import Scan
 from derain.system.notices import Notices
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import Oddity, left_out, much_removed, oddities, outside_view
+from derain.views.oddities import Oddity, left_out, much_removed, outside_view
 
 SUMMARY = "clean scans on a CPU, without torch"
 
-DESCRIPTION = f"""\
+DESCRIPTION = """\
 Cleans scans: writes <stem>.label (1 = rain, one per row of the input) and the scan without its
 rain, in the input's format with every field kept.
 
@@ -42,7 +43,7 @@ rain, in the input's format with every field kept.
   derain run dsor scans/ --out cleaned --parameters best.yaml --set range_multiplier=0.08
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
-or a filter: {", ".join(FILTERS)}.
+or a filter (below).
 What is odd about a scan is warned of, each fault once. One of which more than --most-removed is
 called rain is left alone. It and a scan that cannot be read are reported and passed over; the exit
 code is then 2.
@@ -84,6 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "method", metavar="METHOD", help="ONNX file, YAML file of parameters, or name of a filter"
     )
+    list_filters(parser)
     parser.add_argument("scans", nargs="+", type=Path, help="scans, or folders of scans")
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
@@ -169,10 +171,10 @@ def _judge(
 ) -> tuple[NDArray[np.bool_], list[Oddity]]:
     """Which points are rain, bool (N,), and what is odd about the scan for this method."""
     if isinstance(method, FilterDerainer):
-        return method(scan, stopwatch), list(oddities(scan, method.filter))
+        return method(scan, stopwatch), list(method.filter.oddities(scan))
     judgement = method.judge(scan, stopwatch)
-    outside = outside_view(scan, judgement.judged, method.spec)
-    return judgement.rain, [*oddities(scan, method.spec), *outside]
+    outside = outside_view(scan, judgement.judged, method.spec.data)
+    return judgement.rain, [*method.spec.oddities(scan), *outside]
 
 
 def _summary(done: Sequence[Cleaned]) -> str:

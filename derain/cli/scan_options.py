@@ -4,6 +4,7 @@ import argparse
 
 from derain.cli.arguments import factor
 from derain.files import DEFAULT_COLUMNS
+from derain.files.format import FORMATS
 
 
 def column_names(text: str) -> tuple[str, ...]:
@@ -25,14 +26,15 @@ def add_columns(
         of: Whose files they are, where a command reads several kinds.
         default: What it is where it is not given; None leaves that to the command.
     """
-    parser.add_argument(
+    action = parser.add_argument(
         option,
         type=column_names,
         metavar="NAMES",
         default=default,
-        help=f"names of the columns of {of}files that do not name them: .bin, .npy, .npz of one "
-        f"array, text without a line of names (default: {','.join(DEFAULT_COLUMNS)})",
+        help=f"names of the columns of {of}files that do not name them: %(unnamed)s "
+        f"(default: {','.join(DEFAULT_COLUMNS)})",
     )
+    vars(action)["unnamed"] = _UnnamedFormats()
 
 
 def add_intensity_scale(parser: argparse.ArgumentParser, of: str = "") -> None:
@@ -49,3 +51,32 @@ def add_intensity_scale(parser: argparse.ArgumentParser, of: str = "") -> None:
         metavar="FACTOR",
         help=f"what takes the {of}scans' intensities to the method's unit, e.g. 255 (default: 1)",
     )
+
+
+class ListFormats(argparse.Action):
+    """Option that prints the formats of scan files that there are, and ends the command."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        """Does so."""
+        print(formats_of_scans())
+        parser.exit()
+
+
+def formats_of_scans() -> str:
+    """The formats of scan files that there are, a line each."""
+    suffixes: dict[str, list[str]] = {}
+    for suffix, format_ in FORMATS.items():
+        needs = f" (needs derain[{format_.EXTRA.name}])" if format_.EXTRA else ""
+        suffixes.setdefault(format_.HELP + needs, []).append(suffix)
+    lines = [f"  {', '.join(names):<24}{what}" for what, names in suffixes.items()]
+    return "\n".join(("formats of scans, each of them also compressed as .gz:", *lines))
+
+
+class _UnnamedFormats:
+    """Which files do not name their columns, format by format.
+
+    A text that is made when help shows it, for other packages are asked what formats they bring.
+    """
+
+    def __str__(self) -> str:
+        return ", ".join(sorted({format_.UNNAMED for format_ in FORMATS.values()} - {""}))

@@ -14,6 +14,7 @@ from tqdm import tqdm
 
 from derain import __version__
 from derain.cli.arguments import command_line, count, threads
+from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
 from derain.errors import InputError
@@ -21,7 +22,7 @@ from derain.files.atomic import replacing
 from derain.filters import FILTERS, filter_from
 from derain.sources.training_record import overlap
 from derain.system.notices import Notices
-from derain.views.oddities import Judge, oddities, outside_view
+from derain.views.oddities import Examiner, outside_view
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule
@@ -48,9 +49,8 @@ A model's threshold is found exactly, from its probabilities, without trials.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument(
-        "method", metavar="METHOD", help="ror, sor, dror, dsor, ssr or an ONNX file"
-    )
+    parser.add_argument("method", metavar="METHOD", help="a filter (below) or an ONNX file")
+    list_filters(parser)
     add_data_arguments(parser, part="validation")
     parser.add_argument("--out", type=Path, required=True, help="YAML file to write")
     parser.add_argument(
@@ -66,13 +66,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    from derain.export.tuning import SPACES
-
     notices = Notices()
     data = labelled(arguments, arguments.data)
     files = _drawn(data.frames(arguments.part), arguments.scans, arguments.seed)
     refuse_unwritable(arguments.out)
-    tune = _tuned_filter if arguments.method in SPACES else _tuned_model
+    tune = _tuned_filter if arguments.method in FILTERS else _tuned_model
     tuned = tune(arguments, data, files, notices)
     notices.tell_how_many_more()
     facts = (
@@ -92,11 +90,12 @@ def _tuned_filter(
     files: list["Frame"],
     notices: Notices,
 ) -> "Tuned":
-    from derain.export.tuning import Search, ViewedScan, tune_filter
+    from derain.export.tuning import LabelledNeighbourhoods, Search, neighbours_to_find, tune_filter
 
+    neighbours = neighbours_to_find(arguments.method)
     read = partial(_read, data, filter_from(arguments.method, {}), notices)
     scans = [
-        ViewedScan.of(read(file), data.card, arguments.threads)
+        LabelledNeighbourhoods.of(read(file), data.card, neighbours, arguments.threads)
         for file in tqdm(files, desc="finding neighbours", unit="scan", disable=None)
     ]
     if not any(scan.rain.any() for scan in scans):
@@ -123,14 +122,14 @@ def _tuned_model(
     from derain.export.tuning import tune_threshold
 
     derainer = load_method(arguments.method, {}, arguments.threads)
-    assert isinstance(derainer, Derainer)  # every filter has its bounds
+    assert isinstance(derainer, Derainer)  # filters are tuned by _tuned_filter
 
     def judged() -> Iterator[tuple[Any, Any]]:
         for file in tqdm(files, desc="judging", unit="scan", disable=None):
             scan = _read(data, derainer.spec, notices, file)
             known = scan.valid & ~data.card.unknown_of(scan)
             judgement = derainer.judge(scan)
-            outside = outside_view(scan, judgement.judged, derainer.spec)
+            outside = outside_view(scan, judgement.judged, derainer.spec.data)
             notices.tell(file.name, outside)
             yield judgement.probability[known], data.card.rain_of(scan)[known]
 
@@ -143,10 +142,10 @@ def _tuned_model(
     return tune_threshold(scans, derainer.spec.threshold)
 
 
-def _read(data: "ScanDataModule", judge: Judge, notices: Notices, file: "Frame") -> "Scan":
+def _read(data: "ScanDataModule", examiner: Examiner, notices: Notices, file: "Frame") -> "Scan":
     """Reads a scan, and warns of what is odd about it for the method."""
     scan = data.read_measured(file)
-    notices.tell(file.name, oddities(scan, judge))
+    notices.tell(file.name, examiner.oddities(scan))
     return scan
 
 

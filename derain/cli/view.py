@@ -5,18 +5,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cli.arguments import threads
+from derain.cli.filter_help import list_filters
 from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError
 from derain.files import read_scan
 from derain.system.notices import Notices
-from derain.views.oddities import oddities, outside_view
+from derain.views.oddities import outside_view
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from derain.export.bench.contestants import Contestant
+    from derain.export.bench.contestant import Contestant
     from derain.scan import Scan
 
 SUMMARY = "draw a scan as several methods clean it"
@@ -29,8 +30,8 @@ sensor sees it.
   derain view scan.bin --card wads --methods outdet.onnx tuned=dsor.yaml dror --out figure.png
   derain view scan.bin --methods outdet.onnx --window
 
-A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), a filter (ror, sor, dror,
-dsor, ssr), all or none. --card says what the scan's labels mean; without it there is no truth, and
+A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), a filter (below), all or
+none. --card says what the scan's labels mean; without it there is no truth, and
 with it points whose label says that they are unknown are left out.
 """
 
@@ -38,6 +39,7 @@ with it points whose label says that they are unknown are left out.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument("scan", type=Path)
+    list_filters(parser)
     parser.add_argument("--methods", nargs="+", required=True, metavar="[TITLE=]METHOD")
     parser.add_argument("--out", type=Path, help="PNG file to write")
     parser.add_argument("--window", action="store_true", help="open a window for each method")
@@ -60,7 +62,8 @@ def main(arguments: argparse.Namespace) -> int:
     scan = scan.with_intensity_times(arguments.intensity_scale)
     notices = Notices()
     for method in methods:
-        notices.tell(str(arguments.scan), oddities(scan, method.judge), method.title)
+        if method.judges_by is not None:
+            notices.tell(str(arguments.scan), method.judges_by.oddities(scan), method.title)
     truth = _truth(scan, arguments)
     predicted = {
         method.title: _rain(scan, method, arguments.threads, notices) for method in methods
@@ -94,7 +97,7 @@ def _rain(
     if not isinstance(judge, Derainer):
         return judge(scan, Stopwatch())
     judgement = judge.judge(scan)
-    outside = outside_view(scan, judgement.judged, judge.spec)
+    outside = outside_view(scan, judgement.judged, judge.spec.data)
     notices.tell(scan.name, outside, method.title)
     return judgement.rain
 

@@ -1,6 +1,6 @@
 """What shows whether a derainer has learnt rain at all: places alone, everything, nothing.
 
-The fourth, dim and near points, is :class:`derain.evaluation.intensity_rule.OneLineRule`.
+The fourth, dim and near points, is :class:`derain.evaluation.intensity_rule.IntensityRule`.
 """
 
 import math

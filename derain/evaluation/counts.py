@@ -1,5 +1,6 @@
 """Points by what they are and what they were called, and the scores that follow from them."""
 
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 
 import numpy as np
@@ -22,14 +23,17 @@ def ratio(part: ArrayLike, whole: ArrayLike, undefined: float = 1.0) -> NDArray[
     return shares
 
 
-def intersection_over_union(hits: ArrayLike, errors: ArrayLike) -> NDArray[np.float64]:
-    """IoU of rain, float64; 1 where no point is rain or called rain.
+def intersection_over_union(
+    hits: ArrayLike, errors: ArrayLike, undefined: float = 1.0
+) -> NDArray[np.float64]:
+    """IoU of rain, float64, of the shape that hits and errors have together.
 
     Args:
         hits: Points of rain called rain, or one number of them for each choice.
-        errors: Rain not called rain and other points called rain, together; of the same shape.
+        errors: Rain not called rain and other points called rain, together.
+        undefined: The IoU where no point is rain or called rain.
     """
-    return ratio(hits, np.add(hits, errors))
+    return ratio(hits, np.add(hits, errors), undefined)
 
 
 @dataclass(frozen=True)
@@ -89,3 +93,13 @@ class Counts:
         """Intersection over union of rain; 1 where no point is rain or called rain."""
         errors = self.false_positive + self.false_negative
         return float(intersection_over_union(self.true_positive, errors))
+
+
+def mean_over_scans(per_scan: Sequence[Counts], score: str) -> float:
+    """Mean of the scores of single scans; 1 where there is none, as for no points at all.
+
+    Args:
+        per_scan: Counts of each scan.
+        score: One of ``SCORES``.
+    """
+    return float(np.mean([getattr(counts, score) for counts in per_scan])) if per_scan else 1.0

@@ -18,18 +18,30 @@ def scene(points: int = 3000, seed: int = 0) -> NDArray[np.float32]:
     Returns:
         x, y, z in metres and intensity 0..255, float32 (points, 4).
     """
-    rng = np.random.default_rng(seed)
+    generator = np.random.default_rng(seed)
     road, drops = points // 2, points // 10
     wall = points - road - drops
     x = np.concatenate(
-        [rng.uniform(3, 60, road), rng.normal(40, 0.02, wall), rng.gamma(2, 4, drops)]
+        [
+            generator.uniform(3, 60, road),
+            generator.normal(40, 0.02, wall),
+            generator.gamma(2, 4, drops),
+        ]
     )
-    y = rng.uniform(-15, 15, points)
+    y = generator.uniform(-15, 15, points)
     z = np.concatenate(
-        [rng.normal(-1.8, 0.02, road), rng.uniform(-1.8, 6, wall), rng.uniform(-1.5, 4, drops)]
+        [
+            generator.normal(-1.8, 0.02, road),
+            generator.uniform(-1.8, 6, wall),
+            generator.uniform(-1.5, 4, drops),
+        ]
     )
     intensity = np.concatenate(
-        [rng.uniform(5, 60, road), rng.uniform(20, 200, wall), rng.uniform(0, 4, drops)]
+        [
+            generator.uniform(5, 60, road),
+            generator.uniform(20, 200, wall),
+            generator.uniform(0, 4, drops),
+        ]
     )
     return np.stack([x, y, z, intensity], axis=1).astype(np.float32)
 

@@ -1,6 +1,6 @@
-"""The rule every derainer has to beat: rain is dim and near."""
+"""The rule on intensity and range that every derainer has to beat: rain is dim and near."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Self
 
@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from derain.evaluation.counts import intersection_over_union
 from derain.scan import Scan
+from derain.views.oddities import Oddity, missing_intensity
 
-STEPS = 200
+# Limits of intensity, and as many of range, that are tried where the rain has more values.
+MOST_LIMITS = 200
 
 
 @dataclass(frozen=True)
-class OneLineRule:
+class IntensityRule:
     """Calls a point rain if its intensity and its range are both small.
 
     On the WADS sample, "intensity 0 and nearer than 20 m" reaches an IoU of .72: a method that
@@ -36,6 +38,10 @@ class OneLineRule:
         dim: NDArray[np.bool_] = intensity <= self.intensity
         return dim & (scan.range <= self.range) & scan.valid
 
+    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+        """What is odd about a scan: no intensity. Its unit is that of the scans learnt from."""
+        yield from missing_intensity(scan)
+
     @classmethod
     def best(cls, scans: Iterable[tuple[Scan, NDArray[np.bool_]]]) -> Self:
         """Finds the two limits of the greatest IoU.
@@ -54,13 +60,14 @@ class OneLineRule:
         if not any(rain.any() for _, _, rain in parts):
             return cls(-np.inf, -np.inf)
         intensity, distance, rain = (np.concatenate(column) for column in zip(*parts, strict=True))
-        # Only a value of the rain itself can be the best limit; of very many, evenly spaced ones.
-        shares = np.linspace(0, 1, STEPS)
+        # Only a value of the rain itself can be the best limit. Where there are very many values,
+        # those at evenly spaced quantiles are tried.
+        shares = np.linspace(0, 1, MOST_LIMITS)
         limits = [
             np.unique(np.quantile(column[rain], shares, method="lower"))
             for column in (intensity, distance)
         ]
-        # The cell of a point holds the lowest limits that let it pass.
+        # A point's cell is the pair of the lowest limits that let it pass.
         cells = [
             np.searchsorted(limit, column)
             for limit, column in zip(limits, (intensity, distance), strict=True)

@@ -1,6 +1,5 @@
 """How well a method finds rain, counted over points: of all scans together and scan by scan."""
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,7 +12,7 @@ from torchmetrics import Metric
 from torchmetrics.utilities import dim_zero_cat
 
 from derain.errors import InputError
-from derain.evaluation.counts import SCORES, Counts, ratio
+from derain.evaluation.counts import SCORES, Counts, mean_over_scans, ratio
 from derain.scan import Scan
 
 
@@ -134,8 +133,10 @@ class RainMetrics(Metric):
             predicted: True for the points called rain, bool (N,).
 
         Raises:
-            InputError: A label that is no class.
+            InputError: A scan without labels, or a label that is no class.
         """
+        if scan.label is None:
+            raise InputError(scan.name, "it has no labels", "Give its label file.")
         self.update(
             predicted=torch.from_numpy(predicted).to(self.device),
             label=torch.from_numpy(scan.label).to(self.device),
@@ -153,9 +154,7 @@ class RainMetrics(Metric):
         """
         pooled, per_scan = self._pooled(), self._per_scan()
         scores = {score: getattr(pooled, score) for score in SCORES}
-        for score in SCORES:
-            total = math.fsum(getattr(counts, score) for counts in per_scan)
-            scores[f"{score}_per_scan"] = float(ratio(total, len(per_scan)))
+        scores |= {f"{score}_per_scan": mean_over_scans(per_scan, score) for score in SCORES}
         return {
             name: torch.tensor(score, dtype=torch.float32, device=self.device)
             for name, score in scores.items()

@@ -11,21 +11,26 @@ from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.files.columns import DEFAULT_COLUMNS
 from derain.files.content import compressed, read_content
-from derain.files.formats import FORMATS, format_of
+from derain.files.format import FORMATS, format_of
 from derain.files.frame_times import METADATA
 from derain.files.names import is_compressed, scan_suffix
 from derain.files.reading import reading
 from derain.scan import Scan
 
-__all__ = ["DEFAULT_COLUMNS", "find_scans", "read_scan", "write_scan"]
+__all__ = ["DEFAULT_COLUMNS", "count_points", "find_scans", "read_scan", "write_scan"]
 
-# What lies in folders of scans and is none: when they were taken, and KITTI's poses, times and
-# calibration.
+# Files that lie in folders of scans and are no scans, though their suffix is one of a format: when
+# the scans were taken, and KITTI's poses, times and calibration.
 RECORDS = (METADATA, "calib.txt", "poses.txt", "times.txt", "timestamps.txt")
 
 
 def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Scan:
     """Reads one scan.
+
+    Example:
+        >>> scan = read_scan("scan.bin")
+        >>> len(scan), list(scan.fields)
+        (820, ['x', 'y', 'z', 'intensity'])
 
     Args:
         path: The file, in any of FORMATS; compressed as a whole if its name ends in .gz.
@@ -47,8 +52,28 @@ def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Sca
         return format_.decode(read_content(path), columns)
 
 
+def count_points(path: Path, columns: Sequence[str] = DEFAULT_COLUMNS) -> int:
+    """Number of points of a scan, which is read only where the size of its file does not tell.
+
+    Args:
+        path: As for :func:`read_scan`.
+        columns: As for :func:`read_scan`.
+
+    Raises:
+        InputError: A scan that cannot be read.
+    """
+    counted = None if is_compressed(path) else format_of(path).count(path, columns)
+    return len(read_scan(path, columns)) if counted is None else counted
+
+
 def write_scan(path: Path | str, scan: Scan) -> None:
     """Writes one scan: every column of the file it came from, else coordinates and intensity.
+
+    Example:
+        >>> scan = read_scan("scan.bin")
+        >>> write_scan("near.pcd", scan.take(scan.range < 15))
+        >>> len(read_scan("near.pcd"))
+        20
 
     Args:
         path: The file, in any of FORMATS; compressed as a whole if its name ends in .gz.
@@ -91,8 +116,8 @@ def _scans_in(folder: Path) -> list[Path]:
         and not path.name.startswith(".")
         and path.is_file()
     )
-    least = min((FORMATS[scan_suffix(path)].record for path in scans), default=0)
-    scans = [path for path in scans if FORMATS[scan_suffix(path)].record == least]
+    least = min((FORMATS[scan_suffix(path)].RECORD for path in scans), default=0)
+    scans = [path for path in scans if least == FORMATS[scan_suffix(path)].RECORD]
     if not scans:
         raise InputError(
             folder, f"holds no scans ({', '.join(FORMATS)})", "Name a folder with scans in it."

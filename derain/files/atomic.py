@@ -15,7 +15,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Until then `path` stays as it was; after an error the temporary file is gone. It is hidden, has
     the same suffix where that may be one of a format, and lies in the same folder, which is created
-    if missing. What a killed process leaves there goes with the next one that writes to the folder.
+    if missing. What a killed process leaves there goes when the next one writes to the folder.
 
     Args:
         path: The file to write.

@@ -119,7 +119,7 @@ def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
 
 
 def describable_columns(path: Path, scan: Scan, types: Collection[str]) -> dict[str, NDArray[Any]]:
-    """The columns of a scan for a format that has a line of text for each.
+    """The columns of a scan for a format whose header describes each in a line of text.
 
     Args:
         path: The file, for messages.

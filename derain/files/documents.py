@@ -28,7 +28,8 @@ DEEPEST = 32
 # document may have one for so many of the bytes that it may have.
 BYTES_PER_VALUE = 16
 
-# What PyYAML lets out: its own errors, and what Python says of a tag such as !!int over no number.
+# What PyYAML raises on bad documents: its own errors, and what Python raises where a tag such as
+# !!int stands before what is no number.
 _YAML_DAMAGE = (
     *(yaml.YAMLError, ValueError, LookupError, TypeError, AttributeError),
     *(ArithmeticError, RecursionError),
@@ -275,7 +276,7 @@ def _refuse_depth(value: Any, depth: int = 0) -> None:
 
 
 def _refuse_what_unfolds(text: str, most: int) -> None:
-    """Refuses, before anything is built, what would be far larger than its text."""
+    """Refuses a text whose values would take far more memory than it, before any are made."""
     depth = 0
     for number, event in enumerate(yaml.parse(text, _LOADER)):
         if number > most:

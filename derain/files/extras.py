@@ -1,6 +1,8 @@
 """Libraries that only some formats need, and that are therefore installed on demand."""
 
-import importlib
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
@@ -8,22 +10,39 @@ from derain.errors import InputError
 from derain.files.names import scan_suffix
 
 
-def import_extra(library: str, extra: str, path: Path) -> ModuleType:
-    """Imports the library of a format.
+@dataclass(frozen=True)
+class Extra:
+    """One of derain's extras, as in ``pip install 'derain[las]'``.
 
-    Args:
-        library: Name of the module.
-        extra: Name of derain's extra that installs it.
-        path: The file that needs it, for the message.
-
-    Raises:
-        InputError: It is not installed.
+    Attributes:
+        name: Its name.
+        library: Name of the module that it installs.
     """
-    try:
-        return importlib.import_module(library)
-    except ImportError as error:
-        raise InputError(
-            path,
-            f"{scan_suffix(path)} needs {library}, which is not installed ({error})",
-            f"pip install 'derain[{extra}]'.",
-        ) from error
+
+    name: str
+    library: str
+
+    @property
+    def installed(self) -> bool:
+        """Whether the library is there; it is not imported."""
+        return find_spec(self.library) is not None
+
+    def load(self, path: Path, submodule: str = "") -> ModuleType:
+        """Imports the library.
+
+        Args:
+            path: The file that needs it, for the message.
+            submodule: Name of a module within it, where that is wanted.
+
+        Raises:
+            InputError: It is not installed.
+        """
+        name = f"{self.library}.{submodule}" if submodule else self.library
+        try:
+            return import_module(name)
+        except ImportError as error:
+            raise InputError(
+                path,
+                f"{scan_suffix(path)} needs {name}, which is not installed ({error})",
+                f"pip install 'derain[{self.name}]'.",
+            ) from error

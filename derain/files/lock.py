@@ -1,4 +1,4 @@
-"""Locks that the system takes back from a process that dies."""
+"""Locks on files, which the system releases when the process that holds them dies."""
 
 import errno
 import os

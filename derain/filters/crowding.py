@@ -1,15 +1,16 @@
 """Which points have few others around them, found without every point's neighbours.
 
 Points that are next to each other along a Morton curve are near in space. Most points of a scan
-have enough company among those few, and only the others are searched for.
+have enough others within their radius among the next few along the curve, and need no search: it is
+made for the remaining ones only.
 """
 
 import numpy as np
 import small_gicp
 from numpy.typing import NDArray
 
-# Places along the curve looked at to either side: settles 86 of 100 points of the WADS sample with
-# DROR. Twice as many settle one more, for twice the time.
+# Places along the curve that are looked at to either side of a point. Four settle 86 of 100 points
+# of the WADS sample with DROR; eight settle one more, for twice the time.
 STEPS = 4
 
 # Closer to the radius than this share of it, the search decides, so that rounding never does.
@@ -34,18 +35,29 @@ def few_around(
     if len(xyz) < count:
         return few
     places = xyz.astype(np.float64)
-    few[_company(places, radius * (1 - MARGIN)) >= count] = False
+    few[_found_along_curve(places, radius * (1 - MARGIN)) >= count] = False
     unsettled = np.flatnonzero(few)
     tree = small_gicp.KdTree(places, num_threads=threads)
     _, squared = tree.batch_knn_search(places[unsettled], count, num_threads=threads)
-    # Rounded as the distances of a view of neighbours are, which decides the same.
+    # Rounded to float32 as the distances of the neighbour view are, so that a filter says the same
+    # whether it judges alone or shares a view with others.
     distance = np.sqrt(squared[:, count - 1].astype(np.float32))
     few[unsettled] = distance > radius[unsettled]
     return few
 
 
-def _company(places: NDArray[np.float64], radius: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Points within the radius among the next few along the curve, the point itself included."""
+def _found_along_curve(
+    places: NDArray[np.float64], radius: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Counts points within the radius, the point itself and up to STEPS places to either side.
+
+    Args:
+        places: Positions in the order of the curve, float64 (M, 3), metres.
+        radius: That of each point, metres, float64 (M,).
+
+    Returns:
+        At most as many as there are within the radius, int64 (M,).
+    """
     columns, limit = np.ascontiguousarray(places.T), np.square(radius)
     found = np.ones(len(places), np.int64)
     for step in range(1, min(STEPS, len(places) - 1) + 1):

@@ -20,8 +20,11 @@ class FilterDerainer:
     """A filter, called as :class:`derain.export.runtime.Derainer` is.
 
     Example:
-        >>> derainer = FilterDerainer(DROR())  # doctest: +SKIP
-        >>> clean = points[~derainer(points)]  # doctest: +SKIP
+        >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)  # x, y, z, intensity
+        >>> derainer = FilterDerainer(derain.DROR())
+        >>> clean = points[~derainer(points)]
+        >>> len(points), len(clean)
+        (820, 800)
 
     Args:
         filter: The filter.
@@ -79,11 +82,15 @@ class FilterDerainer:
 
 
 def filter_view(neighbours: int, threads: int = 0) -> NeighbourView:
-    """How filters see a scan, several at once where it has the neighbours of the most demanding.
+    """How filters see a scan.
+
+    One view serves several filters: each looks at no more than its own number of neighbours.
 
     Args:
-        neighbours: Size of a neighbourhood, the point itself included.
+        neighbours: Size of a neighbourhood, the point itself included; the largest that any of the
+            filters looks at.
         threads: Threads of the search; 0 takes every core this process may use.
     """
-    # No comparison with what is not a number holds: what needs intensity finds nothing without.
+    # In a scan without intensity every point has NaN for it, and no comparison with NaN is true: a
+    # filter that judges by intensity finds nothing there.
     return NeighbourView(neighbours, stand_in={"intensity": math.nan}, threads=threads)

@@ -1,19 +1,23 @@
 """Dynamic radius outlier removal."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import shown
+from derain.filters.point_filter import TUNED_NEIGHBOURS, Span
 from derain.filters.radius_filter import RadiusFilter
+from derain.filters.registry import FILTERS
 
 Variant = Literal["code", "paper"]
 
 
+@FILTERS.add("dror")
 @dataclass(frozen=True)
 class DROR(RadiusFilter):
     """Calls a point rain if it has few points around it for the spacing of beams at its range.
@@ -30,6 +34,12 @@ class DROR(RadiusFilter):
     finer than what spinning sensors step by: on the WADS sample it takes 40 % of the points that
     are no snow for snow, 0.16° takes 2 %.
 
+    Example:
+        >>> scan = derain.read_scan("scan.bin")  # a wall of 800 points and 20 drops before it
+        >>> rain = derain.FilterDerainer(DROR())(scan)
+        >>> int(rain.sum()), bool((scan.range[rain] < 15).all())
+        (20, True)
+
     Attributes:
         neighbours: Points to be found, the point itself included.
         radius_multiplier: Beam spacings that make a radius.
@@ -43,6 +53,14 @@ class DROR(RadiusFilter):
     Source: N. Charron, S. Phillips and S. L. Waslander, "De-noising of Lidar Point Clouds Corrupted
         by Snowfall", CRV 2018, and github.com/nickcharron/lidar_snow_removal.
     """
+
+    HELP: ClassVar[str] = "rain has few points within a radius that grows with range"
+    # Of multiplier and resolution only the product counts: one of them is looked for.
+    SPACE: ClassVar[Mapping[str, Span]] = {
+        "neighbours": TUNED_NEIGHBOURS,
+        "radius_multiplier": (0.3, 30.0),
+        "minimum_radius": (0.005, 1.0),
+    }
 
     neighbours: int = 3
     radius_multiplier: float = 3.0

@@ -1,15 +1,19 @@
 """Dynamic statistical outlier removal."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.filters.point_filter import PointFilter
+from derain.filters.point_filter import TUNED_NEIGHBOURS, PointFilter, Span
+from derain.filters.registry import FILTERS
 from derain.filters.usual_distance import mean_distance, usual_limit
 from derain.views.neighbours import Neighbourhoods
 
 
+@FILTERS.add("dsor")
 @dataclass(frozen=True)
 class DSOR(PointFilter):
     """Calls a point rain if it lies farther from its neighbours than is usual at its range.
@@ -20,6 +24,12 @@ class DSOR(PointFilter):
     What is very near the sensor is rain by this definition. A scan of a single point says nothing
     of what is usual: not rain.
 
+    Example:
+        >>> scan = derain.read_scan("scan.bin")  # a wall of 800 points and 20 drops before it
+        >>> rain = derain.FilterDerainer(DSOR())(scan)
+        >>> int(rain.sum()), bool((scan.range[rain] < 15).all())
+        (20, True)
+
     Attributes:
         neighbours: Size of a neighbourhood, the point itself included.
         deviation_multiplier: s, standard deviations above the mean that are still usual.
@@ -28,6 +38,13 @@ class DSOR(PointFilter):
     Source: A. Kurup and J. Bos, "DSOR: A Scalable Statistical Filter for Removing Falling Snow from
         LiDAR Point Clouds in Severe Winter Weather", arXiv 2109.07078, 2021, and its defaults.
     """
+
+    HELP: ClassVar[str] = "rain lies farther from its neighbours than is usual at its range"
+    SPACE: ClassVar[Mapping[str, Span]] = {
+        "neighbours": TUNED_NEIGHBOURS,
+        "deviation_multiplier": (0.001, 10.0),
+        "range_multiplier": (0.002, 2.0),
+    }
 
     neighbours: int = 5
     deviation_multiplier: float = 0.01

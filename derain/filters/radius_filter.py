@@ -1,4 +1,4 @@
-"""What the two filters by radius share: a point is rain if it has few points around it."""
+"""What filters by radius share: a point is rain if it has few points around it."""
 
 from abc import abstractmethod
 from dataclasses import dataclass

@@ -1,15 +1,19 @@
 """Statistical outlier removal."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.filters.point_filter import PointFilter
+from derain.filters.point_filter import TUNED_NEIGHBOURS, PointFilter, Span
+from derain.filters.registry import FILTERS
 from derain.filters.usual_distance import mean_distance, usual_limit
 from derain.views.neighbours import Neighbourhoods
 
 
+@FILTERS.add("sor")
 @dataclass(frozen=True)
 class SOR(PointFilter):
     """Calls a point rain if it lies farther from its neighbours than is usual in the scan.
@@ -23,6 +27,12 @@ class SOR(PointFilter):
     its means; that scales both sides alike and so decides the same, save that a point just at the
     limit goes.
 
+    Example:
+        >>> scan = derain.read_scan("scan.bin")  # a wall of 800 points and 20 drops before it
+        >>> rain = derain.FilterDerainer(SOR())(scan)
+        >>> int(rain.sum()), bool((scan.range[rain] < 15).all())
+        (20, True)
+
     Attributes:
         neighbours: Size of a neighbourhood, the point itself included.
         deviation_multiplier: Standard deviations above the mean that are still usual.
@@ -31,6 +41,12 @@ class SOR(PointFilter):
         environments", Robotics and Autonomous Systems 56, 2008. The defaults are those of DSOR,
         which extends it.
     """
+
+    HELP: ClassVar[str] = "rain lies farther from its neighbours than is usual in the scan"
+    SPACE: ClassVar[Mapping[str, Span]] = {
+        "neighbours": TUNED_NEIGHBOURS,
+        "deviation_multiplier": (0.001, 10.0),
+    }
 
     neighbours: int = 5
     deviation_multiplier: float = 0.01

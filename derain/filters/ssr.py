@@ -1,16 +1,21 @@
 """The label-free teacher of 3D-UnOutDet."""
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.filters.point_filter import PointFilter
+from derain.filters.point_filter import TUNED_NEIGHBOURS, PointFilter, Span
+from derain.filters.registry import FILTERS
+from derain.scan import Scan
 from derain.views.neighbours import Neighbourhoods
+from derain.views.oddities import Oddity, intensity_of_another_scale, missing_intensity
 
 
+@FILTERS.add("ssr")
 @dataclass(frozen=True)
 class SSR(PointFilter):
     """Calls a point rain if its whole neighbourhood is dim for how far apart it lies.
@@ -19,6 +24,12 @@ class SSR(PointFilter):
     neighbourhood, distances being those to the point, in metres. That is the norm of the
     spectrum of these k numbers, which the authors compute. Where the scan has fewer points, k is
     their number. Without intensity, nothing is found.
+
+    Example:
+        >>> scan = derain.read_scan("scan.bin")  # a wall of 800 points and 20 drops before it
+        >>> rain = derain.FilterDerainer(SSR())(scan)
+        >>> int(rain.sum()), bool((scan.range[rain] < 15).all())
+        (20, True)
 
     Attributes:
         neighbours: k, the size of a neighbourhood, the point itself included.
@@ -29,6 +40,11 @@ class SSR(PointFilter):
         its norm after a Fourier transform is √k times that before.
     """
 
+    HELP: ClassVar[str] = "rain is dim, as are its neighbours, for how far apart they lie"
+    SPACE: ClassVar[Mapping[str, Span]] = {
+        "neighbours": TUNED_NEIGHBOURS,
+        "threshold": (0.01, 1e6),
+    }
     FULL_SCALE: ClassVar[float] = 255.0
 
     neighbours: int = 9
@@ -48,3 +64,8 @@ class SSR(PointFilter):
         ):
             energy += np.square(intensity[neighbour] * np.square(distance + 1))
         return math.sqrt(k) * np.sqrt(energy) < self.threshold
+
+    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+        """What is odd about a scan: no intensity, or one in another unit than the threshold's."""
+        yield from missing_intensity(scan)
+        yield from intensity_of_another_scale(scan, self.FULL_SCALE, self.name)

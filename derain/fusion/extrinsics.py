@@ -12,9 +12,9 @@ from derain.scan import to_float32
 
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 
-# Farthest that the product of a rotation and its transpose may be from the identity: calibration
-# files are rounded, to four digits or more.
-ROUNDING = 1e-3
+# By how much the product of a rotation and its transpose may differ from the identity, element by
+# element: the numbers in calibration files are rounded, to four digits or more.
+ROTATION_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +106,10 @@ def _extrinsics(document: Entry) -> Extrinsics:
 
 
 def _is_rotation(matrix: NDArray[np.float64]) -> bool:
-    # The first is asked first: squares of what is far larger would not be numbers.
+    # Large elements are refused first, before their squares can overflow.
     return bool(
-        np.abs(matrix).max() <= 1 + ROUNDING
-        and np.abs(matrix @ matrix.T - np.eye(3)).max() <= ROUNDING
+        np.abs(matrix).max() <= 1 + ROTATION_TOLERANCE
+        and np.abs(matrix @ matrix.T - np.eye(3)).max() <= ROTATION_TOLERANCE
         and np.linalg.det(matrix) > 0
     )
 

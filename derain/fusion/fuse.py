@@ -12,10 +12,10 @@ from derain.fusion.extrinsics import Extrinsics
 from derain.fusion.label_transfer import LABEL_WITHIN, transfer_labels
 from derain.scan import Scan
 
-# Columns that every merged file has; a channel of the radar's cannot go by their names.
+# Columns that every merged file has. No channel of the radar may have one of these names.
 MERGED_COLUMNS = ("x", "y", "z", "intensity", "radar")
 
-# What is fused with a LiDAR scan that has no radar frame near in time.
+# The radar frame of a LiDAR scan near whose time none was taken: one without detections.
 NO_DETECTIONS = Scan(np.zeros((0, 3), np.float32), name="no radar frame")
 
 
@@ -60,7 +60,8 @@ def fuse(
 
     Args:
         lidar: The LiDAR's scan. With labels, the fused cloud has labels.
-        radar: The radar's frame; its own labels count if it has any, else it gets the LiDAR's.
+        radar: The radar's frame. Its labels are kept; if it has none, each of its points gets that
+            of the nearest LiDAR point.
         extrinsics: Takes points of the radar into the LiDAR's frame.
         label_within: How far a LiDAR point's label reaches, metres.
         channels: Fields of the radar frame to carry along, such as doppler and rcs.

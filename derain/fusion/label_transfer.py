@@ -9,7 +9,8 @@ from derain.scan import Scan
 from derain.system.cores import usable_cores
 from derain.views.morton import distinct_rows
 
-# Class of points of which no label is known; no class of REHEARSE-3D, SemanticKITTI or WADS.
+# Id that stands for "class not known". No class of REHEARSE-3D has it; in SemanticKITTI and WADS,
+# which have no radar to transfer labels to, it is that of moving motorcyclists.
 UNKNOWN = 255
 
 # How far a label reaches by default, metres, a modelling choice: about the size of an automotive
@@ -23,7 +24,7 @@ def transfer_labels(
 ) -> NDArray[np.int64]:
     """Labels points by the nearest valid point of a labelled scan.
 
-    Where several rows of the scan lie at one position, the first of them speaks for all.
+    Where several rows of the scan lie at one position, the label of the first of them counts.
 
     Args:
         labelled: A scan with labels.
@@ -42,7 +43,8 @@ def transfer_labels(
     if labelled.label is None:
         raise InputError(labelled.name, "it has no labels", "Give its label file.")
     label = np.full(len(xyz), UNKNOWN, np.int64)
-    # The first row of each position only, for a kd-tree gives any of those that are equally near.
+    # Only the first row at each position is searched: of several rows that are equally near, a
+    # kd-tree may find any.
     source, _ = distinct_rows(labelled)
     asked = np.flatnonzero(Scan(xyz).valid)
     if len(source) and len(asked):

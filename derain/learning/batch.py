@@ -8,7 +8,7 @@ from torch import Tensor
 
 from derain.cards.card import DataCard
 from derain.scan import Scan
-from derain.views.view import IGNORED, ViewedScan, WayToRows
+from derain.views.view import IGNORED, BackProjection, SeenScan
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,14 +25,14 @@ class Sample:
     """
 
     scan: Scan
-    view: ViewedScan
+    view: SeenScan
     target: Tensor | None
     measured: bool = True
     key: str = ""
 
     @classmethod
     def of(
-        cls, scan: Scan, view: ViewedScan, card: DataCard, measured: bool = True, key: str = ""
+        cls, scan: Scan, view: SeenScan, card: DataCard, measured: bool = True, key: str = ""
     ) -> "Sample":
         """Gives a view its target, by the labels of its scan if there are any.
 
@@ -51,12 +51,12 @@ class MeasuredScan:
 
     Attributes:
         scan: The whole scan, with its labels where they are known.
-        way_to_rows: Carries scores of its cells to its rows.
+        back_projection: Carries scores of its cells to its rows.
         key: What is made of the scan is named by this.
     """
 
     scan: Scan
-    way_to_rows: WayToRows
+    back_projection: BackProjection
     key: str
 
 
@@ -90,7 +90,7 @@ class Batch:
             target=torch.cat(targets) if len(targets) == len(samples) else None,
             cells=[sample.view.size for sample in samples],
             measured=[
-                MeasuredScan(sample.scan, sample.view.way_to_rows(), sample.key)
+                MeasuredScan(sample.scan, sample.view.back_projection(), sample.key)
                 for sample in samples
                 if sample.measured
             ],

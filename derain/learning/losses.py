@@ -1,7 +1,7 @@
 """What a supervised derainer learns from: weighted cross-entropy and the Lovász-softmax loss.
 
-Losses take one row a point. Whoever has an image picks its valid pixels first:
-``logits.movedim(1, -1)[valid]``. Each has a defined, finite value and gradient for every scan:
+Losses take one row for each point. Of an image, take its valid pixels:
+``logits.movedim(1, -1)[valid]``. Each loss has a defined, finite value and gradient for every scan:
 without points, without rain, or with nothing but rain. All compute in float32 or wider.
 """
 
@@ -42,8 +42,8 @@ def segmentation_loss(logits: Tensor, target: Tensor, class_weight: Tensor) -> S
 def weighted_cross_entropy(logits: Tensor, target: Tensor, class_weight: Tensor) -> Tensor:
     """Mean cross-entropy with each point weighted by its class.
 
-    What :func:`torch.nn.functional.cross_entropy` gives, save where that is 0 / 0: without points,
-    or where the classes of all points weigh nothing. There it is 0, with gradient 0.
+    It is what :func:`torch.nn.functional.cross_entropy` gives, except where that is 0 / 0: without
+    points, or where the classes of all points have a weight of 0. There it is 0, with gradient 0.
 
     Args:
         logits: Scores before the softmax, float (N, C).
@@ -82,14 +82,14 @@ def lovasz_softmax(probability: Tensor, target: Tensor) -> Tensor:
 
 
 def _jaccard_steps(foreground: Tensor, dtype: torch.dtype) -> Tensor:
-    """What each point adds to the Jaccard loss when it joins those got wrong before it.
+    """How much the Jaccard loss grows with each point, as one after another is counted as wrong.
 
     With the first i points wrong, the loss is 1 − intersection / union. A foreground point takes
     one from the intersection, any other adds one to the union. Both differences are written out:
     subtracting neighbouring losses would cancel all but a few digits in a scan of 400,000 points.
 
     Args:
-        foreground: Which points are of the class, in the order they go wrong, bool (N, C).
+        foreground: Which points are of the class, those with the largest error first, bool (N, C).
         dtype: Floating-point type of the result.
 
     Returns:
@@ -109,7 +109,7 @@ def class_weights(shares: Sequence[float], floor: float = 1e-3) -> Tensor:
 
     Args:
         shares: Share of each class among the training points, 0 to 1.
-        floor: What is added to each share so that a class next to absent keeps a finite weight.
+        floor: What is added to each share, so that a class that hardly occurs has a finite weight.
 
     Returns:
         float32 (C,).
@@ -125,5 +125,5 @@ def class_weights(shares: Sequence[float], floor: float = 1e-3) -> Tensor:
 
 
 def at_least_float32(tensor: Tensor) -> Tensor:
-    """The same numbers in a type that sums of a scan's points fit into."""
+    """The same numbers in float32 or wider, so that sums over a scan do not overflow."""
     return tensor.to(torch.promote_types(tensor.dtype, torch.float32))

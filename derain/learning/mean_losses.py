@@ -10,9 +10,9 @@ from torchmetrics.utilities import dim_zero_cat
 
 
 class MeanLosses(Metric):
-    """Means of the losses of batches, each weighing as many scans as it has.
+    """Means of the losses of batches, weighted by the number of scans in each.
 
-    They are the same to the bit in whatever order the batches come and whichever process sees them.
+    They are the same to the bit in whatever order batches come and in whichever process each is.
     """
 
     full_state_update = False
@@ -28,8 +28,8 @@ class MeanLosses(Metric):
 
         Args:
             losses: Scalars by name, the same names at every call and in every process.
-            scans: How many scans of the batch count; a batch of which none does leaves the means
-                alone, and tells its process the names.
+            scans: How many scans of the batch count. A batch with none does not change the means;
+                a process that has no other learns the names of the losses from it.
         """
         self.names = tuple(losses)
         row = torch.stack([loss.detach().float() for loss in losses.values()])

@@ -1,7 +1,7 @@
 """Where the randomness of a training comes from: the run's seed, the epoch, and what is drawn.
 
-Whatever draws has a generator of its own for every draw, so that how many others have drawn before,
-in which process, or before which interruption does not matter.
+Every draw has a random generator of its own. So it does not matter how often others have drawn
+before, in which process the draw is made, or whether the training was interrupted before it.
 """
 
 import os
@@ -23,14 +23,15 @@ def run_seed() -> int:
     return int(os.environ.get("PL_GLOBAL_SEED", 0))
 
 
-def generator(draw: Draw, seed: int, epoch: int, *number: int) -> np.random.Generator:
-    """The generator of one draw.
+def generator_of(draw: Draw, seed: int, epoch: int, *number: int) -> np.random.Generator:
+    """The random generator of one draw.
 
     Args:
         draw: What is drawn.
         seed: Seed of the run.
         epoch: The epoch, from 0.
-        number: For which scan of the data, or at which step and in which process.
+        number: The number of the scan in the data, or those of the step and of the process.
     """
-    # The numbers are a key of their own: in the entropy itself, zeros at the end change nothing.
+    # The numbers are the key, not part of the entropy: there, zeros at the end change nothing, so
+    # that two draws could have the same generator.
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(draw, epoch, *number)))

@@ -40,10 +40,11 @@ class Standing:
     group: str
 
 
-def unbeaten(standings: Sequence[Standing]) -> list[Standing]:
-    """The methods that no other beats, one that is at least as fast and as good, by ascending time.
+def pareto_front(standings: Sequence[Standing]) -> list[Standing]:
+    """The Pareto front: the methods that no other surpasses, by ascending time.
 
-    Of equally fast and good ones, the first speaks for all.
+    One method surpasses another if it is at least as fast and makes no more errors, and is better
+    in one of the two. Of methods that are equally fast and good, only the first is on the front.
     """
     front: list[Standing] = []
     for standing in sorted(standings, key=lambda method: (method.milliseconds, method.error)):
@@ -53,7 +54,7 @@ def unbeaten(standings: Sequence[Standing]) -> list[Standing]:
 
 
 def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
-    """Error over milliseconds, both logarithmic, and the front of those that nothing beats.
+    """Error over milliseconds, both logarithmic, and the Pareto front.
 
     Args:
         standings: The methods, one or more.
@@ -66,7 +67,7 @@ def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
     axes.set(xscale="log", yscale="log", title=title)
     axes.set_xlabel("milliseconds a scan, from file to mask (median)")
     axes.set_ylabel("error: 1 - IoU of rain")
-    _draw_front(axes, unbeaten(standings))
+    _draw_front(axes, pareto_front(standings))
     for group, marker in MARKERS.items():
         _draw_group(axes, [s for s in standings if s.group == group], group, marker)
     axes.margins(0.12)
@@ -103,7 +104,7 @@ def _draw_group(axes: Axes, members: Sequence[Standing], group: str, marker: str
 
 
 def _label(axes: Axes, standings: Sequence[Standing]) -> None:
-    """Writes each title where it covers no marker and no other title, and is nobody else's."""
+    """Writes each title where it covers no marker and no other title, and is nearest to its own."""
     places = axes.transData.transform([(s.milliseconds, _drawn(s.error)) for s in standings])
     taken = [Bbox.from_bounds(x - 5, y - 5, 10, 10) for x, y in places]
     legend = axes.get_legend()
@@ -115,8 +116,8 @@ def _label(axes: Axes, standings: Sequence[Standing]) -> None:
             inside = all(map(axes.bbox.contains, *letters.corners().T))
             # Without a line to lead to it, a label is read as the nearest marker's.
             gaps = _gaps(letters, places)
-            told = annotation.arrow_patch is not None or gaps[number] == gaps.min()
-            if inside and told and not letters.count_overlaps(taken):
+            clear = annotation.arrow_patch is not None or gaps[number] == gaps.min()
+            if inside and clear and not letters.count_overlaps(taken):
                 break
             annotation.remove()
         else:

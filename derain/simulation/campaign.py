@@ -13,15 +13,17 @@ from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.sensor import Sensor, load_sensor
 
-# Two sequences of five are clean: of REHEARSE-3D's, 39 % are. How often each of its rain rates
-# comes is not published. The first is rainy, for it may be all that there is to train on.
+# Two of five sequences are clean, as are 39 % of REHEARSE-3D's. How often each rain rate occurs in
+# it is not published. The first sequence has rain, because it may be the only one to train on.
 # Source: REHEARSE-3D, sections III.A and III.C.
 FACILITY_RAIN_RATES = (10.0, 0.0, 25.0, 0.0, 50.0)
 
-# Sequences of a part, and scans of a sequence: months of simulation.
+# The most sequences that each part may have, and scans that each sequence may have. So many would
+# take months to simulate.
 MOST = 100_000
 
-# Shares of the sequences to validate and to test on: 28 and 29 of 143.
+# Share of the sequences that is held out to validate on, and again to test on. REHEARSE-3D holds
+# out 28 and 29 of 143.
 # Source: data_cfg.yaml of the SalsaNext model published with REHEARSE-3D.
 HELD_OUT = 0.2
 
@@ -103,7 +105,7 @@ class Campaign:
 
     @property
     def description(self) -> dict[str, Any]:
-        """All that the files depend on, as JSON gives it back."""
+        """Everything that the files depend on, as reading it back from JSON gives it."""
         content = {
             "made_by": MAKER,
             "version": __version__,
@@ -115,9 +117,9 @@ class Campaign:
 
 
 def partition(sequences: int) -> tuple[int, int, int]:
-    """How many of some sequences to train on, to validate and to test on.
+    """Divides a number of sequences into those to train on, to validate and to test on.
 
-    Of one or two, which somebody wants to look at, none is held out.
+    Of one or two sequences none is held out: whoever makes so few wants to look at them.
     """
     held_out = max(1, round(HELD_OUT * sequences)) if sequences >= 3 else 0
     return sequences - 2 * held_out, held_out, held_out

@@ -4,8 +4,8 @@ manifest.json       campaign, split, rain rate of each sequence, SHA-256 of each
 sequences/000/...   see :mod:`derain.simulation.sequence`
 
 A sequence's folder appears when it is complete, so that an interrupted run can be taken up again.
-Each sequence has its own source of chance: neither an interruption nor the number of workers
-changes a byte. Of two runs at work on one folder the second waits for the first.
+Each sequence is drawn with a random generator of its own, so that neither an interruption nor the
+number of workers changes a byte. Of two runs on one folder the second waits for the first.
 """
 
 import os
@@ -36,8 +36,8 @@ SEQUENCES = "sequences"
 def ensure_track(root: Path, campaign: Campaign) -> None:
     """Simulates a data set for a program's own use, unless the folder already holds this very one.
 
-    What this function made of another campaign is replaced; what :func:`simulate_track` made for a
-    person is not.
+    If the folder holds a data set that this function made of another campaign, it is replaced. One
+    that :func:`simulate_track` made is never replaced, because a person asked for it.
 
     Args:
         root: Folder of the data set.
@@ -46,12 +46,13 @@ def ensure_track(root: Path, campaign: Campaign) -> None:
     Raises:
         InputError: As :func:`simulate_track`.
     """
-    campaign = replace(campaign, sensor=campaign.lidar)  # a file that is wrong is named first
+    campaign = replace(campaign, sensor=campaign.lidar)  # reports a wrong sensor file first
     with _alone(root):
         there = read_manifest(root)
         if there and not there.get("keep") and not _describes(there, campaign):
             with _writing(root):
-                # The manifest last, and the rest may be gone: this run may be killed, too.
+                # The manifest goes last. Without it the folder would be taken for somebody else's,
+                # should this run be killed in between; the sequences may then be gone already.
                 if (root / SEQUENCES).exists():
                     shutil.rmtree(root / SEQUENCES)
                 (root / MANIFEST).unlink()
@@ -70,22 +71,30 @@ def simulate_track(root: Path, campaign: Campaign, workers: int = 1) -> None:
         InputError: The folder holds something else or cannot be written, or Open3D cannot be
             imported. What was complete by then stays, and nothing half-written.
     """
-    campaign = replace(campaign, sensor=campaign.lidar)  # a file that is wrong is named first
+    campaign = replace(campaign, sensor=campaign.lidar)  # reports a wrong sensor file first
     with _alone(root):
         _simulate(root, campaign, workers, keep=True)
 
 
 def _simulate(root: Path, campaign: Campaign, workers: int, *, keep: bool) -> None:
-    """Simulates what is missing; what is not to be kept :func:`ensure_track` may replace later."""
+    """Simulates the sequences that are missing.
+
+    Args:
+        root: Folder of the data set.
+        campaign: What to simulate.
+        workers: Processes that share the work.
+        keep: Whether the data set is a person's; otherwise :func:`ensure_track` may replace it.
+    """
     there = read_manifest(root)
     _refuse_others(root, there, campaign)
     if "files" in there and all((root / SEQUENCES / name).is_dir() for name in campaign.names):
         return
-    import_open3d()  # where it is missing, nothing is begun
+    import_open3d()  # raises where it is missing, before anything is written
     description = {**campaign.description, "keep": keep}
     files: dict[str, str] = {}
     with _writing(root):
-        write_manifest(root, description)  # first: without it the folder is somebody else's
+        # The manifest comes first: a folder with content but without one is refused.
+        write_manifest(root, description)
         (root / SEQUENCES).mkdir(exist_ok=True)
         with closing(_complete_sequences(root, campaign, workers)) as complete:
             for written in complete:
@@ -95,7 +104,7 @@ def _simulate(root: Path, campaign: Campaign, workers: int, *, keep: bool) -> No
 
 @contextmanager
 def _alone(root: Path) -> Iterator[None]:
-    """Makes the folder, and keeps other processes out of it that ask in the same way."""
+    """Makes the folder and locks it, so that only one process at a time simulates in it."""
     if root.exists() and not root.is_dir():
         raise InputError(root, "is not a folder", "Name a new or empty folder.")
     with _writing(root):
@@ -110,7 +119,10 @@ def _alone(root: Path) -> Iterator[None]:
 
 
 def _locked(root: Path) -> int | None:
-    """The folder, held locked; None where there are no locks, which is as good as alone."""
+    """Locks the folder, after waiting for whoever holds it, and returns its file descriptor.
+
+    None where folders cannot be opened: there two runs on one folder do not wait for each other.
+    """
     try:
         folder = os.open(root, os.O_RDONLY)
     except OSError:
@@ -171,7 +183,7 @@ def _complete_sequences(
             root, "a worker was killed, perhaps for want of memory", "Try again with fewer workers."
         ) from error
     finally:
-        for name in campaign.names:  # a worker that is stopped does not clear up
+        for name in campaign.names:  # a worker that was killed leaves what it had begun
             shutil.rmtree(_unfinished(root, name), ignore_errors=True)
 
 
@@ -182,7 +194,7 @@ def _unfinished(root: Path, name: str) -> Path:
 def _complete_sequence(root: Path, campaign: Campaign, name: str) -> dict[str, str]:
     folder, unfinished = root / SEQUENCES / name, _unfinished(root, name)
     if not folder.exists():
-        shutil.rmtree(unfinished, ignore_errors=True)  # of a run that was killed
+        shutil.rmtree(unfinished, ignore_errors=True)  # left behind by a run that was killed
         try:
             write_sequence(unfinished, campaign, name)
             unfinished.rename(folder)

@@ -43,22 +43,24 @@ class Drops:
 def draw_drops(
     rate: float, reach: NDArray[np.float64], sensor: Sensor, generator: np.random.Generator
 ) -> Drops:
-    """Draws the drops that even rain has inside every beam, from the minimum range to its end.
+    """Draws the drops inside every beam, between the minimum range and the beam's end.
 
-    Their number is Poisson with the volume of the beam's cone; they are uniform in that volume, so
-    their distances follow the cone's cross-section.
+    The rain is the same everywhere. The number of drops in a beam is Poisson distributed with a
+    mean proportional to the volume of the beam's cone. The drops are uniform in that volume, so
+    that the density of their distances is proportional to the cone's cross-section.
 
     Args:
         rate: Rain rate, mm/h.
         reach: Where each beam ends, float64 (N,), metres.
         sensor: The sensor whose beams they are.
-        generator: Source of chance.
+        generator: Random generator.
     """
     far = np.maximum(reach, sensor.minimum_range)
     near = np.full_like(far, sensor.minimum_range)
     expected = drops_per_cubic_metre(rate) * sensor.beam_volume(near, far)
     beam = np.repeat(np.arange(len(far)), generator.poisson(expected))
-    # Volume grows with the cube of the width: an even share of the one gives the other.
+    # The volume up to some distance grows with the cube of the beam's width there. So the cube of
+    # the width is uniform between those at both ends for drops that are uniform in the volume.
     narrowest, widest = sensor.beam_width(near) ** 3, sensor.beam_width(far) ** 3
     share = generator.random(len(beam))
     width = np.cbrt(narrowest[beam] + share * (widest - narrowest)[beam])
@@ -69,17 +71,17 @@ def draw_drops(
 def thin_out(
     drops: Drops, beams: NDArray[np.float64], rain: RainField, generator: np.random.Generator
 ) -> Drops:
-    """Keeps as many drops of a field's heaviest rain, and of such sizes, as fall where they are.
+    """Thins drops of a field's heaviest rain out to the rain that falls where they are.
 
-    At every place and size, the share that stays is the ratio of the local density of drops to
-    that of the heaviest rain, exp(−(Λ − Λ of the heaviest) D): what is left is a Poisson process of
-    the local density.
+    A drop of diameter D stays with the probability exp(−(Λ − Λ of the heaviest rain) D), which is
+    the local density of drops of its size over their density in the heaviest rain. The drops that
+    stay are a Poisson process of the local density, and have the local distribution of sizes.
 
     Args:
         drops: Drops of even rain at ``rain.heaviest``.
         beams: Unit vectors along the beams, float64 (N, 3), sensor frame.
         rain: The field.
-        generator: Source of chance.
+        generator: Random generator.
 
     Source: Lewis and Shedler 1979, "Simulation of nonhomogeneous Poisson processes by thinning".
     """

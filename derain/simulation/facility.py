@@ -9,8 +9,9 @@ from derain.simulation.layout import on_slope, road_and_ground
 from derain.simulation.objects import Surface
 from derain.simulation.track import Track
 
-# What stands on the road, and between which distances in metres. All lie within REHEARSE's 10 to
-# 112 m; the rest is chosen so that the classes come near its shares of the points.
+# What stands on the road, and between which distances from the sensor, metres. In REHEARSE they
+# stand at 10 to 112 m. Within that, the distances are chosen so that every class has about the
+# share of the points that it has in REHEARSE-3D.
 # Source: REHEARSE-3D, section III.A.
 ROAD_USERS: tuple[tuple[Callable[[np.random.Generator], Surface], tuple[float, float]], ...] = (
     (objects.car, (30, 80)),
@@ -34,7 +35,8 @@ def lay_out_facility(generator: np.random.Generator) -> Track:
     A road 6.8 to 7.6 m wide leads straight away from the sensor, turned by up to 2 degrees and
     sloping by up to 1 %. A car, two pedestrians, a bike and a target stand on it, with a row of
     sprinklers on each side. Bushes and the posts of a fence line it; trees and buildings close the
-    view. Puddles darken the road and the bushes are near: rain is not alone in being dark or near.
+    view. Puddles darken the road and bushes stand near the sensor, so that a point is not rain
+    merely because it is dark or near.
     """
     half_width = generator.uniform(3.4, 3.8)
     surfaces = [

@@ -1,4 +1,4 @@
-"""Where a sensor looked, as its returns tell."""
+"""Where a sensor looked: inside the convex hull of the directions of its returns."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,9 @@ def in_hull(
 ) -> NDArray[np.bool_]:
     """Whether places lie in the convex hull of points, or on its edge.
 
-    A convex field of view holds the hull of whatever was seen in it, however the sensor scans: a
-    circle as well as a rectangle. The hull never goes beyond it, and falls short of it where
-    nothing returned from its edge, as from the sky.
+    The hull of the returns never reaches beyond a field of view that is convex, be it a rectangle
+    or a circle. It falls short of it where nothing returned near the edge, for example from the
+    sky.
 
     Args:
         points: Azimuth and inclination of the returns, float64 (N,) each, N > 0, degrees, the
@@ -35,11 +35,12 @@ def _upper_hull(
     """Corners of the upper side of the convex hull, from left to right."""
     order = np.lexsort((y, x))
     x, y = x[order], y[order]
-    highest = np.append(x[1:] > x[:-1], True)  # of those one above the other
+    highest = np.append(x[1:] > x[:-1], True)  # of the points at one x only the highest
     x, y = x[highest], y[highest]
     while True:
         run, rise = np.diff(x), np.diff(y)
-        # What lies on or below the line between its neighbours is no corner, whatever else is.
+        # A point on or below the line between its two neighbours is no corner of the hull. That
+        # stays true when a neighbour is dropped in the same round, for the hull lies higher still.
         corner = np.ones(len(x), bool)
         corner[1:-1] = rise[1:] * run[:-1] < rise[:-1] * run[1:]
         if corner.all():

@@ -18,7 +18,8 @@ def lay_out_track(generator: np.random.Generator) -> Track:
     A road 6 to 12 m wide leads away from the sensor, turned by up to 6 degrees and sloping by up to
     4 %, with vehicles, people and targets on it, sprinklers along it, plants and posts beside it,
     boughs over it, and buildings behind. Patches of the road are wet whether it rains or not, and
-    much of the foliage is near: nothing is rain merely because it is dark, near or in the air.
+    much of the foliage is near the sensor, so that a point is not rain merely because it is dark,
+    near or in the air.
     """
     half_width = generator.uniform(3, 6)
     surfaces = [
@@ -36,13 +37,13 @@ def lay_out_track(generator: np.random.Generator) -> Track:
 def on_slope(
     surfaces: Iterable[Surface], aside: float, heading: float, slope: NDArray[np.float64]
 ) -> Track:
-    """Puts surfaces, laid out along x, on sloping ground under a sensor that looks another way.
+    """Makes a track of surfaces that are laid out along x: turns, moves and tilts all of them.
 
     Args:
         surfaces: All that is on the track, at least one surface.
         aside: How far the surfaces are moved to the left, metres.
-        heading: Angle that they are turned by before, radians.
-        slope: Rise per metre ahead and per metre to the left, (2,).
+        heading: Angle by which they are turned first, radians from x towards y.
+        slope: Rise of the ground per metre ahead and per metre to the left, (2,).
     """
     ahead, left = slope
     return Track.of(

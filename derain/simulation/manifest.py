@@ -1,7 +1,7 @@
 """The manifest of a simulated data set: what it was made from, and the checksum of every file.
 
-It is written twice: without ``files`` when the work begins, so that the folder is known for what it
-is, and with them when every sequence is there.
+It is written twice: without ``files`` when the work begins, so that a run that is taken up again
+recognises the folder, and with ``files`` when every sequence is there.
 """
 
 import hashlib
@@ -17,16 +17,16 @@ from derain.simulation.rain_field import HARDEST_RAIN
 
 MANIFEST = "manifest.json"
 
-# By this a manifest is known.
+# What stands under ``made_by``: by this a manifest of derain is told from any other JSON file.
 MAKER = "derain.simulation"
 
 # Parts of its split.
-PARTS = ("train", "validation", "test")
+SPLIT_PARTS = ("train", "validation", "test")
 
 # Key of the rain rate of each sequence.
 RAIN_RATE = "rain_rate_mm_h"
 
-# A file takes 130 bytes: those of half a million.
+# In bytes. The entry of a file takes 130, so that half a million files fit.
 LARGEST_MANIFEST = 2**26
 
 
@@ -88,7 +88,7 @@ def checksums(folder: Path, root: Path) -> dict[str, str]:
 
 
 def _split(entry: Entry) -> None:
-    entry.record(dict.fromkeys(PARTS, Entry.texts), required=PARTS)
+    entry.record(dict.fromkeys(SPLIT_PARTS, Entry.texts), required=SPLIT_PARTS)
 
 
 def _checksums(entry: Entry) -> None:

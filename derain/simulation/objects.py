@@ -136,7 +136,7 @@ def foliage(
     Args:
         radii: Half-axes of the ellipsoid, metres.
         height: Height of its centre, metres.
-        generator: Source of chance.
+        generator: Random generator.
     """
     surface_area = radii[0] * radii[1] + radii[1] * radii[2] + radii[2] * radii[0]
     count = int(generator.uniform(30, 250) * surface_area)

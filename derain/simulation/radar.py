@@ -1,9 +1,10 @@
 """A 4D radar: what it detects of a track in the rain.
 
 The radar sorts its echoes into cells of inclination, azimuth and range. The mean echo of a cell is
-that of surfaces and rain in it, and noise; every frame draws from it anew, and a cell that stands
-out of its neighbours in range is a detection. Echoes are radar cross-sections in m². The rain's
-attenuation is left out: through a facility's rain and back it is 2 dB, less than a frame's chance.
+that of the surfaces and the rain in it, and of noise. Every frame draws the echo of each cell anew,
+at random about that mean, and a cell whose echo exceeds those of its neighbours in range is a
+detection. Echoes are radar cross-sections in m². The rain's attenuation is left out: through a
+facility's rain and back it is 2 dB, less than an echo varies from frame to frame.
 """
 
 import math
@@ -42,8 +43,8 @@ BACKSCATTER_EFFICIENCY = 0.9
 # Source: Atlas, Srivastava and Sekhon 1973, 9.65 - 10.3 exp(-0.6 D).
 FALL_SPEED = 9.65 - 10.3 * math.exp(-0.6 * 2)
 
-# Cells on each side, in range, that a cell must stand out of, and those next to it that are left
-# out for they may hold the same thing. Modelling choices.
+# An echo is compared with this many cells on either side of its own, in range. The cells right next
+# to it are left out, because they may hold an echo of the same object. Modelling choices.
 REFERENCE_CELLS = 8
 GUARD_CELLS = 2
 
@@ -153,7 +154,7 @@ def detect(mean: NDArray[np.float64], radar: Radar, generator: np.random.Generat
     Args:
         mean: What :func:`mean_echoes` gave.
         radar: The radar.
-        generator: Source of chance.
+        generator: Random generator.
 
     Returns:
         The detections, in the radar's frame: ``fields`` has x, y, z (metres), doppler (m/s, along
@@ -216,7 +217,8 @@ def rain_echoes(
 ) -> NDArray[np.float64]:
     """Mean echo of the rain in every cell.
 
-    The radar looks so level that rain stands over the same ground at every inclination.
+    The radar looks almost level. So the rain in a cell is taken to be that over the ground at the
+    cell's azimuth and range, whatever its inclination.
 
     Args:
         rain: The rain.

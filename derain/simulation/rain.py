@@ -29,12 +29,12 @@ def rain_on_beams(
     returned ends at the maximum range, and can still meet a drop.
 
     Args:
-        clear: What each beam would return through clear air, were the detector perfect: one row
-            for each of the N beams, in their order.
+        clear: What each beam would return through clear air to a perfect detector: one row for
+            each of the N beams, in their order.
         beams: Unit vectors along them, float64 (N, 3), sensor frame.
         rain: The rain.
         sensor: The sensor that they belong to.
-        generator: Source of chance.
+        generator: Random generator.
 
     Returns:
         What the sensor detects, one row for each beam; of a sensor with dual returns a second one
@@ -62,7 +62,7 @@ def rain_on_beams(
 def _detected_surfaces(
     clear: Returns, transmission: NDArray[np.float64], sensor: Sensor
 ) -> Returns:
-    """What the sensor would see of the surfaces, were there no drops in front of them."""
+    """What the sensor would see of the surfaces if there were no drops in front of them."""
     reflectivity = clear.reflectivity * transmission
     strong = reflectivity >= sensor.detection_threshold * clear.range**2
     seen = strong & (clear.range >= sensor.minimum_range)
@@ -82,8 +82,8 @@ def _visible_drops(
     transmission: Transmission,
     generator: np.random.Generator,
 ) -> Returns:
-    """Drops that the sensor would see, were there nothing else in their beams."""
-    # What cannot be seen in clear air is left out before anything else is worked out for it.
+    """Drops that the sensor would see if there were nothing else in their beams."""
+    # A drop that could not be seen even through clear air is left out first, which saves work.
     reach = np.minimum(reach, farthest_visible_drop(sensor))
     drops = draw_drops(rain.heaviest, reach, sensor, generator)
     needed = sensor.detection_threshold * drops.range**2

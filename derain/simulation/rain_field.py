@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 
-# The facility's water, in mm/h times metres of wet track, and the length that its sprinklers can
-# wet: 10, 25 and 50 mm/h over 112, 56 and 28 m.
+# The facility's supply of water limits the product of rain rate and length of wet track, mm/h · m,
+# and its sprinklers limit that length, metres: it rains 10, 25 and 50 mm/h over 112, 56 and 28 m.
 # Source: REHEARSE-3D, section III.A.
 WATER = 1400.0
 LONGEST_SPAN = 112.0
@@ -20,33 +20,37 @@ LONGEST_SPAN = 112.0
 # Source: REHEARSE-3D, section III.C.
 EVEN_SHARE = 80 / 112
 
-# Sprinklers stand in two rows along x, this far apart, from behind the sensor to a little beyond
-# the evenly wet part, metres. What follows are modelling choices that come to Figure 4.
+# Sprinklers stand in two rows along x, every SPACING metres, from FIRST_SPRINKLER, behind the
+# sensor, to BEYOND_EVEN_PART metres beyond the evenly wet part. These and the constants that follow
+# are modelling choices, made so that the field resembles Figure 4.
 SPACING = 3.0
 FIRST_SPRINKLER = -8.0
-MARGIN = 4.0
+BEYOND_EVEN_PART = 4.0
 
-# Where a row's water comes down: Gaussian about a line beside the axis. Distance and standard
-# deviation being the same, the two rows together are flattest in the middle. Metres.
+# The water of each row comes down beside the axis, normally distributed across it. This is both the
+# distance of the middle from the axis and the standard deviation, metres: when the two are equal,
+# the sum of both rows is flattest on the axis.
 THROW = 3.0
 
-# The wind blows in gusts, standing waves along the track: it carries water along x towards the two
-# peaks of Figure 4, and across the track to the one's right and the other's left, metres.
+# Gusts of wind move the water in standing waves along the track, metres: along x towards the two
+# peaks of Figure 4, and across the track to the right at the first peak and to the left at the
+# second.
 PEAKS = (25.0, 58.0)
 GUST_ALONG = 1.15
 GUST_ACROSS = 2.0
 
-# Excess of the mean rate on the axis over the nominal one, which is the mean of the whole lane.
+# Ratio of the mean rate on the axis to the nominal rate, which is the mean over the whole lane.
 EXCESS_ON_AXIS = 1.13
 
-# How long water is in the wind, seconds: the way down from 5 m at the 5 m/s of drops of 1 to 2 mm.
+# How long the mean wind carries a drop, seconds: drops of 1 to 2 mm fall 5 m at 5 m/s.
 TIME_IN_WIND = 1.0
 
 # The hardest rain on record fell at 1,900 mm/h, for a minute.
 HARDEST_RAIN = 2000.0
 
-# Step in metres at which the greatest rate is looked for, and what may lie between the steps.
-STEP = 0.5
+# The greatest rate is looked for on a grid of this spacing, metres, and multiplied by a factor in
+# case it is greater between the points of the grid.
+SEARCH_STEP = 0.5
 BETWEEN_STEPS = 1.01
 
 
@@ -128,8 +132,9 @@ class SprinkledRain:
     @cached_property
     def heaviest(self) -> float:
         """A rate in mm/h that is exceeded nowhere."""
-        x = np.arange(FIRST_SPRINKLER, self.span + MARGIN, STEP) + TIME_IN_WIND * self.wind[0]
-        y = np.arange(-2 * THROW, 2 * THROW, STEP) + TIME_IN_WIND * self.wind[1]
+        drift_x, drift_y = (TIME_IN_WIND * speed for speed in self.wind)
+        x = np.arange(FIRST_SPRINKLER, self.span + BEYOND_EVEN_PART, SEARCH_STEP) + drift_x
+        y = np.arange(-2 * THROW, 2 * THROW, SEARCH_STEP) + drift_y
         return BETWEEN_STEPS * float(self.rate(*np.meshgrid(x, y)).max())
 
     def rate(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -142,14 +147,14 @@ class SprinkledRain:
         density = np.zeros(np.shape(x))
         for centre_x, centre_y in self._plumes():
             density += np.exp(-((x - centre_x) ** 2 + (y - centre_y) ** 2) / (2 * THROW**2))
-        # Plumes of unit height, so close that they make an even band: its height on the axis is
-        # that of a row, once for each row, at the distance of one standard deviation.
+        # The plumes have a height of 1 and stand so close that each row makes an even band. On the
+        # axis, which is one standard deviation away from both bands, their heights add up to this.
         on_axis = 2 * math.exp(-0.5) * math.sqrt(2 * math.pi) * THROW / SPACING
         return EXCESS_ON_AXIS * self.nominal / on_axis * density
 
     def _plumes(self) -> NDArray[np.float64]:
         """Where the sprinklers' water comes down, float64 (P, 2), metres."""
-        stand = np.arange(FIRST_SPRINKLER, EVEN_SHARE * self.span + MARGIN, SPACING)
+        stand = np.arange(FIRST_SPRINKLER, EVEN_SHARE * self.span + BEYOND_EVEN_PART, SPACING)
         phase = 2 * np.pi * (stand - PEAKS[0]) / (PEAKS[1] - PEAKS[0])
         along = stand - GUST_ALONG * np.sin(phase)
         across = -GUST_ACROSS * np.cos(phase / 2)

@@ -14,8 +14,8 @@ from derain.simulation.rewriting import with_intensity, with_points
 from derain.simulation.sensor import FULL_SCALE_INTENSITY, Returns, Sensor
 from derain.views.full_scale import full_scale
 
-# What everything is taken to reflect in a scan without intensities: a tenth, which the ranges of
-# LiDARs are stated for.
+# The reflectivity that every surface is taken to have in a scan without intensities: a tenth, for
+# which makers of LiDARs state the range.
 USUAL_REFLECTIVITY = 0.1
 
 
@@ -27,16 +27,18 @@ def rain_on_scan(
     A return stays where it is and gets darker, or a drop in front of it takes its place, or it is
     lost. A beam that returned nothing may hit a drop; see :func:`find_beams` for how such beams are
     found. Returns nearer than the sensor's minimum range are the vehicle's own and stay as they
-    are, and so do points of a radar. Of two returns of one beam, in two rows, each is treated as a
-    beam's only one, so that such beams meet twice the drops; columns of a second return in the
-    same row stay.
+    are, and so do points of a radar. Two returns of one beam that stand in two rows are treated as
+    returns of two beams, so that such a beam meets twice as many drops. Columns of a second return
+    in the same row stay as they are.
 
     Reflectivity is the intensity as a share of its full scale (1, 255 or 65,535), or a tenth where
-    the scan has none. One intensity throughout was not measured either: every return keeps it, and
-    drops get it, too, or else it would give them away. What should have been too dark for
-    ``sensor`` was seen nevertheless. How far above the threshold it was nobody knows: it is taken
-    to be above twice the threshold with probability 1/2, above ten times with 1/10, and so on, so
-    that it is lost with the share of the light that the rain takes.
+    the scan has none. Where all intensities are equal they were not measured: every return keeps
+    that value, and drops get it as well, because any other would give them away.
+
+    By its intensity a return may be too dark for ``sensor``, although it was recorded. How far
+    above the threshold it really was is not known, and therefore drawn: above twice the threshold
+    with probability 1/2, above ten times with 1/10, and so on. So drawn, the probability that such
+    a return is lost is the share of its light that the rain takes away.
 
     Args:
         scan: The scan. Its file's columns of coordinates, intensity, and range or distance follow
@@ -44,14 +46,15 @@ def rain_on_scan(
         rain: The rain.
         sensor: Tells how wide the beams are, and what is seen of drops. Where its beams point does
             not matter. It reports the last return, or else the strongest.
-        generator: Source of chance.
+        generator: Random generator.
 
     Returns:
-        The scan in the rain, with labels: TrackClass.RAIN, and what the scan had or 0 elsewhere.
-        Rows come in the order of ``scan``. A lost one looks like the empty cells of an organised
-        scan (without any, it is NaN) and is left out of any other scan. A drop on a beam that had
-        returned nothing fills its cell; without a cell it becomes a row at the end, whose other
-        columns are those of the return before it in its row of the sensor's grid.
+        The scan in the rain, with labels: TrackClass.RAIN for drops, and for all other rows the
+        label that the scan had, 0 if it had none or the return is lost. Rows come in the order of
+        ``scan``. The row of a lost return is left out; in an organised scan it stays and looks like
+        the scan's other empty cells, or is NaN if there are none. A drop on a beam that had
+        returned nothing fills the beam's cell; in a scan without cells it becomes a row at the end,
+        whose other columns are those of the return before it in its row of the sensor's grid.
     """
     beams = find_beams(scan, generator)
     exposed = _exposed(scan, beams, sensor)
@@ -82,7 +85,7 @@ def _exposed(scan: Scan, beams: RecordedBeams, sensor: Sensor) -> NDArray[np.int
 
 
 def _with_measured_intensity(scan: Scan, beams: RecordedBeams) -> Scan:
-    """The scan, without intensities where those of its beams' returns were not measured."""
+    """The scan, without its intensities if those of its beams' returns were not measured."""
     returns = scan.take(beams.row[beams.returned])
     return scan if returns.measured_intensity is not None else replace(scan, intensity=None)
 
@@ -101,7 +104,7 @@ def _clear_air(
     else:
         reflectivity = np.clip(scan.intensity[row] / full_scale([scan]), 0, 1).astype(np.float64)
     needed = sensor.detection_threshold * range_**2
-    # A draw is within [0, 1), and 1 minus it above 0.
+    # What is drawn is at least 0 and less than 1, so that nothing is divided by 0.
     excess = 1 / (1 - generator.random(len(row)))
     reflectivity = np.where(reflectivity < needed, needed * excess, reflectivity)
     return Returns(
@@ -143,7 +146,8 @@ def _intensity(
     wet = detected.label == TrackClass.RAIN
     kept = detected.returned & ~wet
     intensity = scan.intensity[row].astype(np.float64)
-    # Not of its reflectivity anew, which may be a guess: the recorded value, dimmed as much.
+    # The recorded value is dimmed as much as the light. It is not computed from the reflectivity,
+    # which may have been drawn at random.
     intensity[kept] *= detected.reflectivity[kept] / clear.reflectivity[kept]
     share = sensor.measured_intensity(detected.reflectivity[wet], generator) / FULL_SCALE_INTENSITY
     intensity[wet] = full_scale([scan]) * share

@@ -12,11 +12,12 @@ from derain.views.directions import directions
 from derain.views.grid_fit import GridFit, fit_grid
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
-# Rounds of the median polish: as many as sensors take whose lasers point to a few distinct sides.
+# Rounds of the median polish: enough for sensors whose lasers point to a few distinct azimuths.
 ROUNDS = 3
 
-# Rows and columns tell where the beams of an organised scan point if half of its returns are no
-# farther than this from where they should be, degrees. Spinning sensors stay within a tenth.
+# Row and column of an organised scan are taken to tell where a beam points if at least half of the
+# returns are no farther than this from the direction of their cell, degrees. Those of spinning
+# sensors are within a tenth of it.
 FARTHEST_STRAY = 1.0
 
 
@@ -39,24 +40,24 @@ class RecordedBeams:
 def find_beams(scan: Scan, generator: np.random.Generator) -> RecordedBeams:
     """Finds the beams of a scan.
 
-    Every return is a beam of its own, along its own direction: none is lost to another in the same
-    cell of a grid. What returned nothing is told from where nothing is:
+    Every return is a beam of its own, along its own direction, even if several returns lie in one
+    cell of a grid. Beams that returned nothing are found in one of two ways:
 
-    - An organised scan has a cell for each beam. The direction of an empty one is the sum of what
-      is usual of its row and of its column; cells in rows or columns without any return have none,
-      nor has any where this says little of the returns, as of a rosette's.
-    - For any other scan a grid is fitted, see :func:`derain.views.grid_fit.fit_grid`. Its empty
-      pixels are beams, except for as many as there are returns that share a pixel with another:
-      those left their own pixels empty, chance says which. The grid is in ascending order by
-      construction, and its azimuths wrap around. A sensor that looks one way, and whose returns are
-      in no rows, may look through a circle: only pixels in the convex hull of its returns are
-      beams.
+    - An organised scan has a cell for each beam. The direction of an empty cell is the sum of the
+      usual angles of its row and of its column. It is not known in a row or column without any
+      return, nor in a scan whose returns are far from the directions so found, such as that of a
+      sensor that scans in a rosette.
+    - To any other scan a grid is fitted, see :func:`derain.views.grid_fit.fit_grid`. Its empty
+      pixels are beams that returned nothing, with an exception: a return that shares its pixel with
+      another has left a pixel of its own empty. So as many empty pixels, chosen at random, are no
+      beams. A sensor that looks one way, and whose returns are in no rows, may have a round field
+      of view: of its pixels only those in the convex hull of the returns are beams.
 
     Args:
         scan: The scan. Rows that are not valid, or of a radar, are empty cells or no beams.
-        generator: Source of chance.
+        generator: Random generator.
 
-    Source: what REHEARSE-3D's Algorithm 1 is for, by other means.
+    Source: REHEARSE-3D, Algorithm 1, for the purpose; the method is another.
     """
     valid = scan.valid if scan.radar is None else scan.valid & ~scan.radar
     own = np.full((len(scan), 3), np.nan)
@@ -95,14 +96,15 @@ def _cell_directions(scan: Scan, valid: NDArray[np.bool_]) -> NDArray[np.float64
 def _polished(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     """Sum of a column's and a row's effect in every cell, of (H, W) angles or NaN.
 
-    Columns come first, and should differ most: what is missing of one must not pass for an effect.
+    The effect of the columns is estimated first, and should be the larger one: otherwise rows that
+    lack different columns would seem to differ.
 
     Source: Tukey 1977, "Exploratory Data Analysis", the median polish.
     """
     of_row = np.zeros((angle.shape[0], 1))
     of_column = np.zeros((1, angle.shape[1]))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of an empty row or column: NaN is meant
+        warnings.simplefilter("ignore", RuntimeWarning)  # an empty row or column has the median NaN
         for _ in range(ROUNDS):
             of_column = np.nanmedian(angle - of_row, axis=0, keepdims=True)
             of_row = np.nanmedian(angle - of_column, axis=1, keepdims=True)

@@ -49,7 +49,7 @@ def with_intensity(scan: Scan, rows: NDArray[np.int64], intensity: NDArray[np.fl
     by_lower_case = {name.lower(): name for name in scan.fields}
     found = [by_lower_case[name] for name in INTENSITY_NAMES if name in by_lower_case][:1]
     fields = {name: _written(scan.fields[name], rows, intensity) for name in found}
-    # The rounding of the file's column shows in what is seen of it.
+    # The scan's intensity is what its file holds: rounded if that is a column of whole numbers.
     seen = [column[rows] for column in fields.values()] or [intensity]
     return replace(
         scan,

@@ -3,16 +3,15 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
-from derain.files.reading import is_file
+from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
 from derain.views.spherical_grid import FULL_CIRCLE
 
@@ -209,8 +208,7 @@ class Sensor:
 
 def packaged_sensors() -> dict[str, Path]:
     """Files of the sensors that come with derain, by name."""
-    folder = Path(str(resources.files("derain.simulation"))) / "sensors"
-    return {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+    return packaged("derain.simulation", "sensors")
 
 
 def load_sensor(name: str | Path) -> Sensor:
@@ -223,12 +221,7 @@ def load_sensor(name: str | Path) -> Sensor:
     Raises:
         InputError: No such sensor, or a file that does not describe one.
     """
-    sensors = packaged_sensors()
-    path = sensors.get(str(name), Path(name))
-    if not is_file(path):
-        raise InputError(
-            name, "no such sensor", f"Give a YAML file or one of {', '.join(sensors)}."
-        )
+    path = packaged_or_own(name, packaged_sensors(), "sensor")
     values = Entry.of_yaml(path).record(_PARSERS)
     try:
         return Sensor(**values)
@@ -246,20 +239,12 @@ def _beams(entry: Entry) -> int:
     return entry.whole(1, MOST_BEAMS)
 
 
-_PARSERS: dict[str, Callable[[Entry], Any]] = {
-    "azimuth": _span,
-    "inclination": _span,
-    "columns": _beams,
-    "rows": _beams,
-    "row_inclinations": Entry.numbers,
-    "minimum_range": Entry.number,
-    "maximum_range": Entry.number,
-    "aperture": Entry.number,
-    "beam_divergence": Entry.number,
-    "detection_threshold": Entry.number,
-    "range_noise": Entry.number,
-    "intensity_noise": Entry.number,
-    "mounting_height": Entry.number,
-    "returns": Entry.text,
-    "frame_rate": Entry.number,
+# What reads the attributes of a sensor, by their type.
+_PARSERS_BY_TYPE: dict[Any, Callable[[Entry], Any]] = {
+    tuple[float, float]: _span,
+    tuple[float, ...]: Entry.numbers,
+    int: _beams,
+    float: Entry.number,
+    ReturnMode: Entry.text,
 }
+_PARSERS = {name: _PARSERS_BY_TYPE[kind] for name, kind in get_type_hints(Sensor).items()}

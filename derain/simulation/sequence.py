@@ -46,8 +46,8 @@ LAYOUTS = {"street": lay_out_track, "facility": lay_out_facility}
 
 
 @dataclass(frozen=True)
-class Scene:
-    """What stays the same for a sequence: the track, the rain that falls on it, the weather."""
+class SimulatedScene:
+    """What stays the same throughout a sequence: the track, the rain on it, the weather."""
 
     track: Track
     rain: RainField
@@ -75,20 +75,20 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
     Raises:
         InputError: A file cannot be written, or Open3D cannot be imported.
     """
-    # The radar has its own source of chance: the LiDAR sees the same with it and without.
-    chance = np.random.SeedSequence(campaign.seed, spawn_key=(int(name),)).spawn(3)
-    of_scene, of_lidar, of_radar = map(np.random.default_rng, chance)
-    scene, sensor = Scene.of(campaign, name, of_scene), campaign.lidar
+    # The radar has a random generator of its own, so that the LiDAR sees the same without it.
+    seeds = np.random.SeedSequence(campaign.seed, spawn_key=(int(name),)).spawn(3)
+    scene_generator, lidar_generator, radar_generator = map(np.random.default_rng, seeds)
+    scene, sensor = SimulatedScene.of(campaign, name, scene_generator), campaign.lidar
     times = np.arange(campaign.scans) / sensor.frame_rate
     beside = [NO_DETECTIONS] * len(times)
     mounting = Extrinsics(np.eye(4))
     if campaign.radar is not None:
         mounting = _write_mounting(folder, campaign.radar, sensor)
-        beside = _record_radar(folder, scene, campaign.radar, times, of_radar)
+        beside = _record_radar(folder, scene, campaign.radar, times, radar_generator)
     beams, clear = sensor.beams(), scene.track.cast(sensor)
     for stem, frame in zip(_stems(len(times)), beside, strict=True):
-        detected = rain_on_beams(clear, beams, scene.rain, sensor, of_lidar)
-        scan = sensor.measure(detected, of_lidar)
+        detected = rain_on_beams(clear, beams, scene.rain, sensor, lidar_generator)
+        scan = sensor.measure(detected, lidar_generator)
         joined = fuse(scan, frame, mounting)
         assert joined.label is not None  # as both of its parts are labelled
         write_scan(folder / FOLDERS.lidar / f"{stem}.bin", scan)
@@ -109,14 +109,14 @@ def _write_mounting(folder: Path, radar: Radar, sensor: Sensor) -> Extrinsics:
 
 def _record_radar(
     folder: Path,
-    scene: Scene,
+    scene: SimulatedScene,
     radar: Radar,
     scan_times: NDArray[np.float64],
     generator: np.random.Generator,
 ) -> list[Scan]:
     """Writes what the radar detects while scans are taken; returns the frame nearest to each."""
     period = 1 / radar.frame_rate
-    # The two sensors run freely: the radar's first frame comes at any time of its period.
+    # The two sensors are not synchronised: the radar's first frame comes anywhere in its period.
     times = np.arange(generator.uniform(0, period), scan_times[-1] + period, period)
     mean = mean_echoes(scene.track, scene.rain, radar)
     frames = [_with_intensity(detect(mean, radar, generator), radar) for _ in times]

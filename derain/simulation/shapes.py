@@ -78,7 +78,7 @@ def leaves(centres: NDArray[np.float64], size: float, generator: np.random.Gener
     Args:
         centres: Centres in metres, (L, 3).
         size: Standard deviation of a corner's distance from the centre along an axis, metres.
-        generator: Source of chance.
+        generator: Random generator.
     """
     return centres[:, None, :] + generator.normal(0, size, (len(centres), 3, 3))
 
@@ -91,7 +91,7 @@ def inside_ellipsoid(
     Args:
         count: How many.
         radii: Half-axes along x, y and z, metres.
-        generator: Source of chance.
+        generator: Random generator.
     """
     direction = generator.normal(size=(count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)

@@ -50,7 +50,7 @@ class Track:
         )
 
     def cast(self, sensor: Sensor) -> Returns:
-        """What every beam of a sensor would return through clear air, were its detector perfect.
+        """What every beam of a sensor would return through clear air to a perfect detector.
 
         A beam is one ray. Surfaces scatter like Lambert's: their apparent reflectivity falls with
         the cosine of the angle of incidence.
@@ -82,7 +82,7 @@ class Track:
 
     @cached_property
     def _scene(self) -> Any:
-        """Open3D's ray-casting scene, made once: a LiDAR and a radar look at the same track."""
+        """Open3D's ray-casting scene, made once for the LiDAR and the radar that see one track."""
         open3d = import_open3d()
         tensor = open3d.core.Tensor
         scene = open3d.t.geometry.RaycastingScene()

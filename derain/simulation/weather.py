@@ -12,7 +12,7 @@ from derain.simulation.marshall_palmer import INTERCEPT, extinction, slope
 # Source: Koschmieder 1924, with his contrast threshold of 2 %.
 VISIBLE_OPTICAL_DEPTH = 3.912
 
-# Half of the water of Marshall and Palmer's rain is in drops of more than this over the slope.
+# Half of the water of Marshall and Palmer's rain is in drops larger than this over Λ, the slope.
 # Source: Ulbrich 1983, "Natural variations in the analytical form of the raindrop size
 # distribution", for the exponential one.
 MEDIAN_VOLUME_DIAMETER = 3.67

@@ -14,8 +14,7 @@ import numpy as np
 
 from derain.cards.known import known_layouts
 from derain.errors import InputError
-from derain.files import find_scans, read_scan
-from derain.files.binary import count_rows
+from derain.files import count_points, find_scans
 from derain.files.labels import LABEL, label_beside, read_labels, semantic
 from derain.files.names import scan_stem
 from derain.files.reading import reading
@@ -144,7 +143,7 @@ def count_scan(path: Path, layout: tuple[str, str] | None, columns: Sequence[str
     Raises:
         InputError: A scan that cannot be read, or labels that do not belong to it.
     """
-    points = _points(path, columns)
+    points = count_points(path, columns)
     tally = Tally(scans=1, points=points)
     labels = (
         label_beside(path)
@@ -166,12 +165,6 @@ def _scan_folders(root: Path, layout: tuple[str, str]) -> list[Path]:
         if found := glob(f"{sequences}{scans}/", root_dir=root):
             return [root / folder for folder in sorted(found)]
     return []
-
-
-def _points(path: Path, columns: Sequence[str]) -> int:
-    """Number of points of a scan; the size of a file of plain rows tells it."""
-    counted = count_rows(path, columns) if path.suffix.lower() == ".bin" else None
-    return len(read_scan(path, columns)) if counted is None else counted
 
 
 def _recorded_rate(weather: Path) -> float | None:

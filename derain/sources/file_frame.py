@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, read_scan
-from derain.files.binary import count_rows
+from derain.files.format import format_of
 from derain.files.labels import read_labels, semantic
-from derain.files.names import scan_stem
+from derain.files.names import is_compressed, scan_stem
 from derain.files.reading import file_size, read_bytes, reading
 from derain.scan import Scan
 from derain.sources.frame import Frame
@@ -72,8 +72,8 @@ class FileFrame(Frame):
 
     def count_points(self) -> int:
         """Number of points of the scan; the size of a file of plain rows tells it."""
-        plain = self.path.suffix.lower() == ".bin"
-        counted = count_rows(self.path, self.columns) if plain else None
+        format_ = format_of(self.path)
+        counted = None if is_compressed(self.path) else format_.count(self.path, self.columns)
         return len(self.read()) if counted is None else counted
 
     def fingerprint(self) -> str:

@@ -6,10 +6,9 @@ of their files: everybody's folders may be called the same.
 
 from collections.abc import Iterable, Mapping, Sequence
 
-import numpy as np
-
 from derain.cards.card import DataCard
 from derain.sources.frame import Frame
+from derain.sources.spread import evenly_spaced
 from derain.spec import Spec
 
 # What a record holds: names of sequences, and fingerprints of scans.
@@ -34,8 +33,7 @@ def by_fingerprint(frames: Sequence[Frame]) -> dict[str, tuple[str, ...]]:
     Raises:
         InputError: A file that cannot be read.
     """
-    chosen = np.linspace(0, len(frames) - 1, min(len(frames), MOST_NAMES)).round().astype(int)
-    prints = tuple(sorted({frames[number].fingerprint() for number in chosen.tolist()}))
+    prints = tuple(sorted({frame.fingerprint() for frame in evenly_spaced(frames, MOST_NAMES)}))
     return {SCANS: prints} if prints else {}
 
 

@@ -13,8 +13,8 @@ GROUPS = Path("/sys/fs/cgroup")
 def usable_cores(membership: Path = MEMBERSHIP, groups: Path = GROUPS) -> int:
     """Cores this process may use, at least one.
 
-    They are those it may run on, but no more than its share of processor time keeps busy, rounded
-    up, where it is in a container that has one: further threads would only wait for these.
+    They are the cores that it may run on. In a container whose processor time is limited they are
+    no more than that time keeps busy, rounded up: further threads would only wait.
 
     Args:
         membership: File that names the control groups of the process, of version 1 or 2.
@@ -38,9 +38,10 @@ def _quotas(membership: Path, groups: Path) -> Iterator[int]:
 
 
 def _groups(membership: Path, groups: Path) -> Iterator[Path]:
-    """The groups of the process that may limit its time, and all above them, which do as well.
+    """The control groups that may limit the process's time: its own, and all that hold those.
 
-    In a container the path may be the machine's, while the container's group is mounted on top.
+    In a container a path may be that on the machine, while the folder of the container's own group
+    is mounted at the top. The top is one of the groups that are looked at.
     """
     with suppress(OSError, ValueError):
         for line in membership.read_text("utf-8").splitlines():
@@ -52,7 +53,7 @@ def _groups(membership: Path, groups: Path) -> Iterator[Path]:
 
 
 def _version_1(group: Path) -> tuple[int, int]:
-    """Microseconds of time in each period of so many; -1 for no limit.
+    """Quota and period: how many microseconds of processor time in how many; -1 for no limit.
 
     Source: Linux, Documentation/scheduler/sched-bwc.rst.
     """
@@ -61,7 +62,7 @@ def _version_1(group: Path) -> tuple[int, int]:
 
 
 def _version_2(group: Path) -> tuple[int, int]:
-    """The same; ``max``, which is no number, for no limit.
+    """The same in version 2, where no limit is ``max``: that is no number and raises ValueError.
 
     Source: Linux, Documentation/admin-guide/cgroup-v2.rst, cpu.max.
     """

@@ -3,36 +3,48 @@
 import sys
 from collections import Counter
 from collections.abc import Iterable
+from typing import Protocol
 
 from tqdm import tqdm
 
 from derain.errors import printable
-from derain.views.oddities import Oddity
+
+
+class Notice(Protocol):
+    """Something that a user is told of a scan, such as a :class:`derain.views.oddities.Oddity`."""
+
+    @property
+    def kind(self) -> str:
+        """What it is, in the same words for every scan that has it."""
+
+    @property
+    def detail(self) -> str:
+        """How it shows in this scan."""
 
 
 class Notices:
     """Warns on stderr of what is odd, each kind with the first scan that has it.
 
-    A folder's scans mostly have the same fault, with other numbers: the first one speaks for all
-    of its kind, and the end says how many more there were.
+    The scans of a folder mostly have the same fault, with other numbers. So of each kind the first
+    scan is told in detail; of those after it, only their number is told, at the end.
     """
 
     def __init__(self) -> None:
         self._seen: Counter[str] = Counter()
 
-    def tell(self, scan: str, oddities: Iterable[Oddity], method: str = "") -> None:
+    def tell(self, scan: str, notices: Iterable[Notice], method: str = "") -> None:
         """Warns of a scan.
 
         Args:
             scan: Its name.
-            oddities: What is odd about it.
+            notices: What is odd about it.
             method: Title of the method that finds it so, where there are several.
         """
         prefix = f"{method}: " if method else ""
-        for oddity in oddities:
-            self._seen[prefix + oddity.kind] += 1
-            if self._seen[prefix + oddity.kind] == 1:
-                warn(f"{scan}: {prefix}{oddity.detail}")
+        for notice in notices:
+            self._seen[prefix + notice.kind] += 1
+            if self._seen[prefix + notice.kind] == 1:
+                warn(f"{scan}: {prefix}{notice.detail}")
 
     def tell_how_many_more(self) -> None:
         """Says of each kind how many more scans had it."""
@@ -46,7 +58,7 @@ def warn(text: str) -> None:
     """Warns on stderr, in one line.
 
     Args:
-        text: Of what.
+        text: What of.
     """
     # Not print: a progress bar may stand in the line.
     tqdm.write(f"derain: warning: {printable(text)}", sys.stderr)

@@ -1,4 +1,4 @@
-"""Imports Open3D, an extra of derain's that wants a system library which a bare Debian lacks."""
+"""Imports Open3D, which is optional, and lets it find libusb, which a bare Debian lacks."""
 
 import contextlib
 import ctypes
@@ -46,8 +46,8 @@ def make_open3d_loadable() -> None:
     On Linux, Open3D links against libusb-1.0.so.0, which the wheel libusb-package carries. Loading
     that before Open3D would serve this process alone. TensorBoard, however, loads Open3D's plug-in
     whenever it starts, and dies where it cannot. So a link to the library is left beside Open3D's
-    own, where those look first for what they need. Where that folder may not be written, the
-    library is loaded into this process.
+    own libraries, which look there first for what they need. Where that folder cannot be written
+    to, the library is loaded into this process.
     """
     open3d = find_spec("open3d")
     if sys.platform != "linux" or open3d is None or open3d.origin is None:
@@ -55,7 +55,7 @@ def make_open3d_loadable() -> None:
     with contextlib.suppress(OSError):
         ctypes.CDLL(LIBUSB)
         return  # the system has it
-    with contextlib.suppress(ImportError, OSError):  # Open3D will name what it lacks
+    with contextlib.suppress(ImportError, OSError):  # importing Open3D then says what it lacks
         import libusb_package
 
         if library := libusb_package.get_library_path():

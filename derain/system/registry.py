@@ -2,9 +2,8 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
-from importlib.metadata import entry_points
 from pkgutil import iter_modules
-from typing import Generic, TypeVar
+from typing import Generic, TypeVar, cast
 
 from derain.errors import InputError
 
@@ -20,22 +19,32 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         @FILTERS.add("dror")
         class DROR(RadiusFilter): ...
 
-    The files are imported when somebody asks what there is. A package outside derain names the
-    module of its own under the entry points of the same name, and is imported then as well::
+    The files are imported when somebody asks for a name that is not known yet, or what there is. A
+    package outside derain names the module of its own among the entry points of the same name::
 
         [project.entry-points."derain.filters"]
         mine = "my_package.my_filter"
 
+    That module is imported when derain's own files do not have the name that is asked for, or when
+    somebody asks what there is. One that cannot be imported is warned of, and the others stay
+    usable. The names come in alphabetical order, whatever was imported first.
+
     Args:
         package: Package whose modules bring members, such as ``derain.filters``.
         group: Name of the entry points of other packages; by default the package's.
+        attribute: Attribute of a member that is set to the first of its names, so that it knows
+            what it is called; by default none is.
     """
 
-    def __init__(self, package: str, group: str | None = None) -> None:
+    def __init__(
+        self, package: str, group: str | None = None, attribute: str | None = None
+    ) -> None:
         self.package = package
         self.group = group or package
+        self.attribute = attribute
         self._members: dict[str, Kind] = {}
-        self._complete = False
+        self._has_own = False
+        self._has_others = False
 
     def add(self, *names: str) -> Callable[[Member], Member]:
         """Decorates a member, which is then found by these names.
@@ -46,46 +55,73 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
 
         def added(member: Member) -> Member:
             for name in names:
-                # A module that is imported twice brings the same once more.
-                if repr(self._members.setdefault(name, member)) != repr(member):  # type: ignore[arg-type]
+                former = _origin(self._members.get(name, member))
+                if former != _origin(member):
                     raise InputError(
-                        f"{self.group}: {name}", "two are called so", "Remove or rename one."
+                        f"{self.group}: {name}",
+                        f"two are called so, {former} and {_origin(member)}",
+                        "Remove or rename one.",
                     )
+            # Where a module was imported anew, its members take the place of the former ones.
+            self._members.update(dict.fromkeys(names, cast(Kind, member)))
+            if self.attribute:
+                setattr(member, self.attribute, names[0])
             return member
 
         return added
 
+    def name_of(self, member: object) -> str | None:
+        """The first of the names that a member was added by; None for what was not added."""
+        return next((name for name, added in self._members.items() if added is member), None)
+
     def __getitem__(self, name: str) -> Kind:
-        if name not in self._members:
-            self._complete_it()
+        # Other packages come last: to look for them takes longer than to import derain's files.
+        for import_more in (self._import_own, self._import_others):
+            if name not in self._members:
+                import_more()
         return self._members[name]
 
     def __iter__(self) -> Iterator[str]:
-        self._complete_it()
+        self._import_own()
+        self._import_others()
         return iter(sorted(self._members))
 
     def __len__(self) -> int:
-        self._complete_it()
-        return len(self._members)
+        return len(list(iter(self)))
 
-    def _complete_it(self) -> None:
-        """Imports what brings members, once.
-
-        Raises:
-            InputError: A package outside derain that cannot be imported.
-        """
-        if self._complete:
+    def _import_own(self) -> None:
+        """Imports the modules of the package, once."""
+        if self._has_own:
             return
-        self._complete = True
         package = import_module(self.package)
         for module in iter_modules(package.__path__):
             import_module(f"{self.package}.{module.name}")
-        for entry in entry_points(group=self.group):
+        self._has_own = True
+
+    def _import_others(self) -> None:
+        """Imports what other packages bring, once; warns of what cannot be imported."""
+        if self._has_others:
+            return
+        self._has_others = True  # before, for one of them may ask what there is
+        # Both are imported here, for most commands never ask other packages.
+        from importlib.metadata import entry_points
+
+        from derain.system.notices import warn
+
+        for entry in sorted(entry_points(group=self.group), key=lambda entry: entry.name):
             try:
                 entry.load()
-            except Exception as error:  # whatever a foreign module raises
-                raise InputError(
+            except Exception as error:  # whatever the code of others raises
+                package = entry.dist.name if entry.dist else "that brings it"
+                problem = InputError(
                     f"{entry.group}: {entry.name}",
-                    f"{entry.value} cannot be loaded ({error})",
-                    f"Repair or uninstall the package {entry.dist.name if entry.dist else ''}.",
-                ) from error
+                    f"{entry.value} cannot be imported ({type(error).__name__}: {error})",
+                    f"Repair or uninstall the package {package}.",
+                )
+                warn(str(problem))
+
+
+def _origin(member: object) -> str:
+    """Where a member is defined: the same when its module is imported anew."""
+    name = getattr(member, "__qualname__", None)
+    return repr(member) if name is None else f"{member.__module__}.{name}"

@@ -2,13 +2,16 @@
 
 import multiprocessing
 import os
+import sys
 import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from types import ModuleType
 
-# Tells the processes that Lightning starts for a run on several devices which process began it.
+# Environment variable with the id of the process that began a run on several devices. It tells the
+# further processes that Lightning starts for the run whom to watch.
 LAUNCHER = "DERAIN_LAUNCHER"
 
 
@@ -16,14 +19,15 @@ LAUNCHER = "DERAIN_LAUNCHER"
 def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """Lends processes that share work.
 
-    When the block ends with an error, or by a signal, nobody waits for what they are at. When this
-    process is killed they end as well, instead of waiting for work for ever.
+    When the block ends with an error or by a signal they are killed, whatever they are doing. When
+    this process is killed they end as well, instead of waiting for work for ever.
 
     Args:
         workers: How many.
     """
     others = set(multiprocessing.active_children())
-    # Not forked: a fork would hold all that this process holds, but none of its threads.
+    # Not forked: a fork has the memory and the locks of this process, but none of the threads that
+    # would release them.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, context, _end_with_parent) as pool:
         try:
@@ -32,6 +36,22 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
             for worker in set(multiprocessing.active_children()) - others:
                 worker.kill()
             raise
+
+
+@contextmanager
+def main_left_out() -> Iterator[None]:
+    """Keeps processes that are started here from running the user's script once more.
+
+    A new process loads the module that the program began with, for what may be defined there.
+    Where nothing of it is needed, that would only take time and memory; and a script that does not
+    guard its work by ``if __name__ == "__main__"`` would do all of it again.
+    """
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def end_with_launcher() -> None:

@@ -1,4 +1,4 @@
-"""The way back from pixels to points: whose score is given to a point that lost its pixel."""
+"""Back-projection from pixels to points: whose score a point is given that lost its pixel."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# Pixels on each side of a point's own that a way back looks at: a window of 5 × 5.
+# Pixels on each side of a point's own that a back-projection may choose from: a window of
+# 5 × 5.
 # Source: Milioto et al. 2019, RangeNet++; github.com/TiagoCortinhal/SalsaNext, salsanext.yml.
 REACH = 2
 
@@ -49,7 +50,7 @@ class ProjectedPoints:
     wraps: bool
 
 
-WayBack = Callable[[ProjectedPoints, NDArray[np.float32]], NDArray[np.float32]]
+PixelsToPoints = Callable[[ProjectedPoints, NDArray[np.float32]], NDArray[np.float32]]
 
 
 def copy(points: ProjectedPoints, score: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -131,7 +132,12 @@ def vote(points: ProjectedPoints, score: NDArray[np.float32]) -> NDArray[np.floa
     return result
 
 
-WAYS_BACK: Mapping[str, WayBack] = {"nearest range": nearest_range, "copy": copy, "vote": vote}
+# Every back-projection, by the name that the option `way_back` and a Spec have for it.
+BACK_PROJECTIONS: Mapping[str, PixelsToPoints] = {
+    "nearest range": nearest_range,
+    "copy": copy,
+    "vote": vote,
+}
 
 
 class _Window:

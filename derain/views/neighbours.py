@@ -14,19 +14,21 @@ from derain.scan import Scan
 from derain.system.cores import usable_cores
 from derain.views.channels import filled_values
 from derain.views.morton import distinct_rows
+from derain.views.registry import VIEWS
 from derain.views.spherical_grid import ALL_AROUND
-from derain.views.view import WayToRows
+from derain.views.view import BackProjection, SeenScan, View
 
-# Seven times as many as 3D-OutDet looks at. A hundred thousand points have 80 MB of them.
-MOST_NEIGHBOURS = 64
+# The most that the Spec of a network may ask for, seven times as many as 3D-OutDet looks at. A
+# hundred thousand points have 80 MB of them.
+MOST_NETWORK_NEIGHBOURS = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Neighbourhoods:
+class Neighbourhoods(SeenScan):
     """One or more scans as a point network sees them.
 
-    The M points are the distinct valid positions of the scan, along a Morton curve; of points at
-    one position the first row speaks for all.
+    The M points are the distinct valid positions of the scan, along a Morton curve. Of several rows
+    at one position the network sees the first, and all of them are given its score.
 
     Attributes:
         points: The view's channels, each in its own unit, float32 (M, C).
@@ -34,7 +36,7 @@ class Neighbourhoods:
             of ``points``, int64 (M, k).
         distances: Their distances in metres, float32 (M, k).
         first: Row of the scan that each point was taken from, int64 (M,).
-        inverse: Point that answers for each row of the scan, int64 (N,); -1 for invalid rows.
+        inverse: Point whose score each row of the scan is given, int64 (N,); -1 for invalid rows.
     """
 
     VARYING: ClassVar[str | None] = "points"
@@ -52,7 +54,7 @@ class Neighbourhoods:
 
     @property
     def judged(self) -> NDArray[np.bool_]:
-        """True for rows of the scan that some point answers for, bool (N,)."""
+        """True for rows of the scan that are given the score of some point, bool (N,)."""
         return self.inverse >= 0
 
     def inputs(self) -> dict[str, NDArray[Any]]:
@@ -74,36 +76,26 @@ class Neighbourhoods:
         """
         return rain[self.first].astype(np.int64)
 
-    def back(self, score: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Carries the network's scores back to every row of the scan.
-
-        Args:
-            score: One value per point, float32 (M,).
-
-        Returns:
-            One value per row of the scan in its order, float32 (N,); 0 for invalid rows.
-        """
-        return _to_rows(self.inverse, score)
-
-    def way_to_rows(self) -> WayToRows:
-        """What :meth:`back` does, without the inputs."""
+    def back_projection(self) -> BackProjection:
+        """What gives every row the score of its point, and invalid rows 0."""
         return partial(_to_rows, self.inverse)
 
     @staticmethod
-    def pack(views: Sequence["Neighbourhoods"]) -> dict[str, NDArray[Any]]:
+    def pack(seen: Sequence["Neighbourhoods"]) -> dict[str, NDArray[Any]]:
         """Inputs of several scans as one cloud, each scan's neighbours staying its own."""
-        offsets = np.cumsum([0, *(len(view.points) for view in views)])
+        offsets = np.cumsum([0, *(len(one.points) for one in seen)])
         return {
-            "points": np.concatenate([view.points for view in views]),
-            "distances": np.concatenate([view.distances for view in views]),
+            "points": np.concatenate([one.points for one in seen]),
+            "distances": np.concatenate([one.distances for one in seen]),
             "neighbours": np.concatenate(
-                [view.neighbours + offset for view, offset in zip(views, offsets, strict=False)]
+                [one.neighbours + offset for one, offset in zip(seen, offsets, strict=False)]
             ),
         }
 
 
+@VIEWS.add("neighbours")
 @dataclass(frozen=True)
-class NeighbourView:
+class NeighbourView(View):
     """How a scan becomes neighbourhoods; the same in training and in deployment.
 
     Args:
@@ -112,8 +104,6 @@ class NeighbourView:
         stand_in: What stands in for a value that a scan lacks, by channel; 0 if not named.
         threads: Threads of the search; 0 takes every core this process may use.
     """
-
-    KIND: ClassVar[str] = "neighbours"
 
     neighbours: int = 9
     channels: tuple[str, ...] = ("x", "y", "z", "intensity")
@@ -130,10 +120,14 @@ class NeighbourView:
             InputError: Something that does not describe it.
         """
         found = entry.record(
-            {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NEIGHBOURS)},
+            {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NETWORK_NEIGHBOURS)},
             required=("neighbours",),
         )
         return cls(found["neighbours"], channels, stand_in, threads)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Its part of a Spec: ``kind`` and ``neighbours``."""
+        return {"kind": self.NAME, "neighbours": self.neighbours}
 
     @property
     def azimuth(self) -> tuple[float, float]:

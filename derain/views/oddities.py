@@ -1,23 +1,20 @@
-"""What is odd about a scan, given the method that judges it."""
+"""What may be odd about a scan, in plain values; each method says which of it matters to itself."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.evaluation.intensity_rule import OneLineRule
-from derain.files.ply import PlyHeader
-from derain.filters import SSR, PointFilter
-from derain.scan import FEWEST_ALIKE, Scan
-from derain.spec import Spec
+from derain.scan import FEWEST_ALIKE, PartialHeader, Scan
 from derain.views.full_scale import FULL_SCALES
 
 # Intensities this many times off the training data's are of another unit.
 INTENSITY_MISMATCH = 30.0
 
-# Units of intensity that tell its full scale.
-SPANS = {f"0..{scale:g}": scale for scale in FULL_SCALES}
+# Full scale of intensities, by the units that tell it.
+SCALE_OF_UNIT = {f"0..{scale:g}": scale for scale in FULL_SCALES}
 
 # What of a scan its full scale is read from: above it lie glints, and damaged values.
 FULL_SCALE_PERCENTILE = 99
@@ -29,9 +26,6 @@ MOST_OUTSIDE = 0.02
 # the heavy rain of REHEARSE-3D. A method that takes twice as much has mistaken sensor or unit.
 HEAVIEST_RAIN = 0.17
 MOST_RAIN = 2 * HEAVIEST_RAIN
-
-# What a method judges by, as far as a scan may not suit it; None for what suits every scan.
-Judge = Spec | PointFilter | OneLineRule | None
 
 
 @dataclass(frozen=True)
@@ -47,27 +41,86 @@ class Oddity:
     detail: str
 
 
-def oddities(scan: Scan, judge: Judge) -> Iterator[Oddity]:
-    """What is odd about a scan before it is judged.
+class Examiner(Protocol):
+    """What scans are judged by, and what can say of a scan beforehand whether it suits."""
+
+    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+        """What is odd about a scan before it is judged.
+
+        Args:
+            scan: The scan, its intensities in the unit of the method. One without a point that can
+                be judged is not odd.
+        """
+
+
+def missing_channels(scan: Scan, stand_in: Mapping[str, float], data: str) -> Iterator[Oddity]:
+    """Says which channels of a model a scan has not got.
 
     Args:
-        scan: The scan, its intensities in the unit of the method. One without a point that can be
-            judged is not odd.
-        judge: What the method judges by.
+        scan: The scan.
+        stand_in: The channels that it has not got, and the means that stand in for them.
+        data: Name of the data that the means are of.
     """
-    if judge is None or not scan.valid.any():
+    if not scan.valid.any():
         return
-    if isinstance(judge, Spec):
-        yield from _missing_channels(scan, judge)
-        yield from _intensity_unlike_training(scan, judge)
-    elif isinstance(judge, SSR | OneLineRule):
-        if scan.measured_intensity is None:
-            yield Oddity(_lack(scan), f"{_lack_in_detail(scan)}: nothing can be found without")
-        elif isinstance(judge, SSR):
-            yield from _of_another_scale(scan, SSR.FULL_SCALE, "ssr")
+    for name, mean in stand_in.items():
+        lack, detail = _lack(scan) if name == "intensity" else (f"no {name}", f"no {name}")
+        yield Oddity(lack, f"{detail}: the mean of {data}, {mean:.3g}, stands in")
 
 
-def outside_view(scan: Scan, judged: NDArray[np.bool_], judge: Spec) -> Iterator[Oddity]:
+def missing_intensity(scan: Scan) -> Iterator[Oddity]:
+    """Whether a scan lacks the intensity without which a method finds nothing."""
+    if scan.measured_intensity is None and scan.valid.any():
+        lack, detail = _lack(scan)
+        yield Oddity(lack, f"{detail}: nothing can be found without")
+
+
+def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> Iterator[Oddity]:
+    """Whether a scan's intensities are of another unit than a model's training data.
+
+    Args:
+        scan: The scan.
+        mean: Mean intensity of the training data; 0 for a model that sees none.
+        unit: Unit of the training data's intensity.
+        data: Name of the training data.
+    """
+    if mean <= 0 or scan.measured_intensity is None:
+        return
+    intensity = scan.measured_intensity[scan.valid]
+    found = float(intensity.mean(dtype="float64")) if len(intensity) else 0.0
+    if found > 0 and not 1 / INTENSITY_MISMATCH < found / mean < INTENSITY_MISMATCH:
+        yield Oddity(
+            _other_unit(found < mean),
+            f"mean intensity {found:.3g}, but {mean:.3g} where the model was trained "
+            f"(unit {unit}): see --intensity-scale",
+        )
+    elif full_scale := SCALE_OF_UNIT.get(unit):
+        yield from intensity_of_another_scale(scan, full_scale, data)
+
+
+def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Iterator[Oddity]:
+    """Whether a scan's intensities have another full scale than expected.
+
+    Args:
+        scan: The scan.
+        expected: One of FULL_SCALES: 1, 255 or 65,535.
+        whose: Name of the method or the data that expects it.
+    """
+    if scan.measured_intensity is None:
+        return
+    intensity = scan.measured_intensity[scan.valid]
+    if len(intensity) < FEWEST_ALIKE:  # so few may all be dark
+        return
+    bright = np.percentile(intensity, FULL_SCALE_PERCENTILE)
+    scale = next((scale for scale in FULL_SCALES if bright <= scale), FULL_SCALES[-1])
+    if scale != expected:
+        yield Oddity(
+            _other_unit(scale < expected),
+            f"intensities of 0..{scale:g}, but 0..{expected:g} for {whose}: see --intensity-scale",
+        )
+
+
+def outside_view(scan: Scan, judged: NDArray[np.bool_], data: str) -> Iterator[Oddity]:
     """Whether much of a scan lies outside what a model sees.
 
     Only who judged the scan can say: to project it once more would take as long as the view. A
@@ -77,14 +130,14 @@ def outside_view(scan: Scan, judged: NDArray[np.bool_], judge: Spec) -> Iterator
     Args:
         scan: The scan.
         judged: Rows that the model judged, bool (N,).
-        judge: The model's Spec.
+        data: Name of the data that the model's grid is for.
     """
     valid = scan.valid
     outside = float((~judged[valid]).mean()) if valid.any() else 0.0
     if outside > MOST_OUTSIDE:
         yield Oddity(
             "points outside the grid",
-            f"{outside:.0%} of the points lie outside the grid of {judge.data}, and stay",
+            f"{outside:.0%} of the points lie outside the grid of {data}, and stay",
         )
 
 
@@ -104,65 +157,22 @@ def much_removed(share: float) -> Iterator[Oddity]:
 
 def left_out(scan: Scan) -> Iterator[Oddity]:
     """Whether a scan's file holds what is not written with the cleaned scan."""
-    if isinstance(scan.header, PlyHeader) and scan.header.left_out:
+    if isinstance(scan.header, PartialHeader) and scan.header.left_out:
         yield Oddity(
             "parts of the file that are not written",
             f"the cleaned file is without its {', '.join(scan.header.left_out)}",
         )
 
 
-def _missing_channels(scan: Scan, spec: Spec) -> Iterator[Oddity]:
-    """Which channels of the model a scan has not got."""
-    for name, mean in spec.missing_channels(scan).items():
-        lack, detail = f"no {name}", f"no {name}"
-        if name == "intensity":
-            lack, detail = _lack(scan), _lack_in_detail(scan)
-        yield Oddity(lack, f"{detail}: the mean of {spec.data}, {mean:.3g}, stands in")
-
-
-def _lack(scan: Scan) -> str:
-    """What a scan without a measured intensity has instead."""
-    return "no intensity" if scan.intensity is None else "intensity not measured"
-
-
-def _lack_in_detail(scan: Scan) -> str:
+def _lack(scan: Scan) -> tuple[str, str]:
+    """Kind and detail of what a scan without a measured intensity has instead."""
     if scan.intensity is None:
-        return "no intensity"
+        return "no intensity", "no intensity"
     values = scan.intensity[scan.valid]
     if values.min() == values.max():
-        return f"intensity {values[0]:g} at every point, so that it was not measured"
-    return "no intensity is a number that sensors measure"
-
-
-def _intensity_unlike_training(scan: Scan, spec: Spec) -> Iterator[Oddity]:
-    """Whether a scan's intensities are of another unit than a model's training data."""
-    intensity, expected = scan.measured_intensity, spec.mean_intensity
-    if intensity is None or expected <= 0:
-        return
-    mean = float(intensity[scan.valid].mean(dtype="float64"))
-    if mean > 0 and not 1 / INTENSITY_MISMATCH < mean / expected < INTENSITY_MISMATCH:
-        yield Oddity(
-            _other_unit(mean < expected),
-            f"mean intensity {mean:.3g}, but {expected:.3g} where the model was trained "
-            f"(unit {spec.intensity_unit}): see --intensity-scale",
-        )
-    elif full_scale := SPANS.get(spec.intensity_unit):
-        yield from _of_another_scale(scan, full_scale, spec.data)
-
-
-def _of_another_scale(scan: Scan, expected: float, whose: str) -> Iterator[Oddity]:
-    """Whether a scan's intensities have another full scale than expected: 1, 255 or 65,535."""
-    assert scan.intensity is not None
-    intensity = scan.intensity[scan.valid]
-    if len(intensity) < FEWEST_ALIKE:  # so few may all be dark
-        return
-    bright = np.percentile(intensity, FULL_SCALE_PERCENTILE)
-    scale = next((scale for scale in FULL_SCALES if bright <= scale), FULL_SCALES[-1])
-    if scale != expected:
-        yield Oddity(
-            _other_unit(scale < expected),
-            f"intensities of 0..{scale:g}, but 0..{expected:g} for {whose}: see --intensity-scale",
-        )
+        alike = f"intensity {values[0]:g} at every point, so that it was not measured"
+        return "intensity not measured", alike
+    return "intensity not measured", "no intensity is a number that sensors measure"
 
 
 def _other_unit(smaller: bool) -> str:

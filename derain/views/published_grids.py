@@ -5,8 +5,8 @@ from typing import Any
 
 # Inclinations of WADS's 64 beams, degrees. LiSnowNet's own table is in its repository, which derain
 # does not draw on. Source: measured here, on the ten raw scans of sequence 36, by
-# `python benchmarks/way_back.py --beams WADS/sequences/36/velodyne/*.bin`; the published sample
-# scan gives the same, and the returns of a beam differ by no more than 0.00001 degrees.
+# `python benchmarks/back_projection.py --beams WADS/sequences/36/velodyne/*.bin`; the published
+# sample scan gives the same, and the returns of a beam differ by no more than 0.00001 degrees.
 WADS_BEAMS = [
     *(14.842, 10.992, 8.019, 5.017, 3.0, 1.988, 1.82, 1.648, 1.482, 1.311, 1.144, 0.973, 0.806),
     *(0.635, 0.468, 0.297, 0.129, -0.04, -0.209, -0.377, -0.548, -0.715, -0.885, -1.053, -1.224),

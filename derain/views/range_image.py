@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.scan import Scan
-from derain.views.back_projection import WAYS_BACK, ProjectedPoints
+from derain.views.back_projection import BACK_PROJECTIONS, ProjectedPoints
 from derain.views.channels import filled_values
+from derain.views.registry import VIEWS
 from derain.views.spherical_grid import SphericalGrid, grid_at
-from derain.views.view import IGNORED, WayToRows
-
-CHANNELS = ("range", "x", "y", "z", "intensity")
+from derain.views.view import IGNORED, BackProjection, SeenScan, View
 
 
 @dataclass(frozen=True, eq=False)
-class RangeImage:
+class RangeImage(SeenScan):
     """One scan as a network on images sees it.
 
     Attributes:
@@ -32,7 +31,7 @@ class RangeImage:
         winner: Row of the scan that each pixel shows, int64 (H · W,); -1 where nothing returned.
         range: Range of each row of the scan, float32 (N,), metres.
         wraps: True where the last column is the neighbour of the first.
-        way_back: How points that are not shown get a score.
+        way_back: Name of the back-projection, by which points that are not shown get a score.
     """
 
     VARYING: ClassVar[str | None] = None
@@ -78,20 +77,8 @@ class RangeImage:
         result[shown] = rain[self.winner[shown]]
         return result
 
-    def back(self, score: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Carries the network's scores back to every row of the scan.
-
-        Args:
-            score: One value per pixel, float32 (H · W,).
-
-        Returns:
-            One value per row of the scan in its order, float32 (N,); 0 for invalid rows and for
-            points outside the grid, which nobody judged.
-        """
-        return self.way_to_rows()(score)
-
-    def way_to_rows(self) -> WayToRows:
-        """What :meth:`back` does, without the image."""
+    def back_projection(self) -> BackProjection:
+        """What gives points scores of pixels as ``way_back`` says, and 0 to rows off the grid."""
         judged = np.flatnonzero(self.judged)
         points = ProjectedPoints(
             self.pixel[judged],
@@ -102,11 +89,11 @@ class RangeImage:
         return partial(_to_rows, self.way_back, points, judged, len(self.pixel))
 
     @staticmethod
-    def pack(views: Sequence["RangeImage"]) -> dict[str, NDArray[Any]]:
+    def pack(seen: Sequence["RangeImage"]) -> dict[str, NDArray[Any]]:
         """Inputs of several scans on one grid as one batch."""
         return {
-            "image": np.stack([view.image for view in views]),
-            "valid": np.stack([view.valid[None] for view in views]),
+            "image": np.stack([one.image for one in seen]),
+            "valid": np.stack([one.valid[None] for one in seen]),
         }
 
     def _nearest(self) -> NDArray[np.float32]:
@@ -125,12 +112,13 @@ def _to_rows(
     score: NDArray[np.float32],
 ) -> NDArray[np.float32]:
     result = np.zeros(rows, np.float32)
-    result[judged] = WAYS_BACK[way_back](points, score)
+    result[judged] = BACK_PROJECTIONS[way_back](points, score)
     return result
 
 
+@VIEWS.add("range")
 @dataclass(frozen=True)
-class RangeView:
+class RangeView(View):
     """How a scan becomes a range image; the same in training and in deployment.
 
     The nearest return wins a pixel; of equally near ones that of the lowest row.
@@ -138,32 +126,35 @@ class RangeView:
     Args:
         grid: Rows and columns of the image.
         channels: What a pixel holds, in order, as :meth:`Scan.channel` names it.
-        way_back: How points that lost their pixel get a score: ``nearest range``, ``copy`` or
-            ``vote``.
+        way_back: Name of the back-projection, by which points that lost their pixel get a score:
+            ``nearest range``, ``copy`` or ``vote``. It is called so in options and in Specs, which
+            users type and files hold.
         stand_in: What stands in for a value that a scan lacks, by channel; 0 if not named.
 
     Raises:
-        InputError: An unknown way back.
+        InputError: An unknown back-projection.
     """
 
-    KIND: ClassVar[str] = "range"
-
     grid: SphericalGrid
-    channels: tuple[str, ...] = CHANNELS
+    channels: tuple[str, ...] = ("range", "x", "y", "z", "intensity")
     way_back: str = "nearest range"
     stand_in: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.way_back not in WAYS_BACK:
+        if self.way_back not in BACK_PROJECTIONS:
             raise InputError(
                 "way_back",
                 f"no such way back: '{self.way_back}'",
-                f"Known are {', '.join(WAYS_BACK)}.",
+                f"Known are {', '.join(BACK_PROJECTIONS)}.",
             )
 
     @classmethod
-    def of(cls, entry: Entry, channels: tuple[str, ...], stand_in: Mapping[str, float]) -> Self:
+    def of(
+        cls, entry: Entry, channels: tuple[str, ...], stand_in: Mapping[str, float], threads: int
+    ) -> Self:
         """The view that a Spec describes by its ``kind``, ``grid`` and ``way_back``.
+
+        It takes one thread, whatever it may use.
 
         Raises:
             InputError: Something that does not describe it.
@@ -173,6 +164,10 @@ class RangeView:
             required=("grid", "way_back"),
         )
         return cls(found["grid"], channels, found["way_back"], stand_in)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Its part of a Spec: ``kind``, ``grid`` and ``way_back``."""
+        return {"kind": self.NAME, "grid": self.grid.as_dict(), "way_back": self.way_back}
 
     @property
     def azimuth(self) -> tuple[float, float]:

@@ -1,21 +1,24 @@
 """What every view of a scan can do: be a network's input, and carry its scores back."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.files.documents import Entry
 from derain.scan import Scan
+from derain.views.window import Window, WindowOfScans
 
 # In a target: nothing is there to be judged, such as in a pixel without a return.
 IGNORED = -1
 
 # Carries scores of a view's cells, float32 (M,), to the rows of its scan, float32 (N,).
-WayToRows = Callable[[NDArray[np.float32]], NDArray[np.float32]]
+BackProjection = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 
-class ViewedScan(Protocol):
+class SeenScan(ABC):
     """One scan as a network sees it, in cells: points of a neighbour view, pixels of an image.
 
     Attributes:
@@ -26,16 +29,20 @@ class ViewedScan(Protocol):
     VARYING: ClassVar[str | None]
 
     @property
+    @abstractmethod
     def size(self) -> int:
         """M, the number of cells that the network scores."""
 
     @property
+    @abstractmethod
     def judged(self) -> NDArray[np.bool_]:
-        """True for rows of the scan that some cell answers for, bool (N,)."""
+        """True for rows of the scan that are given the score of some cell, bool (N,)."""
 
+    @abstractmethod
     def inputs(self) -> dict[str, NDArray[Any]]:
         """The network's inputs by name, in its order."""
 
+    @abstractmethod
     def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
         """What the network is to say of each cell.
 
@@ -47,29 +54,82 @@ class ViewedScan(Protocol):
             int64 (M,).
         """
 
-    def back(self, score: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Carries scores of the cells, float32 (M,), to the scan's rows, float32 (N,)."""
+    @abstractmethod
+    def back_projection(self) -> BackProjection:
+        """What carries scores to the scan's rows, without the inputs, which may be let go of."""
 
-    def way_to_rows(self) -> WayToRows:
-        """What :meth:`back` does, without the inputs: what is needed once they were scored."""
+    def back(self, score: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Carries the network's scores back to every row of the scan.
+
+        Args:
+            score: One value per cell, float32 (M,).
+
+        Returns:
+            One value per row of the scan in its order, float32 (N,); 0 for rows that are not
+            ``judged``.
+        """
+        return self.back_projection()(score)
 
     @staticmethod
-    def pack(views: Sequence[Any]) -> dict[str, NDArray[Any]]:
-        """The inputs of several scans as one batch."""
+    @abstractmethod
+    def pack(seen: Sequence[Any]) -> dict[str, NDArray[Any]]:
+        """The inputs of several scans of this kind as one batch."""
 
 
-class View(Protocol):
+class View(ABC):
     """How a scan becomes a network's input; the same in training and in deployment.
 
+    A view enters derain by its file in ``derain/views``, or by an entry point ``derain.views`` of
+    another package, and the decorator that gives it its name::
+
+        @VIEWS.add("neighbours")
+        class NeighbourView(View): ...
+
     Attributes:
-        KIND: Its name in a Spec.
+        NAME: Its name in a Spec; the decorator sets it.
     """
 
-    KIND: ClassVar[str]
+    NAME: ClassVar[str]
+
+    @classmethod
+    @abstractmethod
+    def of(
+        cls, entry: Entry, channels: tuple[str, ...], stand_in: Mapping[str, float], threads: int
+    ) -> Self:
+        """Reads back what :meth:`as_dict` gave. It is not trusted.
+
+        Args:
+            entry: What stands under ``view`` in a Spec.
+            channels: What the network sees of a point, in order, as :meth:`Scan.channel` names it.
+            stand_in: What stands in for a value that a scan lacks, by channel.
+            threads: Threads that it may use; 0 takes every core this process may use.
+
+        Raises:
+            InputError: Something that does not describe it.
+        """
+
+    @abstractmethod
+    def as_dict(self) -> dict[str, Any]:
+        """Its part of a Spec, JSON-able: its name as ``kind``, and what is its own."""
 
     @property
+    @abstractmethod
     def azimuth(self) -> tuple[float, float]:
         """What it sees: right and left bound, degrees counter-clockwise from x."""
 
-    def __call__(self, scan: Scan) -> ViewedScan:
-        """Views a scan."""
+    @property
+    def window(self) -> Window:
+        """The scans that it sees: by default the one that is judged, alone."""
+        return Window()
+
+    @abstractmethod
+    def __call__(self, scan: Scan) -> SeenScan:
+        """Views a scan, alone."""
+
+    def of_window(self, scans: WindowOfScans) -> SeenScan:
+        """Views a scan among those around it, as many as :attr:`window` asks for or fewer.
+
+        Args:
+            scans: The scan, with others of its sequence. What is seen has its rows, not theirs.
+        """
+        return self(scans.scan)

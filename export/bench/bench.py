@@ -1,63 +1,225 @@
-"""Runs a bench, and says what it depends on."""
+"""Runs a bench: every method on the same scans, each timed alone."""
 
 import platform
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
-from derain.datamodules.base import ScanDataModule
-from derain.datamodules.labelled import full_name
-from derain.export.bench.contestants import Contestant
+from derain.cards.card import DataCard, load_card
+from derain.evaluation.scores import score
+from derain.export.bench.contestant import Contestant
+from derain.export.bench.contestants import GivenMethod, contestants
 from derain.export.bench.cost import Timing, measure_cost
+from derain.export.bench.labelled_frames import LabelledFrames
+from derain.export.bench.report import main_table, write_report
 from derain.export.bench.rows import Row, joined
-from derain.export.bench.scores import Labelled, score
-from derain.export.latency import processor, versions
-from derain.sources.frame import Frame
+from derain.export.bench.shared_search import scored_methods
+from derain.export.machine import processor, versions
+from derain.files import DEFAULT_COLUMNS
+from derain.scan import Scan
+from derain.sources.given import GivenScans, source_of
+from derain.sources.spread import evenly_spaced
+from derain.sources.training_record import overlap
+from derain.spec import Spec
+from derain.system.notices import Notices
 
 
-def run_bench(
-    contestants: Sequence[Contestant], data: Labelled, timing: Timing, seed: int = 0
-) -> list[Row]:
-    """Scores every method on every scan, and measures what each costs alone.
+@dataclass(frozen=True)
+class Bench:
+    """What a bench found; as text, its main table.
+
+    Attributes:
+        rows: How each method did, in the order of the methods.
+        facts: What the figures depend on besides the methods, as JSON-able primitives: scans, data
+            card, seed, processor, versions.
+    """
+
+    rows: Sequence[Row]
+    facts: Mapping[str, Any]
+
+    def __str__(self) -> str:
+        return main_table(self.rows)
+
+    def __getitem__(self, title: str) -> Row:
+        """The row of a method, by its title.
+
+        Raises:
+            KeyError: No method is called so.
+        """
+        return {row.title: row for row in self.rows}[title]
+
+    def write(self, folder: str | Path) -> None:
+        """Writes ``bench.md``, ``bench.csv``, ``bench.json`` and ``speed_error.png``.
+
+        Args:
+            folder: Where to, made if missing.
+
+        Raises:
+            InputError: A folder that cannot be written.
+        """
+        from derain.export.bench.speed_error import draw_speed_error
+
+        write_report(self.rows, self.facts, Path(folder))
+        draw_speed_error(self.rows, self.facts, Path(folder) / "speed_error.png")
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is timed and drawn.
+
+    Attributes:
+        threads: Threads of views and networks; 0 takes every core this process may use.
+        timed: Scans that each method is timed on, spread over all; fewer where there are not as
+            many.
+        repeats: Timed runs on each of them.
+        seed: Of the draws behind the intervals.
+    """
+
+    threads: int = 0
+    timed: int = 10
+    repeats: int = 3
+    seed: int = 0
+
+
+def bench(
+    methods: Sequence[GivenMethod] | Mapping[str, GivenMethod],
+    scans: GivenScans,
+    card: DataCard | str | Path,
+    *,
+    train: GivenScans | None = None,
+    columns: Sequence[str] = DEFAULT_COLUMNS,
+    intensity_scale: float = 1.0,
+    distinct: bool | None = None,
+    rain_rates: Mapping[str, float] | None = None,
+    threads: int = 0,
+    timed: int = 10,
+    repeats: int = 3,
+    seed: int = 0,
+) -> Bench:
+    """Compares methods on the same labelled scans: error, time and memory.
+
+    A method that another process can be given is timed alone in one of its own. A function that is
+    defined in the running script or session cannot; it is timed in this process, which its row
+    says.
+
+    Example:
+        >>> import numpy as np
+        >>> from derain.scan import Scan
+        >>> points = np.random.default_rng(0).uniform(-9, 9, (500, 4))
+        >>> scan = Scan.of(points).with_label(np.where(points[:, 3] < 0, 110, 40))
+        >>> found = bench({"dim": lambda scan: scan.intensity < 0, "all": "all"}, [scan], "wads")
+        >>> found["dim"].scores.pooled.iou, found["dim"].milliseconds > 0
+        (1.0, True)
 
     Args:
-        contestants: The methods, one or more.
-        data: Labelled scans, one or more.
-        timing: What the methods are timed on, and how; scoring takes as many threads.
+        methods: Each an exported model (``.onnx``), parameters that ``derain tune`` wrote
+            (``.yaml``), the name of a filter or baseline (``position``, ``intensity``, ``all``,
+            ``none``), a ``Derainer``, a filter, or any function that takes a Scan and says which
+            points are rain, bool (N,). A mapping gives them titles.
+        scans: Labelled scans, in memory or in files and folders: all that a source gives.
+        card: What their labels mean: a data card, the name of a packaged one, or a YAML file.
+        train: Labelled scans that ``position`` and ``intensity`` learn from.
+        columns: Names of the columns of files that do not name them.
+        intensity_scale: What takes the scans' intensities to the unit of the methods, e.g. 255.
+        distinct: Whether points at one position count once; None does as the card says.
+        rain_rates: Rain rate in mm/h by sequence, as far as it is known.
+        threads: Threads of views and networks; 0 takes every core this process may use.
+        timed: Scans that each method is timed on, spread over all.
+        repeats: Timed runs on each of them.
         seed: Of the draws behind the intervals.
 
     Returns:
-        The rows of the table, in the order of the methods.
+        A row for each method, which can be printed and written.
+
+    Raises:
+        InputError: A method that is not known or cannot be read, or two of one title; no scans, or
+            one that cannot be read or has no labels. A method that fails is told in its row.
+    """
+    card = card if isinstance(card, DataCard) else load_card(card)
+    asked = card.deduplicate if distinct is None else distinct
+
+    def labelled(given: GivenScans) -> LabelledFrames:
+        frames = source_of(given, columns)
+        return LabelledFrames(card, frames, intensity_scale, asked, rain_rates or {})
+
+    learn_from = None if train is None else labelled(train).truths
+    rows = contestants(methods, learn_from)
+    titles = ", ".join(repr(row.title) for row in rows)
+    effort = Effort(threads, timed, repeats, seed)
+    return run_bench(rows, labelled(scans), effort, command=f"derain.bench([{titles}], ...)")
+
+
+def run_bench(
+    methods: Sequence[Contestant], data: LabelledFrames, effort: Effort, command: str
+) -> Bench:
+    """Scores every method on every scan, and measures what each costs alone.
+
+    Args:
+        methods: The methods, one or more.
+        data: The scans.
+        effort: How much is timed and drawn.
+        command: What makes this bench, for its report.
 
     Raises:
         InputError: A scan that cannot be read. A method that fails is told in its row.
     """
-    scores = score(contestants, data, timing.threads)
+    notes, notices = _notes(methods, data), Notices()
+    timed_on = evenly_spaced(data.frames, effort.timed)
+    timing = Timing(timed_on, effort.threads, effort.repeats, data.intensity_scale)
+    scores = score(
+        scored_methods(methods, effort.threads),
+        _scans(methods, data, notices),
+        data.card,
+        data.distinct,
+        list(map(data.rain_rate, data.frames)),
+    )
     costs = [
-        measure_cost(contestant, timing)
-        for contestant in tqdm(contestants, desc="timing", unit="method", disable=None)
+        measure_cost(method, timing)
+        for method in tqdm(methods, desc="timing", unit="method", disable=None)
     ]
-    return joined(contestants, scores, costs, np.random.default_rng(seed))
+    notices.tell_how_many_more()
+    rows = joined(methods, scores, costs, np.random.default_rng(effort.seed))
+    return Bench(rows, {**_facts(command, data, timing, effort.seed), "notes": notes})
 
 
-def provenance(
-    command: str, module: ScanDataModule, files: Sequence[Frame], timing: Timing, seed: int
-) -> dict[str, Any]:
-    """Everything that a bench depends on besides its methods, as JSON-able primitives.
+def _notes(methods: Sequence[Contestant], data: LabelledFrames) -> list[str]:
+    """Says, and gives back, which models were trained on what they are measured on."""
+    notes = [
+        note
+        for method in methods
+        if isinstance(method.judges_by, Spec)
+        and (note := overlap(method.title, method.judges_by, data.card, data.frames))
+    ]
+    for note in notes:
+        tqdm.write(f"derain: warning: {note}", sys.stderr)
+    return notes
 
-    Args:
-        command: The command line that makes the bench.
-        module: Where the scans come from.
-        files: The scans, with their labels.
-        timing: What the methods were timed on, and how.
-        seed: Of the draws behind the intervals.
-    """
-    card = module.card
-    scans = "1 scan" if len(files) == 1 else f"{len(files):,} scans"
+
+def _scans(methods: Sequence[Contestant], data: LabelledFrames, notices: Notices) -> Iterator[Scan]:
+    """Reads the scans one by one, and warns of what is odd about them for each method."""
+    for frame in tqdm(data.frames, desc="scoring", unit="scan", disable=None):
+        scan = data.read(frame)
+        for method in methods:
+            if method.judges_by is not None:
+                notices.tell(frame.name, method.judges_by.oddities(scan), method.title)
+        yield scan
+
+
+def _facts(command: str, data: LabelledFrames, timing: Timing, seed: int) -> dict[str, Any]:
+    """Everything that a bench depends on besides its methods, as JSON-able primitives."""
+    card, frames = data.card, data.frames
+    scans = "1 scan" if len(frames) == 1 else f"{len(frames):,} scans"
+    files = []
+    for frame in frames:
+        of_scan, of_label = frame.checksums()
+        files.append({"scan": frame.name, "sha256": of_scan, "label_sha256": of_label})
     return {
-        "title": f"{full_name(card)}, {scans}",
+        "title": f"{card.title}, {scans}",
         "command": command,
         "data": card.name,
         "simulated": card.simulated,
@@ -66,14 +228,9 @@ def provenance(
         "seed": seed,
         "threads": timing.threads,
         "repeats": timing.repeats,
-        "timed_on": [str(path) for path in timing.scans],
+        "timed_on": [frame.name for frame in timing.frames],
         "processor": processor(),
         "system": platform.platform(),
         "versions": versions(),
-        "files": [
-            dict(
-                zip(("scan", "sha256", "label_sha256"), (file.name, *file.checksums()), strict=True)
-            )
-            for file in files
-        ],
+        "files": files,
     }

@@ -4,8 +4,8 @@ Nothing here loads torch, so that a process that measures a method's memory hold
 """
 
 import os
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 from math import prod
@@ -17,16 +17,17 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError, printable
 from derain.evaluation.baselines import PositionPrior, all_points, no_points
-from derain.evaluation.intensity_rule import OneLineRule
+from derain.evaluation.intensity_rule import IntensityRule
+from derain.export.bench.contestant import Contestant
+from derain.export.bench.functions import TimedFunction
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
 from derain.filters import FilterDerainer, PointFilter
 from derain.scan import Scan
-from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import Judge
 
-# Judges a scan, bool (N,), and gives the stopwatch its stages.
-Method = Callable[[Scan, Stopwatch], NDArray[np.bool_]]
+# A method as a user gives it: a name or a file, a derainer, a filter, or a function that says which
+# points of a scan are rain, bool (N,).
+GivenMethod = str | Path | Derainer | FilterDerainer | PointFilter | Callable[[Scan], NDArray[Any]]
 
 # Gives scans and their rain, bool (N,), to whatever is learnt from them; points of which it is not
 # known whether they are rain are left out.
@@ -37,41 +38,28 @@ TRIVIAL = {"all": all_points, "none": no_points}
 LEARNT = ("position", "intensity")
 
 
-@dataclass(frozen=True)
-class Contestant:
-    """One row of a bench.
-
-    Attributes:
-        title: What the row is called; no two have the same.
-        kind: Name of its network, filter or baseline.
-        ready: Makes the method, with a number of threads. It can be pickled: each method's cost is
-            measured in a process of its own.
-        facts: What the method is, for whoever repeats the bench: file or parameters.
-        filter: The filter, where it is one: filters share one search for neighbours.
-        judge: What it judges by, as far as a scan may not suit it.
-    """
-
-    title: str
-    kind: str
-    ready: Callable[[int], Method]
-    facts: dict[str, Any] = field(default_factory=dict)
-    filter: PointFilter | None = None
-    judge: Judge = None
-
-
-def contestants(texts: Sequence[str], learn_from: LearnFrom | None = None) -> list[Contestant]:
-    """The methods that a user names.
+def contestants(
+    methods: Sequence[GivenMethod] | Mapping[str, GivenMethod], learn_from: LearnFrom | None = None
+) -> list[Contestant]:
+    """The methods of a bench.
 
     Args:
-        texts: Each an exported model, a YAML file of parameters, a filter or a baseline (position,
-            intensity, all, none); ``title=`` before it gives it another title.
+        methods: The methods, by their titles or with titles of their own. A text is an exported
+            model, a YAML file of parameters, a filter or a baseline (position, intensity, all,
+            none), and without a mapping may have ``title=`` before it.
         learn_from: Scans for position and intensity; None where there are none to learn from.
 
     Raises:
         InputError: A method that is not known or cannot be read, one that has nothing to learn
             from, or two of one title.
     """
-    rows = [_contestant(text, learn_from) for text in texts]
+    if isinstance(methods, Mapping):
+        rows = [
+            replace(_contestant(method, learn_from), title=printable(title))
+            for title, method in methods.items()
+        ]
+    else:
+        rows = [_contestant(method, learn_from) for method in methods]
     titles = [row.title for row in rows]
     for title in titles:
         if titles.count(title) > 1:
@@ -81,13 +69,35 @@ def contestants(texts: Sequence[str], learn_from: LearnFrom | None = None) -> li
     return rows
 
 
-def _contestant(text: str, learn_from: LearnFrom | None) -> Contestant:
+def _contestant(method: GivenMethod, learn_from: LearnFrom | None) -> Contestant:
+    match method:
+        case str():
+            return _named(method, learn_from)
+        case Path():
+            return _deployable(printable(method.stem), *named_method(str(method)))
+        case PointFilter():
+            return _filter(method.name, method, partial(FilterDerainer, method))
+        case FilterDerainer(filter=filter):
+            return _filter(filter.name, filter, partial(FilterDerainer, filter))
+        case Derainer(path=path, spec=spec):
+            ready = partial(load_method, str(path), {"threshold": spec.threshold})
+            return _model(printable(path.stem), str(path), method, ready)
+        case _ if callable(method):
+            return _function(method)
+    raise InputError(
+        "methods",
+        f"{type(method).__name__} is no method",
+        "Give a name, a file, a derainer, a filter, or a function of a scan.",
+    )
+
+
+def _named(text: str, learn_from: LearnFrom | None) -> Contestant:
     title, equals, name = text.partition("=")
     if not equals or os.path.isfile(text):  # files may well have an equals sign in their names
         title, name = Path(text).stem, text
     title = printable(title)  # it goes into tables and pictures
     if name in TRIVIAL:
-        return Contestant(title, name, partial(_timed_rule, TRIVIAL[name]))
+        return Contestant(title, name, TimedFunction(TRIVIAL[name]).ready)
     if name in LEARNT:
         return _learnt(title, name, learn_from)
     return _deployable(title, *named_method(name))
@@ -98,16 +108,29 @@ def _deployable(title: str, name: str, parameters: dict[str, Any]) -> Contestant
     ready = partial(load_method, name, parameters)
     match ready(1):
         case FilterDerainer(filter=filter):
-            return Contestant(title, name, ready, {"parameters": filter.as_dict()}, filter, filter)
-        case Derainer(spec=spec):
-            facts = {
-                "model": name,
-                "sha256": sha256(Path(name).read_bytes()).hexdigest(),
-                "weights": _weights(Path(name)),
-                "trained_on": spec.data,
-                "threshold": spec.threshold,
-            }
-            return Contestant(title, spec.network, ready, facts, judge=spec)
+            return _filter(title, filter, ready)
+        case Derainer() as derainer:
+            return _model(title, name, derainer, ready)
+
+
+def _filter(
+    title: str, filter: PointFilter, ready: Callable[[int], FilterDerainer | Derainer]
+) -> Contestant:
+    return Contestant(title, filter.name, ready, {"parameters": filter.as_dict()}, filter, filter)
+
+
+def _model(
+    title: str, name: str, derainer: Derainer, ready: Callable[[int], FilterDerainer | Derainer]
+) -> Contestant:
+    spec = derainer.spec
+    facts = {
+        "model": name,
+        "sha256": sha256(Path(name).read_bytes()).hexdigest(),
+        "weights": _weights(Path(name)),
+        "trained_on": spec.data,
+        "threshold": spec.threshold,
+    }
+    return Contestant(title, spec.network, ready, facts, judges_by=spec)
 
 
 def _weights(path: Path) -> int:
@@ -124,17 +147,12 @@ def _learnt(title: str, name: str, learn_from: LearnFrom | None) -> Contestant:
         )
     if name == "position":
         prior = PositionPrior.learn(learn_from())
-        return Contestant(title, name, partial(_timed_rule, prior), {"voxel": prior.voxel})
-    rule = OneLineRule.best(learn_from())
+        return Contestant(title, name, TimedFunction(prior).ready, {"voxel": prior.voxel})
+    rule = IntensityRule.best(learn_from())
     limits = f"intensity <= {rule.intensity:.4g} and range <= {rule.range:.4g} m"
-    return Contestant(title, name, partial(_timed_rule, rule), {"rule": limits}, judge=rule)
+    return Contestant(title, name, TimedFunction(rule).ready, {"rule": limits}, judges_by=rule)
 
 
-def _timed_rule(rule: Callable[[Scan], NDArray[np.bool_]], threads: int) -> Method:
-    """A rule without a view or a network, timed as a method; it has no use for threads."""
-
-    def judge(scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
-        with stopwatch.stage("network"):
-            return rule(scan)
-
-    return judge
+def _function(function: Callable[[Scan], NDArray[Any]]) -> Contestant:
+    title = printable(getattr(function, "__name__", type(function).__name__))
+    return Contestant(title, "function", TimedFunction(function).ready)

@@ -5,20 +5,18 @@ neighbours is shared, no other method's memory is counted, and a crash is that m
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.export.bench.contestants import Contestant
-from derain.export.timing import STAGES, timed_runs
-from derain.files import DEFAULT_COLUMNS
+from derain.export.bench.contestant import Contestant
+from derain.export.timing import RunTimes, timed_runs
 from derain.scan import Scan
+from derain.sources.frame import Frame
 from derain.system.stopwatch import Stopwatch
-from derain.system.workers import worker_pool
-
-WARM_UP = 2
+from derain.system.workers import main_left_out, worker_pool
 
 
 @dataclass(frozen=True)
@@ -26,15 +24,13 @@ class Timing:
     """How methods are timed.
 
     Attributes:
-        scans: Scans to time them on, one or more.
-        columns: Names of the columns of scans that do not name them.
+        frames: Scans to time them on, one or more.
         threads: Threads of view and network; 0 takes every core this process may use.
         repeats: Timed runs on each scan.
         intensity_scale: What takes the scans' intensities to the unit of the methods.
     """
 
-    scans: Sequence[Path]
-    columns: Sequence[str] = DEFAULT_COLUMNS
+    frames: Sequence[Frame]
     threads: int = 0
     repeats: int = 3
     intensity_scale: float = 1.0
@@ -45,47 +41,45 @@ class Cost:
     """Milliseconds and memory of one method.
 
     Attributes:
-        milliseconds: Time of each run by stage, float64 (runs,); 0 in stages that it has not.
+        times: Milliseconds of each run.
         peak_memory: Largest resident memory of a process that does this alone, in MiB, Python and
-            its libraries included; None where the system does not tell.
+            its libraries included; None where the system does not tell, or it was not alone.
         failure: What went wrong, if anything did; there are no runs then.
+        alone: Whether it was measured in a process of its own.
     """
 
-    milliseconds: dict[str, NDArray[np.float64]]
+    times: RunTimes
     peak_memory: float | None
     failure: str | None = None
-
-    def percentile(self, percentage: float, stage: str | None = None) -> float:
-        """Milliseconds that a share of the runs stay within, of one stage or of all together.
-
-        Not a number where nothing was run.
-        """
-        times = sum(self.milliseconds.values()) if stage is None else self.milliseconds[stage]
-        return float(np.percentile(times, percentage)) if np.size(times) else float("nan")
+    alone: bool = True
 
 
 def measure_cost(contestant: Contestant, timing: Timing) -> Cost:
-    """Measures a method in a process of its own.
+    """Measures a method in a process of its own, or in this one where it can be sent to no other.
 
     Args:
         contestant: The method.
         timing: What it is timed on, and how.
     """
-    with worker_pool(1) as pool:
-        try:
-            return pool.submit(run_alone, contestant, timing).result()
-        except Exception as error:  # whatever its libraries raise is told in the method's row
-            return Cost({stage: np.zeros(0) for stage in STAGES}, None, str(error))
+    try:
+        if not contestant.can_be_sent:
+            return replace(timed_here(contestant, timing), peak_memory=None, alone=False)
+        with worker_pool(1) as pool:
+            with main_left_out():
+                measured = pool.submit(timed_here, contestant, timing)
+            return measured.result()
+    except Exception as error:  # whatever its libraries raise is told in the method's row
+        return Cost(RunTimes.of_no_runs(), None, str(error), contestant.can_be_sent)
 
 
-def run_alone(contestant: Contestant, timing: Timing) -> Cost:
+def timed_here(contestant: Contestant, timing: Timing) -> Cost:
     """Runs a method on every scan, in turns, in this process; see :func:`measure_cost`."""
     method = contestant.ready(timing.threads)
 
     def judge(scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
         return method(scan.with_intensity_times(timing.intensity_scale), stopwatch)
 
-    times = timed_runs(judge, timing.scans, timing.columns, WARM_UP, timing.repeats)
+    times = timed_runs(judge, timing.frames, timing.repeats)
     return Cost(times, _peak_memory())
 
 

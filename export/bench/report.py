@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from derain.evaluation.counts import SCORES, Counts
+from derain.evaluation.text_tables import markdown_table
 from derain.export.bench.rows import Row
-from derain.export.markdown import markdown_table
 from derain.export.timing import STAGES
 from derain.files.atomic import replacing
 
@@ -73,6 +73,7 @@ def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
         *(f"**{note}.**" for note in facts.get("notes", ())),
         main_table(rows),
         READING,
+        *_not_alone(rows),
         "## Called rain, by class",
         _by_class(rows),
         "## IoU by range",
@@ -138,6 +139,16 @@ def _by_stage(rows: Sequence[Row]) -> str:
             [row.title, *(f"{_number(time['p50'])} / {_number(time['p95'])}" for time in times)]
         )
     return markdown_table(["method", *STAGES], body)
+
+
+def _not_alone(rows: Sequence[Row]) -> list[str]:
+    titles = [row.title for row in rows if not row.cost.alone]
+    if not titles:
+        return []
+    return [
+        f"Timed in the process of the program that measures, where other methods had run before, "
+        f"for they cannot be sent to one of their own: {', '.join(titles)}."
+    ]
 
 
 def _failures(rows: Sequence[Row]) -> str:

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from derain.evaluation.counts import SCORES, Counts
-from derain.export.bench.bootstrap import Bootstrap, Interval, bootstrap
-from derain.export.bench.contestants import Contestant
+from derain.evaluation.bootstrap import Bootstrap, Interval, bootstrap
+from derain.evaluation.counts import SCORES, Counts, mean_over_scans
+from derain.evaluation.scores import Scores
+from derain.export.bench.contestant import Contestant
 from derain.export.bench.cost import Cost
-from derain.export.bench.scores import Scores
 from derain.export.timing import STAGES
 
 
@@ -38,24 +38,29 @@ class Row:
         return self.contestant.title
 
     @property
+    def kind(self) -> str:
+        """Name of its network, filter or baseline."""
+        return self.contestant.kind
+
+    @property
     def milliseconds(self) -> float:
         """Median time from file to mask; not a number where the method could not be timed."""
-        return self.cost.percentile(50)
+        return self.cost.times.percentile(50)
 
     def as_dict(self) -> dict[str, Any]:
         """The row as JSON-able primitives; what is not known is None."""
-        scores = self.scores
+        scores, times = self.scores, self.cost.times
         return {
             "method": self.title,
-            "kind": self.contestant.kind,
+            "kind": self.kind,
             **_scores(scores.pooled),
-            **{f"{name}_per_scan": _mean(scores.per_scan, name) for name in SCORES},
+            **{f"{name}_per_scan": mean_over_scans(scores.per_scan, name) for name in SCORES},
             "iou_interval": self.iou_interval,
             "iou_behind_best_interval": self.behind_best,
             "ms": _known(self.milliseconds),
-            "ms_p95": _known(self.cost.percentile(95)),
+            "ms_p95": _known(times.percentile(95)),
             "stages": {
-                stage: {f"p{p}": _known(self.cost.percentile(p, stage)) for p in (50, 95)}
+                stage: {f"p{p}": _known(times.percentile(p, stage)) for p in (50, 95)}
                 for stage in STAGES
             },
             "peak_memory_mib": self.cost.peak_memory,
@@ -66,6 +71,7 @@ class Row:
             "by_sensor": _all_scores(scores.by_sensor),
             "failed_scans": dict(scores.failures),
             "not_timed": self.cost.failure,
+            **({} if self.cost.alone else {"timed_alone": False}),
             **self.contestant.facts,
         }
 
@@ -108,10 +114,6 @@ def _scores(counts: Counts) -> dict[str, float]:
 
 def _all_scores(groups: Mapping[str, Counts]) -> dict[str, dict[str, float]]:
     return {name: {**_scores(counts), **asdict(counts)} for name, counts in groups.items()}
-
-
-def _mean(per_scan: Sequence[Counts], name: str) -> float:
-    return float(np.mean([getattr(counts, name) for counts in per_scan]))
 
 
 def _known(value: float) -> float | None:

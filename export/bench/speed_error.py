@@ -6,7 +6,6 @@ from typing import Any
 
 from derain.export.bench.contestants import LEARNT, TRIVIAL
 from derain.export.bench.rows import Row
-from derain.filters import FILTERS
 from derain.pictures.scan_pictures import save
 from derain.pictures.speed_error import Standing, speed_error_figure
 
@@ -32,6 +31,6 @@ def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) 
 
 
 def _group(row: Row) -> str:
-    if row.contestant.kind in FILTERS:
+    if row.contestant.filter is not None:
         return "filter"
-    return "baseline" if row.contestant.kind in (*LEARNT, *TRIVIAL) else "network"
+    return "baseline" if row.kind in (*LEARNT, *TRIVIAL) else "network"

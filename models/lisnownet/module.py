@@ -19,20 +19,21 @@ from torch import Tensor, nn
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
+from derain.files.documents import Entry
 from derain.learning.batch import Batch
 from derain.learning.task import EXAMPLES
 from derain.models.base import DerainingModule
 from derain.models.lisnownet.network import LiSnowNetwork
 from derain.models.lisnownet.selection_rule import SelectionRule
 from derain.models.lisnownet.sparsity import sparsity_loss
+from derain.models.published import Published
 from derain.models.range_module import FITTED, per_pixel, range_view, stated
+from derain.models.registry import NETWORKS
 from derain.scan import Scan
-from derain.spec import Spec
 from derain.views.range_image import RangeView
+from derain.views.view import View
 
 __all__ = ["DeployedLiSnowNet", "LiSnowNet", "LiSnowNetwork"]
-
-CHANNELS = ("range", "z", "intensity")
 
 # How surely a residual of twice the rule's threshold is rain: its logit.
 STEEPNESS = 4.0
@@ -106,13 +107,20 @@ def possible(image: Tensor, rule: SelectionRule) -> Tensor:
     return (height > rule.ground) & (intensity < rule.intensity * rule.full_scale)
 
 
-class LiSnowNet(DerainingModule):
+@NETWORKS.add("lisnownet")
+class LiSnowNet(DerainingModule, Published):
     """Trains LiSnowNet-L1 on scans without reading a label; the recipe is the published one.
+
+    Example:
+        >>> model = LiSnowNet(grid="rehearse3d", rule={"residual": 0.01})
+        >>> model.LEARNS_FROM_LABELS, model.selection.residual
+        (False, 0.01)
 
     Args:
         grid: The range image's grid: ``fitted`` to the training scans, the name of a published
             one, or its bounds.
-        way_back: How points that lost their pixel to a nearer one get a score.
+        way_back: Name of the back-projection, by which points that lost their pixel to a nearer one
+            get a score: ``nearest range``, ``copy`` or ``vote``.
         width: Channels of the features at full size, 8 as published.
         dropout: Share of feature maps dropped in training.
         alpha: How much sparsity counts against the residual: it weighs 1 - 2^-alpha.
@@ -129,7 +137,8 @@ class LiSnowNet(DerainingModule):
         InputError: Weights of the loss, or constants of the rule, that cannot be meant.
     """
 
-    NAME: ClassVar[str] = "lisnownet"
+    VIEW: ClassVar[type[View]] = RangeView
+    CHANNELS: ClassVar[tuple[str, ...]] = ("range", "z", "intensity")
     # What denoising changed is divided by the rule's residual, some thousandths.
     AMPLIFIES: ClassVar[float] = 100.0
     LEARNS_FROM_LABELS: ClassVar[bool] = False
@@ -149,7 +158,7 @@ class LiSnowNet(DerainingModule):
         threshold: float = 0.5,
         spec: dict[str, Any] | None = None,
     ) -> None:
-        super().__init__(CHANNELS)
+        super().__init__(self.CHANNELS)
         if alpha < 0 or not 0 <= beta <= 1:
             raise InputError(
                 self.NAME,
@@ -182,23 +191,22 @@ class LiSnowNet(DerainingModule):
         model.adopt(model.spec_for(card))
         return model
 
-    def adopt(self, spec: Spec | dict[str, Any] | None) -> None:
-        """Takes over a Spec, its selection rule included."""
-        super().adopt(spec)
-        if self._spec is not None:
-            self.selection = SelectionRule(**self._spec.rule)
+    def view_for(self, scans: Sequence[Scan]) -> RangeView:
+        """The view that the network sees a scan through, its grid fitted if it is not stated."""
+        grid, way_back = self.hparams["grid"], self.hparams["way_back"]
+        return range_view(grid, self.channels, way_back, scans)
 
-    def view_parameters(self, scans: Sequence[Scan]) -> dict[str, Any]:
-        """Kind and parameters of the view that the network sees."""
-        return range_view(self.hparams["grid"], self.hparams["way_back"], scans)
-
-    def sees_through(self, view: Mapping[str, Any]) -> bool:
-        """Whether the network can take what a Spec's view gives: range images of any size."""
-        return view["kind"] == RangeView.KIND
-
-    def rule(self, scans: Sequence[Scan]) -> dict[str, float]:
+    def rule_for(self, scans: Sequence[Scan]) -> dict[str, float]:
         """Constants of the selection rule, fitted to training scans where they are not stated."""
         return SelectionRule.fitted(self.hparams["rule"], scans).as_dict()
+
+    def adopt_rule(self, rule: Entry) -> None:
+        """Takes over the selection rule of a Spec.
+
+        Raises:
+            InputError: Constants missing, unknown, or that cannot be.
+        """
+        self.selection = SelectionRule.of(rule)
 
     def forward(self, image: Tensor, valid: Tensor) -> Tensor:
         """Logits of every pixel, float (B · H · W, 2).
@@ -207,10 +215,10 @@ class LiSnowNet(DerainingModule):
             image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
             valid: Pixels with a return, bool (B, 1, H, W).
         """
-        return self.folded()(image, valid)
+        return self.deployed()(image, valid)
 
-    def folded(self) -> nn.Module:
-        """The network as it is deployed."""
+    def deployed(self) -> DeployedLiSnowNet:
+        """The network as it is exported."""
         return DeployedLiSnowNet(self.network, self.selection)
 
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:

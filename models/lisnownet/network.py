@@ -100,6 +100,12 @@ class InverseHaar(nn.Module):
 class LiSnowNetwork(nn.Module):
     """The network as published, from a range image with holes to a denoised one without.
 
+    Example:
+        >>> network = LiSnowNetwork(width=4).eval()
+        >>> valid = torch.ones(1, 1, 32, 128, dtype=torch.bool)
+        >>> network(torch.rand(1, 2, 32, 128), valid).shape  # an image of 32 × 128 pixels
+        torch.Size([1, 2, 32, 128])
+
     Args:
         channels: Channels of the image.
         width: Channels of the features at full size; each halving doubles them.

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
+from derain.files.documents import Entry
 from derain.scan import Scan
 from derain.views.full_scale import full_scale
 
@@ -77,8 +78,19 @@ class SelectionRule:
         return replace(self, residual=max(parting, LEAST_RESIDUAL))
 
     def as_dict(self) -> dict[str, float]:
-        """The rule as JSON-able primitives, for a Spec."""
+        """The rule as JSON-able primitives, for a Spec, which :meth:`of` reads back."""
         return asdict(self)
+
+    @classmethod
+    def of(cls, entry: Entry) -> Self:
+        """Reads back the rule of a Spec. It is not trusted.
+
+        Raises:
+            InputError: Constants missing, unknown, or that cannot be.
+        """
+        parsers = {field.name: Entry.number for field in fields(cls)}
+        above_0 = {"residual": Entry.positive, "full_scale": Entry.positive}
+        return cls(**entry.record({**parsers, **above_0}, required=tuple(parsers)))
 
     @classmethod
     def fitted(cls, stated: Mapping[str, float], scans: Sequence[Scan]) -> Self:

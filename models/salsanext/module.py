@@ -16,15 +16,16 @@ from torch import Tensor, nn
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.learning.losses import SegmentationLoss, lovasz_softmax, weighted_cross_entropy
+from derain.models.published import Published
 from derain.models.range_module import FITTED, per_pixel, range_view, stated
+from derain.models.registry import NETWORKS
 from derain.models.salsanext.network import SalsaNextNetwork
 from derain.models.supervised import SupervisedModule
 from derain.scan import Scan
 from derain.views.range_image import RangeView
+from derain.views.view import View
 
 __all__ = ["DeployedSalsaNext", "SalsaNext", "SalsaNextNetwork"]
-
-CHANNELS = ("range", "x", "y", "z", "intensity")
 
 
 class DeployedSalsaNext(nn.Module):
@@ -66,13 +67,20 @@ def score_pixels(
     return per_pixel(network(torch.where(valid, normalised, 0.0)))
 
 
-class SalsaNext(SupervisedModule):
+@NETWORKS.add("salsanext")
+class SalsaNext(SupervisedModule, Published):
     """Trains SalsaNext; the optimiser and its schedule are the published ones.
+
+    Example:
+        >>> model = SalsaNext(grid="rehearse3d", width=8)
+        >>> model.network.width, model.channels
+        (8, ('range', 'x', 'y', 'z', 'intensity'))
 
     Args:
         grid: The range image's grid: ``fitted`` to the training scans, the name of a published
             one, or its bounds.
-        way_back: How points that lost their pixel to a nearer one get a score.
+        way_back: Name of the back-projection, by which points that lost their pixel to a nearer one
+            get a score: ``nearest range``, ``copy`` or ``vote``.
         channels: What it sees of a point: ``range``, ``x``, ``y``, ``z``, ``intensity``, ``radar``,
             or other columns of the scans, such as ``doppler``.
         width: Channels of the first layers, 32 as published; all others are multiples of it.
@@ -90,7 +98,8 @@ class SalsaNext(SupervisedModule):
     Source: TiagoCortinhal/SalsaNext, salsanext.yml, trainer.py, warmupLR.py.
     """
 
-    NAME: ClassVar[str] = "salsanext"
+    VIEW: ClassVar[type[View]] = RangeView
+    CHANNELS: ClassVar[tuple[str, ...]] = ("range", "x", "y", "z", "intensity")
     network: SalsaNextNetwork
 
     def __init__(
@@ -124,31 +133,28 @@ class SalsaNext(SupervisedModule):
             InputError: A state_dict of another network or of more than two classes, or no grid.
         """
         network = SalsaNextNetwork.from_published(state_dict)
-        if (network.channels, network.classes) != (len(CHANNELS), 2):
+        if (network.channels, network.classes) != (len(cls.CHANNELS), 2):
             raise InputError(
                 cls.NAME,
                 f"the weights tell {network.classes} classes from {network.channels} channels",
-                f"Give weights that tell rain from the rest, from {', '.join(CHANNELS)}.",
+                f"Give weights that tell rain from the rest, from {', '.join(cls.CHANNELS)}.",
             )
         model = cls(grid=stated(grid, cls.NAME), width=network.width)
         model.network = network
         model.adopt(model.spec_for(card))
         return model
 
-    def view_parameters(self, scans: Sequence[Scan]) -> dict[str, Any]:
-        """Kind and parameters of the view that the network sees."""
-        return range_view(self.hparams["grid"], self.hparams["way_back"], scans)
-
-    def sees_through(self, view: Mapping[str, Any]) -> bool:
-        """Whether the network can take what a Spec's view gives: range images of any size."""
-        return view["kind"] == RangeView.KIND
+    def view_for(self, scans: Sequence[Scan]) -> RangeView:
+        """The view that the network sees a scan through, its grid fitted if it is not stated."""
+        grid, way_back = self.hparams["grid"], self.hparams["way_back"]
+        return range_view(grid, self.channels, way_back, scans)
 
     def forward(self, image: Tensor, valid: Tensor) -> Tensor:
         """Logits of every pixel, float (B · H · W, 2); arguments as for :func:`score_pixels`."""
         return score_pixels(self.network, self.mean, self.std, image, valid)
 
-    def folded(self) -> nn.Module:
-        """The network as it is deployed."""
+    def deployed(self) -> DeployedSalsaNext:
+        """The network as it is exported."""
         return DeployedSalsaNext(self.network, self.mean, self.std)
 
     def segmentation_loss(self, logits: Tensor, target: Tensor) -> SegmentationLoss:

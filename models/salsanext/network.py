@@ -152,6 +152,11 @@ class DecoderBlock(nn.Module):
 class SalsaNextNetwork(nn.Module):
     """The network as published, from normalised range images to logits.
 
+    Example:
+        >>> network = SalsaNextNetwork(channels=5, width=4).eval()
+        >>> network(torch.rand(1, 5, 32, 128)).shape  # an image of 32 × 128 pixels
+        torch.Size([1, 2, 32, 128])
+
     Args:
         channels: Number of input channels.
         width: Number of features at full resolution, even; deeper down there are up to eight times

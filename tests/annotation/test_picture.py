@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 
 from derain.annotation.boxes import Box
-from derain.annotation.picture import COLOURS, SURROUNDINGS, UNKNOWN_COLOUR, annotation_figure
+from derain.annotation.picture import CLASS_COLOURS, SURROUNDINGS, UNKNOWN_COLOUR, annotation_figure
 from derain.annotation.scene import Scene
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.fusion.label_transfer import UNKNOWN
@@ -34,11 +34,11 @@ def test_both_panels_show_every_valid_point_in_the_colour_of_its_class(tmp_path:
         (dots,) = panel.collections
         shown = dots.get_facecolors()
         for kind in (*TrackClass, UNKNOWN):
-            colour = COLOURS.get(kind, UNKNOWN_COLOUR)
+            colour = CLASS_COLOURS.get(kind, UNKNOWN_COLOUR)
             count = np.isclose(shown, to_rgba(colour)).all(axis=1).sum()
             assert count == (label == kind)[scan.valid].sum()
     outlines = [patch.get_edgecolor() for patch in figure.axes[0].patches]
-    colours = ["white", COLOURS[TrackClass.RAIN], COLOURS[TrackClass.CAR]]
+    colours = ["white", CLASS_COLOURS[TrackClass.RAIN], CLASS_COLOURS[TrackClass.CAR]]
     assert outlines == [to_rgba(colour) for colour in colours]
     save(figure, tmp_path / "picture.png")
     assert (tmp_path / "picture.png").stat().st_size > 10_000

@@ -9,11 +9,12 @@ import yaml
 from numpy.typing import NDArray
 
 from derain.export.bench import bench
-from derain.export.bench.contestants import Contestant
-from derain.export.bench.cost import Timing, run_alone
+from derain.export.bench.contestant import Contestant
+from derain.export.bench.cost import Timing, timed_here
 from derain.export.runtime import Derainer
 from derain.scan import Scan
 from derain.simulation.campaign import MAKER
+from derain.sources.file_frame import FileFrame
 from derain.system.stopwatch import Stopwatch
 
 FILES = ["bench.csv", "bench.json", "bench.md", "speed_error.png"]
@@ -22,7 +23,7 @@ FILES = ["bench.csv", "bench.json", "bench.md", "speed_error.png"]
 @pytest.fixture(autouse=True)
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Times methods in this process; that each has its own is tested by itself."""
-    monkeypatch.setattr(bench, "measure_cost", run_alone)
+    monkeypatch.setattr(bench, "measure_cost", timed_here)
 
 
 @pytest.fixture
@@ -100,13 +101,14 @@ def test_intensities_of_another_unit_are_warned_of_and_scaled(
 
 def test_methods_are_timed_on_scaled_intensities(root: Path) -> None:
     scan = root / "sequences/002/lidar_radar_pcd/0.bin"
+    frame = FileFrame(key="0", path=scan)
     seen: list[float] = []
 
     def judge(scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
         seen.append(float(scan.intensity.max()))
         return scan.valid
 
-    run_alone(Contestant("t", "t", lambda threads: judge), Timing([scan], intensity_scale=2.0))
+    timed_here(Contestant("t", "t", lambda threads: judge), Timing([frame], intensity_scale=2.0))
     assert set(seen) == {2 * np.fromfile(scan, np.float32).reshape(-1, 4)[:, 3].max()}
 
 

@@ -222,7 +222,7 @@ def test_weights_that_run_code_are_refused(run_derain, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("network", "weights", "stats", "reason"),
     [
-        ("resnet", "published.pt", "wads", "resnet: no such network. Known are outdet"),
+        ("resnet", "published.pt", "wads", "resnet: no such network. Known are lisnownet"),
         ("outdet", "none.pt", "wads", "none.pt: there is no such file"),
         ("outdet", "published.pt", "mars", "mars: no such data card. Give a YAML file or one of"),
         ("outdet", "published.pt", "rehearse3d", "the data card has no statistics"),

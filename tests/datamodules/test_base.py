@@ -149,7 +149,7 @@ def test_duplicates_are_measured_once_and_every_row_is_predicted(
         np.testing.assert_array_equal(scan.label, np.resize([0, SNOW], 80)[first])
     ((measured,),) = (batch.measured for batch in batches(data, "predict"))
     score = np.arange(1, 31, dtype=np.float32)
-    back = measured.way_to_rows(score)
+    back = measured.back_projection(score)
     assert len(back) == 80
     np.testing.assert_array_equal(back[75:], 0)
     assert len(set(back[:75].tolist())) == 30

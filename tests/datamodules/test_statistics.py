@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.cards.card import DataCard
-from derain.datamodules.statistics import evenly_spaced, measured
+from derain.datamodules.statistics import measured
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.scan import Scan
@@ -120,15 +120,3 @@ def test_what_a_card_says_is_not_measured_again() -> None:
     complete = measured(card, [random_scan(1, 50)])
     assert (complete.mean, complete.rain_share) == (card.mean, 0.5)
     assert complete.std == measured(CARD, [random_scan(1, 50)]).std
-
-
-@given(st.integers(0, 60), st.integers(1, 20))
-def test_items_are_spread_evenly_from_first_to_last(count: int, most: int) -> None:
-    items = list(range(count))
-    spaced = evenly_spaced(items, most)
-    assert len(spaced) == min(count, most)
-    steps = np.diff(spaced)
-    assert (steps > 0).all()
-    assert not len(steps) or steps.max() - steps.min() <= 1
-    if count and most > 1:
-        assert (spaced[0], spaced[-1]) == (0, count - 1)

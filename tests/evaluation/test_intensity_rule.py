@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases
-from derain.evaluation.intensity_rule import OneLineRule
+from derain.evaluation.intensity_rule import IntensityRule
 from derain.scan import Scan
 
 HARD_CASES = dict(hard_cases(largest=5000))
@@ -22,11 +22,12 @@ def iou(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
 
 def random_scan(seed: int, points: int, levels: int = 1000) -> tuple[Scan, NDArray[np.bool_]]:
     """Points of so many different ranges and intensities, and their rain: more of the near."""
-    rng = np.random.default_rng(seed)
+    generator = np.random.default_rng(seed)
     columns = np.zeros((points, 4))
-    columns[:, 0] = rng.integers(1, levels + 1, points) * 0.7
-    columns[:, 3] = rng.integers(0, levels, points) * 0.1
-    return Scan.of(columns), rng.random(points) < 0.8 - 0.7 * columns[:, 0] / columns[:, 0].max()
+    columns[:, 0] = generator.integers(1, levels + 1, points) * 0.7
+    columns[:, 3] = generator.integers(0, levels, points) * 0.1
+    share = 0.8 - 0.7 * columns[:, 0] / columns[:, 0].max()
+    return Scan.of(columns), generator.random(points) < share
 
 
 @given(st.integers(0, 2**32), st.integers(1, 30), st.integers(1, 3), st.sampled_from([6, 1000]))
@@ -41,17 +42,17 @@ def test_no_other_rule_is_better_than_the_best(
     rain = np.concatenate([rain for _, rain in truth])
     dim, near = (column <= column[:, None] for column in (whole.intensity, whole.range))
     best = max(iou(predicted, rain) for row in dim for predicted in row & near)
-    assert iou(OneLineRule.best(truth)(whole), rain) == (best if rain.any() else 1.0)
+    assert iou(IntensityRule.best(truth)(whole), rain) == (best if rain.any() else 1.0)
 
 
 def test_dim_and_near_points_are_rain() -> None:
     scan = Scan.of(np.array([[1, 0, 0, 5], [0, 3, 0, 5], [0, 0, 2, 6], [2, 0, 0, 5.5]]))
-    assert OneLineRule(intensity=5.5, range=2)(scan).tolist() == [True, False, False, True]
+    assert IntensityRule(intensity=5.5, range=2)(scan).tolist() == [True, False, False, True]
 
 
 def test_points_that_cannot_be_judged_are_not_rain() -> None:
     scan = Scan.of(np.array([[0, 0, 0, 0], [-1, -1, -1, -1], [np.nan, 0, 0, 0], [1, 0, 0, 0.0]]))
-    assert OneLineRule(intensity=255, range=100)(scan).tolist() == [False, False, False, True]
+    assert IntensityRule(intensity=255, range=100)(scan).tolist() == [False, False, False, True]
 
 
 def test_points_that_cannot_be_judged_teach_nothing() -> None:
@@ -60,27 +61,27 @@ def test_points_that_cannot_be_judged_teach_nothing() -> None:
     broken[::2] = 0
     padded = Scan.of(np.concatenate([np.c_[scan.xyz, scan.intensity], broken]))
     everywhere = np.concatenate([rain, np.ones(500, bool)])
-    assert OneLineRule.best([(padded, everywhere)]) == OneLineRule.best([(scan, rain)])
+    assert IntensityRule.best([(padded, everywhere)]) == IntensityRule.best([(scan, rain)])
 
 
 def test_a_scan_without_intensity_has_no_dim_points_and_teaches_nothing() -> None:
     bare = Scan(np.ones((4, 3), np.float32))
-    assert not OneLineRule(intensity=np.inf, range=np.inf)(bare).any()
+    assert not IntensityRule(intensity=np.inf, range=np.inf)(bare).any()
     taught = random_scan(seed=2, points=60)
-    assert OneLineRule.best([(bare, np.ones(4, bool)), taught]) == OneLineRule.best([taught])
+    assert IntensityRule.best([(bare, np.ones(4, bool)), taught]) == IntensityRule.best([taught])
 
 
 @pytest.mark.parametrize("scans", [[], ["no intensity"], ["empty"], ["nothing valid"]], ids=str)
 def test_where_there_is_no_rain_to_learn_from_nothing_is_found(scans: list[str]) -> None:
     cases = [HARD_CASES[name] for name in scans]
-    rule = OneLineRule.best((scan, np.ones(len(scan), bool)) for scan in cases)
+    rule = IntensityRule.best((scan, np.ones(len(scan), bool)) for scan in cases)
     assert not rule(random_scan(seed=3, points=60)[0]).any()
 
 
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
 def test_hard_scans_get_an_answer(scan: Scan) -> None:
     rain = np.random.default_rng(0).random(len(scan)) < 0.5
-    for predicted in (OneLineRule(50, 20)(scan), OneLineRule.best([(scan, rain)])(scan)):
+    for predicted in (IntensityRule(50, 20)(scan), IntensityRule.best([(scan, rain)])(scan)):
         assert predicted.shape == (len(scan),)
         assert not predicted[~scan.valid].any()
 
@@ -89,6 +90,6 @@ def test_on_real_snow_the_rule_reaches_its_published_quality(shared: Path) -> No
     points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)
     snow = np.fromfile(shared / "data/wads/sample.label", np.uint32) & 0xFFFF == 110
     scan = Scan.of(points)
-    stated = iou(OneLineRule(intensity=0, range=20)(scan), snow)
+    stated = iou(IntensityRule(intensity=0, range=20)(scan), snow)
     assert stated == pytest.approx(0.72, abs=0.005)
-    assert iou(OneLineRule.best([(scan, snow)])(scan), snow) > stated
+    assert iou(IntensityRule.best([(scan, snow)])(scan), snow) > stated

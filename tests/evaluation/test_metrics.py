@@ -289,7 +289,7 @@ def count_in_one_of_two_processes(rank: int, folder: str) -> None:
 @pytest.mark.filterwarnings("ignore:The ``compute`` method of metric RainMetrics was called before")
 def test_two_processes_count_what_one_counts(tmp_path: Path) -> None:
     # Under this name a spawned process finds the function, through pytest's pythonpath.
-    from test_metrics import count_in_one_of_two_processes as count
+    from evaluation.test_metrics import count_in_one_of_two_processes as count
 
     torch.multiprocessing.spawn(count, (str(tmp_path),), nprocs=2)
     expected = {}

@@ -3,7 +3,7 @@
 import pytest
 
 from derain.evaluation.counts import SCORES, Counts
-from derain.export.bench.paper import TABLES, paper_table
+from derain.evaluation.published_tables import TABLES, paper_table
 
 ROWS = [row for name in TABLES for row in paper_table(name).rows]
 POOLED_ROWS = {

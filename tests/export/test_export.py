@@ -30,7 +30,7 @@ def test_the_file_is_alone_and_holds_all_weights(onnx_model: Path, random_outdet
     proto = onnx.load(onnx_model, load_external_data=False)
     assert not any(onnx.external_data_helper.uses_external_data(t) for t in proto.graph.initializer)
     stored = sum(onnx.numpy_helper.to_array(t).size for t in proto.graph.initializer)
-    folded = sum(parameter.numel() for parameter in random_outdet.folded().parameters())
+    folded = sum(parameter.numel() for parameter in random_outdet.deployed().parameters())
     assert folded <= stored <= folded + 100
 
 
@@ -230,8 +230,8 @@ def test_no_file_stays_when_the_exported_network_is_wrong(
     tmp_path: Path, random_outdet: OutDet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "model.onnx"
-    spoilt = SpoiltFarAway(random_outdet.folded(), offset=10)
-    monkeypatch.setattr(random_outdet, "folded", lambda: spoilt)
+    spoilt = SpoiltFarAway(random_outdet.deployed(), offset=10)
+    monkeypatch.setattr(random_outdet, "deployed", lambda: spoilt)
     with pytest.raises(InputError, match=r"differs: FAILED range 1e4 m.* 4 cases") as error:
         export(random_outdet, path)
     assert error.value.subject == path

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,21 +12,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import tuning
 from derain.export.tuning import (
-    SPACES,
+    LabelledNeighbourhoods,
     Search,
-    ViewedScan,
+    neighbours_to_find,
     pooled_iou,
+    space_of,
     tune_filter,
     tune_threshold,
 )
-from derain.filters import FILTERS, FilterDerainer, filter_from
+from derain.filters import FILTERS, FilterDerainer, PointFilter, Span, filter_from
 from derain.scan import Scan
+from derain.views.neighbours import Neighbourhoods
 
 CARD = DataCard("made up", {0: "solid", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))
 
@@ -37,9 +40,14 @@ def labelled(seed: int) -> Scan:
     return Scan.of(scene(600, seed)).with_label(label)
 
 
+def neighbourhoods(scan: Scan, card: DataCard = CARD) -> LabelledNeighbourhoods:
+    """As wide as any of derain's filters needs them."""
+    return LabelledNeighbourhoods.of(scan, card, neighbours=12, threads=1)
+
+
 @pytest.fixture(scope="module")
-def viewed() -> list[ViewedScan]:
-    return [ViewedScan.of(labelled(seed), CARD, threads=1) for seed in (1, 2)]
+def seen() -> list[LabelledNeighbourhoods]:
+    return [neighbourhoods(labelled(seed)) for seed in (1, 2)]
 
 
 def search(trials: int, storage: Path | None = None, data: str = "a") -> tuple[Search, list[int]]:
@@ -48,7 +56,9 @@ def search(trials: int, storage: Path | None = None, data: str = "a") -> tuple[S
 
 
 @pytest.mark.parametrize("name", FILTERS)
-def test_a_trial_scores_a_filter_as_running_it_does(name: str, viewed: list[ViewedScan]) -> None:
+def test_a_trial_scores_a_filter_as_running_it_does(
+    name: str, seen: list[LabelledNeighbourhoods]
+) -> None:
     filter = filter_from(name, {})
     found = union = 0
     for seed in (1, 2):
@@ -56,29 +66,92 @@ def test_a_trial_scores_a_filter_as_running_it_does(name: str, viewed: list[View
         called, known = FilterDerainer(filter, 1)(scan), scan.label != 9
         found += np.count_nonzero(called & (scan.label == 3))
         union += np.count_nonzero((called | (scan.label == 3)) & known)
-    assert pooled_iou(filter, viewed) == found / union
+    assert pooled_iou(filter, seen) == found / union
 
 
 @pytest.mark.parametrize("name", FILTERS)
 def test_tuning_starts_from_the_defaults_and_ends_no_worse(
-    name: str, viewed: list[ViewedScan]
+    name: str, seen: list[LabelledNeighbourhoods]
 ) -> None:
     for trials in (1, 12):
         how, told = search(trials)
-        tuned = tune_filter(name, viewed, how)
+        tuned = tune_filter(name, seen, how)
         assert len(told) == trials
-        assert tuned.iou == pooled_iou(filter_from(name, tuned.parameters), viewed)
-        assert tuned.default_iou == pooled_iou(filter_from(name, {}), viewed)
+        assert tuned.iou == pooled_iou(filter_from(name, tuned.parameters), seen)
+        assert tuned.default_iou == pooled_iou(filter_from(name, {}), seen)
         assert tuned.iou >= tuned.default_iou
         if trials == 1:
             assert filter_from(name, tuned.parameters) == filter_from(name, {})
 
 
-def test_every_filter_has_bounds_that_hold_its_defaults() -> None:
-    assert list(SPACES) == list(FILTERS)
-    for name, space in SPACES.items():
-        default = filter_from(name, {}).as_dict()
+def test_every_filter_is_looked_for_around_its_defaults() -> None:
+    for name in FILTERS:
+        space, default = space_of(name), filter_from(name, {}).as_dict()
         assert all(low <= default[parameter] <= high for parameter, (low, high) in space.items())
+        assert neighbours_to_find(name) == 12
+
+
+@dataclass(frozen=True)
+class Near(PointFilter):
+    """Calls a point rain if its third neighbour is near."""
+
+    neighbours: int = 15
+    reach: float = 5.0
+
+    def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+        return view.distances[:, self.neighbours - 1] < self.reach
+
+
+@pytest.fixture
+def add_filter(monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
+    """Adds a filter like that for the length of a test, with a space to be looked for in."""
+    monkeypatch.setattr(FILTERS, "_members", dict(FILTERS))
+
+    def add(**space: Span) -> str:
+        FILTERS.add("near")(type("Near", (Near,), {"SPACE": space}))
+        return "near"
+
+    return add
+
+
+def test_a_filter_that_does_not_say_where_to_look_is_not_tuned(
+    add_filter: Callable[..., str], seen: list[LabelledNeighbourhoods]
+) -> None:
+    name = add_filter()
+    for ask in (space_of, neighbours_to_find, lambda name: tune_filter(name, seen, search(1)[0])):
+        with pytest.raises(InputError, match="near: it cannot be tuned"):
+            ask(name)
+
+
+@pytest.mark.parametrize(
+    ("space", "reason"),
+    [
+        ({"reach": (6.0, 9.0)}, "its SPACE has reach from 6.0 to 9.0, where its default is 5.0"),
+        (
+            {"width": (6.0, 9.0)},
+            "its SPACE has width from 6.0 to 9.0, where its default is missing",
+        ),
+    ],
+)
+def test_a_space_that_a_search_cannot_start_in_is_refused(
+    add_filter: Callable[..., str], space: dict[str, Span], reason: str
+) -> None:
+    with pytest.raises(InputError, match=reason):
+        space_of(add_filter(**space))
+
+
+def test_as_many_neighbours_are_found_as_any_trial_looks_at(
+    add_filter: Callable[..., str],
+) -> None:
+    assert neighbours_to_find(add_filter(reach=(0.1, 50.0))) == 15
+    name = add_filter(neighbours=(10, 30), reach=(0.1, 50.0))
+    assert neighbours_to_find(name) == 30
+    scans = [LabelledNeighbourhoods.of(labelled(1), CARD, neighbours_to_find(name), threads=1)]
+    tuned = tune_filter(name, scans, search(5)[0])
+    found = FilterDerainer(filter_from(name, tuned.parameters))(labelled(1))
+    rain, known = labelled(1).label == 3, labelled(1).label != 9
+    union = np.count_nonzero((found | rain) & known)
+    assert tuned.iou == np.count_nonzero(found & rain) / union
 
 
 def test_tuning_finds_the_radius_that_parts_drops_from_a_wall() -> None:
@@ -88,39 +161,39 @@ def test_tuning_finds_the_radius_that_parts_drops_from_a_wall() -> None:
     drops = np.stack(np.meshgrid([4.0, 6, 8], [-4.0, -2, 0, 2, 4], [0.0, 2])).reshape(3, -1).T
     points = np.concatenate([wall, drops]).astype(np.float32)
     label = np.where(np.arange(len(points)) >= len(wall), 3, 0)
-    viewed = [ViewedScan.of(Scan(points).with_label(label), CARD, threads=1)]
-    tuned = tune_filter("ror", viewed, search(60)[0])
+    seen = [neighbourhoods(Scan(points).with_label(label))]
+    tuned = tune_filter("ror", seen, search(60)[0])
     assert tuned.iou == 1 > tuned.default_iou
     assert 0.1 < tuned.parameters["radius"] < 3
 
 
-def test_one_seed_finds_one_answer(viewed: list[ViewedScan]) -> None:
-    assert tune_filter("dsor", viewed, search(15)[0]) == tune_filter("dsor", viewed, search(15)[0])
+def test_one_seed_finds_one_answer(seen: list[LabelledNeighbourhoods]) -> None:
+    assert tune_filter("dsor", seen, search(15)[0]) == tune_filter("dsor", seen, search(15)[0])
 
 
 def test_a_stored_study_goes_on_to_the_number_of_trials(
-    viewed: list[ViewedScan], tmp_path: Path
+    seen: list[LabelledNeighbourhoods], tmp_path: Path
 ) -> None:
     storage = tmp_path / "study.db"
     for trials, run in ((4, 4), (9, 5), (9, 0)):
         how, told = search(trials, storage)
-        tuned = tune_filter("dsor", viewed, how)
+        tuned = tune_filter("dsor", seen, how)
         assert len(told) == run
-    again = tune_filter("dsor", viewed, search(9, storage)[0])
+    again = tune_filter("dsor", seen, search(9, storage)[0])
     assert again == tuned
     with pytest.raises(InputError, match="holds a study of dsor on other scans"):
-        tune_filter("dsor", viewed, search(9, storage, data="b")[0])
+        tune_filter("dsor", seen, search(9, storage, data="b")[0])
     # Another filter has a study of its own in the same file.
-    assert tune_filter("ror", viewed, search(1, storage, data="b")[0]).iou > 0
+    assert tune_filter("ror", seen, search(1, storage, data="b")[0]).iou > 0
 
 
 def test_a_study_goes_on_only_with_the_same_labels(
-    viewed: list[ViewedScan], tmp_path: Path
+    seen: list[LabelledNeighbourhoods], tmp_path: Path
 ) -> None:
     storage = tmp_path / "study.db"
-    tune_filter("dsor", viewed, search(1, storage)[0])
+    tune_filter("dsor", seen, search(1, storage)[0])
     other = DataCard("made up", {0: "solid", 3: "rain", 9: "also rain"}, rain=(3, 9))
-    relabelled = [ViewedScan.of(labelled(seed), other, threads=1) for seed in (1, 2)]
+    relabelled = [neighbourhoods(labelled(seed), other) for seed in (1, 2)]
     with pytest.raises(InputError, match="other scans or labels"):
         tune_filter("dsor", relabelled, search(2, storage)[0])
 
@@ -133,9 +206,9 @@ def trials_in(storage: Path) -> list[tuple[dict[str, float], float]]:
 
 
 def test_a_search_broken_off_in_the_midst_of_a_trial_ends_as_an_unbroken_one(
-    viewed: list[ViewedScan], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    seen: list[LabelledNeighbourhoods], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    unbroken = tune_filter("dsor", viewed, search(14, tmp_path / "unbroken.db")[0])
+    unbroken = tune_filter("dsor", seen, search(14, tmp_path / "unbroken.db")[0])
     for whole in (0, 12):  # none, and more than are drawn at random
         storage = tmp_path / f"{whole}.db"
         weighed = itertools.count()
@@ -148,42 +221,42 @@ def test_a_search_broken_off_in_the_midst_of_a_trial_ends_as_an_unbroken_one(
         with monkeypatch.context() as patch:
             patch.setattr(tuning, "pooled_iou", broken_off)
             with pytest.raises(KeyboardInterrupt):
-                tune_filter("dsor", viewed, search(14, storage)[0])
+                tune_filter("dsor", seen, search(14, storage)[0])
         assert len(trials_in(storage)) == whole
-        assert tune_filter("dsor", viewed, search(14, storage)[0]) == unbroken
+        assert tune_filter("dsor", seen, search(14, storage)[0]) == unbroken
         assert trials_in(storage) == trials_in(tmp_path / "unbroken.db")
 
 
 def test_a_running_trial_that_nobody_runs_is_no_trial(
-    viewed: list[ViewedScan], tmp_path: Path
+    seen: list[LabelledNeighbourhoods], tmp_path: Path
 ) -> None:
     storage = tmp_path / "study.db"
-    tune_filter("dsor", viewed, search(5, storage)[0])
+    tune_filter("dsor", seen, search(5, storage)[0])
     optuna.load_study(study_name="dsor", storage=f"sqlite:///{storage}").ask()
-    assert tune_filter("dsor", viewed, search(14, storage)[0]) == (
-        tune_filter("dsor", viewed, search(14)[0])
+    assert tune_filter("dsor", seen, search(14, storage)[0]) == (
+        tune_filter("dsor", seen, search(14)[0])
     )
 
 
-def test_trials_of_another_seed_count(viewed: list[ViewedScan], tmp_path: Path) -> None:
+def test_trials_of_another_seed_count(seen: list[LabelledNeighbourhoods], tmp_path: Path) -> None:
     storage = tmp_path / "study.db"
     first = replace(search(12, storage)[0], seed=7)
-    best = tune_filter("dsor", viewed, first)
+    best = tune_filter("dsor", seen, first)
     how, told = search(12, storage)
-    assert tune_filter("dsor", viewed, how) == best
+    assert tune_filter("dsor", seen, how) == best
     assert told == []
-    assert tune_filter("dsor", viewed, search(20, storage)[0]).iou >= best.iou
+    assert tune_filter("dsor", seen, search(20, storage)[0]).iou >= best.iou
     assert len(trials_in(storage)) == 20
 
 
 @pytest.mark.parametrize("make", [Path.mkdir, lambda path: path.write_text("no database" * 99)])
 def test_a_storage_that_cannot_be_used_is_refused(
-    make: Callable[[Path], object], viewed: list[ViewedScan], tmp_path: Path
+    make: Callable[[Path], object], seen: list[LabelledNeighbourhoods], tmp_path: Path
 ) -> None:
     storage = tmp_path / "study.db"
     make(storage)
     with pytest.raises(InputError, match="cannot be used as storage"):
-        tune_filter("dsor", viewed, search(1, storage)[0])
+        tune_filter("dsor", seen, search(1, storage)[0])
 
 
 # Two of them are neighbours: nothing lies midway.

@@ -20,7 +20,7 @@ from derain import InputError, Scan
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
 from derain.files.content import ALWAYS_ROOM, LARGEST_EXPANSION, LARGEST_SCAN, Room, read_content
-from derain.files.formats import FORMATS, Format
+from derain.files.format import FORMATS
 from derain.files.labels import read_labels
 
 # A float32 x, y, z and intensity for each of seven million points.
@@ -259,7 +259,7 @@ def test_a_scan_that_needs_too_much_memory_does_not_end_a_run(
     def decode(*_: object) -> Scan:
         raise MemoryError
 
-    monkeypatch.setitem(FORMATS, ".pcd", Format(decode, FORMATS[".pcd"].encode))
+    monkeypatch.setattr(FORMATS[".pcd"], "decode", decode)
     (tmp_path / "a.pcd").touch()
     scene(300).tofile(tmp_path / "b.bin")
     outcome = run_derain("run", "ror", tmp_path, "--out", tmp_path / "out")

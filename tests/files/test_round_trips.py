@@ -12,9 +12,9 @@ from hypothesis.extra.numpy import arrays
 from derain import Scan
 from derain.files import DEFAULT_COLUMNS, read_scan, write_scan
 from derain.files.columns import scan_of
-from derain.files.pcd_header import ENCODINGS, VALUE_TYPES, PcdHeader
-from derain.files.ply import PlyHeader
-from derain.files.ply_header import BYTE_ORDERS
+from derain.files.formats.pcd.header import ENCODINGS, VALUE_TYPES, PcdHeader
+from derain.files.formats.ply import PlyHeader
+from derain.files.formats.ply.header import BYTE_ORDERS
 
 FLOATS = ("f4", "f8")
 NAMES = st.text("abcdefgh_0123456789-.äλ", min_size=2, max_size=6)

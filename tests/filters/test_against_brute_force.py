@@ -188,12 +188,12 @@ def test_one_wide_view_serves_every_filter_as_its_own_does(
     [ROR(3, 0.35), DROR(4, azimuth_resolution=1.0), DROR(azimuth_resolution=2.0, variant="paper")],
 )
 def test_points_settled_along_the_curve_are_settled_right(filter_: RadiusFilter) -> None:
-    rng = np.random.default_rng(5)
-    scan = Scan.of(rng.normal(size=(4000, 3)) * [10, 10, 0.1])
+    generator = np.random.default_rng(5)
+    scan = Scan.of(generator.normal(size=(4000, 3)) * [10, 10, 0.1])
     view = filter_view(filter_.neighbours)(scan)
     lonely = filter_.judge(view)
     assert 0.05 < lonely.mean() < 0.95
     np.testing.assert_array_equal(filter_.judge_alone(view.points[:, :3].copy(), 2), lonely)
-    shuffle = rng.permutation(view.size)
+    shuffle = generator.permutation(view.size)
     shuffled = filter_.judge_alone(view.points[shuffle, :3], 1)
     np.testing.assert_array_equal(shuffled, lonely[shuffle])

@@ -1,7 +1,7 @@
 """What holds for every filter: hard scans, copies, stages, and parameters that make no sense."""
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import make_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -117,10 +117,45 @@ def test_a_filter_is_found_by_its_name_and_takes_its_parameters() -> None:
         assert filter_from(name, filter_.as_dict()) == filter_
 
 
+@pytest.fixture
+def add_filter(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, type], None]:
+    """Registers filters for the length of a test."""
+    monkeypatch.setattr(FILTERS, "_members", dict(FILTERS))
+    return lambda name, kind: FILTERS.add(name)(kind)
+
+
+def test_a_filter_is_called_what_it_is_registered_by(
+    add_filter: Callable[[str, type], None],
+) -> None:
+    fog = type("FogRemover", (ROR,), {})
+    assert fog().name == "fogremover"
+    add_filter("fog", fog)
+    assert filter_from("fog", {}).name == fog().name == "fog"
+    assert ROR().name == "ror"
+    with pytest.raises(InputError, match="fog: radius is -1"):
+        filter_from("fog", {"radius": -1})
+
+
+def test_numbers_are_checked_where_annotations_are_texts_as_well(
+    add_filter: Callable[[str, type], None],
+) -> None:
+    fog = make_dataclass("Fog", [("reach", "float", 5.0)], bases=(ROR,), frozen=True)
+    add_filter("fog", fog)
+    assert filter_from("fog", {"reach": 7}).as_dict()["reach"] == 7
+    with pytest.raises(InputError, match="fog: reach is 'far'"):
+        filter_from("fog", {"reach": "far"})
+
+
+@every_filter
+def test_a_line_of_help_says_what_rain_is(name: str) -> None:
+    assert FILTERS[name].HELP.startswith("rain ")
+    assert FILTERS[name].HELP.splitlines() == [FILTERS[name].HELP]
+
+
 @pytest.mark.parametrize(
     ("name", "parameters", "message"),
     [
-        ("rorr", {}, "rorr: no such filter. Give one of ror, sor, dror, dsor, ssr."),
+        ("rorr", {}, "rorr: no such filter. Give one of dror, dsor, ror, sor, ssr."),
         (
             "ror",
             {"radios": 1},

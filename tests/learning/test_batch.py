@@ -105,7 +105,7 @@ def test_a_batch_that_is_measured_carries_the_scans_and_one_that_is_not_tensors_
     for scan, viewed, score, measured in zip(scans, seen, scores, sent.measured, strict=True):
         np.testing.assert_array_equal(measured.scan.xyz, scan.xyz)
         np.testing.assert_array_equal(
-            measured.way_to_rows(score.numpy()), viewed.back(score.numpy())
+            measured.back_projection(score.numpy()), viewed.back(score.numpy())
         )
     assert not untold.measured
     assert untold.cells == told.cells

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from derain.learning.seeds import Draw, generator, run_seed
+from derain.learning.seeds import Draw, generator_of, run_seed
 
 
 def test_no_two_draws_are_alike_and_each_is_always_the_same() -> None:
@@ -14,9 +14,9 @@ def test_no_two_draws_are_alike_and_each_is_always_the_same() -> None:
         for draw, seed, epoch in itertools.product(Draw, (0, 1, 2**32 - 1), (0, 1, 2))
         for number in ((), (0,), (1,), (0, 0), (1, 0), (0, 1))
     ]
-    drawn = [generator(*key).integers(2**63) for key in keys]
+    drawn = [generator_of(*key).integers(2**63) for key in keys]
     assert len(set(drawn)) == len(keys)
-    assert drawn == [generator(*key).integers(2**63) for key in keys]
+    assert drawn == [generator_of(*key).integers(2**63) for key in keys]
 
 
 def test_the_seed_is_the_runs(monkeypatch: pytest.MonkeyPatch) -> None:

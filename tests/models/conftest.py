@@ -54,7 +54,7 @@ def outdet() -> Callable[..., OutDet]:
         model.adopt(
             Spec(
                 network="outdet",
-                view=model.view_parameters([]),
+                view=model.view_for([]).as_dict(),
                 mean=tuple(rng.normal(0, 3, len(channels)).tolist()),
                 std=tuple(rng.uniform(0.5, 20, len(channels)).tolist()),
                 classes={0: "other", 1: "rain"},

@@ -215,6 +215,14 @@ def test_a_view_that_the_network_cannot_take_is_refused(
         load_model(path)
 
 
+def test_a_rule_that_the_network_does_not_have_is_refused(
+    content: dict[str, Any], path: Path
+) -> None:
+    torch.save(with_spec(content, rule={"residual": 0.008}), path)
+    with pytest.raises(InputError, match=r"model\.ckpt: .*rule: outdet has no rule with constants"):
+        load_model(path)
+
+
 @pytest.mark.parametrize("read", [load_model, read_state_dict])
 def test_a_compressed_checkpoint_is_refused(
     content: dict[str, Any], path: Path, read: Callable[[Path], Any]

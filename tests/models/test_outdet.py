@@ -138,12 +138,12 @@ def test_a_folded_network_computes_the_same_from_further_channels(
     inputs = inputs_of(sample(scene()))
     six = torch.randn(len(inputs["points"]), 6, generator=torch.Generator().manual_seed(0))
     inputs["points"] = six * model.std + model.mean
-    torch.testing.assert_close(model.folded()(**inputs), model(**inputs), atol=2e-4, rtol=2e-4)
+    torch.testing.assert_close(model.deployed()(**inputs), model(**inputs), atol=2e-4, rtol=2e-4)
 
 
 def test_the_neighbourhood_is_as_large_as_asked_for(sample: MakeSample) -> None:
     model = OutDet(neighbours=5)
-    assert model.view_parameters([]) == {"kind": "neighbours", "neighbours": 5}
+    assert model.view_for([]).as_dict() == {"kind": "neighbours", "neighbours": 5}
     assert model(**inputs_of(sample(scene(100), neighbours=5))).shape == (100, 2)
 
 
@@ -217,7 +217,7 @@ def test_published_weights_give_the_published_logits(
     assert sorted(one.view.first) == list(range(len(oracle)))
     np.testing.assert_allclose(logits.numpy(), oracle[one.view.first], atol=1e-4, rtol=0)
     with torch.no_grad():
-        folded = model.folded()(**inputs_of(one))
+        folded = model.deployed()(**inputs_of(one))
     np.testing.assert_allclose(folded.numpy(), oracle[one.view.first], atol=1e-4, rtol=0)
 
 
@@ -244,7 +244,7 @@ def test_the_folded_network_computes_the_same(
 ) -> None:
     model = outdet(seed, neighbours)
     inputs = inputs_of(sample(scene(500, seed), neighbours))
-    logits, folded = model(**inputs), model.folded()(**inputs)
+    logits, folded = model(**inputs), model.deployed()(**inputs)
     assert logits.std() > 0.1
     torch.testing.assert_close(folded, logits, atol=2e-4, rtol=2e-4)
 
@@ -252,7 +252,7 @@ def test_the_folded_network_computes_the_same(
 def test_folding_leaves_the_model_as_it_was(outdet: MakeModel) -> None:
     model = outdet()
     before = {name: tensor.clone() for name, tensor in model.state_dict().items()}
-    folded = model.folded()
+    folded = model.deployed()
     assert not any(parameter.requires_grad for parameter in folded.parameters())
     for name, tensor in model.state_dict().items():
         assert torch.equal(tensor, before[name])

@@ -11,7 +11,7 @@ import pytest
 
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
-from derain.models.measured import MERIT
+from derain.models.measured import MONITOR
 
 from . import two_processes
 
@@ -48,7 +48,7 @@ def test_two_processes_find_what_one_finds(folder: Path) -> None:
         counted = alone["report"]["classes"].values()
         assert sum(counts["points"] for counts in counted) == sum(POINTS)
         # Each process trained on scans of its own; what chose the checkpoint is what one finds.
-        assert found["merit"] == alone["validated"][MERIT]
+        assert found["monitor"] == alone["validated"][MONITOR]
         one, two = (
             {path.name: path.read_bytes() for path in (folder / network / labels).iterdir()}
             for labels in ("labels1", "labels2")

@@ -59,7 +59,7 @@ def test_a_stated_grid_is_taken_whatever_the_scans(
     model = model_class(grid=grid, way_back="vote")
     for scans in ([], [Scan.of(scene(100))]):
         expected = {"kind": "range", "grid": grid_of(grid, "").as_dict(), "way_back": "vote"}
-        assert model.view_parameters(scans) == expected
+        assert model.view_for(scans).as_dict() == expected
 
 
 @both_models
@@ -120,7 +120,7 @@ def test_the_deployed_network_computes_the_same(
 ) -> None:
     model = image_network(model_class)
     inputs = Batch.of([image_sample(model, scene())]).inputs
-    assert torch.equal(model.folded()(**inputs), model(**inputs))
+    assert torch.equal(model.deployed()(**inputs), model(**inputs))
 
 
 def step(model: DerainingModule, batch: Batch, bfloat16: bool = False) -> None:

@@ -19,11 +19,11 @@ from derain.datamodules.folder import Folder
 from derain.datamodules.simulated import Simulated
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.evaluation.intensity_rule import OneLineRule
+from derain.evaluation.intensity_rule import IntensityRule
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.learning.losses import class_weights
-from derain.learning.seeds import Draw, generator
+from derain.learning.seeds import Draw, generator_of
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
@@ -95,7 +95,7 @@ def test_the_loss_falls(run: Run) -> None:
 
 
 def test_a_trained_network_beats_rules_that_need_no_network(run: Run) -> None:
-    rule = OneLineRule.best(truths(run.data, "train"))
+    rule = IntensityRule.best(truths(run.data, "train"))
     ((scan, rain),) = truths(run.data, "test")
     everything = iou(np.ones(len(scan), bool), rain)
     assert run.scores["test/iou"] > iou(rule(scan), rain) > everything
@@ -356,7 +356,7 @@ def test_accumulated_batches_make_one_step_on_the_mean_of_their_gradients(
     for number, batch in enumerate(steps.batches):
         epoch, step = divmod(number, 4)
         optimizer.param_groups[0]["lr"] = 1e-3 * 0.1**epoch
-        seed = generator(Draw.NETWORK, 0, epoch, step, 0).integers(2**63)
+        seed = generator_of(Draw.NETWORK, 0, epoch, step, 0).integers(2**63)
         torch.manual_seed(int(seed))  # of dropout
         losses, _ = by_hand.losses(batch)
         (losses["loss"] / 2).backward()

@@ -24,7 +24,7 @@ from derain.models.callbacks.prediction import PredictionWriter
 from derain.models.callbacks.report import TestReport
 from derain.models.checkpoint import load_model
 from derain.models.lisnownet import LiSnowNet
-from derain.models.measured import MERIT
+from derain.models.measured import MONITOR
 from derain.models.outdet import OutDet
 
 GRID = {"rows": 16, "columns": 64, "inclination": [-30.0, 20.0]}
@@ -59,10 +59,10 @@ def make_trainer(folder: Path, processes: int, *callbacks: lightning.Callback) -
 def fit(scans: Path, folder: Path) -> float:
     """Trains the network that a folder is named after; returns what ``best.ckpt`` was chosen by."""
     lightning.seed_everything(0)
-    best = ModelCheckpoint(folder, filename="best", monitor=MERIT, mode="max")
+    best = ModelCheckpoint(folder, filename="best", monitor=MONITOR, mode="max")
     trainer = make_trainer(folder, 2, best)
     trainer.fit(NETWORKS[folder.name](), data_of(scans))
-    return float(trainer.callback_metrics[MERIT])
+    return float(trainer.callback_metrics[MONITOR])
 
 
 def measure(scans: Path, folder: Path, processes: int) -> dict[str, Any]:
@@ -80,6 +80,6 @@ if __name__ == "__main__":
     torch.set_num_threads(1)
     here = Path(sys.argv[1])
     for network in NETWORKS:
-        merit = fit(here, here / network)
-        found = {"merit": merit, "scores": measure(here, here / network, 2)}
+        monitor = fit(here, here / network)
+        found = {"monitor": monitor, "scores": measure(here, here / network, 2)}
         (here / network / "found.json").write_text(json.dumps(found))

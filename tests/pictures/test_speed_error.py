@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.text import Text
 
-from derain.pictures.speed_error import LEAST_ERROR, Standing, speed_error_figure, unbeaten
+from derain.pictures.speed_error import LEAST_ERROR, Standing, pareto_front, speed_error_figure
 
 values = st.sampled_from([0.0, 0.1, 0.2, 0.5, 1.0])
 standings = st.lists(
@@ -19,21 +19,23 @@ standings = st.lists(
 
 
 @given(standings)
-def test_the_front_is_what_no_other_beats(methods: list[Standing]) -> None:
-    def beats(a: Standing, b: Standing) -> bool:
+def test_the_pareto_front_is_what_no_other_method_surpasses(methods: list[Standing]) -> None:
+    def surpasses(a: Standing, b: Standing) -> bool:
         no_worse = a.error <= b.error and a.milliseconds <= b.milliseconds
         return no_worse and (a.error, a.milliseconds) != (b.error, b.milliseconds)
 
-    places = {(m.milliseconds, m.error) for m in methods if not any(beats(n, m) for n in methods)}
-    front = [(m.milliseconds, m.error) for m in unbeaten(methods)]
+    places = {
+        (m.milliseconds, m.error) for m in methods if not any(surpasses(n, m) for n in methods)
+    }
+    front = [(m.milliseconds, m.error) for m in pareto_front(methods)]
     assert front == sorted(places)
 
 
 def crowd(seed: int) -> list[Standing]:
     """Sixteen methods, half of them close together."""
-    chance = np.random.default_rng(seed)
-    error = np.concatenate([chance.uniform(0.02, 1, 8), chance.normal(0.2, 0.01, 8)])
-    milliseconds = np.concatenate([chance.uniform(5, 900, 8), chance.normal(120, 8, 8)])
+    generator = np.random.default_rng(seed)
+    error = np.concatenate([generator.uniform(0.02, 1, 8), generator.normal(0.2, 0.01, 8)])
+    milliseconds = np.concatenate([generator.uniform(5, 900, 8), generator.normal(120, 8, 8)])
     groups = itertools.cycle(["network", "filter", "baseline"])
     return [
         Standing(f"method number {number}", *place, group)

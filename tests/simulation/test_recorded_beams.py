@@ -139,9 +139,9 @@ def off_axis(direction: NDArray[np.float64], about: float) -> NDArray[np.float64
 @pytest.mark.parametrize("about", [0.0, 90.0, 180.0])
 def test_a_rosette_has_no_beams_outside_its_circle(about: float) -> None:
     direction = rosette(24_000, about)
-    rng = np.random.default_rng(8)
-    returned = rng.random(len(direction)) < 0.8
-    distance = rng.uniform(3, 60, len(direction))[:, None]
+    generator = np.random.default_rng(8)
+    returned = generator.random(len(direction)) < 0.8
+    distance = generator.uniform(3, 60, len(direction))[:, None]
     beams = beams_of(Scan((direction * distance)[returned].astype(np.float32)))
     unreturned = beams.direction[~beams.returned]
     # All over the circle, out to its edge and no farther.

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from derain.views.back_projection import (
+    BACK_PROJECTIONS,
     CHUNK,
-    WAYS_BACK,
     ProjectedPoints,
     copy,
     nearest_range,
@@ -104,12 +104,12 @@ def test_copying_gives_every_point_its_pixels_score(
 
 
 @settings(deadline=None)
-@given(projections(), st.sampled_from(sorted(WAYS_BACK)), st.sampled_from([0.0, 1.0]))
+@given(projections(), st.sampled_from(sorted(BACK_PROJECTIONS)), st.sampled_from([0.0, 1.0]))
 def test_a_unanimous_image_gives_every_point_its_answer(
     projection: tuple[ProjectedPoints, NDArray[np.float32]], way_back: str, answer: float
 ) -> None:
     points, score = projection
-    result = WAYS_BACK[way_back](points, np.full_like(score, answer))
+    result = BACK_PROJECTIONS[way_back](points, np.full_like(score, answer))
     assert result.dtype == np.float32
     assert result.tolist() == [answer] * len(points.pixel)
 
@@ -122,7 +122,7 @@ def test_points_that_are_shown_have_their_own_pixels_score(
     points, score = projection
     shown = points.range == points.nearest.ravel()[points.pixel]
     np.testing.assert_array_equal(
-        WAYS_BACK[way_back](points, score)[shown], score[points.pixel[shown]]
+        BACK_PROJECTIONS[way_back](points, score)[shown], score[points.pixel[shown]]
     )
 
 

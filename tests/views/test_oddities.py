@@ -1,6 +1,6 @@
 """What is odd about a scan: missing, constant and mistaken intensities, and what lies outside."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -8,20 +8,18 @@ import pytest
 
 from derain.cards.card import load_card
 from derain.evaluation.hard_cases import scene
-from derain.evaluation.intensity_rule import OneLineRule
+from derain.evaluation.intensity_rule import IntensityRule
 from derain.files import read_scan
 from derain.filters import DROR, SSR, FilterDerainer
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.spec import Spec
-from derain.system.notices import Notices
 from derain.views.oddities import (
     HEAVIEST_RAIN,
     MOST_OUTSIDE,
-    Judge,
-    Oddity,
+    Examiner,
+    left_out,
     much_removed,
-    oddities,
     outside_view,
 )
 
@@ -38,32 +36,32 @@ def with_intensity(values: float | np.ndarray, points: int = 300) -> Scan:
     return Scan.of(xyzi)
 
 
-def kinds(scan: Scan, judge: Judge) -> list[str]:
-    return [oddity.kind for oddity in oddities(scan, judge)]
+def kinds(scan: Scan, examiner: Examiner) -> list[str]:
+    return [oddity.kind for oddity in examiner.oddities(scan)]
 
 
 def test_an_ordinary_scan_is_not_odd(spec: Spec) -> None:
-    for judge in (spec, SSR(), DROR(), OneLineRule(1.0, 20.0), None):
-        assert kinds(Scan.of(scene(300)), judge) == []
+    for examiner in (spec, SSR(), DROR(), IntensityRule(1.0, 20.0)):
+        assert kinds(Scan.of(scene(300)), examiner) == []
 
 
 @pytest.mark.parametrize("value", [0.0, 7.0, 255.0, 65_535.0])
 def test_one_intensity_everywhere_was_not_measured(spec: Spec, value: float) -> None:
     scan = with_intensity(value)
-    (oddity,) = oddities(scan, spec)
+    (oddity,) = spec.oddities(scan)
     assert oddity.kind == "intensity not measured"
     assert oddity.detail == (
         f"intensity {value:g} at every point, so that it was not measured: "
         "the mean of WADS, 9.88, stands in"
     )
-    for judge in (SSR(), OneLineRule(1e6, 1e6)):
-        assert kinds(scan, judge) == ["intensity not measured"]
+    for examiner in (SSR(), IntensityRule(1e6, 1e6)):
+        assert kinds(scan, examiner) == ["intensity not measured"]
     assert kinds(scan, DROR()) == []  # it looks at places alone
 
 
 def test_intensities_that_are_no_numbers_were_not_measured(spec: Spec) -> None:
     for values in (np.nan, np.resize([np.nan, np.inf, 1e9], 300)):
-        (oddity,) = oddities(with_intensity(values), spec)
+        (oddity,) = spec.oddities(with_intensity(values))
         assert oddity.detail.startswith("no intensity is a number that sensors measure: the mean")
 
 
@@ -85,9 +83,9 @@ def test_intensities_of_another_unit_are_told_from_those_of_a_bright_scene(
     # Bright enough for the means to be no farther apart than those of two scenes may be.
     shares = np.random.default_rng(0).beta(*((8, 4) if full_scale == 1 else (0.05, 20)), 3000)
     scan = with_intensity(np.maximum(shares, 0.01) * full_scale, 3000)
-    for judge in (spec, SSR()):
-        assert kinds(scan, judge) == [f"intensity of a {unit} unit"]
-        assert kinds(scan.with_intensity_times(255 / full_scale), judge) == []
+    for examiner in (spec, SSR()):
+        assert kinds(scan, examiner) == [f"intensity of a {unit} unit"]
+        assert kinds(scan.with_intensity_times(255 / full_scale), examiner) == []
 
 
 def test_real_scans_are_odd_only_where_their_intensities_are_shares(
@@ -104,8 +102,8 @@ def test_real_scans_are_odd_only_where_their_intensities_are_shares(
         "wads/sample.bin": [],
     }
     scans = {name: read_scan(shared / "data" / name) for name in units}
-    for judge in (spec, SSR()):
-        assert {name: kinds(scan, judge) for name, scan in scans.items()} == units
+    for examiner in (spec, SSR()):
+        assert {name: kinds(scan, examiner) for name, scan in scans.items()} == units
 
 
 def test_a_unit_that_is_not_stated_is_told_by_the_mean_alone(spec: Spec) -> None:
@@ -116,15 +114,17 @@ def test_a_unit_that_is_not_stated_is_told_by_the_mean_alone(spec: Spec) -> None
 
 def test_a_scan_without_a_point_is_not_odd(spec: Spec) -> None:
     for points in (np.zeros((0, 4), np.float32), np.full((200, 4), np.nan, np.float32)):
-        assert kinds(Scan.of(points), spec) == []
-        assert list(outside_view(Scan.of(points), np.zeros(len(points), bool), spec)) == []
+        for examiner in (spec, SSR(), DROR(), IntensityRule(1.0, 20.0)):
+            assert kinds(Scan.of(points), examiner) == []
+            assert kinds(Scan.of(points[:, :3]), examiner) == []
+        assert list(outside_view(Scan.of(points), np.zeros(len(points), bool), spec.data)) == []
 
 
 def test_points_outside_the_view_are_odd_where_they_are_many(spec: Spec) -> None:
     scan = Scan.of(scene(1000))
     few = np.arange(1000) >= 1000 * MOST_OUTSIDE
-    assert list(outside_view(scan, few, spec)) == []
-    (oddity,) = outside_view(scan, np.arange(1000) >= 250, spec)
+    assert list(outside_view(scan, few, spec.data)) == []
+    (oddity,) = outside_view(scan, np.arange(1000) >= 250, spec.data)
     assert oddity.detail == "25% of the points lie outside the grid of WADS, and stay"
 
 
@@ -134,26 +134,21 @@ def test_twice_the_heaviest_rain_is_too_much() -> None:
     assert oddity.detail.startswith("35% of the points are called rain")
 
 
+def test_any_header_may_say_that_parts_of_its_file_are_not_written() -> None:
+    @dataclass(frozen=True)
+    class Header:
+        left_out: tuple[str, ...]
+
+    scan = Scan.of(scene(9))
+    (oddity,) = left_out(replace(scan, header=Header(("edge", "material"))))
+    assert oddity.kind == "parts of the file that are not written"
+    assert oddity.detail == "the cleaned file is without its edge, material"
+    for header in (Header(()), None, "of another format"):
+        assert not list(left_out(replace(scan, header=header)))
+
+
 def test_ssr_and_the_rule_find_nothing_where_intensity_was_not_measured() -> None:
     scan = with_intensity(0)
     assert not FilterDerainer(SSR(threshold=1e9))(scan).any()
-    assert not OneLineRule(1e6, 1e6)(scan).any()
-    assert OneLineRule(1e6, 1e6)(with_intensity(0, 99)).all()
-
-
-def test_each_kind_is_told_with_its_first_scan_and_counted(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    notices = Notices()
-    none, unit = Oddity("no intensity", "no intensity here"), Oddity("another unit", "0..1")
-    notices.tell("a", [none])
-    notices.tell("b", [none, unit])
-    notices.tell("c\x1b[2J", [Oddity("no intensity", "nor here")])
-    notices.tell("d", [none], method="outdet")
-    notices.tell_how_many_more()
-    assert capsys.readouterr().err.splitlines() == [
-        "derain: warning: a: no intensity here",
-        "derain: warning: b: 0..1",
-        "derain: warning: d: outdet: no intensity here",
-        "derain: warning: 2 more scans: no intensity",
-    ]
+    assert not IntensityRule(1e6, 1e6)(scan).any()
+    assert IntensityRule(1e6, 1e6)(with_intensity(0, 99)).all()

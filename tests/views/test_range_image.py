@@ -15,9 +15,9 @@ from derain.evaluation.hard_cases import hard_cases
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.files.labels import label_beside, read_labels, semantic
 from derain.scan import Scan
-from derain.views.back_projection import WAYS_BACK
+from derain.views.back_projection import BACK_PROJECTIONS
 from derain.views.grid_fit import fit_grid
-from derain.views.range_image import CHANNELS, RangeImage, RangeView
+from derain.views.range_image import RangeImage, RangeView
 from derain.views.spherical_grid import SphericalGrid, grid_of
 from derain.views.view import IGNORED
 
@@ -56,7 +56,7 @@ def test_every_pixel_shows_the_nearest_of_its_points(
     winner = shown_by_hand(scan, image.pixel, image.size)
     assert image.winner.tolist() == winner
     for number, row in enumerate(winner):
-        content = image.image.reshape(len(CHANNELS), -1)[:, number]
+        content = image.image.reshape(len(RangeView.channels), -1)[:, number]
         held = np.zeros(5) if row < 0 else [scan.range[row], *points[row]]
         np.testing.assert_array_equal(content, np.float32(held))
     np.testing.assert_array_equal(image.valid.ravel(), np.array(winner) >= 0)
@@ -149,12 +149,12 @@ def test_packing_keeps_every_scan_to_its_own_image() -> None:
             np.testing.assert_array_equal(packed[name][number : number + 1], array)
 
 
-def test_an_unknown_way_back_is_refused() -> None:
+def test_an_unknown_back_projection_is_refused() -> None:
     with pytest.raises(InputError, match="no such way back: 'knn'"):
         RangeView(FULL, way_back="knn")
 
 
-@pytest.mark.parametrize("way_back", WAYS_BACK)
+@pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
 @pytest.mark.parametrize("case", HARD_CASES)
 def test_hard_cases_have_finite_images_and_every_judged_row_an_answer(
     case: str, way_back: str
@@ -191,7 +191,7 @@ def test_scores_come_back_to_every_point_of_every_real_scan(shared: Path, name: 
     image = view(scan)
     np.testing.assert_array_equal(image.pixel >= 0, scan.valid)
     # A constant comes back by every way; a vote makes it the share of votes.
-    for way_back in WAYS_BACK:
+    for way_back in BACK_PROJECTIONS:
         back = replace(image, way_back=way_back).back(np.full(image.size, 0.75, np.float32))
         constant = np.float32(1 if way_back == "vote" else 0.75)
         np.testing.assert_array_equal(back, np.where(scan.valid, constant, 0))

@@ -2,10 +2,10 @@
 
 import re
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 
 from derain.errors import InputError
+from derain.files.packaged import packaged
 
 OPTIONS = ("--config", "-c")
 
@@ -16,8 +16,7 @@ _INSTEAD = re.compile(r"--(model|print_config|help-all|[\w.]+\.help\b)")
 
 def packaged_configs() -> dict[str, Path]:
     """Files of the configurations that come with derain, by file name."""
-    folder = Path(str(resources.files("derain.configs")))
-    return {file.name: file for file in sorted(folder.glob("*.yaml"))}
+    return {file.name: file for file in packaged("derain.configs").values()}
 
 
 def with_packaged_configs(arguments: Sequence[str]) -> list[str]:
@@ -68,9 +67,9 @@ def _with_names(arguments: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def _file(name: str) -> Path:
-    packaged = packaged_configs()
+    configs = packaged_configs()
     if Path(name).is_file():
         return Path(name)
-    if name in packaged:
-        return packaged[name]
-    raise InputError(name, "no such configuration", f"Packaged are {', '.join(packaged)}.")
+    if name in configs:
+        return configs[name]
+    raise InputError(name, "no such configuration", f"Packaged are {', '.join(configs)}.")

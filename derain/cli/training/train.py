@@ -36,10 +36,8 @@ from derain.models.callbacks.prediction import PredictionWriter
 from derain.models.callbacks.report import TestReport
 from derain.models.callbacks.whole_checkpoints import save_whole
 from derain.models.checkpoint import check_resumable, load_model
-from derain.models.lisnownet import LiSnowNet
-from derain.models.measured import MERIT
-from derain.models.outdet import OutDet
-from derain.models.salsanext import SalsaNext
+from derain.models.measured import MONITOR
+from derain.models.registry import NETWORKS
 from derain.system.cores import usable_cores
 from derain.system.open3d_import import make_open3d_loadable
 from derain.system.workers import end_with_launcher
@@ -54,10 +52,7 @@ class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatt
 
 __all__ = [
     "Folder",
-    "LiSnowNet",
-    "OutDet",
     "Rehearse3D",
-    "SalsaNext",
     "Sequences",
     "Simulated",
     "Wads",
@@ -65,12 +60,16 @@ __all__ = [
 ]
 
 
-# What has options of its own, by the option that chooses it.
-CLASSES = {
-    "data": (Folder, Rehearse3D, Sequences, Simulated, Wads),
-    "model": (LiSnowNet, OutDet, SalsaNext),
-    "trainer.logger": (TensorBoardLogger,),
-}
+def choices() -> dict[str, tuple[type, ...]]:
+    """What has options of its own, by the option that chooses it.
+
+    They are loaded then, and a configuration may name their classes without a module.
+    """
+    return {
+        "data": (Folder, Rehearse3D, Sequences, Simulated, Wads),
+        "model": tuple(NETWORKS.values()),
+        "trainer.logger": (TensorBoardLogger,),
+    }
 
 
 class DerainCLI(LightningCLI):
@@ -87,7 +86,7 @@ class DerainCLI(LightningCLI):
         parser.add_lightning_class_args(ScanCheck, "scan_check")
         parser.set_defaults(
             {
-                "checkpoint.monitor": MERIT,
+                "checkpoint.monitor": MONITOR,
                 "checkpoint.mode": "max",
                 "checkpoint.filename": "best",
                 "checkpoint.enable_version_counter": False,
@@ -100,7 +99,7 @@ class DerainCLI(LightningCLI):
 
     def parse_arguments(self, parser: LightningArgumentParser, args: ArgsType) -> None:
         """Refuses what cannot be used: options, and checkpoints before Lightning reads them."""
-        known = known_options(self.parser_of_a_subcommand, CLASSES)
+        known = known_options(self.parser_of_a_subcommand, choices())
         arguments = args if isinstance(args, list) else []
         files = [read_configuration(path, known) for path in own_configurations(arguments)]
         parser.set_defaults({"test.verbose": False})  # the table is in our report

@@ -52,7 +52,7 @@ def test_the_weights_are_those_of_the_network(random_outdet, onnx_model: Path) -
     # Two convolutions of 9 neighbours, 4 channels and a distance to 32 and 32 to 32, their biases,
     # the shortcut past them, and the head: the norms are folded into them.
     folded = 9 * (4 + 1) * 32 + 32 + 9 * 32 * 32 + 32 + 4 * 32 + 32 * 2 + 2
-    assert sum(tensor.numel() for tensor in random_outdet.folded().parameters()) == folded
+    assert sum(tensor.numel() for tensor in random_outdet.deployed().parameters()) == folded
     # The exporter adds the numbers that shapes and indices are made of.
     graph = onnx.load(onnx_model).graph
     tensors = [onnx.numpy_helper.to_array(tensor) for tensor in graph.initializer]

@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from derain.export.bench.contestants import Contestant, contestants
-from derain.export.bench.cost import WARM_UP, Timing, measure_cost, run_alone
-from derain.export.bench.scores import Labelled
+from derain.export.bench.contestant import Contestant
+from derain.export.bench.contestants import contestants
+from derain.export.bench.cost import Timing, measure_cost, timed_here
+from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.methods import load_method
-from derain.export.timing import STAGES
+from derain.export.timing import STAGES, WARM_UP
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
 
 
-def test_each_run_is_timed_by_stage(labelled: Labelled) -> None:
+def test_each_run_is_timed_by_stage(labelled: LabelledFrames) -> None:
     milliseconds = iter(range(100))
 
     def method(scan: Scan, stopwatch: Stopwatch) -> np.ndarray:
@@ -27,23 +28,24 @@ def test_each_run_is_timed_by_stage(labelled: Labelled) -> None:
         return np.zeros(len(scan), bool)
 
     row = Contestant("timed", "outdet", lambda threads: method)
-    cost = run_alone(row, Timing(labelled.scans, threads=1, repeats=2))
-    assert list(cost.milliseconds) == list(STAGES)
+    cost = timed_here(row, Timing(labelled.frames, threads=1, repeats=2))
+    stages = cost.times.stages
+    assert list(stages) == list(STAGES)
     runs = range(WARM_UP, WARM_UP + 2 * 3)
-    np.testing.assert_array_equal(cost.milliseconds["network"], runs)
-    assert (cost.milliseconds["view"] == 0).all()
-    assert (cost.milliseconds["read"] > 0).all()
-    assert cost.percentile(50, "network") == WARM_UP + 2.5
-    total = cost.milliseconds["read"] + cost.milliseconds["network"]
-    assert cost.percentile(95) == np.percentile(total, 95)
+    np.testing.assert_array_equal(stages["network"], runs)
+    assert (stages["view"] == 0).all()
+    assert (stages["read"] > 0).all()
+    assert cost.times.percentile(50, "network") == WARM_UP + 2.5
+    total = stages["read"] + stages["network"]
+    assert cost.times.percentile(95) == np.percentile(total, 95)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is Linux's to tell")
-def test_a_process_of_its_own_holds_little_but_the_method(labelled: Labelled) -> None:
+def test_a_process_of_its_own_holds_little_but_the_method(labelled: LabelledFrames) -> None:
     (row,) = contestants(["dsor"])
     held = np.ones(300_000_000, np.uint8)  # in this process, not in that one
-    cost = measure_cost(row, Timing(labelled.scans[:1], threads=1, repeats=1))
-    assert len(cost.milliseconds["view"]) == 1
+    cost = measure_cost(row, Timing(labelled.frames[:1], threads=1, repeats=1))
+    assert len(cost.times.stages["view"]) == 1
     assert held.nbytes / 2**20 > 250 > cost.peak_memory > 20
 
 
@@ -55,17 +57,17 @@ def test_a_process_of_its_own_holds_little_but_the_method(labelled: Labelled) ->
     ],
 )
 def test_a_method_that_cannot_be_timed_says_why(
-    labelled: Labelled, ready: Callable[[int], Any], reason: str
+    labelled: LabelledFrames, ready: Callable[[int], Any], reason: str
 ) -> None:
-    cost = measure_cost(Contestant("broken", "outdet", ready), Timing(labelled.scans, repeats=1))
+    cost = measure_cost(Contestant("broken", "outdet", ready), Timing(labelled.frames, repeats=1))
     assert cost.failure is not None
     assert cost.failure.startswith(reason)
-    assert np.isnan(cost.percentile(50))
+    assert np.isnan(cost.times.percentile(50))
     assert cost.peak_memory is None
 
 
-def test_methods_can_be_sent_to_another_process(labelled: Labelled, onnx_model: Path) -> None:
-    training = [labelled.read(path) for path in labelled.scans]
+def test_methods_can_be_sent_to_another_process(labelled: LabelledFrames, onnx_model: Path) -> None:
+    training = [labelled.read(frame) for frame in labelled.frames]
     rows = contestants(
         [str(onnx_model), "dror", "position", "intensity", "all", "none"],
         lambda: ((scan, scan.label == 3) for scan in training),

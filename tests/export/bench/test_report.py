@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,13 +10,16 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from derain.export.bench.contestants import Contestant, contestants
+from derain.evaluation.scores import Scores, score
+from derain.export.bench.contestant import Contestant
+from derain.export.bench.contestants import contestants
 from derain.export.bench.cost import Cost
+from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.report import SIMULATED_IS_EASY, as_markdown, write_report
 from derain.export.bench.rows import Row, joined
-from derain.export.bench.scores import Labelled, score
+from derain.export.bench.shared_search import scored_methods
 from derain.export.bench.speed_error import draw_speed_error
-from derain.export.timing import STAGES
+from derain.export.timing import STAGES, RunTimes
 
 FACTS = {
     "title": "made up, 3 scans",
@@ -27,19 +31,25 @@ FACTS = {
 
 
 def cost(milliseconds: float) -> Cost:
-    return Cost({stage: np.full(5, milliseconds / 4) for stage in STAGES}, 100.0)
+    return Cost(RunTimes({stage: np.full(5, milliseconds / 4) for stage in STAGES}), 100.0)
+
+
+def scored(methods: list[Contestant], data: LabelledFrames) -> list[Scores]:
+    rates = list(map(data.rain_rate, data.frames))
+    scans = map(data.read, data.frames)
+    return score(scored_methods(methods, 1), scans, data.card, rain_rates=rates)
 
 
 @pytest.fixture
-def rows(labelled: Labelled) -> list[Row]:
+def rows(labelled: LabelledFrames) -> list[Row]:
     """A filter, a baseline, and a method that fails wherever it is run."""
 
     def broken(scan: object, stopwatch: object) -> np.ndarray:
         raise MemoryError("no room")
 
     methods = [*contestants(["dror", "all"]), Contestant("broken", "outdet", lambda _: broken)]
-    failed = Cost({stage: np.zeros(0) for stage in STAGES}, None, "no room")
-    scores = score(methods, labelled, threads=1)
+    failed = Cost(RunTimes.of_no_runs(), None, "no room")
+    scores = scored(methods, labelled)
     return joined(methods, scores, [cost(40), cost(4), failed], np.random.default_rng(0))
 
 
@@ -86,10 +96,10 @@ def test_simulated_data_are_called_so(rows: list[Row]) -> None:
     assert SIMULATED_IS_EASY in as_markdown(rows, {**FACTS, "simulated": True})
 
 
-def test_one_scan_has_no_interval(labelled: Labelled) -> None:
-    one = Labelled(labelled.card, labelled.scans[:1], labelled.read)
+def test_one_scan_has_no_interval(labelled: LabelledFrames) -> None:
+    one = replace(labelled, frames=labelled.frames[:1])
     methods = contestants(["all"])
-    (row,) = joined(methods, score(methods, one, 1), [cost(4)], np.random.default_rng(0))
+    (row,) = joined(methods, scored(methods, one), [cost(4)], np.random.default_rng(0))
     assert row.iou_interval is None
     assert row.as_dict()["iou_behind_best_interval"] is None
 

@@ -26,7 +26,7 @@ from derain.models.lisnownet.module import cube_roots, select
 from derain.models.lisnownet.network import LiSnowNetwork, published_key
 from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule
 from derain.models.lisnownet.sparsity import sparsity_loss
-from derain.models.measured import MERIT
+from derain.models.measured import MONITOR
 from derain.scan import Scan
 from derain.sources import file_frame
 from derain.views.probability import probability_of_rain
@@ -65,7 +65,7 @@ def test_the_rule_is_fitted_to_the_scans_where_it_is_not_stated() -> None:
     model.adopt(model.spec_for(WADS, scans))
     assert model.selection == SelectionRule.fitted({"ground": -0.5}, scans)
     assert (model.selection.ground, model.selection.full_scale) == (-0.5, 255.0)
-    assert LiSnowNet(grid="wads").rule(scans)["ground"] == pytest.approx(-1.4, abs=0.1)
+    assert LiSnowNet(grid="wads").rule_for(scans)["ground"] == pytest.approx(-1.4, abs=0.1)
 
 
 def test_a_constant_that_the_rule_does_not_have_is_refused() -> None:
@@ -81,6 +81,16 @@ def test_the_rule_travels_in_the_checkpoint(image_network: MakeModel, tmp_path: 
     assert copy.spec == model.spec
     assert copy.selection == model.selection
     assert (copy.selection.residual, copy.selection.near) == (0.5, 3.0)
+
+
+def test_a_checkpoint_whose_rule_lacks_a_constant_is_refused(
+    image_network: MakeModel, tmp_path: Path
+) -> None:
+    model = image_network(LiSnowNet)
+    del model.hparams["spec"]["rule"]["near"]
+    save_model(model, tmp_path / "model.ckpt")
+    with pytest.raises(InputError, match=r"model\.ckpt: .*checkpoint: rule: near is missing"):
+        load_model(tmp_path / "model.ckpt")
 
 
 @pytest.mark.parametrize(
@@ -247,14 +257,14 @@ class Progress(lightning.Callback):
     """Keeps what every validation measured."""
 
     def __init__(self) -> None:
-        self.merit: list[float] = []
+        self.monitor: list[float] = []
         self.loss: list[float] = []
         self.iou: list[float] = []
 
     def on_validation_end(self, trainer: lightning.Trainer, *_: Any) -> None:
         if not trainer.sanity_checking:
             metrics = trainer.callback_metrics
-            self.merit.append(metrics[MERIT].item())
+            self.monitor.append(metrics[MONITOR].item())
             self.loss.append(metrics["val/loss"].item())
             if "val/iou" in metrics:
                 self.iou.append(metrics["val/iou"].item())
@@ -284,7 +294,7 @@ def train(
         data = Folder(str(tmp_path), card, **parts, loading=Loading(batch_size=3))
         model = LiSnowNet(small_grid, width=2, learning_rate=0.05, decay=0.5, rule=rule)
         progress = Progress()
-        best = ModelCheckpoint(tmp_path / "runs", "best", monitor=MERIT, mode="max")
+        best = ModelCheckpoint(tmp_path / "runs", "best", monitor=MONITOR, mode="max")
         trainer = make_trainer(epochs=4, callbacks=[progress, best], enable_checkpointing=True)
         trainer.fit(model, data)
         content = torch.load(best.best_model_path, weights_only=True)
@@ -335,9 +345,9 @@ def test_validation_labels_measure_and_choose_nothing(
     second = train()
     assert first.progress.iou != second.progress.iou
     assert len(set(first.progress.iou)) > 1
-    assert first.progress.merit == second.progress.merit
-    assert first.progress.merit == [-loss for loss in first.progress.loss]
-    assert first.best["epoch"] == second.best["epoch"] == int(np.argmax(first.progress.merit))
+    assert first.progress.monitor == second.progress.monitor
+    assert first.progress.monitor == [-loss for loss in first.progress.loss]
+    assert first.best["epoch"] == second.best["epoch"] == int(np.argmax(first.progress.monitor))
     assert_same(first.best["state_dict"], second.best["state_dict"])
 
 
@@ -347,7 +357,7 @@ def test_a_run_needs_no_labels_at_all(train: Callable[..., Run], tmp_path: Path)
         label.unlink()
     run = train()
     assert run.progress.iou == []
-    assert run.progress.merit == labelled.progress.merit
+    assert run.progress.monitor == labelled.progress.monitor
     assert_same(run.best["state_dict"], labelled.best["state_dict"])
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.files import read_scan
+from derain.files.documents import Entry
 from derain.models.lisnownet.selection_rule import SelectionRule, otsu
 from derain.scan import Scan
 
@@ -46,7 +47,27 @@ def test_without_scans_the_rule_is_the_published_one() -> None:
 
 def test_a_rule_survives_json() -> None:
     rule = SelectionRule(0.1, 0.2, 0.3, 0.4, 0.5)
-    assert SelectionRule(**json.loads(json.dumps(rule.as_dict()))) == rule
+    entry = Entry("model", "rule", json.loads(json.dumps(rule.as_dict())))
+    assert SelectionRule.of(entry) == rule
+
+
+WHOLE = SelectionRule().as_dict()
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ({name: value for name, value in WHOLE.items() if name != "near"}, "rule: near is missing"),
+        ({**WHOLE, "height": 1.0}, r"rule\.height: there is no such key. Known are residual, "),
+        ({**WHOLE, "residual": 0.0}, r"rule\.residual: 0 is not above 0"),
+        ({**WHOLE, "full_scale": -255.0}, r"rule\.full_scale: -255 is not above 0"),
+        ({**WHOLE, "ground": float("nan")}, r"rule\.ground: nan is not a finite number"),
+        ({}, "rule: residual is missing"),
+    ],
+)
+def test_a_rule_that_a_spec_cannot_mean_is_refused(content: dict[str, float], reason: str) -> None:
+    with pytest.raises(InputError, match=rf"^model: {reason}"):
+        SelectionRule.of(Entry("model", "rule", content))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,1 @@
+"""What the fuzzer gives each format of scan files; one file a format, as derain has them."""

@@ -1,0 +1,32 @@
+"""What ``import derain`` offers: one line a name, which is all that it takes to offer another.
+
+:mod:`derain` reads this file to find out where a name comes from, and type checkers and editors
+read it to know what it is.
+"""
+
+from derain.cards.card import DataCard as DataCard
+from derain.cards.card import load_card as load_card
+from derain.datamodules.folder import Folder as Folder
+from derain.datamodules.rehearse3d import Rehearse3D as Rehearse3D
+from derain.datamodules.simulated import Simulated as Simulated
+from derain.datamodules.wads import Wads as Wads
+from derain.errors import InputError as InputError
+from derain.export.runtime import Derainer as Derainer
+from derain.files import read_scan as read_scan
+from derain.files import write_scan as write_scan
+from derain.filters import DROR as DROR
+from derain.filters import DSOR as DSOR
+from derain.filters import ROR as ROR
+from derain.filters import SOR as SOR
+from derain.filters import SSR as SSR
+from derain.filters import FilterDerainer as FilterDerainer
+from derain.models.checkpoint import load_model as load_model
+from derain.models.lisnownet import LiSnowNet as LiSnowNet
+from derain.models.lisnownet import LiSnowNetwork as LiSnowNetwork
+from derain.models.outdet import OutDet as OutDet
+from derain.models.outdet import OutDetNetwork as OutDetNetwork
+from derain.models.salsanext import SalsaNext as SalsaNext
+from derain.models.salsanext import SalsaNextNetwork as SalsaNextNetwork
+from derain.scan import Scan as Scan
+
+__version__: str

@@ -1,0 +1,177 @@
+"""The tables of the REHEARSE-3D paper, and ours beside them."""
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import TYPE_CHECKING, Literal, Protocol, TypeVar
+
+import yaml
+
+from derain.cards.card import DataCard
+from derain.errors import InputError
+from derain.evaluation.counts import SCORES, mean_over_scans
+from derain.evaluation.text_tables import markdown_table
+
+if TYPE_CHECKING:
+    from derain.evaluation.scores import Scores
+
+Item = TypeVar("Item")
+
+TABLES = ("table2", "table3")
+
+
+@dataclass(frozen=True)
+class PublishedRow:
+    """A row as it is printed.
+
+    Attributes:
+        method: What the paper calls the method.
+        kind: What derain calls it.
+        group: Part of the split in table II, rain in table III.
+        scores: Precision, recall, F1 and IoU of rain, in percent.
+        ms: Milliseconds, where the table has them.
+        average: How the scores agree with each other: pooled over points, or the mean over scans.
+        simulated: On rain simulated by the paper's authors, not on REHEARSE-3D.
+        misprint: What the row's own figures contradict.
+    """
+
+    method: str
+    kind: str
+    group: str
+    scores: tuple[float, float, float, float]
+    ms: float | None = None
+    average: Literal["pooled", "scans"] = "pooled"
+    simulated: bool = False
+    misprint: str | None = None
+
+
+class MeasuredRow(Protocol):
+    """A row of ours: a method that was measured."""
+
+    @property
+    def title(self) -> str:
+        """What it is called."""
+
+    @property
+    def kind(self) -> str:
+        """Name of its network, filter or baseline."""
+
+    @property
+    def scores(self) -> "Scores":
+        """What it scored."""
+
+    @property
+    def milliseconds(self) -> float:
+        """Median time from file to mask; not a number where it could not be timed."""
+
+
+@dataclass(frozen=True)
+class PaperTable:
+    """A table of the paper.
+
+    Attributes:
+        title: What it shows.
+        groups: Part of the split, or rain rate in mm/h, by the name of a group.
+        rows: Its rows.
+    """
+
+    title: str
+    groups: Mapping[str, str | float]
+    rows: Sequence[PublishedRow]
+
+
+def paper_table(name: str) -> PaperTable:
+    """One of ``TABLES``, as published.
+
+    Source: A. M. Raisuddin et al., "REHEARSE-3D: A Multi-modal Emulated Rain Dataset for 3D Point
+        Cloud De-raining", tables II and III.
+    """
+    file = resources.files("derain.evaluation").joinpath("published_tables.yaml")
+    table = yaml.safe_load(file.read_text("utf-8"))[name]
+    rows = [PublishedRow(**{**row, "scores": tuple(row["scores"])}) for row in table["rows"]]
+    return PaperTable(table["title"], table["groups"], rows)
+
+
+def scans_by_group(
+    table: PaperTable,
+    scans_of_part: Callable[[str], Sequence[Item]],
+    rain_rate_of: Callable[[Item], float | None],
+) -> dict[str, Sequence[Item]]:
+    """The scans that each group of a table is measured on.
+
+    Args:
+        table: The table.
+        scans_of_part: The scans of a part of our split, ``validation`` or ``test``.
+        rain_rate_of: Rain rate of a scan in mm/h, None where it is not known; table III asks for
+            it.
+
+    Raises:
+        InputError: No scan belongs to any group.
+    """
+    parts = {name: part for name, part in table.groups.items() if isinstance(part, str)}
+    if parts:
+        return {name: scans_of_part(part) for name, part in parts.items()}
+    by_rate: dict[float | None, list[Item]] = defaultdict(list)
+    for scan in scans_of_part("test"):
+        by_rate[rain_rate_of(scan)].append(scan)
+    groups: dict[str, Sequence[Item]] = {
+        name: by_rate[rate] for name, rate in table.groups.items() if rate in by_rate
+    }
+    if not groups:
+        raise InputError(
+            "--data",
+            f"no test scan is known to have {', '.join(map(str, table.groups.values()))} mm/h",
+            'Give --rain-rates: a YAML file with lines such as "005": 25.',
+        )
+    return groups
+
+
+def beside_published(
+    table: PaperTable, ours: Mapping[str, Sequence[MeasuredRow]], card: DataCard
+) -> str:
+    """Our rows under the published ones of the same method, in Markdown.
+
+    Args:
+        table: The table.
+        ours: Our rows, by the names of the table's groups.
+        card: Data card of our scans.
+    """
+    published = [row for row in table.rows if row.simulated == card.simulated]
+    if not published:  # table II has no row on simulated rain
+        published = list(table.rows)
+    head = ["method", *("P", "R", "F1", "IoU"), "ms", "average"]
+    parts = [f"# {table.title}", f"Ours on {card.title}."]
+    for name, rows in ours.items():
+        group = [row for row in published if row.group == name]
+        parts += [f"## {name}", markdown_table(head, _beside(group, rows))]
+    misprints = [
+        f"(*) {row.method}, {row.group}: {row.misprint}." for row in published if row.misprint
+    ]
+    return "\n\n".join([*parts, *misprints])
+
+
+def _beside(published: Sequence[PublishedRow], rows: Sequence[MeasuredRow]) -> list[list[str]]:
+    body = []
+    for paper in published:
+        body.append(_published_cells(paper))
+        body += [_our_cells(row, paper.average) for row in rows if row.kind == paper.kind]
+    kinds = {paper.kind for paper in published}
+    return body + [_our_cells(row, "pooled") for row in rows if row.kind not in kinds]
+
+
+def _published_cells(row: PublishedRow) -> list[str]:
+    title = f"{row.method}, published{' (*)' if row.misprint else ''}"
+    scores = [f"{score:.2f}" for score in row.scores]
+    return [title, *scores, "-" if row.ms is None else f"{row.ms:g}", row.average]
+
+
+def _our_cells(row: MeasuredRow, average: str) -> list[str]:
+    pooled, per_scan = row.scores.pooled, row.scores.per_scan
+    values = [
+        getattr(pooled, score) if average == "pooled" else mean_over_scans(per_scan, score)
+        for score in SCORES
+    ]
+    ms = "-" if math.isnan(row.milliseconds) else f"{row.milliseconds:.0f}"
+    return [f"{row.title}, ours", *(f"{100 * value:.2f}" for value in values), ms, average]

@@ -1,0 +1,115 @@
+"""What methods score: counted over the points of all scans, and over many a part of them."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.cards.card import DataCard
+from derain.evaluation.counts import Counts
+from derain.evaluation.metrics import ClassCounts, RainMetrics
+from derain.scan import Scan
+from derain.views.morton import first_rows
+
+# Says which points of a scan are rain, bool (N,).
+Method = Callable[[Scan], NDArray[np.bool_]]
+
+
+@dataclass(frozen=True)
+class Scores:
+    """What became of the points of all scans.
+
+    Attributes:
+        pooled: All points together.
+        per_scan: Those of each scan, in order.
+        by_class: Each semantic class, by name.
+        by_range: Each band of ranges, by names such as ``0-10 m``.
+        by_rain_rate: Scans of one rain rate, by names such as ``25 mm/h``; empty where none is
+            known.
+        by_sensor: Points of the LiDAR and of the radar; empty where it is not known whose they are.
+        failures: What went wrong, by the scan's name. Such a scan counts as one in which the method
+            found nothing: it stays as it came.
+    """
+
+    pooled: Counts
+    per_scan: Sequence[Counts]
+    by_class: Mapping[str, ClassCounts]
+    by_range: Mapping[str, Counts]
+    by_rain_rate: Mapping[str, Counts]
+    by_sensor: Mapping[str, Counts]
+    failures: Mapping[str, str]
+
+
+def score(
+    methods: Sequence[Method],
+    scans: Iterable[Scan],
+    card: DataCard,
+    distinct: bool = False,
+    rain_rates: Sequence[float | None] | None = None,
+) -> list[Scores]:
+    """Judges every scan by every method.
+
+    Args:
+        methods: The methods.
+        scans: Labelled scans. One is in memory at a time, if they are read as they are asked for.
+        card: Their data card, which says what of them is rain.
+        distinct: Count points at one position once.
+        rain_rates: Rain rate of each scan in mm/h, None where it is not known; None knows of none.
+
+    Returns:
+        The scores of each method, in the order of the methods.
+
+    Raises:
+        InputError: A scan that cannot be read, one without labels, or a label that is no class of
+            the card. A method that fails is noted in its scores.
+    """
+    scorings = [_Scoring(card) for _ in methods]
+    for scan in scans:
+        counted = first_rows(scan) if distinct else np.arange(len(scan))
+        for method, scoring in zip(methods, scorings, strict=True):
+            scoring.judge(method, scan, counted)
+    return [scoring.scores(rain_rates) for scoring in scorings]
+
+
+class _Scoring:
+    """Counts what one method makes of the scans."""
+
+    def __init__(self, card: DataCard) -> None:
+        self.card = card
+        self.metrics = RainMetrics(card.classes, card.rain, unknown=card.unknown)
+        self.by_sensor: dict[str, list[Counts]] = {}
+        self.failures: dict[str, str] = {}
+
+    def judge(self, method: Method, scan: Scan, counted: NDArray[np.int64]) -> None:
+        """Judges a whole scan, and counts some of its rows."""
+        try:
+            predicted = method(scan)
+        except Exception as error:  # whatever its libraries raise is told in the method's row
+            self.failures[scan.name] = str(error)
+            predicted = np.zeros(len(scan), bool)
+        scan, predicted = scan.take(counted), predicted[counted]
+        self.metrics.update_scan(scan, predicted)
+        if scan.radar is not None:
+            rain, known = self.card.rain_of(scan), ~self.card.unknown_of(scan)
+            for sensor, points in {"LiDAR": ~scan.radar, "radar": scan.radar}.items():
+                rows = known & points
+                self.by_sensor.setdefault(sensor, []).append(Counts.of(predicted[rows], rain[rows]))
+
+    def scores(self, rain_rates: Sequence[float | None] | None) -> Scores:
+        """The counts so far, given the rain rate of each scan in mm/h."""
+        per_scan = self.metrics.per_scan()
+        rain_rates = [None] * len(per_scan) if rain_rates is None else rain_rates
+        by_rate: dict[float, list[Counts]] = {}
+        for rate, counts in zip(rain_rates, per_scan, strict=True):
+            if rate is not None:
+                by_rate.setdefault(rate, []).append(counts)
+        return Scores(
+            self.metrics.pooled(),
+            per_scan,
+            self.metrics.by_class(),
+            self.metrics.by_range(),
+            {f"{rate:g} mm/h": sum(by_rate[rate], Counts()) for rate in sorted(by_rate)},
+            {sensor: sum(parts, Counts()) for sensor, parts in self.by_sensor.items()},
+            self.failures,
+        )

@@ -1,0 +1,38 @@
+"""Tables as text, with columns that line up."""
+
+from collections.abc import Sequence
+
+
+def markdown_table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown that can be read as it is: its first column is aligned to the left.
+
+    Args:
+        head: Titles of the columns.
+        body: The cells of each row.
+    """
+    widths = _widths([head, *body])
+    lines = [f"| {' | '.join(_padded(cells, widths))} |" for cells in (head, *body)]
+    rule = "|".join(["", "-" * (widths[0] + 2), *("-" * (w + 1) + ":" for w in widths[1:]), ""])
+    return "\n".join([lines[0], rule, *lines[1:]])
+
+
+def plain_table(rows: Sequence[Sequence[str]]) -> str:
+    """An indented table without lines: its first column is aligned to the left.
+
+    Args:
+        rows: The cells of each row.
+    """
+    widths = _widths(rows)
+    return "\n".join(f"  {'  '.join(_padded(cells, widths))}".rstrip() for cells in rows)
+
+
+def _widths(rows: Sequence[Sequence[str]]) -> list[int]:
+    return [max(map(len, column)) for column in zip(*rows, strict=True)]
+
+
+def _padded(cells: Sequence[str], widths: Sequence[int]) -> list[str]:
+    """Cells as wide as their columns, of which all but the first are aligned to the right."""
+    return [
+        cell.rjust(width) if number else cell.ljust(width)
+        for number, (cell, width) in enumerate(zip(cells, widths, strict=True))
+    ]

@@ -1,0 +1,96 @@
+"""What a format of scan files is, and all that there are."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar
+
+from derain.errors import InputError
+from derain.files.content import Content
+from derain.files.extras import Extra
+from derain.files.names import scan_suffix
+from derain.scan import Scan
+from derain.system.registry import Registry
+
+
+class Format(ABC):
+    """A format of scan files: one file, found by being in `derain.files.formats`.
+
+    A decorator says which suffixes its files have, in lower case::
+
+        @FORMATS.add(".pcd")
+        class Pcd(Format): ...
+
+    A package outside derain brings one by naming the module that holds it::
+
+        [project.entry-points."derain.formats"]
+        mine = "my_package.my_format"
+
+    Attributes:
+        HELP: What it is, for ``derain info --formats``.
+        UNNAMED: Which of its files do not name their columns, for the help of ``--columns``; empty
+            where every file does.
+        EXTRA: What must be installed for it besides what derain always needs, if anything.
+        RECORD: How likely such a file is no scan but a record of something else, such as of poses:
+            of a folder's files those of the lowest number are its scans.
+    """
+
+    HELP: ClassVar[str] = ""
+    UNNAMED: ClassVar[str] = ""
+    EXTRA: ClassVar[Extra | None] = None
+    RECORD: ClassVar[int] = 0
+
+    @abstractmethod
+    def decode(self, content: Content, columns: Sequence[str]) -> Scan:
+        """Makes a scan of a file's content, one point per row of the file, in its order.
+
+        Args:
+            content: The file. What is made of it beyond its own size takes its ``room`` first.
+            columns: Names of its columns, which count where the file does not name them itself.
+
+        Raises:
+            InputError: Content that it cannot read.
+        """
+
+    @abstractmethod
+    def encode(self, path: Path, scan: Scan) -> bytes:
+        """Makes the content of a file of a scan: every column of ``scan.fields``, if it has any.
+
+        Args:
+            path: The file to be written, for messages; its suffix is one of the format's.
+            scan: The scan, read from a file of any format or made in memory.
+
+        Raises:
+            InputError: A scan that the format cannot hold.
+        """
+
+    def count(self, path: Path, columns: Sequence[str]) -> int | None:
+        """Number of points of an uncompressed file where its size tells it, else None.
+
+        Args:
+            path: The file.
+            columns: As for `decode`.
+
+        Raises:
+            InputError: A file that cannot be read.
+        """
+        return None
+
+
+FORMATS: Registry[type[Format]] = Registry("derain.files.formats", "derain.formats")
+
+
+def format_of(path: Path) -> Format:
+    """The format of a file, by its suffix.
+
+    Raises:
+        InputError: No format has this suffix.
+    """
+    suffix = scan_suffix(path)
+    if suffix not in FORMATS:
+        raise InputError(
+            path,
+            f"'{suffix}' is not the suffix of a scan",
+            f"Known are {', '.join(FORMATS)}, and each of them with .gz.",
+        )
+    return FORMATS[suffix]()

@@ -1,0 +1,259 @@
+"""Point clouds in NumPy's own files: one array (`.npy`) or several named ones (`.npz`)."""
+
+import io
+import math
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy_format
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.columns import columns_of, name_columns, records, scan_of
+from derain.files.content import Content, check_columns
+from derain.files.format import FORMATS, Format
+from derain.files.reading import reading
+from derain.scan import Scan
+
+# NumPy parses an array's header as Python code, which may raise anything on damaged bytes.
+_DAMAGE = Exception
+
+# What stands before each member in the directory of a ZIP file.
+_MEMBER = b"PK\x01\x02"
+
+
+@dataclass(frozen=True)
+class NpyHeader:
+    """How a .npy file holds its columns: as named fields, or side by side without names."""
+
+    structured: bool
+
+
+@dataclass(frozen=True)
+class NpzHeader:
+    """How an .npz file holds its columns.
+
+    Attributes:
+        constants: Arrays that are not one value per point, e.g. the angles of the beams.
+        table: Name of the array that holds several columns, if there is one.
+        columns: Their names.
+        structured: Whether they are named fields of that array.
+    """
+
+    constants: Mapping[str, NDArray[Any]]
+    table: str | None = None
+    columns: tuple[str, ...] = ()
+    structured: bool = False
+
+
+@FORMATS.add(".npy")
+class Npy(Format):
+    """One array of NumPy's."""
+
+    HELP = "one array of NumPy's"
+    UNNAMED = ".npy"
+
+    def decode(self, content: Content, columns: Sequence[str]) -> Scan:
+        """Reads one array of points.
+
+        Args:
+            content: The file: numbers (N, C), or (H, W, C) of an organised cloud; or a structured
+                array (N,) or (H, W).
+            columns: Names of the C columns; a structured array has its own.
+
+        Raises:
+            InputError: A file that is damaged, or an array of another shape.
+        """
+        with reading(content.path, _DAMAGE):
+            array = _array(content.data)
+        shape = _organised(content.path, _grid_of_table(array))
+        fields = _columns_of_table(content.path, array, columns)
+        return scan_of(content.path, fields, shape, NpyHeader(structured=bool(array.dtype.names)))
+
+    def encode(self, path: Path, scan: Scan) -> bytes:
+        """A scan's columns as one array.
+
+        Columns of one dtype become an array (N, C), unless the scan comes from a structured one;
+        columns of several become a structured array. Organised clouds stay organised.
+        """
+        named = isinstance(scan.header, NpyHeader) and scan.header.structured
+        columns = scan.fields if named else columns_of(scan)
+        return _to_bytes(_gridded(scan, _table(columns, named)))
+
+
+@FORMATS.add(".npz")
+class Npz(Format):
+    """Several arrays of NumPy's, each under its name."""
+
+    HELP = "several arrays of NumPy's, by name"
+    UNNAMED = ".npz of one array"
+
+    def decode(self, content: Content, columns: Sequence[str]) -> Scan:
+        """Reads named arrays.
+
+        Args:
+            content: The file. Coordinates are `xyz` (N, 3) or `x`, `y` and `z` (N,); in an
+                organised cloud `xyz` (H, W, 3) or `x`, `y` and `z` (H, W). Without them, `points`
+                or the only array is a table as in a .npy. Every array that begins with the same
+                (N,) or (H, W) is a column of the scan, flattened row-major. An array (W,) in an
+                organised cloud, such as a spinning sensor's timestamps, is repeated for each of the
+                H rows.
+            columns: Names of the columns of such a table, unless it is structured.
+
+        Raises:
+            InputError: A file that is damaged, or that has no coordinates.
+        """
+        path = content.path
+        with reading(path, _DAMAGE):
+            arrays = _arrays(content)
+        table = _name_of_table(arrays)
+        grid = _grid(path, arrays) if table is None else _grid_of_table(arrays[table])
+        shape = _organised(path, grid)
+        fields, constants, structured = dict[str, NDArray[Any]](), {}, False
+        if table is not None:
+            structured = bool(arrays[table].dtype.names)
+            fields = _columns_of_table(path, arrays.pop(table), columns)
+        stated = tuple(fields)
+        for name, array in arrays.items():
+            if name in stated:
+                raise InputError(path, f"has an array {name} beside a column {name}", "Rename one.")
+            if array.shape[: len(grid)] == grid:
+                fields[name] = array.reshape(math.prod(grid), *array.shape[len(grid) :])
+            elif shape and array.shape == shape[1:]:
+                with reading(path, ValueError):
+                    content.room.take(shape[0] * array.nbytes)
+                fields[name] = np.tile(array, shape[0])
+            else:
+                constants[name] = array
+        return scan_of(path, fields, shape, NpzHeader(constants, table, stated, structured))
+
+    def encode(self, path: Path, scan: Scan) -> bytes:
+        """A scan's columns as named arrays, compressed. Organised clouds stay organised."""
+        columns = dict(scan.fields or columns_of(scan))
+        header = scan.header if isinstance(scan.header, NpzHeader) else NpzHeader({})
+        arrays: dict[str, NDArray[Any]] = {}
+        if header.table is not None and columns.keys() >= set(header.columns):
+            table = {name: columns.pop(name) for name in header.columns}
+            arrays[header.table] = _gridded(scan, _table(table, header.structured))
+        arrays |= {name: _gridded(scan, column) for name, column in columns.items()}
+        arrays |= header.constants
+        file = io.BytesIO()
+        # Not numpy.savez, which cannot write an array named "file".
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, array in arrays.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                    member.write(_to_bytes(array))
+        return file.getvalue()
+
+
+def _array(data: bytes) -> NDArray[Any]:
+    """The array of a .npy file, if the file is as long as its header says."""
+    file = io.BytesIO(data)
+    # The third version differs from the second in the encoding of names alone.
+    read_header = (
+        npy_format.read_array_header_1_0
+        if npy_format.read_magic(file) == (1, 0)
+        else npy_format.read_array_header_2_0
+    )
+    shape, _, dtype = read_header(file)
+    size = math.prod(shape) * dtype.itemsize
+    if size > len(data) - file.tell() and not dtype.hasobject:
+        raise ValueError(f"{size:,} bytes in the header, {len(data) - file.tell():,} behind it")
+    file.seek(0)
+    array: NDArray[Any] = npy_format.read_array(file, allow_pickle=False)
+    return array
+
+
+def _to_bytes(array: NDArray[Any]) -> bytes:
+    """The array as a .npy file."""
+    file = io.BytesIO()
+    npy_format.write_array(file, array, allow_pickle=False)
+    return file.getvalue()
+
+
+def _arrays(content: Content) -> dict[str, NDArray[Any]]:
+    """The arrays of an .npz file by their names."""
+    check_columns(content.data.count(_MEMBER))
+    arrays = {}
+    with zipfile.ZipFile(io.BytesIO(content.data)) as archive:
+        for member in archive.infolist():
+            if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                raise ValueError(f"{member.filename} is compressed as NumPy never does")
+            content.room.take(member.file_size)
+            with archive.open(member) as file:
+                # So many bytes, not all: what a member states is not what it may expand to.
+                data = file.read(member.file_size)
+            arrays[member.filename.removesuffix(".npy")] = _array(data)
+    return arrays
+
+
+def _table(columns: Mapping[str, NDArray[Any]], structured: bool) -> NDArray[Any]:
+    """Columns as one array: numbers (N, C) if all are of one dtype, else structured (N,)."""
+    dtypes = {column.dtype for column in columns.values()}
+    flat = all(column.ndim == 1 for column in columns.values())
+    if len(dtypes) == 1 and flat and not structured:
+        return np.stack(list(columns.values()), axis=1, dtype=dtypes.pop())
+    row = [(name, column.dtype, column.shape[1:]) for name, column in columns.items()]
+    return records(columns, np.dtype(row))
+
+
+def _columns_of_table(
+    path: Path, array: NDArray[Any], columns: Sequence[str]
+) -> dict[str, NDArray[Any]]:
+    """The columns of an array of numbers or a structured one, each (N,)."""
+    if names := array.dtype.names:
+        flat = array.reshape(-1)
+        return {name: flat[name] for name in names}
+    with reading(path, ValueError):  # before an array is made of each
+        check_columns(array.shape[-1])
+    points = math.prod(array.shape[:-1])
+    return name_columns(path, list(array.reshape(points, array.shape[-1]).T), columns)
+
+
+def _name_of_table(arrays: Mapping[str, NDArray[Any]]) -> str | None:
+    """Name of the array that holds all columns; None where each column has its own."""
+    names = {name.lower(): name for name in arrays}
+    if "xyz" in names or "x" in names:
+        return None
+    return names.get("points", next(iter(arrays)) if len(arrays) == 1 else None)
+
+
+def _grid_of_table(array: NDArray[Any]) -> tuple[int, ...]:
+    return array.shape if array.dtype.names else array.shape[:-1]
+
+
+def _grid(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[int, ...]:
+    """Shape of the arrays that hold one value per point."""
+    shapes = {name.lower(): array.shape for name, array in arrays.items()}
+    if "xyz" in shapes:
+        return shapes["xyz"][:-1]
+    if "x" in shapes:
+        return shapes["x"]
+    raise InputError(
+        path,
+        f"has no coordinates among its arrays ({', '.join(arrays)})",
+        "Name them xyz, or x, y and z.",
+    )
+
+
+def _organised(path: Path, grid: tuple[int, ...]) -> tuple[int, int] | None:
+    """(height, width) if the points lie on a grid of two axes."""
+    match grid:
+        case (_,):
+            return None
+        case (height, width):
+            return height, width
+        case _:
+            raise InputError(
+                path,
+                f"points lie in an array of {len(grid)} axes",
+                "Give a list of points, or a grid of rows and columns.",
+            )
+
+
+def _gridded(scan: Scan, column: NDArray[Any]) -> NDArray[Any]:
+    return column.reshape(*(scan.shape or (len(scan),)), *column.shape[1:])

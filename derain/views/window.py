@@ -1,0 +1,78 @@
+"""A window: which scans of a sequence a view sees besides the one that is judged."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from derain.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from derain.scan import Scan
+
+
+@dataclass(frozen=True)
+class Window:
+    """How many scans before and after one a view asks for; none by default.
+
+    Attributes:
+        before: Scans before it in its sequence.
+        after: Scans after it, for which whoever judges it has to wait.
+
+    Raises:
+        InputError: Numbers below 0.
+    """
+
+    before: int = 0
+    after: int = 0
+
+    def __post_init__(self) -> None:
+        if min(self.before, self.after) < 0:
+            raise InputError(
+                "window", f"{self.before} scans before and {self.after} after", "Give 0 or more."
+            )
+
+    @property
+    def is_one_scan(self) -> bool:
+        """Whether nothing is asked for but the scan that is judged."""
+        return self == Window()
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedScan:
+    """A scan of a sequence, and when and where the sensor took it.
+
+    Attributes:
+        scan: The scan, in the frame of its sensor.
+        time: Seconds; None where it is not known.
+        pose: Takes the sensor's frame to that of the world, float64 (4, 4), metres; None where it
+            is not known.
+    """
+
+    scan: "Scan"
+    time: float | None = None
+    pose: "NDArray[np.float64] | None" = None
+
+
+@dataclass(frozen=True, eq=False)
+class WindowOfScans:
+    """A scan that is to be judged, and those around it in its sequence.
+
+    Near the ends of a sequence there are fewer than the view's :class:`Window` asks for.
+
+    Attributes:
+        judged: The scan that is to be judged.
+        before: Those before it, the oldest first.
+        after: Those after it, the next one first.
+    """
+
+    judged: PlacedScan
+    before: Sequence[PlacedScan] = ()
+    after: Sequence[PlacedScan] = ()
+
+    @property
+    def scan(self) -> "Scan":
+        """The scan that is to be judged."""
+        return self.judged.scan

@@ -1,0 +1,51 @@
+"""One method of a bench: what it is called, how it is made, and what it is."""
+
+import pickle
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.filters import PointFilter
+from derain.scan import Scan
+from derain.system.stopwatch import Stopwatch
+from derain.views.oddities import Examiner
+
+# Judges a scan, bool (N,), and gives the stopwatch its stages.
+TimedMethod = Callable[[Scan, Stopwatch], NDArray[np.bool_]]
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """One row of a bench.
+
+    Attributes:
+        title: What the row is called; no two have the same.
+        kind: Name of its network, filter or baseline.
+        ready: Makes the method, with a number of threads.
+        facts: What the method is, for whoever repeats the bench: file or parameters.
+        filter: The filter, where it is one: filters share one search for neighbours.
+        judges_by: What it judges by, as far as a scan may not suit it.
+    """
+
+    title: str
+    kind: str
+    ready: Callable[[int], TimedMethod]
+    facts: dict[str, Any] = field(default_factory=dict)
+    filter: PointFilter | None = None
+    judges_by: Examiner | None = None
+
+    @cached_property
+    def can_be_sent(self) -> bool:
+        """Whether another process can be given it.
+
+        What cannot be pickled cannot, nor can what the user's own script or session defines: no
+        other process knows of it.
+        """
+        try:
+            return b"__main__" not in pickle.dumps(self.ready)
+        except Exception:  # each object that cannot be pickled says so in its own way
+            return False

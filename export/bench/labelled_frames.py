@@ -1,0 +1,73 @@
+"""The labelled scans that a bench measures on, and that its baselines learn from."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.cards.card import DataCard
+from derain.errors import InputError
+from derain.evaluation.baselines import known_truth
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.labelled import with_labels
+from derain.sources.spread import evenly_spaced
+from derain.views.morton import first_rows
+
+# Scans that a baseline learns from, at most.
+MOST_TRAINING_SCANS = 200
+
+
+@dataclass(frozen=True)
+class LabelledFrames:
+    """Labelled scans, and how they are read and counted.
+
+    Attributes:
+        card: Says what their labels mean.
+        frames: The scans, one or more.
+        intensity_scale: What takes their intensities to the unit of the methods.
+        distinct: Count points at one position once.
+        rain_rates: Rain rate in mm/h by sequence, as far as it is known.
+
+    Raises:
+        InputError: No scans, or one without labels.
+    """
+
+    card: DataCard
+    frames: Sequence[Frame]
+    intensity_scale: float = 1.0
+    distinct: bool = False
+    rain_rates: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.frames:
+            raise InputError("scans", "there are none", "Give one or more labelled scans.")
+        for frame in self.frames:
+            if not frame.has_labels:
+                where = f"its labels are not at {frame.label_path}"
+                reason = "it has no labels" if frame.label_path is None else where
+                raise InputError(frame.name, reason, "Add them or leave the scan out.")
+
+    def read(self, frame: Frame) -> Scan:
+        """Reads a scan with its labels.
+
+        Raises:
+            InputError: A file that cannot be read, or labels that are not on the data card.
+        """
+        scan = frame.read().with_intensity_times(self.intensity_scale)
+        return with_labels(scan, frame, self.card)
+
+    def rain_rate(self, frame: Frame) -> float | None:
+        """Rain rate of a scan in mm/h; None where it is not known."""
+        return self.rain_rates.get(frame.sequence)
+
+    def truths(self) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
+        """What some of the scans, spread over all of them, teach: points, and which are rain.
+
+        Raises:
+            InputError: A file that cannot be read, or labels that are not on the data card.
+        """
+        for frame in evenly_spaced(self.frames, MOST_TRAINING_SCANS):
+            scan = self.read(frame)
+            yield known_truth(scan.take(first_rows(scan)) if self.distinct else scan, self.card)

@@ -1,0 +1,157 @@
+"""A network in one file outside derain does all that derain's own networks do."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from derain.cli.main import main
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.export.bench import bench
+from derain.export.bench.cost import run_alone
+from derain.export.proof import THREADS
+from derain.export.runtime import Derainer
+from derain.files.labels import write_labels
+from derain.models.checkpoint import load_model
+from derain.models.registry import NETWORKS
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+RAIN = 110  # falling snow, in WADS
+DROPS = np.arange(300) >= 270
+
+COMMAND = "import sys; from derain.cli.main import main; sys.exit(main(sys.argv[1:]))"
+
+
+@pytest.fixture(scope="module")
+def toy_network() -> Iterator[ModuleType]:
+    """The example's module; derain knows its network as long as these tests run."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(NETWORKS, "_members", dict(NETWORKS))
+        patch.syspath_prepend(EXAMPLES)
+        yield import_module("toy_network")
+        del sys.modules["toy_network"]
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four made-up scans in the layout of WADS: two to train on, one to validate, one to test."""
+    root = tmp_path_factory.mktemp("WADS")
+    for number in range(4):
+        folder = root / "sequences" / f"0{number}"
+        (folder / "velodyne").mkdir(parents=True)
+        (folder / "labels").mkdir()
+        scene(300, seed=number).tofile(folder / "velodyne/0.bin")
+        write_labels(folder / "labels/0.label", np.where(DROPS, RAIN, 0))
+    return root
+
+
+@pytest.fixture(scope="module")
+def data(root: Path) -> list[str]:
+    """Options that name those scans, and the network by its class."""
+    split = '{train: ["00", "01"], validation: ["02"], test: ["03"]}'
+    return [
+        *("--model", "toy_network.Toy", "--data", "Wads", "--data.root", str(root)),
+        *("--data.split", split, "--trainer.enable_progress_bar", "false"),
+        *("--trainer.logger.class_path", "TensorBoardLogger"),
+        *("--trainer.logger.save_dir", f"{root}/runs", "--trainer.accelerator", "cpu"),
+        *("--panels.scans", "0"),
+    ]
+
+
+@pytest.fixture(scope="module")
+def checkpoint(toy_network: ModuleType, root: Path, data: list[str]) -> Path:
+    """What ``derain fit`` makes of it."""
+    assert main(["fit", *data, "--trainer.max_epochs", "20"]) == 0
+    (best,) = root.glob("runs/**/best.ckpt")
+    return best
+
+
+@pytest.fixture(scope="module")
+def model(checkpoint: Path, root: Path) -> Path:
+    """What ``derain export`` makes of that."""
+    out = root / "toy.onnx"
+    assert main(["export", str(checkpoint), "--out", str(out), "--repeats", "1"]) == 0
+    return out
+
+
+def test_it_learns_and_is_tested(run_derain, checkpoint: Path, data: list[str]) -> None:
+    outcome = run_derain("test", *data, "--ckpt_path", checkpoint)
+    assert outcome.code == 0, outcome.err
+    loaded = load_model(checkpoint)
+    assert (loaded.NAME, loaded.spec.network) == ("toy", "toy")
+    assert loaded.spec.view == {"kind": "neighbours", "neighbours": 5}
+    assert loaded.spec.channels == ("z", "intensity")
+
+
+def test_it_is_exported_with_the_proof_of_every_hard_case(model: Path) -> None:
+    cases = Derainer(model).metadata["proof"]["cases"]
+    assert [case["name"] for case in cases] == [name for name, _ in hard_cases() for _ in THREADS]
+    assert all(case["finite"] for case in cases)
+
+
+def test_what_it_learnt_is_rain_in_scans_it_never_saw(
+    run_derain, model: Path, tmp_path: Path
+) -> None:
+    scan = tmp_path / "scan.bin"
+    scene(300, seed=9).tofile(scan)
+    outcome = run_derain("run", model, scan, "--out", tmp_path / "out")
+    assert outcome.code == 0, outcome.err
+    rain = np.fromfile(tmp_path / "out/scan.label", "<u4") == 1
+    assert (rain & DROPS).sum() / (rain | DROPS).sum() > 0.8
+
+
+def test_it_is_benched_beside_others(
+    run_derain, model: Path, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bench, "measure_cost", run_alone)
+    options = ["--card", "wads", "--timed", "1", "--repeats", "1", "--out", tmp_path / "out"]
+    test = root / "sequences/03/velodyne"
+    outcome = run_derain("bench", "--data", test, "--methods", model, "none", *options)
+    assert outcome.code == 0, outcome.err
+    rows = json.loads((tmp_path / "out/bench.json").read_text())["rows"]
+    iou = {row["method"]: row["iou"] for row in rows}
+    assert iou["toy"] > 0.8 > iou["none"]
+
+
+def test_nothing_of_it_was_published(run_derain, toy_network: ModuleType, tmp_path: Path) -> None:
+    out = tmp_path / "toy.ckpt"
+    outcome = run_derain("import-weights", "toy", "toy.pt", "--stats", "wads", "--out", out)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert outcome.err == (
+        "derain: toy: no weights of it were published. Known are lisnownet, outdet, salsanext.\n"
+    )
+
+
+def test_without_the_package_that_brings_it_its_checkpoint_is_refused(
+    run_derain, checkpoint: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = {name: network for name, network in NETWORKS.items() if name != "toy"}
+    monkeypatch.setattr(NETWORKS, "_members", known)
+    outcome = run_derain("info", checkpoint)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert outcome.err == (
+        f"derain: {checkpoint}: a checkpoint of 'toy'. Known are lisnownet, outdet, salsanext.\n"
+    )
+
+
+def test_a_package_that_is_installed_brings_it(checkpoint: Path, tmp_path: Path) -> None:
+    package = tmp_path / "toy-1.0.dist-info"
+    package.mkdir()
+    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: toy\nVersion: 1.0\n")
+    (package / "entry_points.txt").write_text("[derain.networks]\ntoy = toy_network\n")
+    finished = subprocess.run(
+        [sys.executable, "-c", COMMAND, "info", str(checkpoint), "--json"],
+        env={**os.environ, "PYTHONPATH": f"{EXAMPLES}{os.pathsep}{tmp_path}"},
+        capture_output=True,
+        text=True,
+    )
+    assert finished.returncode == 0, finished.stderr
+    assert json.loads(finished.stdout)["spec"]["network"] == "toy"

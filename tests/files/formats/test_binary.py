@@ -1,0 +1,198 @@
+"""Float32 rows."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from derain import InputError, Scan
+from derain.files import DEFAULT_COLUMNS, read_scan, write_scan
+from derain.files.formats.binary import Binary
+
+FIVE = (*DEFAULT_COLUMNS, "ring")
+SIX = (*FIVE, "time")
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "scan.bin"
+
+
+def street(points: int, width: int, azimuth: float = np.pi) -> NDArray[np.float32]:
+    """A flat street with walls, seen from 1.7 m above: x y z intensity ring time ... (N, width)."""
+    generator = np.random.default_rng(width)
+    distance = generator.uniform(2, 60, points)
+    angle = generator.uniform(-azimuth, azimuth, points)
+    height = np.where(generator.random(points) < 0.7, -1.7, generator.uniform(-1.7, 5, points))
+    ring = generator.integers(0, 64, points)
+    time = np.linspace(0, 0.1, points)
+    rows = [distance * np.cos(angle), distance * np.sin(angle), height, generator.random(points)]
+    return np.column_stack([*rows, ring, time, *[ring] * 4])[:, :width].astype(np.float32)
+
+
+def test_columns_are_read_in_the_stated_order(file: Path) -> None:
+    rows = np.arange(12, dtype="<f4").reshape(3, 4)
+    file.write_bytes(rows.tobytes())
+    scan = read_scan(file, ("intensity", "z", "y", "x"))
+    np.testing.assert_array_equal(scan.xyz, rows[:, [3, 2, 1]])
+    np.testing.assert_array_equal(scan.intensity, rows[:, 0])
+    assert list(scan.fields) == ["intensity", "z", "y", "x"]
+
+
+def test_a_file_without_intensity_is_a_scan_without(file: Path) -> None:
+    file.write_bytes(np.ones((3, 3), "<f4").tobytes())
+    assert read_scan(file, ("x", "y", "z")).intensity is None
+
+
+def test_an_empty_file_is_a_scan_of_no_points(file: Path) -> None:
+    file.touch()
+    scan = read_scan(file)
+    assert len(scan) == 0
+    write_scan(file, scan)
+    assert file.read_bytes() == b""
+
+
+def test_a_size_that_is_no_multiple_of_a_row_is_refused_with_numbers_and_remedy(
+    file: Path,
+) -> None:
+    file.write_bytes(bytes(50))
+    with pytest.raises(InputError, match=r"50 bytes are not whole rows of 16 bytes.*--columns"):
+        read_scan(file)
+
+
+@pytest.mark.parametrize("width", [5, 6, 7])
+@pytest.mark.parametrize("azimuth", [np.pi, np.pi / 3], ids=["full circle", "front"])
+def test_wider_rows_read_as_four_columns_are_refused(
+    file: Path, width: int, azimuth: float
+) -> None:
+    file.write_bytes(street(2000, width, azimuth).tobytes())
+    with pytest.raises(InputError, match=r"more columns than stated.*--columns x,y,z,intensity"):
+        read_scan(file)
+
+
+@pytest.mark.parametrize("columns", [FIVE, SIX])
+def test_wider_rows_with_their_columns_stated_are_read(
+    file: Path, columns: tuple[str, ...]
+) -> None:
+    rows = street(2000, len(columns))
+    file.write_bytes(rows.tobytes())
+    np.testing.assert_array_equal(read_scan(file, columns).intensity, rows[:, 3])
+
+
+def test_four_columns_read_as_five_are_refused(file: Path) -> None:
+    file.write_bytes(street(2000, 4).tobytes())
+    with pytest.raises(InputError, match="of the intensities are negative"):
+        read_scan(file, FIVE)
+
+
+@pytest.mark.parametrize("width", [5, 6])
+@pytest.mark.parametrize(
+    "name", ["clean/kitti_hdl64", "clean/kitti_front", "wads/sample", "snowykitti/velodyne/000000"]
+)
+def test_real_scans_pass_and_are_refused_once_widened(
+    file: Path, shared: Path, name: str, width: int
+) -> None:
+    scan = read_scan(shared / "data" / f"{name}.bin")
+    assert scan.intensity is not None
+    further = street(len(scan), 6)[:, 4:width]
+    rows = np.column_stack([scan.xyz, scan.intensity, further])[: len(scan) // 4 * 4]
+    file.write_bytes(rows.astype("<f4").tobytes())
+    with pytest.raises(InputError, match="more columns than stated"):
+        read_scan(file)
+
+
+def test_sentinel_cells_damaged_rows_and_a_few_negative_values_are_no_reason_to_refuse(
+    file: Path,
+) -> None:
+    rows = street(1000, 4)
+    rows[:400] = -1
+    rows[400:700, 3] = -np.inf
+    rows[700:720, 3] = -12.5
+    file.write_bytes(rows.tobytes())
+    assert len(read_scan(file)) == 1000
+
+
+def test_a_negative_column_that_is_not_called_intensity_is_read(file: Path) -> None:
+    rows = street(100, 4)
+    rows[:, 3] = -30
+    file.write_bytes(rows.tobytes())
+    assert read_scan(file, ("x", "y", "z", "rcs")).intensity is None
+
+
+@pytest.mark.parametrize(
+    ("columns", "reason"),
+    [
+        (("x", "y", "intensity", "ring"), "has no x, y and z among its columns"),
+        (("x", "y", "z", "x"), "a name comes twice"),
+        ((), "not whole rows"),
+    ],
+)
+def test_columns_that_make_no_scan_are_refused(
+    file: Path, columns: tuple[str, ...], reason: str
+) -> None:
+    file.write_bytes(bytes(64))
+    with pytest.raises(InputError, match=reason):
+        read_scan(file, columns)
+
+
+def test_a_missing_file_and_a_folder_are_refused(file: Path) -> None:
+    with pytest.raises(InputError, match=r"scan\.bin: there is no such file\. Check the path\."):
+        read_scan(file)
+    file.mkdir()
+    with pytest.raises(InputError, match=r"is a folder\. Name a file\."):
+        read_scan(file)
+
+
+def test_a_column_that_would_lose_digits_is_not_written(file: Path) -> None:
+    fields = {axis: np.ones(2, np.float32) for axis in "xyz"} | {"time": np.array([1, 2**24 + 1])}
+    with pytest.raises(InputError, match=r"float32 cannot hold the column time \(int64\)"):
+        write_scan(file, Scan(np.ones((2, 3), np.float32), fields=fields))
+    assert not file.exists()
+
+
+@pytest.mark.parametrize("columns", [DEFAULT_COLUMNS, FIVE, SIX], ids=len)
+@pytest.mark.parametrize("origin", [np.float32, np.float64])
+def test_float64_is_told_from_float32_and_written_back(
+    file: Path, columns: tuple[str, ...], origin: type
+) -> None:
+    # What was float32 before has 29 bits of zeros behind each number.
+    rows = (street(2000, len(columns)).astype(np.float64) * np.pi).astype(origin).astype("<f8")
+    file.write_bytes(rows.tobytes())
+    scan = read_scan(file, columns)
+    np.testing.assert_array_equal(np.stack(list(scan.fields.values()), axis=1), rows, strict=True)
+    assert Binary().count(file, columns) == 2000
+    write_scan(file, scan.take(np.arange(2000) % 2 == 0))
+    assert file.read_bytes() == rows[::2].tobytes()
+
+
+@pytest.mark.parametrize("columns", [DEFAULT_COLUMNS, FIVE, SIX], ids=len)
+def test_float32_is_not_taken_for_float64(file: Path, columns: tuple[str, ...]) -> None:
+    rows = street(2000, len(columns))
+    for damaged in (rows, np.where(np.arange(2000)[:, None] % 2 == 0, np.float32(1e-40), rows)):
+        file.write_bytes(damaged.astype("<f4").tobytes())
+        assert {column.dtype for column in read_scan(file, columns).fields.values()} == {
+            np.dtype("f4")
+        }
+        assert Binary().count(file, columns) == 2000
+
+
+def test_float64_that_makes_as_good_sense_as_float32_stays_float32(file: Path) -> None:
+    # Whole numbers, which have nothing but zeros in the half that float32 would stumble over.
+    rows = np.random.default_rng(0).integers(1, 60, (100, 4)).astype("<f8")
+    file.write_bytes(rows.tobytes())
+    assert len(read_scan(file)) == 200
+
+
+@pytest.mark.parametrize(
+    "name", ["clean/kitti_hdl64", "clean/kitti_front", "wads/sample", "snowykitti/velodyne/000000"]
+)
+def test_real_scans_are_told_by_their_numbers(file: Path, shared: Path, name: str) -> None:
+    rows = np.fromfile(shared / "data" / f"{name}.bin", "<f4").reshape(-1, 4)
+    rows = rows[: len(rows) // 2 * 2]
+    for value in ("<f4", "<f8"):
+        rows.astype(value).tofile(file)
+        scan = read_scan(file)
+        assert {column.dtype for column in scan.fields.values()} == {np.dtype(value)}
+        np.testing.assert_array_equal(scan.xyz, rows[:, :3])
+        assert Binary().count(file, DEFAULT_COLUMNS) == len(rows)

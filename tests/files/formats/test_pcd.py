@@ -1,0 +1,318 @@
+"""PCD files: read as the Point Cloud Library writes them, written as others can read them."""
+
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import lzf
+import numpy as np
+import pytest
+
+from derain import InputError, Scan
+from derain.files import read_scan, write_scan
+from derain.files.formats.pcd.header import ENCODINGS, PcdHeader
+
+HEADER = """\
+# .PCD v.7 - Point Cloud Data file format
+VERSION .7
+FIELDS x y z intensity
+SIZE 4 4 4 2
+TYPE F F F U
+COUNT 1 1 1 1
+WIDTH 2
+HEIGHT 1
+VIEWPOINT 1 2 3 0.5 0.5 0.5 0.5
+POINTS 2
+DATA binary
+"""
+POINTS = ((1.5, -2.0, 0.25, 7), (math.nan, math.inf, -0.0, 65535))
+ROW = struct.Struct("<fffH")
+DATA = b"".join(ROW.pack(*point) for point in POINTS)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "scan.pcd"
+
+
+def write(file: Path, header: str, data: bytes) -> Path:
+    file.write_bytes(header.encode() + data)
+    return file
+
+
+def compress(data: bytes) -> bytes:
+    compressed = lzf.compress(data, 2 * len(data) + 64)
+    return struct.pack("<II", len(compressed), len(data)) + compressed
+
+
+def column_by_column() -> bytes:
+    columns = zip("fffH", zip(*POINTS, strict=True), strict=True)
+    return b"".join(struct.pack(f"<2{kind}", *values) for kind, values in columns)
+
+
+def check_points(scan: Scan) -> None:
+    expected = np.array([point[:3] for point in POINTS], np.float32)
+    np.testing.assert_array_equal(scan.xyz, expected, strict=True)
+    np.testing.assert_array_equal(scan.intensity, np.float32([7, 65535]), strict=True)
+    np.testing.assert_array_equal(scan.fields["intensity"], np.uint16([7, 65535]), strict=True)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "data"),
+    [
+        ("binary", DATA),
+        ("ascii", b"1.5 -2 .25 7\nnan inf -0 65535\n"),
+        ("ascii", b"  1.5\t-2e0 +0.25 7\r\n\r\nNaN Infinity -0.0 65535"),
+        ("binary_compressed", compress(column_by_column())),
+    ],
+)
+def test_every_encoding_is_read(file: Path, encoding: str, data: bytes) -> None:
+    check_points(read_scan(write(file, HEADER.replace("DATA binary", f"DATA {encoding}"), data)))
+
+
+def test_headers_may_lack_what_is_optional_and_hold_comments_in_any_encoding(file: Path) -> None:
+    optional = ("COUNT", "HEIGHT", "POINTS", "VIEWPOINT")
+    lines = [line for line in HEADER.splitlines() if not line.startswith(optional)]
+    header = b"\r\n".join([b"# Stra\xdfe", b"", *(line.encode() for line in lines), b""])
+    file.write_bytes(header + DATA)
+    scan = read_scan(file)
+    check_points(scan)
+    write_scan(file, scan)
+    assert b"VIEWPOINT 0 0 0 1 0 0 0\n" in file.read_bytes()
+
+
+def test_padding_is_passed_over_in_every_encoding(file: Path) -> None:
+    header = (
+        HEADER.replace("FIELDS x y z", "FIELDS x y z _")
+        .replace("SIZE 4 4 4", "SIZE 4 4 4 1")
+        .replace("TYPE F F F", "TYPE F F F U")
+        .replace("COUNT 1 1 1", "COUNT 1 1 1 4")
+        .replace(" intensity", " intensity _")
+        .replace(" 2\nTYPE", " 2 4\nTYPE")
+        .replace(" U\nCOUNT", " U F\nCOUNT")
+        .replace(" 1\nWIDTH", " 1 2\nWIDTH")
+    )
+    rows = [struct.pack("<fff4xH8x", *point) for point in POINTS]
+    block = column_by_column()
+    padded = block[:24] + bytes(8) + block[24:] + bytes(16)
+    for encoding, data in (
+        ("binary", b"".join(rows)),
+        ("ascii", b"1.5 -2 .25 0 0 0 0 7 0 0\nnan inf -0 0 0 0 0 65535 0 0\n"),
+        ("binary_compressed", compress(block)),
+        ("binary_compressed", compress(padded)),
+    ):
+        scan = read_scan(write(file, header.replace("DATA binary", f"DATA {encoding}"), data))
+        check_points(scan)
+        assert list(scan.fields) == ["x", "y", "z", "intensity"]
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_columns_of_several_values_stay_together(
+    copied: Callable[[Scan, str, object], Scan], scan: Scan, encoding: str
+) -> None:
+    histogram = np.arange(15, dtype=np.int16).reshape(5, 3)
+    wide = replace(scan, fields={**scan.fields, "histogram": histogram})
+    copy = copied(wide, ".pcd", PcdHeader((), 0, 0, 0, encoding))
+    np.testing.assert_array_equal(copy.fields["histogram"], histogram, strict=True)
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_encoding_viewpoint_grid_and_order_of_columns_survive(
+    file: Path, scan: Scan, encoding: str
+) -> None:
+    header = PcdHeader((), 0, 0, 0, encoding, "1 2 3 0.5 0.5 0.5 0.5")
+    grid = scan.take(np.array([0, 1, 2, 3]))
+    write_scan(file, replace(grid, shape=(2, 2), header=header))
+    first = file.read_bytes()
+    assert b"VIEWPOINT 1 2 3 0.5 0.5 0.5 0.5\n" in first
+    assert b"WIDTH 2\nHEIGHT 2\n" in first
+    assert f"DATA {encoding}\n".encode() in first
+    copy = read_scan(file)
+    assert copy.shape == (2, 2)
+    assert list(copy.fields) == list(scan.fields)
+    write_scan(file, copy)
+    assert file.read_bytes() == first
+
+
+def test_a_cleaned_organised_cloud_is_a_list_in_the_same_encoding(file: Path, scan: Scan) -> None:
+    header = PcdHeader((), 0, 0, 0, "ascii")
+    write_scan(file, replace(scan.take(np.array([0, 1, 2, 3])), shape=(2, 2), header=header))
+    cleaned = read_scan(file).take(np.array([True, False, True, True]))
+    write_scan(file, cleaned)
+    assert b"WIDTH 3\nHEIGHT 1\n" in file.read_bytes()
+    assert b"DATA ascii\n" in file.read_bytes()
+    copy = read_scan(file)
+    np.testing.assert_array_equal(copy.fields["time"], scan.fields["time"][[0, 2, 3]])
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_open3d_reads_what_is_written(
+    file: Path, scan: Scan, columns: dict[str, Any], encoding: str, open3d: Any
+) -> None:
+    write_scan(file, replace(scan, header=PcdHeader((), 0, 0, 0, encoding)))
+    cloud = open3d.t.io.read_point_cloud(str(file))
+    np.testing.assert_array_equal(cloud.point["positions"].numpy(), scan.xyz, strict=True)
+    for name in columns.keys() - set("xyz"):
+        np.testing.assert_array_equal(cloud.point[name].numpy().ravel(), columns[name], strict=True)
+
+
+@pytest.mark.parametrize("ascii_data", [False, True])
+@pytest.mark.parametrize("compressed", [False, True])
+def test_what_open3d_writes_is_read(
+    file: Path, scan: Scan, columns: dict[str, Any], ascii_data: bool, compressed: bool, open3d: Any
+) -> None:
+    cloud = open3d.t.geometry.PointCloud(scan.xyz)
+    for name in columns.keys() - set("xyz"):
+        cloud.point[name] = columns[name][:, None]
+    open3d.t.io.write_point_cloud(str(file), cloud, ascii_data, compressed)
+    copy = read_scan(file)
+    exact = not ascii_data  # Open3D writes ten decimals
+    np.testing.assert_allclose(copy.xyz, scan.xyz, rtol=0 if exact else 1e-6)
+    for name in columns.keys() - set("xyz"):
+        np.testing.assert_allclose(
+            copy.fields[name], columns[name], rtol=0 if exact else 1e-6, atol=0 if exact else 1e-9
+        )
+
+
+@pytest.mark.parametrize(
+    ("stated", "shape"),
+    [
+        ("WIDTH 9\nHEIGHT 1\nPOINTS 2", None),
+        ("WIDTH 1\nHEIGHT 2\nPOINTS 9", (2, 1)),
+        ("WIDTH 9\nHEIGHT 2\nPOINTS 2", None),
+        ("WIDTH 0\nHEIGHT 1\nPOINTS 0", None),
+        ("WIDTH 1\nHEIGHT 1\nPOINTS 1", None),
+    ],
+)
+def test_a_wrong_number_of_points_is_overruled_by_the_data(
+    file: Path, stated: str, shape: tuple[int, int] | None
+) -> None:
+    header = HEADER.replace("HEIGHT 1\n", "").replace("POINTS 2\n", "").replace("WIDTH 2", stated)
+    for encoding, data in (
+        ("binary", DATA),
+        ("ascii", b"1.5 -2 .25 7\nnan inf -0 65535\n"),
+        ("binary_compressed", compress(column_by_column())),
+    ):
+        scan = read_scan(write(file, header.replace("DATA binary", f"DATA {encoding}"), data))
+        check_points(scan)
+        assert scan.shape == shape
+
+
+def test_a_line_feed_behind_the_data_is_passed_over(file: Path) -> None:
+    check_points(read_scan(write(file, HEADER, DATA + b"\n")))
+
+
+@pytest.mark.parametrize(
+    ("header", "data"),
+    [
+        (HEADER, DATA[:-1]),
+        (HEADER, DATA[:14]),
+        (HEADER, DATA + b"garbage"[:5] * 3),
+        (HEADER.replace("POINTS 2", "POINTS 9"), DATA * 3),
+        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n"),
+        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3\n"),
+        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3 4 5\n"),
+        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 three 4\n"),
+        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3 65536\n"),
+        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3 4 # 5\n"),
+        (HEADER.replace("binary", "binary_compressed"), b""),
+        (HEADER.replace("binary", "binary_compressed"), compress(column_by_column())[:-3]),
+        (HEADER.replace("binary", "binary_compressed"), compress(column_by_column()[:-2])),
+        (HEADER.replace("binary", "binary_compressed"), struct.pack("<II", 9, 28) + b"\xff" * 9),
+        (HEADER.replace("binary", "binary_compressed"), struct.pack("<II", 2, 28) + b"\0A"),
+    ],
+)
+def test_data_that_do_not_match_the_header_are_refused(
+    file: Path, header: str, data: bytes
+) -> None:
+    with pytest.raises(InputError, match=r"scan\.pcd: cannot be read as \.pcd \(.*write it again"):
+        read_scan(write(file, header, data))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("DATA binary\n", ""),
+        ("DATA binary", "DATA zipped"),
+        ("FIELDS x y z intensity\n", ""),
+        ("FIELDS x y z intensity", "FIELDS x y z x"),
+        ("FIELDS x y z intensity", "FIELDS _ _ _ _"),
+        ("FIELDS x y z", "FIELDS x y"),
+        ("SIZE 4", "SIZE 3"),
+        ("SIZE 4 4 4 2\n", ""),
+        ("SIZE 4", "SIZE four"),
+        ("TYPE F F F U", "TYPE F F F Q"),
+        ("TYPE F F F U", "TYPE F F F F"),
+        ("TYPE F F F U\n", ""),
+        ("COUNT 1 1 1 1", "COUNT 1 1 1 0"),
+        ("COUNT 1 1 1 1", "COUNT 1 1 1 -1"),
+        ("COUNT 1 1 1 1", "COUNT 1 1 1"),
+        ("WIDTH 2\n", ""),
+        ("WIDTH 2", "WIDTH"),
+        ("WIDTH 2", "WIDTH 2.5"),
+        ("POINTS 2", "POINTS many"),
+    ],
+)
+def test_headers_that_make_no_sense_are_refused(file: Path, old: str, new: str) -> None:
+    assert old in HEADER
+    with pytest.raises(InputError, match=r"read as \.pcd \(the header (says|has no) "):
+        read_scan(write(file, HEADER.replace(old, new), DATA))
+
+
+def test_a_count_beyond_all_memory_is_refused(file: Path) -> None:
+    header = HEADER.replace("COUNT 1", "COUNT 99999999999999999999")
+    with pytest.raises(InputError, match=r"cannot be read as \.pcd"):
+        read_scan(write(file, header, DATA))
+
+
+def test_a_cloud_without_coordinates_is_refused(file: Path) -> None:
+    with pytest.raises(InputError, match=r"no x, y and z among its columns \(x, y, depth, "):
+        read_scan(write(file, HEADER.replace("x y z", "x y depth"), DATA))
+
+
+@pytest.mark.parametrize("content", [b"", b"ply\n", bytes(range(256)) * 9])
+def test_files_that_are_no_pcd_are_refused(file: Path, content: bytes) -> None:
+    file.write_bytes(content)
+    with pytest.raises(InputError, match="the header has no DATA line"):
+        read_scan(file)
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_a_cloud_of_no_points_comes_back(file: Path, scan: Scan, encoding: str) -> None:
+    write_scan(file, replace(scan.take(np.array([], int)), header=PcdHeader((), 0, 0, 0, encoding)))
+    copy = read_scan(file)
+    assert len(copy) == 0
+    assert {name: column.dtype for name, column in copy.fields.items()} == {
+        name: column.dtype for name, column in scan.fields.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [
+        ("two words", np.zeros(5)),
+        ("", np.zeros(5)),
+        ("half", np.zeros(5, np.float16)),
+        ("word", np.zeros(5, "U3")),
+        ("nothing", np.zeros((5, 0))),
+    ],
+)
+def test_columns_that_no_pcd_can_hold_are_refused(
+    file: Path, scan: Scan, name: str, column: np.ndarray
+) -> None:
+    with pytest.raises(InputError, match=rf"\.pcd has no place for the column '{name}'"):
+        write_scan(file, replace(scan, fields={**scan.fields, name: column}))
+    assert not file.exists()
+
+
+def test_truth_values_and_foreign_byte_orders_are_written_as_pcd_spells_them(
+    file: Path, scan: Scan
+) -> None:
+    fields = {**scan.fields, "wet": np.arange(5) > 2, "far": np.arange(5, dtype=">i8")}
+    write_scan(file, replace(scan, fields=fields))
+    copy = read_scan(file)
+    np.testing.assert_array_equal(copy.fields["wet"], np.uint8([0, 0, 0, 1, 1]), strict=True)
+    np.testing.assert_array_equal(copy.fields["far"], np.arange(5, dtype="<i8"), strict=True)

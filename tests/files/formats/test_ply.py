@@ -1,0 +1,175 @@
+"""PLY files: vertices with all of their properties."""
+
+import struct
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from derain import InputError, Scan
+from derain.files import read_scan, write_scan
+from derain.files.formats.ply import PlyHeader
+from derain.files.formats.ply.header import BYTE_ORDERS
+
+HEADER = """\
+ply
+format ascii 1.0
+comment made by hand
+obj_info two points
+element vertex 2
+property float x
+property float32 y
+property double z
+property uchar intensity
+element face 1
+property list uchar int vertex_indices
+end_header
+"""
+DATA = b"1.5 -2 0.1 7\nnan inf -0 255\n3 0 1 1\n"
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "scan.ply"
+
+
+def write(file: Path, header: str, data: bytes) -> Path:
+    file.write_bytes(header.encode() + data)
+    return file
+
+
+def check_points(scan: Scan) -> None:
+    x, y, z = np.float32([1.5, np.nan]), np.float32([-2, np.inf]), np.array([0.1, -0.0])
+    expected = np.stack([x, y, z.astype(np.float32)], axis=1)
+    np.testing.assert_array_equal(scan.xyz, expected, strict=True)
+    np.testing.assert_array_equal(scan.fields["z"], z)
+    np.testing.assert_array_equal(scan.fields["intensity"], np.uint8([7, 255]), strict=True)
+    np.testing.assert_array_equal(scan.intensity, np.float32([7, 255]), strict=True)
+
+
+def binary(order: str) -> bytes:
+    vertices = [(1.5, -2.0, 0.1, 7), (float("nan"), float("inf"), -0.0, 255)]
+    faces = struct.pack(f"{order}B3i", 3, 0, 1, 1)
+    return b"".join(struct.pack(f"{order}ffdB", *vertex) for vertex in vertices) + faces
+
+
+def test_text_is_read(file: Path) -> None:
+    check_points(read_scan(write(file, HEADER, DATA)))
+    check_points(read_scan(write(file, HEADER.replace("\n", "\r\n"), DATA)))
+
+
+@pytest.mark.parametrize("encoding", ["binary_little_endian", "binary_big_endian"])
+def test_both_byte_orders_are_read(file: Path, encoding: str) -> None:
+    data = binary(BYTE_ORDERS[encoding])
+    check_points(read_scan(write(file, HEADER.replace("ascii", encoding), data)))
+
+
+def test_elements_before_the_vertices_are_passed_over(file: Path) -> None:
+    camera = "element camera 2\nproperty double angle\nproperty short id\nelement vertex"
+    header = HEADER.replace("element vertex", camera)
+    check_points(read_scan(write(file, header, b"1 2\n3 4\n" + DATA)))
+    data = struct.pack("<dhdh", 1, 2, 3, 4) + binary("<")
+    check_points(read_scan(write(file, header.replace("ascii", "binary_little_endian"), data)))
+
+
+@pytest.mark.parametrize("encoding", BYTE_ORDERS)
+def test_encoding_comments_and_order_of_properties_survive(
+    file: Path, scan: Scan, encoding: str
+) -> None:
+    header = PlyHeader(encoding, ("comment Straße", "obj_info two  words", "comment"))
+    write_scan(file, replace(scan, header=header))
+    copy = read_scan(file)
+    assert copy.header == header
+    assert list(copy.fields) == list(scan.fields)
+    first = file.read_bytes()
+    write_scan(file, copy)
+    assert file.read_bytes() == first
+
+
+def test_a_cleaned_cloud_keeps_its_comments(file: Path) -> None:
+    scan = read_scan(write(file, HEADER, DATA))
+    write_scan(file, scan.take(np.array([True, False])))
+    assert b"comment made by hand\nobj_info two points\nelement vertex 1\n" in file.read_bytes()
+    assert read_scan(file).xyz.tolist() == [[1.5, -2.0, np.float32(0.1)]]
+
+
+@pytest.mark.parametrize("encoding", BYTE_ORDERS)
+def test_open3d_reads_what_is_written(file: Path, scan: Scan, encoding: str, open3d: Any) -> None:
+    # Open3D skips properties of 16 bits.
+    fields = {name: column for name, column in scan.fields.items() if name != "ring"}
+    write_scan(file, replace(scan, fields=fields, header=PlyHeader(encoding)))
+    cloud = open3d.t.io.read_point_cloud(str(file))
+    np.testing.assert_array_equal(cloud.point["positions"].numpy(), scan.xyz, strict=True)
+    for name in fields.keys() - set("xyz"):
+        np.testing.assert_array_equal(cloud.point[name].numpy().ravel(), fields[name], strict=True)
+
+
+@pytest.mark.parametrize("ascii_data", [False, True])
+def test_what_open3d_writes_is_read(file: Path, scan: Scan, ascii_data: bool, open3d: Any) -> None:
+    cloud = open3d.t.geometry.PointCloud(scan.xyz)
+    cloud.point["intensity"] = scan.fields["intensity"][:, None]
+    open3d.t.io.write_point_cloud(str(file), cloud, ascii_data)
+    copy = read_scan(file)
+    np.testing.assert_allclose(copy.xyz, scan.xyz, rtol=1e-5 if ascii_data else 0)
+    np.testing.assert_array_equal(copy.intensity, scan.intensity)
+
+
+@pytest.mark.parametrize("encoding", BYTE_ORDERS)
+def test_a_cloud_of_no_points_comes_back(file: Path, scan: Scan, encoding: str) -> None:
+    write_scan(file, replace(scan.take(np.array([], int)), header=PlyHeader(encoding)))
+    copy = read_scan(file)
+    assert len(copy) == 0
+    assert list(copy.fields) == list(scan.fields)
+
+
+@pytest.mark.parametrize(
+    ("header", "data"),
+    [
+        (HEADER, b""),
+        (HEADER, b"1 2 3 4\n"),
+        (HEADER, b"1 2 3 4\n5 6 7\n"),
+        (HEADER, b"1 2 3 4\n5 6 7 256\n"),
+        (HEADER, b"1 2 3 4\n5 6 seven 8\n"),
+        (HEADER.replace("ascii", "binary_little_endian"), binary("<")[:33]),
+        (HEADER.replace("ascii", "binary_big_endian"), b""),
+        (HEADER.replace("vertex 2", "vertex 99999999999999999999"), DATA),
+        (HEADER.replace("vertex 2", "vertex -2"), DATA),
+        (HEADER.replace("vertex 2", "points 2"), DATA),
+        (HEADER.replace("element face 1", "element vertex 0").replace("vertex 2", "edge 2"), DATA),
+        ("ply\nformat ascii 1.0\nelement vertex 2\nend_header\n", DATA),
+        ("ply\nformat binary_big_endian 1.0\nelement vertex 2\nend_header\n", DATA),
+        (HEADER.replace("format ascii 1.0\n", ""), DATA),
+        (HEADER.replace("format ascii 1.0", "format ascii 2.0"), DATA),
+        (HEADER.replace("format ascii", "format morse"), DATA),
+        (HEADER.replace("uchar intensity", "complex intensity"), DATA),
+        (HEADER.replace("float32 y", "float32 x"), DATA),
+        (HEADER.replace("element vertex 2\n", ""), DATA),
+        (HEADER.replace("comment", "remark"), DATA),
+        (HEADER.replace("end_header\n", ""), DATA),
+        (HEADER.replace("uchar intensity", "list uchar int echoes"), DATA),
+        (HEADER.replace("ply", "obj"), DATA),
+    ],
+)
+def test_damaged_files_are_refused(file: Path, header: str, data: bytes) -> None:
+    with pytest.raises(InputError, match=r"scan\.ply: cannot be read as \.ply \(.*write it again"):
+        read_scan(write(file, header, data))
+
+
+def test_vertices_without_coordinates_are_refused(file: Path) -> None:
+    with pytest.raises(InputError, match=r"has no x, y and z among its columns \(x, y, depth, "):
+        read_scan(write(file, HEADER.replace("double z", "double depth"), DATA))
+
+
+@pytest.mark.parametrize(
+    ("name", "column"), [("long", np.zeros(5, np.int64)), ("two words", np.zeros(5))]
+)
+def test_columns_that_no_ply_can_hold_are_refused(
+    file: Path, scan: Scan, name: str, column: np.ndarray
+) -> None:
+    with pytest.raises(InputError, match=rf"\.ply has no place for the column '{name}'"):
+        write_scan(file, replace(scan, fields={**scan.fields, name: column}))
+    with pytest.raises(InputError, match="several values of 'normal'"):
+        write_scan(file, replace(scan, fields={**scan.fields, "normal": np.zeros((5, 3))}))
+    assert not file.exists()

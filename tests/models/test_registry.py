@@ -1,0 +1,30 @@
+"""Networks are found by the name that they have in a Spec."""
+
+import pytest
+
+from derain.errors import InputError
+from derain.models.base import DerainingModule
+from derain.models.lisnownet import LiSnowNet
+from derain.models.outdet import OutDet
+from derain.models.published import Published
+from derain.models.registry import NETWORKS
+from derain.models.salsanext import SalsaNext
+
+
+def test_derain_has_these_networks_and_each_knows_its_name() -> None:
+    assert dict(NETWORKS) == {"lisnownet": LiSnowNet, "outdet": OutDet, "salsanext": SalsaNext}
+    assert {name: network.NAME for name, network in NETWORKS.items()} == {
+        name: name for name in NETWORKS
+    }
+
+
+@pytest.mark.parametrize("network", [LiSnowNet, OutDet, SalsaNext])
+def test_of_each_of_them_weights_were_published(network: type[DerainingModule]) -> None:
+    assert issubclass(network, Published)
+
+
+def test_a_network_that_was_given_no_name_is_told_how_to_get_one() -> None:
+    demanded = {name: lambda *_: None for name in DerainingModule.__abstractmethods__}
+    nameless = type("Nameless", (DerainingModule,), demanded)
+    with pytest.raises(InputError, match=r"Nameless: the network has no name\. Put @NETWORKS\.add"):
+        nameless(channels=("x",))

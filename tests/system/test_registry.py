@@ -1,0 +1,215 @@
+"""A registry finds what files and other packages bring, once somebody asks for it."""
+
+import importlib
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from derain.errors import InputError
+from derain.system.registry import Registry
+
+# What a module of a package brings: `ITEMS` is the registry in the package's `registry.py`.
+MEMBER = """
+from {package}.registry import ITEMS
+
+@ITEMS.add({names})
+class {title}:
+    pass
+"""
+
+Write = Callable[..., None]
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
+    """Writes modules of packages that can be imported for the length of a test."""
+    before = set(sys.modules)
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def write(name: str, content: str = "") -> None:
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(content)
+        importlib.invalidate_caches()
+
+    yield write
+    for name in set(sys.modules) - before:
+        if name.startswith(("things", "foreign")):
+            del sys.modules[name]
+
+
+@pytest.fixture
+def things(write: Write) -> Registry[type]:
+    """The registry of a package of two files, whose names are not in the order of their members."""
+    write("things/__init__.py")
+    write(
+        "things/registry.py",
+        "from derain.system.registry import Registry\nITEMS = Registry('things')",
+    )
+    write("things/first.py", member("pebble", "Pebble"))
+    write("things/second.py", member("brick", "Brick"))
+    registry: Registry[type] = importlib.import_module("things.registry").ITEMS
+    return registry
+
+
+def member(name: str, title: str, package: str = "things") -> str:
+    return MEMBER.format(package=package, names=repr(name), title=title)
+
+
+def installed(write: Write, package: str, **modules: str) -> None:
+    """Writes what an installed package leaves: its name, and entry points to its modules."""
+    entries = "".join(f"{name} = {module}\n" for name, module in modules.items())
+    write(f"{package}-1.0.dist-info/METADATA", f"Name: {package}\nVersion: 1.0\n")
+    write(f"{package}-1.0.dist-info/entry_points.txt", f"[things]\n{entries}")
+
+
+def loaded() -> set[str]:
+    return {name for name in sys.modules if name.startswith(("things.", "foreign"))}
+
+
+def test_what_there_is_comes_in_alphabetical_order_whatever_was_imported_first(
+    things: Registry[type],
+) -> None:
+    assert things["pebble"].__name__ == "Pebble"
+    assert list(things) == ["brick", "pebble"]
+    assert [kind.__name__ for kind in things.values()] == ["Brick", "Pebble"]
+    assert len(things) == 2
+
+
+def test_files_are_imported_when_somebody_asks_and_not_before(things: Registry[type]) -> None:
+    assert loaded() == {"things.registry"}
+    assert "brick" in things
+    assert loaded() == {"things.registry", "things.first", "things.second"}
+
+
+def test_other_packages_are_imported_where_derain_does_not_have_the_name(
+    things: Registry[type], write: Write
+) -> None:
+    write("foreign_cobble.py", member("cobble", "Cobble"))
+    installed(write, "foreign_cobble", anything="foreign_cobble")
+    assert "brick" in things
+    assert "foreign_cobble" not in loaded()
+    assert things["cobble"].__module__ == "foreign_cobble"
+    assert list(things) == ["brick", "cobble", "pebble"]
+
+
+def test_a_list_asks_other_packages_as_well(things: Registry[type], write: Write) -> None:
+    write("foreign_cobble.py", member("cobble", "Cobble"))
+    installed(write, "foreign_cobble", anything="foreign_cobble")
+    assert list(things) == ["brick", "cobble", "pebble"]
+
+
+def test_what_nobody_brings_is_not_there(things: Registry[type]) -> None:
+    assert "boulder" not in things
+    assert things.get("boulder") is None
+    with pytest.raises(KeyError):
+        things["boulder"]
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("import nothing_of_this_name", "ModuleNotFoundError: No module named 'nothing_of_this_"),
+        ("raise OSError('no\\nlicence')", r"OSError: no licence"),
+        ("def broken(", "SyntaxError: "),
+        (member("brick", "Brick"), "two are called so, things.second.Brick and foreign_bad.Brick"),
+    ],
+)
+def test_a_package_that_cannot_be_imported_is_warned_of_once_and_keeps_no_other_from_use(
+    things: Registry[type],
+    write: Write,
+    capsys: pytest.CaptureFixture[str],
+    content: str,
+    reason: str,
+) -> None:
+    write("foreign_bad.py", content)
+    write("foreign_good.py", member("cobble", "Cobble"))
+    installed(write, "foreign_bad", bad="foreign_bad")
+    installed(write, "foreign_good", good="foreign_good")
+    assert things["brick"].__module__ == "things.second"
+    assert capsys.readouterr().err == ""  # derain's own are found without a look at others
+    assert list(things) == ["brick", "cobble", "pebble"]
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("derain: warning: things: bad: foreign_bad cannot be imported (")
+    assert reason in line
+    assert line.endswith("Repair or uninstall the package foreign_bad.")
+    assert "boulder" not in things
+    assert things["brick"].__module__ == "things.second"
+    assert capsys.readouterr().err == ""
+
+
+def test_a_file_of_the_package_that_cannot_be_imported_is_an_error_every_time(
+    things: Registry[type], write: Write
+) -> None:
+    write("things/third.py", "import nothing_of_this_name")
+    for _ in range(2):
+        with pytest.raises(ModuleNotFoundError, match="nothing_of_this_name"):
+            list(things)
+
+
+def test_two_of_one_name_are_refused_and_both_are_named(things: Registry[type]) -> None:
+    class Other:
+        pass
+
+    assert "brick" in things
+    with pytest.raises(InputError) as refusal:
+        things.add("cobble", "brick")(Other)
+    reason = f"things: brick: two are called so, things.second.Brick and {__name__}."
+    assert str(refusal.value).startswith(reason)
+    assert str(refusal.value).endswith("<locals>.Other. Remove or rename one.")
+    assert "cobble" not in things
+
+
+def test_one_member_may_have_several_names_and_answers_to_the_first(
+    things: Registry[type],
+) -> None:
+    class Slab:
+        pass
+
+    assert things.add("slab", "plate")(Slab) is Slab
+    assert things["slab"] is things["plate"] is Slab
+    assert things.name_of(Slab) == "slab"
+    assert things.name_of(type("Slab", (), {})) is None
+
+
+def test_a_module_that_is_imported_anew_brings_its_member_anew(things: Registry[type]) -> None:
+    former = things["brick"]
+    importlib.reload(sys.modules["things.second"])
+    assert things["brick"] is not former
+    assert things.name_of(things["brick"]) == "brick"
+    assert list(things) == ["brick", "pebble"]
+
+
+@pytest.mark.parametrize("value", [len, ("a", "tuple"), 5], ids=str)
+def test_what_is_no_class_may_be_a_member(things: Registry[object], value: object) -> None:
+    for _ in range(2):
+        assert things.add("it")(value) is value
+    assert things["it"] is value
+    with pytest.raises(InputError, match="things: it: two are called so"):
+        things.add("it")("another")
+
+
+def test_a_module_may_ask_what_there_is_while_it_is_imported(
+    things: Registry[type], write: Write
+) -> None:
+    write("things/third.py", member("tile", "Tile") + "\nKNOWN = list(ITEMS)")
+    write("foreign_cobble.py", member("cobble", "Cobble") + "\nKNOWN = list(ITEMS)")
+    installed(write, "foreign_cobble", cobble="foreign_cobble")
+    assert list(things) == ["brick", "cobble", "pebble", "tile"]
+    assert "tile" in sys.modules["things.third"].KNOWN
+    assert list(things) == sys.modules["foreign_cobble"].KNOWN
+
+
+def test_entry_points_may_be_of_another_name_than_the_package(write: Write) -> None:
+    write("things/__init__.py")
+    write(
+        "things/registry.py",
+        "from derain.system.registry import Registry\nITEMS = Registry('things', 'things of all')",
+    )
+    registry: Registry[type] = importlib.import_module("things.registry").ITEMS
+    write("foreign_cobble.py", member("cobble", "Cobble"))
+    installed(write, "foreign_cobble", cobble="foreign_cobble")
+    assert list(registry) == []
+    assert "foreign_cobble" not in loaded()

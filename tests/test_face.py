@@ -1,0 +1,122 @@
+"""What ``import derain`` offers: when it is loaded, what it is, and that its examples are true."""
+
+import ast
+import doctest
+import pickle
+import pydoc
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from lightning import Trainer
+
+import derain
+
+from .examples import prepare
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+STUB = REPOSITORY / "derain" / "__init__.pyi"
+OFFERED = [name for name in derain.__all__ if name != "__version__"]
+
+# What an example may use without saying where it comes from, besides what its module has.
+NAMES = {"derain": derain, "np": np, "torch": torch, "Trainer": Trainer}
+
+
+@pytest.fixture
+def examples_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder with what examples read, in which they run, on random numbers of their own."""
+    prepare(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    with torch.random.fork_rng(devices=[]):
+        yield tmp_path
+
+
+def run(code: str) -> subprocess.CompletedProcess[str]:
+    """Runs Python code in a process that has loaded nothing yet."""
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+
+
+def test_the_table_is_every_import_of_the_type_stub() -> None:
+    imports = [node for node in ast.parse(STUB.read_text("utf-8")).body if _is_import(node)]
+    assert [alias.asname for node in imports for alias in node.names] == OFFERED
+    assert len(set(OFFERED)) == len(OFFERED) > 20
+
+
+def _is_import(node: ast.AST) -> bool:
+    return isinstance(node, ast.Import | ast.ImportFrom)
+
+
+def test_no_name_is_that_of_a_module_which_would_take_its_place_once_loaded() -> None:
+    modules = {module.name for module in iter_modules(derain.__path__)}
+    assert not modules & set(OFFERED)
+
+
+@pytest.mark.parametrize("name", OFFERED)
+def test_a_name_gives_what_it_is_called_by_and_is_found_without_asking_again(name: str) -> None:
+    value = getattr(derain, name)
+    assert value.__name__ == name
+    assert vars(derain)[name] is value
+    assert pickle.loads(pickle.dumps(value)) is value
+
+
+def test_everything_is_listed_before_anything_is_loaded() -> None:
+    code = "import sys, derain; print(*dir(derain)); assert 'derain.scan' not in sys.modules"
+    finished = run(code)
+    assert finished.returncode == 0, finished.stderr
+    assert set(finished.stdout.split()) >= set(derain.__all__)
+
+
+def test_a_star_imports_all() -> None:
+    namespace: dict[str, Any] = {}
+    exec("from derain import *", namespace)
+    assert namespace.keys() >= set(derain.__all__)
+    assert namespace["Scan"] is derain.Scan
+
+
+def test_a_wrong_name_is_refused_as_python_does_it_with_the_name_that_was_meant() -> None:
+    with pytest.raises(AttributeError, match=r"^module 'derain' has no attribute 'Derainr'$"):
+        derain.Derainr  # noqa: B018
+    assert "Did you mean: 'Derainer'?" in run("import derain; derain.Derainr").stderr
+    assert "Did you mean" not in run("import derain; derain.xylophone").stderr
+    assert not hasattr(derain, "xylophone")
+    with pytest.raises(ImportError, match="cannot import name 'xylophone' from 'derain'"):
+        exec("from derain import xylophone")
+
+
+def test_help_shows_every_name_and_what_it_is() -> None:
+    text = pydoc.plain(pydoc.render_doc(derain))
+    assert "takes the rain out of LiDAR" in text
+    assert not [name for name in OFFERED if not re.search(rf"\b{name}\b", text)]
+    assert "Calls a point rain if it has few points around it." in text  # of a filter's own help
+
+
+@pytest.mark.usefixtures("examples_folder")
+@pytest.mark.parametrize("name", OFFERED)
+def test_every_name_has_an_example_which_is_true(name: str) -> None:
+    documented = getattr(derain, name)
+    own_names = vars(sys.modules[documented.__module__])
+    tests = doctest.DocTestFinder().find(documented, name, globs={**own_names, **NAMES})
+    assert [test for test in tests if test.name == name and test.examples]
+    runner = doctest.DocTestRunner(verbose=False)
+    told: list[str] = []
+    for test in tests:
+        runner.run(test, out=told.append)
+    assert not runner.failures, "".join(told)
+
+
+@pytest.mark.usefixtures("examples_folder")
+def test_the_examples_of_the_readme_run_one_after_the_other() -> None:
+    readme = (REPOSITORY / "README.md").read_text("utf-8")
+    examples = re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
+    assert examples
+    namespace: dict[str, Any] = {}
+    for example in examples:
+        exec(example, namespace)
+    assert 0 < len(namespace["clean"]) < len(namespace["scan"])

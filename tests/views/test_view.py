@@ -1,0 +1,141 @@
+"""A view is found by its name, says its own part of a Spec, and may see a window of scans."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+import pytest
+
+from derain.cards.card import load_card
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.files.documents import Entry
+from derain.scan import Scan
+from derain.spec import Spec
+from derain.views.neighbours import Neighbourhoods, NeighbourView
+from derain.views.range_image import RangeView
+from derain.views.registry import VIEWS
+from derain.views.spherical_grid import ALL_AROUND, grid_of
+from derain.views.view import View
+from derain.views.window import PlacedScan, Window, WindowOfScans
+
+OURS = {"neighbours": NeighbourView(5), "range": RangeView(grid_of("wads", "test"))}
+
+
+def test_derain_has_these_views_and_each_knows_its_name() -> None:
+    assert dict(VIEWS) == {name: type(view) for name, view in OURS.items()}
+    assert {view.NAME for view in OURS.values()} == OURS.keys()
+
+
+@pytest.mark.parametrize("view", OURS.values(), ids=OURS.keys())
+def test_a_view_reads_back_what_it_says_of_itself(view: View) -> None:
+    channels, stand_in = ("z", "range"), {"z": 1.5}
+    entry = Entry("model", "view", view.as_dict())
+    assert entry.value["kind"] == view.NAME
+    expected = replace(view, channels=channels, stand_in=stand_in)
+    if isinstance(view, NeighbourView):
+        expected = replace(expected, threads=3)
+    assert type(view).of(entry, channels, stand_in, threads=3) == expected
+
+
+@pytest.mark.parametrize("view", OURS.values(), ids=OURS.keys())
+def test_a_view_of_one_scan_sees_nothing_of_those_around_it(view: View) -> None:
+    assert view.window == Window(before=0, after=0)
+    judged, other = (PlacedScan(Scan.of(scene(200, seed))) for seed in (1, 2))
+    seen = view.of_window(WindowOfScans(judged, before=[other], after=[other]))
+    expected = view(judged.scan).inputs()
+    for name, array in seen.inputs().items():
+        np.testing.assert_array_equal(array, expected[name])
+
+
+def test_a_window_does_not_ask_for_less_than_nothing() -> None:
+    assert Window().is_one_scan
+    assert not Window(before=1).is_one_scan
+    for wrong in ({"before": -1}, {"after": -2}):
+        with pytest.raises(InputError, match=r"window: .* Give 0 or more"):
+            Window(**wrong)
+
+
+@pytest.fixture
+def registered() -> Iterator[type[View]]:
+    """A view of another package, known to derain for one test."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(VIEWS, "_members", dict(VIEWS))
+        yield VIEWS.add("change")(ChangeView)
+
+
+@dataclass(frozen=True)
+class ChangeView(View):
+    """Sees a point's neighbours, and as its one channel how far the scan before was from it."""
+
+    channels: tuple[str, ...] = ("change",)
+    stand_in: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls, entry: Entry, channels: tuple[str, ...], stand_in: Mapping[str, float], threads: int
+    ) -> Self:
+        entry.record({"kind": Entry.text})
+        return cls(channels, stand_in)
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"kind": self.NAME}
+
+    @property
+    def azimuth(self) -> tuple[float, float]:
+        return ALL_AROUND
+
+    @property
+    def window(self) -> Window:
+        return Window(before=1)
+
+    def __call__(self, scan: Scan) -> Neighbourhoods:
+        return self.of_window(WindowOfScans(PlacedScan(scan)))
+
+    def of_window(self, scans: WindowOfScans) -> Neighbourhoods:
+        seen = NeighbourView(2, ("x",))(scans.scan)
+        change = np.full_like(seen.points, 99.0)
+        if scans.before:
+            former = scans.before[-1].scan.xyz
+            here = scans.scan.xyz[seen.first]
+            change = np.linalg.norm(here[:, None] - former[None], axis=2).min(axis=1)[:, None]
+        return replace(seen, points=change.astype(np.float32))
+
+
+def spec_seen_through(view: Mapping[str, Any]) -> Spec:
+    card = load_card("wads")
+    return Spec(
+        network="toy",
+        view=view,
+        mean=(0.0,),
+        std=(1.0,),
+        classes=card.classes,
+        rain=card.rain,
+        data=card.name,
+        licence=card.licence,
+        channels=("change",),
+        units=("m",),
+    )
+
+
+def test_a_view_of_another_package_sees_a_window_and_stands_in_a_spec(
+    registered: type[View],
+) -> None:
+    spec = spec_seen_through(registered().as_dict())
+    view = Spec.from_dict(spec.as_dict(), "model").make_view()
+    assert isinstance(view, registered)
+    former, now = (Scan.of(scene(50)[rows]) for rows in (slice(40), slice(None)))
+    seen = view.of_window(WindowOfScans(PlacedScan(now, 0.2), [PlacedScan(former, 0.1)]))
+    here, there = now.xyz[seen.first].astype(float), former.xyz.astype(float)
+    expected = [min(np.linalg.norm(point - other) for other in there) for point in here]
+    np.testing.assert_allclose(seen.inputs()["points"][:, 0], expected, rtol=1e-5, atol=1e-6)
+    assert (np.array(expected) > 0).sum() == 10
+    # At the start of a sequence there is none before it.
+    assert (view(now).inputs()["points"] == 99).all()
+
+
+def test_without_the_package_its_spec_is_refused() -> None:
+    spec = spec_seen_through({"kind": "change"})
+    with pytest.raises(InputError, match=r"view\.kind: unknown view 'change'\. Upgrade derain"):
+        spec.make_view()
