@@ -16,11 +16,21 @@ class InMemory(ScanDataModule):
 
     Example:
         >>> import numpy as np
+        >>> from lightning import Trainer
+        >>> from derain.models.outdet import OutDet
         >>> points = np.random.default_rng(0).normal(size=(100, 4))
         >>> scan = Scan.of(points).with_label(np.resize([0, 110], 100))
-        >>> data = InMemory(train=[scan] * 3, card="wads")
-        >>> len(data.frames("train")), data.read(data.frames("train")[0]).label[:2].tolist()
-        (3, [0, 110])
+        >>> data = InMemory(train=[scan] * 3, validation=[scan], test=[scan], card="wads")
+        >>> model = OutDet()
+        >>> quiet = {"logger": False, "enable_progress_bar": False, "enable_checkpointing": False}
+        >>> trainer = Trainer(max_epochs=1, accelerator="cpu", **quiet)
+        >>> trainer.fit(model, data)
+        >>> (scores,) = trainer.test(model, data, verbose=False)
+        >>> 0 <= scores["test/iou"] <= 1
+        True
+        >>> [[rain]] = trainer.predict(model, data)
+        >>> rain.shape  # the probability of every point
+        (100,)
 
     Args:
         train: The training scans, in time order, with the labels that they have.

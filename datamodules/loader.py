@@ -49,8 +49,16 @@ def scan_loader(
         process: Which of them this is.
 
     Raises:
-        InputError: Labels missing where they are needed.
+        InputError: Labels missing where they are needed; or a network that sees several scans, of
+            which the augmentation would change one.
     """
+    view = task.make_view(threads=1 if loading.workers else 0)
+    if part == "train" and loading.augmentation.moves_the_sensor and not view.window.is_one_scan:
+        raise InputError(
+            "augmentation",
+            "would turn a scan and leave those around it, which the network sees too",
+            "Set rotation_probability and mirror_probability to 0.",
+        )
     reader = ScanReader(task.card, loading.intensity_scale, task.columns)
     once = loading.counts_once(task.card)
     dataset = ScanDataset(
@@ -61,7 +69,7 @@ def scan_loader(
             "train": reader.read_distinct,
             "predict": reader.read_unlabelled,
         }.get(part, reader.read_distinct if once else reader.read),
-        task.make_view(threads=1 if loading.workers else 0),
+        view,
         reader,
         loading.augmentation if part == "train" else None,
         run_seed(),

@@ -9,6 +9,7 @@ from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.order import Pick
 from derain.datamodules.reader import ScanReader
+from derain.datamodules.windows import seen
 from derain.errors import InputError
 from derain.learning.batch import Batch, Sample
 from derain.learning.seeds import Draw, generator_of
@@ -77,7 +78,8 @@ class ScanDataset(Dataset[Sample | InputError]):
     def _sample(self, pick: Pick) -> Sample:
         frame = self.frames[pick.number]
         scan = self._changed(self.read(frame), pick)
-        return Sample.of(scan, self.view(scan), self.card, pick.measured, frame.key)
+        view = seen(self.view, scan, self.frames, pick.number, self.reader.read_unlabelled)
+        return Sample.of(scan, view, self.card, pick.measured, frame.key)
 
     def _changed(self, scan: Scan, pick: Pick) -> Scan:
         """The scan as training changes it in this epoch."""
@@ -88,14 +90,17 @@ class ScanDataset(Dataset[Sample | InputError]):
 
 
 class LateLoader(DataLoader[Sample | InputError]):
-    """Starts to read when the first batch is asked for.
+    """Starts to read when the first batch is asked for, and raises what went wrong in a worker.
 
     Lightning makes the iterators of a run that goes on from a checkpoint before it tells the epoch,
     and workers read ahead as soon as there is an iterator.
     """
 
     def __iter__(self) -> Any:
-        yield from super().__iter__()
+        for batch in super().__iter__():
+            if isinstance(batch, InputError):
+                raise batch
+            yield batch
 
 
 def packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:

@@ -76,6 +76,11 @@ class Sequences(SequenceDataModule):
     A data set that derain does not know needs no code, but a card: what its folders are called, its
     split, its classes, and whether points at one position count once.
 
+    Example:
+        >>> data = Sequences("KITTI", card="kitti")
+        >>> data.layout.scans, data.split["validation"]
+        ('velodyne', ('08', '09'))
+
     Args:
         root: Folder of the data set.
         card: Name of a packaged data card, or a YAML file.

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from derain.errors import InputError
 from derain.evaluation.metrics import RainMetrics
 from derain.learning.batch import Batch
 from derain.learning.mean_losses import MeanLosses
@@ -73,12 +72,6 @@ class MeasuredModule(lightning.LightningModule, ABC):
             ``loss`` and what it is made of, each a scalar, by name; and the logits of "not rain"
             and "rain" of every cell, float (M, 2).
         """
-
-    def on_before_batch_transfer(self, batch: Batch | InputError, dataloader_idx: int) -> Batch:
-        """Raises what went wrong where the batch was made, perhaps in another process."""
-        if isinstance(batch, InputError):
-            raise batch
-        return batch
 
     def validation_step(self, batch: Batch) -> list[NDArray[np.float32]]:
         """Loss of one batch, its points counted, and the probability of each, as for predict."""
