@@ -56,7 +56,7 @@ def _print_shares(root: Path) -> None:
 
 def _print_distances(root: Path) -> None:
     data = Simulated(str(root), make=False)
-    scans = map(data.read, data.files("test"))
+    scans = map(data.read, data.frames("test"))
     distance = np.concatenate([scan.range[data.card.rain_of(scan)] for scan in scans])
     median, most = np.percentile(distance, [50, 90])
     print(f"\ndistance of rain in the test scans: median {median:.1f} m, 90 % within {most:.1f} m")

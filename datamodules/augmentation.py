@@ -41,6 +41,11 @@ class Augmentation:
     dropping_probability: float = 0.0
     dropping: float = 0.5
 
+    @property
+    def moves_the_sensor(self) -> bool:
+        """Whether it turns or mirrors whole scans, each in its own way."""
+        return max(self.rotation_probability, self.mirror_probability) > 0
+
     def __call__(
         self, scan: Scan, rng: np.random.Generator, azimuth: tuple[float, float] = ALL_AROUND
     ) -> Scan:

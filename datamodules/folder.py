@@ -5,9 +5,10 @@ from pathlib import Path
 
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading, Part, ScanDataModule
-from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
 from derain.files.labels import label_beside
+from derain.sources.folders import frames_of, relative_keys
+from derain.sources.source import Source
 
 
 class Folder(ScanDataModule):
@@ -15,7 +16,7 @@ class Folder(ScanDataModule):
 
     Example:
         >>> data = Folder(".", card="wads", train=["*.bin"])
-        >>> [file.scan.name for file in data.files("train")]
+        >>> [frame.path.name for frame in data.frames("train")]
         ['scan.bin']
 
     Args:
@@ -41,7 +42,7 @@ class Folder(ScanDataModule):
         self.root = Path(root)
         self.patterns = {"train": train, "validation": validation, "test": test, "predict": test}
 
-    def find(self, part: Part) -> list[ScanFile]:
+    def source(self, part: Part) -> Source:
         """The scans that a part's patterns find, each pattern's in sorted order.
 
         Raises:
@@ -51,7 +52,7 @@ class Folder(ScanDataModule):
         if not patterns:
             raise InputError(self.root, f"no patterns for {part}", f"Give --data.{part}.")
         scans = [scan for pattern in patterns for scan in self._matches(pattern)]
-        return [ScanFile(scan, label_beside(scan)) for scan in scans]
+        return frames_of(scans, label_beside, self.loading.columns, relative_keys(scans))
 
     def _matches(self, pattern: str) -> list[Path]:
         found = sorted(glob(pattern, root_dir=self.root, recursive=True))

@@ -5,15 +5,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from derain.cards.card import DataCard, load_card, packaged_cards
-from derain.cards.known import card_by_folders, known_layouts, label_of
+from derain.cards.known import card_by_folders, known_layouts
 from derain.cards.layout import Layout
 from derain.datamodules.base import Loading, Part, ScanDataModule
-from derain.datamodules.scan_dataset import ScanFile
 from derain.datamodules.sequences import SequenceDataModule
 from derain.errors import InputError
-from derain.files import find_scans
 from derain.files.documents import Entry
 from derain.simulation.manifest import RAIN_RATE, rates_of_sequences, read_manifest
+from derain.sources.folders import named_frames
+from derain.sources.source import Source
 
 
 class NamedScans(ScanDataModule):
@@ -31,13 +31,13 @@ class NamedScans(ScanDataModule):
         super().__init__(card, loading)
         self.paths = paths
 
-    def find(self, part: Part) -> list[ScanFile]:
+    def source(self, part: Part) -> Source:
         """The scans, in the order they are named, those of a folder sorted by name.
 
         Raises:
             InputError: A path that does not exist, or a folder without scans.
         """
-        return [ScanFile(scan, label_of(scan)) for scan in find_scans(self.paths)]
+        return named_frames(self.paths, self.loading.columns, labelled=True)
 
 
 def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> ScanDataModule:

@@ -1,8 +1,6 @@
 """Scans of a data set one by one: read, augmented and viewed."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from torch.utils.data import DataLoader, Dataset
@@ -10,51 +8,52 @@ from torch.utils.data import DataLoader, Dataset
 from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.order import Pick
+from derain.datamodules.reader import ScanReader
+from derain.datamodules.windows import seen
 from derain.errors import InputError
 from derain.learning.batch import Batch, Sample
 from derain.learning.seeds import Draw, generator_of
 from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.spread import evenly_spaced
 from derain.views.view import View
 
 
-@dataclass(frozen=True)
-class ScanFile:
-    """Where one scan lies, and where its labels are to be read, if they are."""
-
-    scan: Path
-    label: Path | None = None
-
-
 class ScanDataset(Dataset[Sample | InputError]):
-    """Reads scans and views them.
+    """Reads the scans of frames and views them.
 
     Args:
-        files: The scans.
-        read: Reads one of them.
+        frames: The frames.
+        read: Reads the scan of one of them, as the network is to see it.
         view: What the network sees.
-        card: Data card that says which labels are rain.
+        reader: Reads scans as they are, and has the data card that says which labels are rain.
         augmentation: Changes each scan anew every epoch; None leaves them as they are.
         seed: Seed of the run; with the epoch and the scan it says how that scan is changed.
     """
 
     def __init__(
         self,
-        files: Sequence[ScanFile],
-        read: Callable[[ScanFile], Scan],
+        frames: Sequence[Frame],
+        read: Callable[[Frame], Scan],
         view: View,
-        card: DataCard,
+        reader: ScanReader,
         augmentation: Augmentation | None = None,
         seed: int = 0,
     ) -> None:
-        self.files = files
+        self.frames = frames
         self.read = read
         self.view = view
-        self.card = card
+        self.reader = reader
         self.augmentation = augmentation
         self.seed = seed
 
+    @property
+    def card(self) -> DataCard:
+        """Says which labels are rain."""
+        return self.reader.card
+
     def __len__(self) -> int:
-        return len(self.files)
+        return len(self.frames)
 
     def __getitem__(self, pick: Pick | int) -> Sample | InputError:
         # What a worker raises becomes a RuntimeError with a traceback in the training process;
@@ -65,23 +64,43 @@ class ScanDataset(Dataset[Sample | InputError]):
         except InputError as error:
             return error
 
+    def scans(self, most: int) -> Iterator[Scan]:
+        """Reads some of the scans, spread over all of them, as they are in their files.
+
+        Args:
+            most: How many, where there are so many.
+
+        Raises:
+            InputError: A scan that cannot be read.
+        """
+        return map(self.reader.read, evenly_spaced(self.frames, most))
+
     def _sample(self, pick: Pick) -> Sample:
-        scan = self.read(self.files[pick.number])
-        if self.augmentation is not None:
-            generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, pick.number)
-            scan = self.augmentation(scan, generator, self.view.azimuth)
-        return Sample.of(scan, self.view(scan), self.card, pick.measured)
+        frame = self.frames[pick.number]
+        scan = self._changed(self.read(frame), pick)
+        view = seen(self.view, scan, self.frames, pick.number, self.reader.read_unlabelled)
+        return Sample.of(scan, view, self.card, pick.measured, frame.key)
+
+    def _changed(self, scan: Scan, pick: Pick) -> Scan:
+        """The scan as training changes it in this epoch."""
+        if self.augmentation is None:
+            return scan
+        generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, pick.number)
+        return self.augmentation(scan, generator, self.view.azimuth)
 
 
 class LateLoader(DataLoader[Sample | InputError]):
-    """Starts to read when the first batch is asked for.
+    """Starts to read when the first batch is asked for, and raises what went wrong in a worker.
 
     Lightning makes the iterators of a run that goes on from a checkpoint before it tells the epoch,
     and workers read ahead as soon as there is an iterator.
     """
 
     def __iter__(self) -> Any:
-        yield from super().__iter__()
+        for batch in super().__iter__():
+            if isinstance(batch, InputError):
+                raise batch
+            yield batch
 
 
 def packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:

@@ -3,14 +3,12 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from derain.cards.card import DataCard
+from derain.cards.card import DataCard, load_card
 from derain.cards.layout import Layout
 from derain.datamodules.base import Loading, Part, ScanDataModule
-from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
-from derain.files import find_scans
-from derain.files.labels import LABEL
-from derain.files.names import scan_stem
+from derain.sources.folders import sequence_frames
+from derain.sources.source import Source
 from derain.sources.training_record import by_name
 
 
@@ -38,7 +36,7 @@ class SequenceDataModule(ScanDataModule):
         self.layout = layout
         self.split = split or card.split
 
-    def find(self, part: Part) -> list[ScanFile]:
+    def source(self, part: Part) -> Source:
         """The scans of a part's sequences, in order; for prediction those of the test part.
 
         Raises:
@@ -47,7 +45,9 @@ class SequenceDataModule(ScanDataModule):
         sequences = self.split.get("test" if part == "predict" else part, ())
         if not sequences:
             raise InputError(self.root, f"no sequences are named for {part}", "Give a split.")
-        return [file for name in sequences for file in self._sequence(name)]
+        return sequence_frames(
+            [self._folder(name) for name in sequences], self.layout, self.loading.columns
+        )
 
     def training_record(self) -> dict[str, tuple[str, ...]]:
         """Which scans it trains on: those of whole sequences.
@@ -58,7 +58,7 @@ class SequenceDataModule(ScanDataModule):
             return super().training_record()
         return by_name(self.split.get("train", ()))
 
-    def _sequence(self, name: str) -> list[ScanFile]:
+    def _folder(self, name: str) -> Path:
         folder = self.root / self.layout.sequences / name
         if not (folder / self.layout.scans).is_dir():
             raise InputError(
@@ -67,7 +67,33 @@ class SequenceDataModule(ScanDataModule):
                 "Check the root. If only some sequences are there, give `derain fit` a "
                 "--data.split, and other commands the folders of scans.",
             )
-        return [
-            ScanFile(scan, folder / self.layout.labels / f"{scan_stem(scan)}{LABEL}")
-            for scan in find_scans([folder / self.layout.scans])
-        ]
+        return folder
+
+
+class Sequences(SequenceDataModule):
+    """Any data set of sequences, of which its data card says everything.
+
+    A data set that derain does not know needs no code, but a card: what its folders are called, its
+    split, its classes, and whether points at one position count once.
+
+    Example:
+        >>> data = Sequences("KITTI", card="kitti")
+        >>> data.layout.scans, data.split["validation"]
+        ('velodyne', ('08', '09'))
+
+    Args:
+        root: Folder of the data set.
+        card: Name of a packaged data card, or a YAML file.
+        split: Sequences of ``train``, ``validation`` and ``test``, in place of the card's.
+        loading: How the scans are read and batched.
+    """
+
+    def __init__(
+        self,
+        root: str,
+        card: str,
+        split: dict[str, list[str]] | None = None,
+        loading: Loading = Loading(),
+    ) -> None:
+        known = load_card(card)
+        super().__init__(root, known, known.layout, split, loading)

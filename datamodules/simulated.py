@@ -4,12 +4,12 @@ from pathlib import Path
 
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading, Part
-from derain.datamodules.scan_dataset import ScanFile
 from derain.datamodules.sequences import SequenceDataModule
 from derain.errors import InputError
 from derain.simulation.campaign import Campaign
 from derain.simulation.dataset import ensure_track
 from derain.simulation.manifest import read_manifest
+from derain.sources.source import Source
 
 
 class Simulated(SequenceDataModule):
@@ -55,7 +55,7 @@ class Simulated(SequenceDataModule):
         if self.make:
             ensure_track(self.root, self.campaign)
 
-    def find(self, part: Part) -> list[ScanFile]:
+    def source(self, part: Part) -> Source:
         """The scans of a part's sequences, in order; for prediction those of the test part.
 
         Raises:
@@ -65,7 +65,7 @@ class Simulated(SequenceDataModule):
             raise InputError(
                 self.root, f"no sequence is for {part}", "Simulate three sequences or more."
             )
-        return super().find(part)
+        return super().source(part)
 
 
 def _split_of(root: Path) -> dict[str, list[str]]:

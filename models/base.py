@@ -1,9 +1,8 @@
 """What every derainer shares: its Spec, and how a step of training goes."""
 
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from typing import Any, ClassVar, Protocol
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import torch
 from lightning.pytorch.loggers import TensorBoardLogger
@@ -16,28 +15,11 @@ from derain.evaluation.metrics import RainMetrics
 from derain.files.documents import Entry, shown
 from derain.learning.batch import Batch
 from derain.learning.seeds import Draw, generator_of, run_seed
+from derain.learning.task import Task, TrainingData, agree
 from derain.models.measured import MeasuredModule
 from derain.scan import Scan
 from derain.spec import Spec
 from derain.views.view import View
-
-# Scans that a view or a rule is fitted to; more change its grid by nothing.
-EXAMPLES = 20
-
-
-class TrainingData(Protocol):
-    """What a derainer asks of the data module it is trained or tested with."""
-
-    card: DataCard
-
-    def training_scans(self, most: int) -> Iterator[Scan]:
-        """Some of the training scans."""
-
-    def validation_scans(self, most: int) -> Iterator[Scan]:
-        """Some of the validation scans."""
-
-    def training_record(self) -> Mapping[str, tuple[str, ...]]:
-        """Which scans it trains on, as a Spec holds it."""
 
 
 class DerainingModule(MeasuredModule):
@@ -58,7 +40,7 @@ class DerainingModule(MeasuredModule):
         AMPLIFIES: How many times more than other networks' its logits amplify rounding.
         channels: Names of its input channels, as :meth:`Scan.channel` takes them.
         network: The network itself.
-        card: Data card of the data it is trained or tested on.
+        card: Data card of the data it is trained or tested on, once that is agreed with them.
 
     Raises:
         InputError: A network without a name; no channels, or one twice.
@@ -89,6 +71,11 @@ class DerainingModule(MeasuredModule):
         # Not in the state_dict: the Spec holds them.
         self.register_buffer("mean", torch.zeros(len(channels)), persistent=False)
         self.register_buffer("std", torch.ones(len(channels)), persistent=False)
+
+    @property
+    def has_spec(self) -> bool:
+        """Whether a training or a checkpoint has said how the network is used."""
+        return self._spec is not None
 
     @property
     def spec(self) -> Spec:
@@ -201,14 +188,34 @@ class DerainingModule(MeasuredModule):
             licence=card.licence,
         )
 
+    def take(self, task: Task) -> None:
+        """Takes over what was agreed with the data: how the network is used, what is counted.
+
+        Raises:
+            InputError: A Spec of another network.
+        """
+        if task.spec is not self._spec:
+            self.adopt(task.spec)
+        self.card = task.card
+        metrics = RainMetrics(self.card.classes, self.card.rain, unknown=self.card.unknown)
+        self.metrics = metrics.to(self.device)
+
     def setup(self, stage: str) -> None:
-        """Learns from the data what the Spec and the metrics need."""
-        data: TrainingData = self.trainer.datamodule  # type: ignore[attr-defined]
-        self.card = data.card
-        if self._spec is None and stage == "fit":
-            spec = self.spec_for(self.card, list(data.training_scans(EXAMPLES)))
-            self.adopt(replace(spec, training=data.training_record()))
-        self.metrics = RainMetrics(self.card.classes, self.card.rain, unknown=self.card.unknown)
+        """Agrees with the data, unless the Spec is still to come: from a checkpoint.
+
+        Raises:
+            InputError: Neither a data module, nor a task that was agreed before.
+        """
+        data = self.trainer.datamodule  # type: ignore[attr-defined]
+        if not isinstance(data, TrainingData):
+            if not hasattr(self, "card"):
+                raise InputError(
+                    self.NAME,
+                    "is given batches by no data module, and told nothing of them",
+                    "Call derain.learning.task.agree(model, data) before.",
+                )
+        elif stage == "fit" or self.has_spec:
+            agree(self, data, training=stage == "fit")
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """Takes the Spec from the checkpoint that a run starts from.
@@ -219,7 +226,17 @@ class DerainingModule(MeasuredModule):
         spec = checkpoint.get("hyper_parameters", {}).get("spec")
         if spec is None:
             raise InputError("checkpoint", "it has no Spec", "Give a checkpoint of derain.")
+        agreed = self._spec
         self.adopt(spec)
+        data = getattr(self._trainer, "datamodule", None)
+        if isinstance(data, TrainingData):
+            agree(self, data, training=False)  # again: the checkpoint has the last word
+        elif agreed is not None and self.spec.view != agreed.view and self._trainer is not None:
+            raise InputError(
+                "checkpoint",
+                "it sees another view than the loader makes",
+                "Load the model from it before the loader is made.",
+            )
 
     def on_train_start(self) -> None:
         """Enters the run in TensorBoard's table of hyper-parameters, to be ranked by its IoU."""

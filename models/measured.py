@@ -1,7 +1,7 @@
 """What every derainer says of scans, counted and logged: validation, test and prediction."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import lightning
@@ -12,6 +12,8 @@ from torch import Tensor
 from derain.evaluation.metrics import RainMetrics
 from derain.learning.batch import Batch
 from derain.learning.mean_losses import MeanLosses
+from derain.learning.task import ReadableScans
+from derain.scan import Scan
 from derain.spec import Spec
 from derain.views.probability import probability_of_rain
 
@@ -41,6 +43,18 @@ class MeasuredModule(lightning.LightningModule, ABC):
     @abstractmethod
     def spec(self) -> Spec:
         """How the network is used."""
+
+    def validation_scans(self, most: int) -> Iterator[Scan]:
+        """Reads some of the validation scans, spread over all of them, as they are in their files.
+
+        Args:
+            most: How many, where there are so many; none where their loader is not derain's.
+
+        Raises:
+            InputError: A scan that cannot be read.
+        """
+        dataset = getattr(self.trainer.val_dataloaders, "dataset", None)
+        return dataset.scans(most) if isinstance(dataset, ReadableScans) else iter(())
 
     @abstractmethod
     def forward(self, *_: Tensor, **inputs: Tensor) -> Tensor:

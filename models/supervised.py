@@ -8,6 +8,7 @@ from torch import Tensor
 from derain.errors import InputError
 from derain.learning.batch import Batch
 from derain.learning.losses import SegmentationLoss, class_weights, segmentation_loss
+from derain.learning.task import Task
 from derain.models.base import DerainingModule
 from derain.views.view import IGNORED
 
@@ -27,7 +28,7 @@ class SupervisedModule(DerainingModule):
         self.register_buffer("class_weight", torch.ones(2), persistent=False)
 
     def setup(self, stage: str) -> None:
-        """Weighs the classes by their shares in the data.
+        """Agrees with the data.
 
         Raises:
             InputError: Data in which nothing counts as rain, to be trained on.
@@ -37,6 +38,14 @@ class SupervisedModule(DerainingModule):
             raise InputError(
                 self.card.name, "has no rain that could be learnt", "Train on data that have."
             )
+
+    def take(self, task: Task) -> None:
+        """Takes over what was agreed with the data, and weighs the classes by their shares there.
+
+        Raises:
+            InputError: A Spec of another network.
+        """
+        super().take(task)
         if (share := self.card.rain_share) is not None:
             self.class_weight.copy_(class_weights([1 - share, share]))
 

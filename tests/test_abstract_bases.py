@@ -18,7 +18,7 @@ DEMANDED = {
     Published: ("from_published",),
     View: ("of", "as_dict", "azimuth", "__call__"),
     SeenScan: ("size", "judged", "inputs", "target", "back_projection", "pack"),
-    ScanDataModule: ("find",),
+    ScanDataModule: ("source",),
     Format: ("decode", "encode"),
     PointFilter: ("judge",),
     RadiusFilter: ("radius_at",),

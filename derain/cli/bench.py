@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from derain.cli.arguments import add_threads, command_line, count
 from derain.cli.filter_help import list_filters
-from derain.cli.labelled_data import add_data_arguments, frames_of_files, labelled
+from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
 from derain.errors import InputError
 from derain.evaluation.published_tables import (
@@ -133,7 +133,11 @@ def _bench(
 
 
 def _frames(data: "ScanDataModule", part: str) -> "Frames":
-    return frames_of_files(data, data.files(part))  # type: ignore[arg-type]
+    """The scans of a part; one that is named twice is one."""
+    from derain.sources.source import Frames
+
+    frames = data.frames(part)  # type: ignore[arg-type]
+    return Frames({frame.name: frame for frame in frames}.values())
 
 
 def _labelled_frames(

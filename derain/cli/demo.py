@@ -149,7 +149,8 @@ def _rainiest(data: Path) -> Path:
     from derain.datamodules.simulated import Simulated
 
     rates = rain_rates([data], None)
-    scans = [file.scan for file in Simulated(str(data), make=False).files("test")]
+    frames = Simulated(str(data), make=False).frames("test")
+    scans = [Path(frame.name) for frame in frames]
     return max(scans, key=lambda scan: (rates[sequence_of(scan)], scan))
 
 

@@ -1,7 +1,6 @@
 """Arguments that name labelled scans, the same in every command that measures."""
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,8 +9,6 @@ from derain.cli.scan_options import add_columns, add_intensity_scale
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule
-    from derain.datamodules.scan_dataset import ScanFile
-    from derain.sources.source import Frames
 
 
 def add_data_arguments(parser: argparse.ArgumentParser, part: str) -> None:
@@ -59,11 +56,3 @@ def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanDataModul
         deduplicate=getattr(arguments, "distinct", None),
     )
     return labelled_scans(paths, card_of(paths, arguments.card), loading)
-
-
-def frames_of_files(data: "ScanDataModule", files: Sequence["ScanFile"]) -> "Frames":
-    """Some of a data module's scans as frames; one that is named twice is one frame."""
-    from derain.sources.folders import frames_of
-
-    labels = {file.scan: file.label for file in files}
-    return frames_of(list(labels), labels.get, data.loading.columns)

@@ -3,7 +3,7 @@
 import argparse
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from tqdm import tqdm
 from derain import __version__
 from derain.cli.arguments import add_threads, command_line, count
 from derain.cli.filter_help import list_filters
-from derain.cli.labelled_data import add_data_arguments, frames_of_files, labelled
+from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
 from derain.errors import InputError
 from derain.files.atomic import replacing
@@ -26,9 +26,9 @@ from derain.views.oddities import Examiner, outside_view
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule
-    from derain.datamodules.scan_dataset import ScanFile
     from derain.export.tuning import Tuned
     from derain.scan import Scan
+    from derain.sources.frame import Frame
 
 SUMMARY = "find a method's best parameters on labelled scans"
 
@@ -68,7 +68,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     notices = Notices()
     data = labelled(arguments, arguments.data)
-    files = _drawn(data.files(arguments.part), arguments.scans, arguments.seed)
+    files = _drawn(data.frames(arguments.part), arguments.scans, arguments.seed)
     refuse_unwritable(arguments.out)
     tune = _tuned_filter if arguments.method in FILTERS else _tuned_model
     tuned = tune(arguments, data, files, notices)
@@ -87,7 +87,7 @@ def main(arguments: argparse.Namespace) -> int:
 def _tuned_filter(
     arguments: argparse.Namespace,
     data: "ScanDataModule",
-    files: list["ScanFile"],
+    files: list["Frame"],
     notices: Notices,
 ) -> "Tuned":
     from derain.export.tuning import LabelledNeighbourhoods, Search, neighbours_to_find, tune_filter
@@ -105,7 +105,7 @@ def _tuned_filter(
             arguments.trials,
             arguments.seed,
             arguments.storage,
-            [str(file.scan) for file in files],
+            [file.name for file in files],
             progress.update,
         )
         return tune_filter(arguments.method, scans, search)
@@ -114,7 +114,7 @@ def _tuned_filter(
 def _tuned_model(
     arguments: argparse.Namespace,
     data: "ScanDataModule",
-    files: list["ScanFile"],
+    files: list["Frame"],
     notices: Notices,
 ) -> "Tuned":
     from derain.export.methods import load_method
@@ -130,10 +130,10 @@ def _tuned_model(
             known = scan.valid & ~data.card.unknown_of(scan)
             judgement = derainer.judge(scan)
             outside = outside_view(scan, judgement.judged, derainer.spec.data)
-            notices.tell(str(file.scan), outside)
+            notices.tell(file.name, outside)
             yield judgement.probability[known], data.card.rain_of(scan)[known]
 
-    note = overlap(arguments.method, derainer.spec, data.card, frames_of_files(data, files))
+    note = overlap(arguments.method, derainer.spec, data.card, files)
     if note is not None:
         tqdm.write(f"derain: warning: {note}", sys.stderr)
     scans = list(judged())
@@ -142,14 +142,14 @@ def _tuned_model(
     return tune_threshold(scans, derainer.spec.threshold)
 
 
-def _read(data: "ScanDataModule", examiner: Examiner, notices: Notices, file: "ScanFile") -> "Scan":
+def _read(data: "ScanDataModule", examiner: Examiner, notices: Notices, file: "Frame") -> "Scan":
     """Reads a scan, and warns of what is odd about it for the method."""
     scan = data.read_measured(file)
-    notices.tell(str(file.scan), examiner.oddities(scan))
+    notices.tell(file.name, examiner.oddities(scan))
     return scan
 
 
-def _drawn(files: list["ScanFile"], most: int, seed: int) -> list["ScanFile"]:
+def _drawn(files: Sequence["Frame"], most: int, seed: int) -> list["Frame"]:
     """At most so many of the scans, drawn at random, in their order."""
     chance = np.random.default_rng(seed)
     chosen = chance.choice(len(files), min(most, len(files)), replace=False)

@@ -21,24 +21,28 @@ class Sample:
         target: What the network is to say of each of its cells, int64 (M,); None without labels.
         measured: Whether what the network says is counted or written. It is not in training, nor
             of a scan that is only read again so that all processes take as many steps.
+        key: What is made of the scan is named by this: the key of its frame.
     """
 
     scan: Scan
     view: SeenScan
     target: Tensor | None
     measured: bool = True
+    key: str = ""
 
     @classmethod
-    def of(cls, scan: Scan, view: SeenScan, card: DataCard, measured: bool = True) -> "Sample":
+    def of(
+        cls, scan: Scan, view: SeenScan, card: DataCard, measured: bool = True, key: str = ""
+    ) -> "Sample":
         """Gives a view its target, by the labels of its scan if there are any.
 
         Cells of points of which it is not known whether they are rain are not judged.
         """
         if scan.label is None:
-            return cls(scan, view, None, measured)
+            return cls(scan, view, None, measured, key)
         target = view.target(card.rain_of(scan))
         target[view.target(card.unknown_of(scan)) == 1] = IGNORED
-        return cls(scan, view, torch.from_numpy(target), measured)
+        return cls(scan, view, torch.from_numpy(target), measured, key)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +52,12 @@ class MeasuredScan:
     Attributes:
         scan: The whole scan, with its labels where they are known.
         back_projection: Carries scores of its cells to its rows.
+        key: What is made of the scan is named by this.
     """
 
     scan: Scan
     back_projection: BackProjection
+    key: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +90,7 @@ class Batch:
             target=torch.cat(targets) if len(targets) == len(samples) else None,
             cells=[sample.view.size for sample in samples],
             measured=[
-                MeasuredScan(sample.scan, sample.view.back_projection())
+                MeasuredScan(sample.scan, sample.view.back_projection(), sample.key)
                 for sample in samples
                 if sample.measured
             ],

@@ -1,7 +1,6 @@
 """Writes what ``derain predict`` finds, one label file per scan."""
 
-import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +10,12 @@ import torch
 from lightning.pytorch.callbacks import BasePredictionWriter
 from numpy.typing import NDArray
 
-from derain.errors import InputError, printable
-from derain.files.labels import LABEL, write_labels
-from derain.files.names import beside
+from derain.errors import printable
 from derain.learning.batch import Batch
+from derain.learning.task import ReadableScans
 from derain.models.base import DerainingModule
+from derain.sources.frame import MemoryFrame
+from derain.sources.label_sink import LabelSink
 
 
 class PredictionWriter(BasePredictionWriter):
@@ -27,12 +27,11 @@ class PredictionWriter(BasePredictionWriter):
 
     def __init__(self, folder: str = "predictions") -> None:
         super().__init__(write_interval="batch")
-        self.folder = Path(folder)
-        self.root = "."
+        self.sink = LabelSink(Path(folder), "--predictions.folder")
         self.written = 0
 
     def on_predict_start(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
-        """Finds the folder that all scans lie below, before the first of them is judged.
+        """Looks at where the labels of all scans will be, before the first of them is judged.
 
         Raises:
             InputError: What is to be written would take the place of labels that are there, or
@@ -41,12 +40,9 @@ class PredictionWriter(BasePredictionWriter):
         # What is written need not be kept: probabilities of a data set fill gigabytes.
         trainer.predict_loop.return_predictions = False
         self.written = 0
-        # Not its files(), which have no labels in prediction: here they count, though none is read.
-        files = trainer.datamodule.find("predict")  # type: ignore[attr-defined]
-        scans = [file.scan for file in files]
-        self.root = os.path.commonpath([scan.parent for scan in scans])
-        self._refuse_labels(scans, [file.label for file in files])
-        self._refuse_clashes(scans)
+        dataset = getattr(trainer.predict_dataloaders, "dataset", None)
+        if isinstance(dataset, ReadableScans):
+            self.sink.refuse_clashes(dataset.frames)
         # What one process writes must not be there while another looks for labels.
         trainer.strategy.barrier()
 
@@ -65,8 +61,8 @@ class PredictionWriter(BasePredictionWriter):
             InputError: A folder that cannot be written.
         """
         for measured, probability in zip(batch.measured, prediction, strict=True):
-            path = self._target(Path(measured.scan.name))
-            write_labels(path, probability > model.spec.threshold)
+            frame = MemoryFrame(key=measured.key, scan=measured.scan)
+            self.sink.write(frame, None, probability > model.spec.threshold)
             self.written += 1
 
     def on_predict_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
@@ -75,34 +71,4 @@ class PredictionWriter(BasePredictionWriter):
         written = int(trainer.strategy.reduce(of_this, reduce_op="sum"))
         if trainer.is_global_zero:
             files = "1 label file" if written == 1 else f"{written:,} label files"
-            print(printable(f"Wrote {files} to {self.folder}"))
-
-    def _target(self, scan: Path) -> Path:
-        """Where the labels that are found for a scan are written."""
-        return beside(self.folder / os.path.relpath(scan, self.root), LABEL)
-
-    def _refuse_labels(self, scans: Sequence[Path], labels: Iterable[Path | None]) -> None:
-        """Refuses to overwrite what labels there are, where the data have them or beside a scan."""
-        known = [*filter(None, labels), *(beside(scan, LABEL) for scan in scans)]
-        # Not Path.is_file, which raises where the name has become too long by its suffix.
-        there = {os.path.realpath(label) for label in known if os.path.isfile(label)}
-        for scan in scans:
-            if os.path.realpath(target := self._target(scan)) in there:
-                raise InputError(
-                    self.folder,
-                    f"what is found for {scan} would overwrite the labels {target}",
-                    "Give --predictions.folder another folder.",
-                )
-
-    def _refuse_clashes(self, scans: Sequence[Path]) -> None:
-        """Refuses scans whose labels would have one name, such as 0.bin and 0.pcd."""
-        scan_of: dict[str, Path] = {}
-        for scan in scans:
-            target = self._target(scan)
-            other = scan_of.setdefault(os.path.realpath(target), scan)
-            if other != scan:  # patterns may well find a scan twice
-                raise InputError(
-                    self.folder,
-                    f"what is found for {other} and for {scan} would both be {target}",
-                    "Take them in two runs, and give --predictions.folder another folder in each.",
-                )
+            print(printable(f"Wrote {files} to {self.sink.folder}"))

@@ -21,7 +21,8 @@ from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.learning.batch import Batch
-from derain.models.base import EXAMPLES, DerainingModule, TrainingData
+from derain.learning.task import EXAMPLES
+from derain.models.base import DerainingModule
 from derain.models.lisnownet.network import LiSnowNetwork
 from derain.models.lisnownet.selection_rule import SelectionRule
 from derain.models.lisnownet.sparsity import sparsity_loss
@@ -242,8 +243,9 @@ class LiSnowNet(DerainingModule, Published):
         training = self.trainer.state.fn == "fit" and not self.trainer.sanity_checking
         if not training or "residual" in self.hparams["rule"]:
             return
-        data: TrainingData = self.trainer.datamodule  # type: ignore[attr-defined]
-        changes = [self._changes(scan) for scan in data.validation_scans(EXAMPLES)]
+        changes = [self._changes(scan) for scan in self.validation_scans(EXAMPLES)]
+        if not changes:  # batches that were made elsewhere
+            return
         rule = self.selection.with_residual_of(np.concatenate(changes))
         # Several processes go on with one rule, however each has rounded.
         rule = replace(rule, residual=self.trainer.strategy.broadcast(rule.residual))

@@ -87,9 +87,9 @@ def test_one_sequence_is_enough_to_look_at_but_not_to_train(run_derain, tmp_path
     outcome = run_derain("info", root, "--json")
     assert json.loads(outcome.out)["scans"] == 1
     data = Simulated(str(root), make=False)
-    assert len(data.files("train")) == 1
+    assert len(data.frames("train")) == 1
     with pytest.raises(InputError, match="no sequence is for validation"):
-        data.files("validation")
+        data.frames("validation")
 
 
 def test_fusing_the_two_sensors_again_gives_the_merged_clouds(run_derain, tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +11,8 @@ from derain.datamodules.base import ScanDataModule
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
 from derain.files.labels import write_labels
+from derain.learning.task import agree
+from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 
@@ -36,13 +37,12 @@ def write() -> Callable[..., None]:
 
 @pytest.fixture
 def connect() -> Callable[..., ScanDataModule]:
-    """Gives a data module the model that a trainer would give it."""
+    """Has a data module agree with a model, by default 3D-OutDet, as a trainer would."""
 
-    def connect(data: ScanDataModule, neighbours: int = 9) -> ScanDataModule:
-        data.setup("fit")
-        model = OutDet(neighbours=neighbours)
-        model.adopt(model.spec_for(data.card))
-        data.trainer = SimpleNamespace(lightning_module=model, world_size=1, global_rank=0)
+    def connect(
+        data: ScanDataModule, neighbours: int = 9, model: DerainingModule | None = None
+    ) -> ScanDataModule:
+        agree(OutDet(neighbours=neighbours) if model is None else model, data)
         return data
 
     return connect

@@ -3,7 +3,6 @@
 import pickle
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,13 +13,13 @@ from derain.cards.card import load_card
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.folder import Folder
-from derain.datamodules.scan_dataset import ScanFile
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.models.lisnownet import LiSnowNet
 from derain.scan import Scan
+from derain.sources.file_frame import FileFrame
 from derain.views.neighbours import NeighbourView
 
 Write = Callable[..., None]
@@ -46,9 +45,7 @@ def folder(tmp_path: Path, write: Write) -> Callable[..., Folder]:
 
 def batches(data: ScanDataModule, part: str) -> list[Batch]:
     """One epoch, as the trainer gives it to the model."""
-    # All of it first: a worker that is left in the middle takes seconds to end.
-    received = list(getattr(data, f"{part}_dataloader")())
-    return [data.on_before_batch_transfer(batch, 0) for batch in received]
+    return list(getattr(data, f"{part}_dataloader")())
 
 
 def scans(data: ScanDataModule, part: str) -> list[Scan]:
@@ -174,9 +171,8 @@ def test_statistics_are_taken_from_the_training_scans_where_the_card_has_none(
         file = tmp_path / f"{number}.bin"
         write(file, file.with_suffix(".label"), [3, 0, 0, 0], scene(40, seed=number))
     data = Folder(str(tmp_path), "simulated", train=["[01].bin"], test=["2.bin"])
-    data.setup("test")
     assert not data.card.has_statistics
-    data.setup("fit")
+    data.complete_card()
     points = np.concatenate([scene(40, seed=0), scene(40, seed=1)]).astype(np.float64)
     np.testing.assert_allclose(data.card.mean, points.mean(axis=0))
     np.testing.assert_allclose(data.card.std, points.std(axis=0))
@@ -184,26 +180,19 @@ def test_statistics_are_taken_from_the_training_scans_where_the_card_has_none(
 
 
 @pytest.fixture
-def unsupervised(small_grid: dict[str, Any]) -> Connect:
-    """Gives a data module a model that does not learn from labels."""
-
-    def connect(data: ScanDataModule) -> ScanDataModule:
-        model = LiSnowNet(small_grid, width=2)
-        data.trainer = SimpleNamespace(lightning_module=model, world_size=1, global_rank=0)
-        data.setup("fit")
-        model.adopt(model.spec_for(data.card))
-        return data
-
-    return connect
+def unsupervised(small_grid: dict[str, Any], connect: Connect) -> Connect:
+    """Has a data module agree with a model that does not learn from labels."""
+    return lambda data: connect(data, model=LiSnowNet(small_grid, width=2))
 
 
 def test_a_model_that_learns_from_no_labels_gets_none_to_train_on(
     folder: Callable[..., Folder], unsupervised: Connect
 ) -> None:
     data = unsupervised(folder())
-    assert {file.label for file in data.files("train")} == {None}
+    assert {frame.label_path for frame in data.frames("train")} == {None}
     assert {batch.target for batch in batches(data, "train")} == {None}
-    assert {scan.label for scan in data.training_scans(SCANS)} == {None}
+    scans = data.training_scans(SCANS, labelled=False)
+    assert {scan.label for scan in scans} == {None}
 
 
 def test_such_a_model_is_validated_on_the_labels_that_there_are(
@@ -216,7 +205,7 @@ def test_such_a_model_is_validated_on_the_labels_that_there_are(
     assert labelled == [True, True, False, True, True, True]
     assert batch.target is None  # there is none for all of them
     with pytest.raises(InputError, match=r"2\.bin: its labels are not at"):
-        data.files("test")
+        data.frames("test")
 
 
 @pytest.mark.parametrize("part", ["train", "validation", "test"])
@@ -226,8 +215,8 @@ def test_a_model_that_learns_from_labels_needs_them_all(
     data = connect(folder())
     (tmp_path / "2.label").unlink()
     with pytest.raises(InputError, match=r"2\.bin: its labels are not at .* Add them or leave"):
-        data.files(part)
-    assert len(data.files("predict")) == SCANS
+        data.frames(part)
+    assert len(data.frames("predict")) == SCANS
 
 
 @pytest.mark.parametrize("card", ["simulated", "rehearse3d"])
@@ -244,7 +233,7 @@ def test_range_images_of_a_batch_have_one_size(
     folder: Callable[..., Folder], unsupervised: Connect
 ) -> None:
     data = unsupervised(folder(batch_size=SCANS))
-    view = data.trainer.lightning_module.spec.make_view()
+    view = data.task.make_view()
     (batch,) = batches(data, "val")
     assert batch.inputs["image"].shape == (SCANS, 3, 18, 60)
     assert batch.inputs["valid"].shape == (SCANS, 1, 18, 60)
@@ -256,7 +245,7 @@ def test_range_images_of_a_batch_have_one_size(
 def test_the_statistics_of_a_card_are_left_alone(folder: Callable[..., Folder]) -> None:
     data = folder()
     card = data.card
-    data.setup("fit")
+    data.complete_card()
     assert data.card is card
 
 
@@ -264,7 +253,8 @@ def test_columns_are_as_stated(tmp_path: Path) -> None:
     rows = np.arange(10, dtype=np.float32).reshape(2, 5)
     rows.tofile(tmp_path / "a.bin")
     loading = Loading(columns=("x", "y", "z", "ring", "intensity"))
-    scan = Folder(str(tmp_path), "wads", loading=loading).read(ScanFile(tmp_path / "a.bin"))
+    data = Folder(str(tmp_path), "wads", test=["a.bin"], loading=loading)
+    scan = data.read(data.frames("predict")[0])
     np.testing.assert_array_equal(scan.xyz, rows[:, :3])
     np.testing.assert_array_equal(scan.intensity, rows[:, 4])
 
@@ -273,7 +263,8 @@ def test_the_instance_of_a_label_is_not_its_class(tmp_path: Path, write: Write) 
     write(tmp_path / "a.bin", points=scene(3))
     write_labels(tmp_path / "a.label", np.array([0, SNOW, 40]), np.array([7, 8, 65535]))
     data = Folder(str(tmp_path), "wads")
-    scan = data.read(ScanFile(tmp_path / "a.bin", tmp_path / "a.label"))
+    label, scan_path = tmp_path / "a.label", tmp_path / "a.bin"
+    scan = data.read(FileFrame(key="a", path=scan_path, label_path=label))
     assert scan.label is not None
     assert scan.label.tolist() == [0, SNOW, 40]
 
@@ -282,9 +273,9 @@ def test_the_instance_of_a_label_is_not_its_class(tmp_path: Path, write: Write) 
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        ("unknown class", r"2\.label: ids \[777, 778\] are no classes of WADS\. Name them"),
-        ("short labels", r"2\.label: holds 2 labels of 4 bytes for a scan of 42 points"),
-        ("half a row", r"2\.bin: 6 bytes are not whole rows of 16 bytes"),
+        ("unknown class", r"5\.label: ids \[777, 778\] are no classes of WADS\. Name them"),
+        ("short labels", r"5\.label: holds 2 labels of 4 bytes for a scan of 45 points"),
+        ("half a row", r"5\.bin: 6 bytes are not whole rows of 16 bytes"),
     ],
 )
 def test_a_file_that_cannot_be_used_is_named_from_a_worker_as_well(
@@ -296,12 +287,13 @@ def test_a_file_that_cannot_be_used_is_named_from_a_worker_as_well(
     workers: int,
 ) -> None:
     data = connect(folder(workers=workers))
+    # The last of the scans: a worker that is left in the middle takes seconds to end.
     if damage == "unknown class":
-        write_labels(tmp_path / "2.label", np.resize([778, 0, 777], 42))
+        write_labels(tmp_path / "5.label", np.resize([778, 0, 777], 45))
     elif damage == "short labels":
-        write_labels(tmp_path / "2.label", np.zeros(2, np.int64))
+        write_labels(tmp_path / "5.label", np.zeros(2, np.int64))
     else:
-        (tmp_path / "2.bin").write_bytes(b"abcdef")
+        (tmp_path / "5.bin").write_bytes(b"abcdef")
     with pytest.raises(InputError, match=message) as refusal:
         batches(data, "val")
     assert "Traceback" not in str(refusal.value)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
 from derain.files.labels import write_labels
+from derain.learning.task import agree
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 
@@ -45,14 +45,12 @@ def folder(request: pytest.FixtureRequest, tmp_path: Path) -> MakeFolder:
         write_labels(path.with_suffix(".label"), np.arange(60) % 2 * 3)
     (tmp_path / "card.yaml").write_text(CARD)
 
-    def make(model: OutDet | None, **loading: Any) -> Folder:
+    def make(**loading: Any) -> Folder:
         parts = {part: [f"*.{request.param}"] for part in ("train", "validation", "test")}
         loading = {"columns": COLUMNS, **loading}
-        data = Folder(
+        return Folder(
             str(tmp_path), str(tmp_path / "card.yaml"), **parts, loading=Loading(**loading)
         )
-        data.trainer = SimpleNamespace(lightning_module=model, world_size=1, global_rank=0)
-        return data
 
     return make
 
@@ -61,14 +59,13 @@ def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(
     folder: MakeFolder,
 ) -> None:
     model = OutDet(channels=("x", "y", "z", "intensity", "rcs", "radar", "doppler"))
-    data = folder(model)
-    data.setup("fit")
+    data = folder()
+    agree(model, data)
     scans = [fused(number) for number in range(3)]
     for name in ("radar", "doppler", "rcs"):
         values = np.concatenate([scan.fields[name] for scan in scans])
         expected = (np.nanmean(values), np.nanstd(values))
         np.testing.assert_allclose(data.card.extra[name], expected, rtol=1e-5)
-    model.adopt(model.spec_for(data.card))
     assert model.spec.units[4:] == ("dBsm", "0 or 1", "m/s")
     for number, batch in enumerate(data.test_dataloader()):
         (measured,) = batch.measured
@@ -83,25 +80,23 @@ def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(
 
 
 def test_a_model_that_names_none_is_given_none(folder: MakeFolder) -> None:
-    model = OutDet()
-    data = folder(model)
-    data.setup("fit")
+    data = folder()
+    agree(OutDet(), data)
     assert data.card.extra == {}
-    assert data.read(data.files("train")[0]).fields == {}
+    assert data.read(data.frames("train")[0]).fields == {}
 
 
 def test_without_a_model_every_column_is_read(folder: MakeFolder) -> None:
-    data = folder(None)
-    assert set(data.read(data.files("train")[0]).fields) == set(COLUMNS)
+    data = folder()
+    assert set(data.read(data.frames("train")[0]).fields) == set(COLUMNS)
 
 
 def test_columns_stay_with_their_points_where_training_drops_and_turns_points(
     folder: MakeFolder,
 ) -> None:
     model = OutDet(channels=("x", "y", "z", "intensity", "rcs"))
-    data = folder(model, augmentation=Augmentation(dropping_probability=1, dropping=0.5))
-    data.setup("fit")
-    model.adopt(model.spec_for(data.card))
+    data = folder(augmentation=Augmentation(dropping_probability=1, dropping=0.5))
+    agree(model, data)
     lost = 0
     loader = data.train_dataloader()
     for pick in loader.sampler:
@@ -118,14 +113,14 @@ def test_columns_stay_with_their_points_where_training_drops_and_turns_points(
 
 
 def test_a_channel_that_the_scans_have_not_is_one_error_before_training(folder: MakeFolder) -> None:
-    data = folder(OutDet(channels=("x", "y", "z", "dopler")))
+    model = OutDet(channels=("x", "y", "z", "dopler"))
     with pytest.raises(InputError, match="channel 'dopler': no training scan holds a number"):
-        data.setup("fit")
+        agree(model, folder())
 
 
 def test_what_the_card_says_of_a_channel_is_not_measured(folder: MakeFolder) -> None:
-    data = folder(OutDet(channels=("x", "y", "z", "rcs", "doppler")))
+    data = folder()
     data.card = data.card.completed(extra={"rcs": (1.0, 2.0)})
-    data.setup("fit")
+    agree(OutDet(channels=("x", "y", "z", "rcs", "doppler")), data)
     assert set(data.card.extra) == {"rcs", "doppler"}
     assert data.card.extra["rcs"] == (1, 2)

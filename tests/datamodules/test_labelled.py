@@ -37,7 +37,7 @@ def simulated(tmp_path: Path, write: Write) -> Path:
 
 def found(paths: list[Path], card: str, part: str = "test") -> list[str]:
     data = labelled_scans(paths, load_card(card), Loading())
-    return [str(file.label.relative_to(paths[0].parent)) for file in data.files(part)]
+    return [str(frame.label_path.relative_to(paths[0].parent)) for frame in data.frames(part)]
 
 
 def test_files_and_folders_are_taken_with_the_labels_beside_them(
@@ -48,7 +48,7 @@ def test_files_and_folders_are_taken_with_the_labels_beside_them(
         write(tmp_path / f"velodyne/{frame}.bin", tmp_path / f"labels/{frame}.label")
     paths = [tmp_path / "a/single.bin", tmp_path / "velodyne"]
     data = labelled_scans(paths, load_card("kitti"), Loading())
-    assert [file.label for file in data.files("test")] == [
+    assert [frame.label_path for frame in data.frames("test")] == [
         tmp_path / "a/single.label",
         tmp_path / "labels/0.label",
         tmp_path / "labels/1.label",

@@ -66,9 +66,9 @@ def test_scans_come_in_the_order_of_the_split_with_their_labels(
     data_set: Callable[..., SequenceDataModule], root: Path
 ) -> None:
     scans, labels = FOLDERS[data_set]
-    files = data_set(root=str(root), split=SPLIT).files("train")
+    frames = data_set(root=str(root), split=SPLIT).frames("train")
     sequences = root / "sequences"
-    assert [(file.scan, file.label) for file in files] == [
+    assert [(frame.path, frame.label_path) for frame in frames] == [
         (
             sequences / sequence / scans / f"{frame}.bin",
             sequences / sequence / labels / f"{frame}.label",
@@ -82,12 +82,12 @@ def test_prediction_is_on_the_test_scans_which_need_no_labels(
     data_set: Callable[..., SequenceDataModule], root: Path
 ) -> None:
     data = data_set(root=str(root), split=SPLIT)
-    files = data.files("predict")
-    assert [file.scan.stem for file in files] == ["000000", "000001"]
-    assert {file.scan.parts[-3] for file in files} == {"011"}
-    assert {file.label for file in files} == {None}
+    frames = data.frames("predict")
+    assert [frame.key for frame in frames] == ["000000", "000001"]
+    assert {frame.sequence for frame in frames} == {"011"}
+    assert {frame.label_path for frame in frames} == {None}
     with pytest.raises(InputError, match=r"011/.*000000\.bin: its labels are not at .*\.label"):
-        data.files("test")
+        data.frames("test")
 
 
 def test_folders_can_have_other_names(tmp_path: Path, write: Write) -> None:
@@ -96,7 +96,7 @@ def test_folders_can_have_other_names(tmp_path: Path, write: Write) -> None:
         write(tmp_path / "runs" / "17" / "ouster" / f"{frame}.pcd", label)
     layout = Layout(sequences="runs", scans="ouster", labels="truth")
     data = Rehearse3D(root=str(tmp_path), layout=layout, split={"train": ["17"]})
-    assert [file.scan.name for file in data.files("train")] == ["a.pcd", "b.pcd"]
+    assert [frame.path.name for frame in data.frames("train")] == ["a.pcd", "b.pcd"]
 
 
 def test_a_part_without_sequences_is_refused(
@@ -105,7 +105,7 @@ def test_a_part_without_sequences_is_refused(
     data: Any = data_set(root=str(root), split={"train": ["003"]})
     for part in ("validation", "test", "predict"):
         with pytest.raises(InputError, match=f"{root}: no sequences are named for {part}"):
-            data.files(part)
+            data.frames(part)
 
 
 def test_a_sequence_that_is_not_there_is_named(
@@ -113,12 +113,12 @@ def test_a_sequence_that_is_not_there_is_named(
 ) -> None:
     data = data_set(root=str(root), split={"train": ["003", "099"]})
     with pytest.raises(InputError, match=f"099/{FOLDERS[data_set][0]}: no such folder, though"):
-        data.files("train")
+        data.frames("train")
 
 
 def test_a_root_that_is_not_there_is_named(data_set: Callable[..., SequenceDataModule]) -> None:
     with pytest.raises(InputError, match=r"nowhere/sequences/.*: no such folder"):
-        data_set(root="nowhere").files("train")
+        data_set(root="nowhere").frames("train")
 
 
 def test_a_sequence_without_scans_is_named(
@@ -127,14 +127,14 @@ def test_a_sequence_without_scans_is_named(
     scans, _ = FOLDERS[data_set]
     (tmp_path / "sequences" / "003" / scans).mkdir(parents=True)
     with pytest.raises(InputError, match=f"003/{scans}: holds no scans"):
-        data_set(root=str(tmp_path), split={"train": ["003"]}).files("train")
+        data_set(root=str(tmp_path), split={"train": ["003"]}).frames("train")
 
 
 def test_the_real_sequence_is_found(shared: Path) -> None:
     data = Wads(root=str(shared / "data/wads"), split={"train": ["36"]})
-    files = data.files("train")
-    assert len(files) == 10
-    scan = data.read(files[0])
+    frames = data.frames("train")
+    assert len(frames) == 10
+    scan = data.read(frames[0])
     assert len(scan) > 200_000
     assert scan.label is not None
     assert {110, 111} <= set(scan.label.tolist())

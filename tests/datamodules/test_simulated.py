@@ -36,13 +36,13 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_part_has_its_sequences_and_every_scan_its_labels(root: Path) -> None:
     data = Simulated(str(root), TINY)
-    counts = {part: len(data.files(part)) for part in ("train", "validation", "test", "predict")}
+    counts = {part: len(data.frames(part)) for part in ("train", "validation", "test", "predict")}
     assert counts == {"train": 4, "validation": 2, "test": 2, "predict": 2}
     sequences = {
-        file.scan.parts[-3] for part in ("train", "validation", "test") for file in data.files(part)
+        frame.sequence for part in ("train", "validation", "test") for frame in data.frames(part)
     }
     assert sequences == {"000", "001", "002", "003"}
-    scan = data.read(data.files("train")[0])
+    scan = data.read(data.frames("train")[0])
     assert scan.label is not None
     assert (scan.label == 3).any()
 
@@ -57,7 +57,7 @@ def test_what_is_there_is_not_made_again(root: Path) -> None:
 def test_the_card_gets_its_statistics_from_the_training_scans(root: Path) -> None:
     data = Simulated(str(root), TINY)
     assert not data.card.has_statistics
-    data.setup("fit")
+    data.complete_card()
     assert data.card.has_statistics
     assert 0 < data.card.rain_share < 0.5
 
@@ -68,7 +68,7 @@ def test_a_data_set_that_is_there_is_taken_as_it_is(root: Path) -> None:
     data.prepare_data()
     assert {file: file.stat().st_mtime_ns for file in root.rglob("*")} == before
     assert data.split == TINY.split
-    assert len(data.files("train")) == 4
+    assert len(data.frames("train")) == 4
 
 
 def test_what_is_not_to_be_made_must_be_there(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def iou(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
 
 
 def truths(data: Simulated, part: str) -> list[tuple[Scan, NDArray[np.bool_]]]:
-    scans = [data.read(file) for file in data.files(part)]
+    scans = [data.read(frame) for frame in data.frames(part)]
     return [(scan, scan.label == RAIN) for scan in scans]
 
 
@@ -240,7 +240,7 @@ def test_a_checkpoint_of_a_run_is_a_model(
     copy = load_model(tmp_path / "run.ckpt")
     assert copy.spec == model.spec
     assert copy.spec.view == {"kind": "neighbours", "neighbours": 6}
-    assert copy.spec.training == by_fingerprint([tmp_path / f"{n}.bin" for n in range(3)])
+    assert copy.spec.training == by_fingerprint(scenes().frames("train"))
     assert_same(copy, model)
 
 

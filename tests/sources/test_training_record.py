@@ -8,58 +8,50 @@ import pytest
 
 from derain.cards.card import load_card
 from derain.export.model_file import ModelFile
+from derain.sources.file_frame import ENDS, FileFrame
 from derain.sources.folders import named_frames
-from derain.sources.training_record import (
-    ENDS,
-    MOST_NAMES,
-    by_fingerprint,
-    by_name,
-    fingerprint,
-    overlap,
-)
+from derain.sources.source import Source
+from derain.sources.training_record import MOST_NAMES, by_fingerprint, by_name, overlap
 
 CARD = load_card("wads")
 SPEC = ModelFile.read(Path(__file__).parents[1] / "export/kept/outdet.onnx").spec
 
 
 @pytest.fixture
-def scans(tmp_path: Path) -> list[Path]:
+def scans(tmp_path: Path) -> Source:
     """Two scans of a sequence and one of another, each of its own content."""
     paths = [tmp_path / f"sequences/{name}.bin" for name in ("11/v/a", "11/v/b", "12/v/a")]
     for number, path in enumerate(paths):
         path.parent.mkdir(parents=True, exist_ok=True)
         np.full(4 * 10, number, "<f4").tofile(path)
-    return paths
+    return named_frames(paths)
 
 
-def test_a_sequence_is_known_by_its_name_where_the_data_are_the_same(scans: list[Path]) -> None:
+def test_a_sequence_is_known_by_its_name_where_the_data_are_the_same(scans: Source) -> None:
     spec = replace(SPEC, training=by_name(["10", "11"]))
-    note = overlap("mine", spec, CARD, named_frames(scans))
+    note = overlap("mine", spec, CARD, scans)
     assert note is not None
-    assert note.startswith(f"mine was trained on 2 of these 3 scans, such as {scans[0]}")
-    assert (
-        overlap("mine", replace(spec, training=by_name(["10", "13"])), CARD, named_frames(scans))
-        is None
-    )
+    assert note.startswith(f"mine was trained on 2 of these 3 scans, such as {scans[0].name}")
+    assert overlap("mine", replace(spec, training=by_name(["10", "13"])), CARD, scans) is None
     # Sequences of other data may well be called the same.
-    assert overlap("mine", replace(spec, data="other data"), CARD, named_frames(scans)) is None
+    assert overlap("mine", replace(spec, data="other data"), CARD, scans) is None
 
 
-def test_a_scan_is_known_by_its_content_wherever_it_lies(scans: list[Path], tmp_path: Path) -> None:
+def test_a_scan_is_known_by_its_content_wherever_it_lies(scans: Source, tmp_path: Path) -> None:
     spec = replace(SPEC, training=by_fingerprint(scans[:1]), data="whatever")
     moved = tmp_path / "elsewhere" / "other_name.bin"
     moved.parent.mkdir()
-    moved.write_bytes(scans[0].read_bytes())
-    note = overlap("mine", spec, CARD, named_frames([scans[1], moved]))
+    moved.write_bytes(Path(scans[0].name).read_bytes())
+    note = overlap("mine", spec, CARD, [scans[1], *named_frames([moved])])
     assert note is not None
     assert note.startswith(f"mine was trained on 1 of these 2 scans, such as {moved}")
     # One of the same name in a folder of the same name is another.
-    assert overlap("mine", spec, CARD, named_frames(scans[1:])) is None
+    assert overlap("mine", spec, CARD, scans[1:]) is None
 
 
-def test_nothing_is_said_where_nothing_is_known(scans: list[Path]) -> None:
+def test_nothing_is_said_where_nothing_is_known(scans: Source) -> None:
     assert by_fingerprint([]) == by_name([]) == {}
-    assert overlap("mine", replace(SPEC, training={}), CARD, named_frames(scans)) is None
+    assert overlap("mine", replace(SPEC, training={}), CARD, scans) is None
 
 
 def test_both_ends_and_the_length_of_a_file_tell_it_from_others(tmp_path: Path) -> None:
@@ -68,12 +60,14 @@ def test_both_ends_and_the_length_of_a_file_tell_it_from_others(tmp_path: Path) 
     prints = set()
     for content in contents:
         (tmp_path / "scan.bin").write_bytes(content)
-        prints.add(fingerprint(tmp_path / "scan.bin"))
+        prints.add(FileFrame(key="scan", path=tmp_path / "scan.bin").fingerprint())
     assert len(prints) == len(contents)
     assert all(len(print_) == 16 for print_ in prints)
 
 
-def test_a_record_stays_small(scans: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_record_stays_small(scans: Source, monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(by_name(map(str, range(2 * MOST_NAMES)))["sequences"]) == MOST_NAMES
     monkeypatch.setattr("derain.sources.training_record.MOST_NAMES", 2)
-    assert by_fingerprint(scans) == {"scans": tuple(sorted(map(fingerprint, scans[::2])))}
+    assert by_fingerprint(scans) == {
+        "scans": tuple(sorted(frame.fingerprint() for frame in scans[::2]))
+    }

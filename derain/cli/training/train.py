@@ -25,6 +25,7 @@ from derain.datamodules.base import ScanDataModule
 from derain.datamodules.folder import Folder
 from derain.datamodules.rehearse3d import Rehearse3D
 from derain.datamodules.scan_check import ScanCheck
+from derain.datamodules.sequences import Sequences
 from derain.datamodules.simulated import Simulated
 from derain.datamodules.wads import Wads
 from derain.errors import InputError
@@ -52,6 +53,7 @@ class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatt
 __all__ = [
     "Folder",
     "Rehearse3D",
+    "Sequences",
     "Simulated",
     "Wads",
     "train",
@@ -64,7 +66,7 @@ def choices() -> dict[str, tuple[type, ...]]:
     They are loaded then, and a configuration may name their classes without a module.
     """
     return {
-        "data": (Folder, Rehearse3D, Simulated, Wads),
+        "data": (Folder, Rehearse3D, Sequences, Simulated, Wads),
         "model": tuple(NETWORKS.values()),
         "trainer.logger": (TensorBoardLogger,),
     }

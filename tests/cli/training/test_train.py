@@ -245,3 +245,27 @@ def test_a_run_that_goes_on_keeps_what_was_best_before(run_derain, wads: list[st
     assert (second / "best.ckpt").read_bytes() == (first / "best.ckpt").read_bytes()
     assert run_derain("test", *wads, "--ckpt_path", first / "last.ckpt").code == 0
     assert not Path("runs/outdet_wads/version_2/checkpoints").exists()  # nothing was trained
+
+
+def test_a_data_set_of_any_layout_is_trained_on_with_a_card_alone(
+    run_derain, write_labelled: Callable[..., None]
+) -> None:
+    for name in ("monday", "tuesday"):
+        folder = Path("drives/recordings") / name
+        write_labelled(folder / "ouster/0.bin", folder / "truth/0.label", rain=7)
+    Path("card.yaml").write_text(
+        "name: drives\nclasses: {0: other, 7: spray}\nrain: [7]\n"
+        "layout: {sequences: recordings, scans: ouster, labels: truth}\n"
+        "split: {train: [monday], validation: [tuesday], test: [tuesday]}\n"
+    )
+    options = [
+        *("--model", "OutDet", "--data", "Sequences"),
+        *("--data.root", "drives", "--data.card", "card.yaml"),
+        *("--trainer.max_epochs", "1", "--trainer.enable_progress_bar", "false"),
+    ]
+    assert run_derain("fit", *options).code == 0
+    (last,) = Path().rglob("last.ckpt")
+    spec = load_model(last).spec
+    assert (spec.data, spec.rain, spec.training) == ("drives", (7,), {"sequences": ("monday",)})
+    assert run_derain("predict", *options, "--ckpt_path", last).code == 0
+    assert [path.name for path in Path("predictions").iterdir()] == ["0.label"]

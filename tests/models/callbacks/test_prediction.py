@@ -52,8 +52,8 @@ def test_what_is_written_is_not_kept(
     assert max(alive.counts) <= 1  # that of the batch before may wait for this one's
     assert f"Wrote 4 label files to {out}\n" in capsys.readouterr().out
     kept = make_trainer(1).predict(model, data)  # who writes nothing is given what was found
-    for file, (probability,) in zip(data.files("predict"), kept, strict=True):
-        label = out / file.scan.relative_to(data.root).with_suffix(".label")
+    for frame, (probability,) in zip(data.frames("predict"), kept, strict=True):
+        label = out / frame.path.relative_to(data.root).with_suffix(".label")
         expected = probability > model.spec.threshold
         np.testing.assert_array_equal(np.fromfile(label, "<u4"), expected)
 
@@ -91,7 +91,8 @@ def test_scans_whose_labels_would_have_one_name_are_refused(
     out = tmp_path / "out"
     with pytest.raises(InputError, match="would both be") as refused:
         make_trainer(1, callbacks=[PredictionWriter(str(out))]).predict(outdet(), data)
-    assert f"{tmp_path / 'a/1.bin'} and for {tmp_path / 'a/1.BIN'}" in refused.value.reason
+    assert {refused.value.subject} < {str(tmp_path / "a/1.bin"), str(tmp_path / "a/1.BIN")}
+    assert "--predictions.folder" in refused.value.remedy
     assert not out.exists()
 
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from derain.cards.card import load_card
-from derain.datamodules import base
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.errors import InputError
@@ -29,6 +28,7 @@ from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule
 from derain.models.lisnownet.sparsity import sparsity_loss
 from derain.models.measured import MONITOR
 from derain.scan import Scan
+from derain.sources import file_frame
 from derain.views.probability import probability_of_rain
 from derain.views.spherical_grid import grid_of
 
@@ -325,13 +325,13 @@ def test_garbage_in_place_of_training_labels_changes_nothing(
 def test_training_opens_no_label_file_and_validation_only_its_own(
     train: Callable[..., Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened, read = set(), base.read_labels
+    opened, read = set(), file_frame.read_labels
 
     def recorded(path: Path, points: int) -> NDArray[np.uint32]:
         opened.add(path)
         return read(path, points)
 
-    monkeypatch.setattr(base, "read_labels", recorded)
+    monkeypatch.setattr(file_frame, "read_labels", recorded)
     train()
     assert opened == {tmp_path / "3.label"}
 

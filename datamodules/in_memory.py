@@ -1,0 +1,77 @@
+"""Scans that are in memory already."""
+
+from collections.abc import Sequence
+
+from derain.cards.card import DataCard, load_card
+from derain.datamodules.base import Loading, Part, ScanDataModule
+from derain.errors import InputError
+from derain.scan import Scan
+from derain.sources.source import Frames, Source
+
+Scans = Sequence[Scan] | Source
+
+
+class InMemory(ScanDataModule):
+    """Scans in memory, or of any source, to be trained on, measured and predicted.
+
+    Example:
+        >>> import numpy as np
+        >>> from lightning import Trainer
+        >>> from derain.models.outdet import OutDet
+        >>> points = np.random.default_rng(0).normal(size=(100, 4))
+        >>> scan = Scan.of(points).with_label(np.resize([0, 110], 100))
+        >>> data = InMemory(train=[scan] * 3, validation=[scan], test=[scan], card="wads")
+        >>> model = OutDet()
+        >>> quiet = {"logger": False, "enable_progress_bar": False, "enable_checkpointing": False}
+        >>> trainer = Trainer(max_epochs=1, accelerator="cpu", **quiet)
+        >>> trainer.fit(model, data)
+        >>> (scores,) = trainer.test(model, data, verbose=False)
+        >>> 0 <= scores["test/iou"] <= 1
+        True
+        >>> [[rain]] = trainer.predict(model, data)
+        >>> rain.shape  # the probability of every point
+        (100,)
+
+    Args:
+        train: The training scans, in time order, with the labels that they have.
+        validation: The validation scans.
+        test: The scans that are tested and predicted.
+        card: Their data card: itself, the name of a packaged one, or a YAML file.
+        loading: How the scans are batched.
+
+    Raises:
+        InputError: No such data card.
+    """
+
+    def __init__(
+        self,
+        train: Scans = (),
+        validation: Scans = (),
+        test: Scans = (),
+        *,
+        card: DataCard | str,
+        loading: Loading = Loading(),
+    ) -> None:
+        super().__init__(card if isinstance(card, DataCard) else load_card(card), loading)
+        test = _source(test, "test")
+        self.sources: dict[Part, Source] = {
+            "train": _source(train, "train"),
+            "validation": _source(validation, "validation"),
+            "test": test,
+            "predict": test,
+        }
+
+    def source(self, part: Part) -> Source:
+        """The scans of a part.
+
+        Raises:
+            InputError: A part without scans.
+        """
+        if not self.sources[part]:
+            name = "test" if part == "predict" else part
+            raise InputError(name, "there are no scans for it", f"Give scans: {name}=[...].")
+        return self.sources[part]
+
+
+def _source(scans: Scans, part: str) -> Source:
+    return scans if isinstance(scans, Source) else Frames.of_scans(scans, part)

@@ -1,0 +1,36 @@
+"""How scans are read and batched."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from derain.cards.card import DataCard
+from derain.datamodules.augmentation import Augmentation
+from derain.files import DEFAULT_COLUMNS
+
+Part = Literal["train", "validation", "test", "predict"]
+
+
+@dataclass(frozen=True)
+class Loading:
+    """How scans are read and batched.
+
+    Attributes:
+        batch_size: Scans in a batch.
+        workers: Processes that read and view scans; 0 does it in the training process.
+        columns: Names of the columns of files that do not name them.
+        intensity_scale: What takes the scans' intensities to the unit of the data card, e.g. 255.
+        deduplicate: Whether points at one position are measured once; None does as the data card
+            says. Predictions are for every row in any case.
+        augmentation: What training changes about its scans.
+    """
+
+    batch_size: int = 1
+    workers: int = 0
+    columns: tuple[str, ...] = DEFAULT_COLUMNS
+    intensity_scale: float = 1.0
+    deduplicate: bool | None = None
+    augmentation: Augmentation = field(default_factory=Augmentation)
+
+    def counts_once(self, card: DataCard) -> bool:
+        """Whether points at one position are measured once."""
+        return card.deduplicate if self.deduplicate is None else self.deduplicate

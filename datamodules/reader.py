@@ -1,0 +1,55 @@
+"""How the scan of a frame is read for a model or a measurement."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from derain.cards.card import DataCard
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.labelled import with_labels
+from derain.views.channels import with_columns
+from derain.views.morton import first_rows
+
+
+@dataclass(frozen=True)
+class ScanReader:
+    """Reads scans in the unit of their data card, with the labels that their frames have.
+
+    Attributes:
+        card: Says which labels there are.
+        intensity_scale: What takes the scans' intensities to the unit of the card.
+        columns: Which columns to keep besides those that every scan has: to a model, the others
+            would only cost memory. None keeps all.
+    """
+
+    card: DataCard
+    intensity_scale: float = 1.0
+    columns: Sequence[str] | None = None
+
+    def read(self, frame: Frame) -> Scan:
+        """Reads all rows of a scan, with its labels if they are to be read.
+
+        Raises:
+            InputError: A scan that cannot be read, or labels that are not in the data card.
+        """
+        scan = self.read_unlabelled(frame)
+        wanted = frame.label_path is not None or frame.has_labels
+        return with_labels(scan, frame, self.card) if wanted else scan
+
+    def read_unlabelled(self, frame: Frame) -> Scan:
+        """Reads all rows of a scan, whether or not there are labels.
+
+        Raises:
+            InputError: A scan that cannot be read.
+        """
+        scan = frame.read().with_intensity_times(self.intensity_scale)
+        return scan if self.columns is None else with_columns(scan, self.columns)
+
+    def read_distinct(self, frame: Frame) -> Scan:
+        """Reads a scan with its labels, and of the points at one position the first.
+
+        Raises:
+            InputError: A scan that cannot be read, or labels that are not in the data card.
+        """
+        scan = self.read(frame)
+        return scan.take(first_rows(scan))

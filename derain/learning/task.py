@@ -1,0 +1,128 @@
+"""What a model and its data agree on, once, before the first batch.
+
+The data say what there is: a card, training scans. The model says what it needs: columns, labels, a
+view fitted to some of the scans. What comes of it is the :class:`Task`, which both are given; from
+then on neither asks the other anything.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, Protocol, runtime_checkable
+
+from derain.cards.card import DataCard
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.spec import Spec
+from derain.views.channels import extra_channels
+from derain.views.view import View
+
+# Scans that a view or a rule is fitted to; more change its grid by nothing.
+EXAMPLES = 20
+
+
+@dataclass(frozen=True)
+class Task:
+    """How a model and its data work together.
+
+    Attributes:
+        card: Data card of the scans, with the statistics that training needs.
+        spec: How the network is used: its view, channels and normalisation.
+        reads_labels: Whether training learns from labels; where not, none is read for it.
+    """
+
+    card: DataCard
+    spec: Spec
+    reads_labels: bool = True
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of a scan that the network sees besides those that every scan has."""
+        return extra_channels(self.spec.channels)
+
+    def make_view(self, threads: int = 0) -> View:
+        """The view that the network sees a scan through, on so many threads; 0 takes all cores."""
+        return self.spec.make_view(threads)
+
+
+class Learner(Protocol):
+    """What an agreement asks of a model."""
+
+    LEARNS_FROM_LABELS: ClassVar[bool]
+    channels: tuple[str, ...]
+
+    @property
+    def has_spec(self) -> bool:
+        """Whether it knows already how it is used, from a training or a checkpoint."""
+
+    @property
+    def spec(self) -> Spec:
+        """How it is used.
+
+        Raises:
+            InputError: Nobody has said so yet.
+        """
+
+    def spec_for(self, card: DataCard, scans: Sequence[Scan]) -> Spec:
+        """How it is used on a data set, fitted to some training scans."""
+
+    def take(self, task: Task) -> None:
+        """Takes over what was agreed."""
+
+
+@runtime_checkable
+class TrainingData(Protocol):
+    """What an agreement asks of a data module."""
+
+    card: DataCard
+    task: Task | None
+
+    def complete_card(self, columns: Sequence[str], labelled: bool) -> None:
+        """Gives the data card the statistics that it lacks, of some columns too."""
+
+    def training_scans(
+        self, most: int, columns: Sequence[str] | None = None, labelled: bool = True
+    ) -> Iterator[Scan]:
+        """Some of the training scans."""
+
+    def training_record(self) -> Mapping[str, tuple[str, ...]]:
+        """Which scans it trains on, as a Spec holds it."""
+
+
+@runtime_checkable
+class ReadableScans(Protocol):
+    """A data set of a loader whose scans can be read besides, as they are in their files."""
+
+    frames: Sequence[Frame]
+
+    def scans(self, most: int) -> Iterator[Scan]:
+        """Some of them, spread over all."""
+
+
+def agree(model: Learner, data: TrainingData, training: bool = True) -> Task:
+    """Settles how a model and its data work together, and gives it to both.
+
+    Lightning's trainer has it done by the model's ``setup`` wherever there is a data module. It is
+    called by hand where loaders are made by :func:`derain.datamodules.loader.scan_loader`.
+
+    Args:
+        model: The model. One that has a Spec, of an earlier training or of a checkpoint, keeps it.
+        data: Its data module.
+        training: Whether the model is to be trained: then what the data card lacks is measured,
+            and a model without a Spec gets one, its view fitted to training scans.
+
+    Raises:
+        InputError: A model without a Spec that is not to be trained, or data that cannot be read or
+            lack what the model needs.
+    """
+    columns, labelled = extra_channels(model.channels), model.LEARNS_FROM_LABELS
+    if training:
+        data.complete_card(columns, labelled)
+    if training and not model.has_spec:
+        scans = list(data.training_scans(EXAMPLES, columns, labelled))
+        spec = replace(model.spec_for(data.card, scans), training=data.training_record())
+    else:
+        spec = model.spec
+    task = Task(data.card, spec, labelled)
+    model.take(task)
+    data.task = task
+    return task

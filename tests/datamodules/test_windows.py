@@ -1,0 +1,100 @@
+"""Views that ask for scans around one are given those of its sequence, and no other."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from derain.datamodules.augmentation import Augmentation
+from derain.datamodules.base import Loading
+from derain.datamodules.in_memory import InMemory
+from derain.datamodules.loader import scan_loader
+from derain.datamodules.windows import seen
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.learning.task import agree
+from derain.models.outdet import OutDet
+from derain.scan import Scan
+from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.source import Frames
+from derain.views.neighbours import NeighbourView
+from derain.views.window import Window, WindowOfScans
+
+
+def drives(*lengths: int) -> Frames:
+    """Sequences of so many scans; a scan's first intensity says which it is."""
+    frames, number = [], 0
+    for sequence, length in enumerate(lengths):
+        for place in range(length):
+            points = scene(30, seed=number)
+            points[0, 3] = number
+            frames.append(
+                MemoryFrame(
+                    key=f"{number}",
+                    sequence=f"{sequence}",
+                    number=place,
+                    scan=Scan.of(points).with_label(np.resize([0, 110], 30)),
+                    seconds=number / 10,
+                    sensor_to_world=np.diag([1.0, 1, 1, 1]) * (number + 1),
+                )
+            )
+            number += 1
+    return Frames(frames)
+
+
+def which(scan: Scan) -> int:
+    assert scan.intensity is not None
+    return int(scan.intensity[0])
+
+
+@pytest.mark.parametrize(
+    ("number", "before", "after"),
+    [(0, [], [1]), (1, [0], [2]), (3, [1, 2], []), (4, [], [5]), (6, [4, 5], [])],
+)
+def test_scans_around_one_are_of_its_sequence_the_oldest_first(
+    number: int, before: list[int], after: list[int]
+) -> None:
+    frames, told = drives(4, 3), []
+    view: Any = SimpleNamespace(window=Window(before=2, after=1), of_window=told.append)
+    seen(view, frames[number].read(), frames, number, lambda frame: frame.read())
+    (window,) = told
+    assert which(window.scan) == number
+    assert [which(placed.scan) for placed in window.before] == before
+    assert [which(placed.scan) for placed in window.after] == after
+    for placed in (*window.before, window.judged, *window.after):
+        assert placed.time == which(placed.scan) / 10
+        assert placed.pose[0, 0] == which(placed.scan) + 1
+
+
+def test_a_view_of_one_scan_pays_for_no_other() -> None:
+    def read(frame: Frame) -> Scan:
+        raise AssertionError(frame)
+
+    frames = drives(3)
+    expected = NeighbourView(5)(frames[1].read())
+    found = seen(NeighbourView(5), frames[1].read(), frames, 1, read)
+    np.testing.assert_array_equal(found.inputs()["points"], expected.inputs()["points"])
+
+
+def test_a_loader_gives_a_network_its_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = InMemory(drives(3, 2), card="wads")
+    task = agree(OutDet(), data)
+    windows: list[WindowOfScans] = []
+
+    def of_window(self: NeighbourView, scans: WindowOfScans) -> object:
+        windows.append(scans)
+        return self(scans.scan)
+
+    monkeypatch.setattr(NeighbourView, "window", Window(before=1))
+    monkeypatch.setattr(NeighbourView, "of_window", of_window)
+    still = Augmentation(rotation_probability=0, jitter_probability=0)
+    list(scan_loader(data.source("train"), "predict", task))
+    judged = [which(window.scan) for window in windows]
+    assert judged == [0, 1, 2, 3, 4]
+    before = [[which(placed.scan) for placed in window.before] for window in windows]
+    assert before == [[], [0], [1], [], [3]]
+    with pytest.raises(InputError, match=r"those around it.* Set rotation_probability"):
+        scan_loader(data.source("train"), "train", task)
+    scan_loader(data.source("train"), "train", task, replace(Loading(), augmentation=still))

@@ -1,0 +1,229 @@
+"""A network is trained and measured alike on files, on scans in memory and by plain loaders."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import lightning
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+from torch.utils.data import DataLoader
+
+from derain.datamodules.base import Loading
+from derain.datamodules.folder import Folder
+from derain.datamodules.in_memory import InMemory
+from derain.datamodules.loader import scan_loader
+from derain.datamodules.scan_check import ScanCheck
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.files import read_scan
+from derain.files.labels import write_labels
+from derain.learning.task import agree
+from derain.models.base import DerainingModule
+from derain.models.callbacks.panels import ScanPanels
+from derain.models.callbacks.prediction import PredictionWriter
+from derain.models.callbacks.report import TestReport
+from derain.models.lisnownet import LiSnowNet
+from derain.models.outdet import OutDet
+from derain.scan import Scan
+
+MakeTrainer = Callable[..., lightning.Trainer]
+SNOW = 110
+SCANS = 4
+TRAINED, VALIDATED, TESTED = range(3), (3,), (2, 3)
+LOADING = Loading(batch_size=2)
+GRID = {"rows": 16, "columns": 64, "inclination": [-30.0, 20.0]}
+NETWORKS: Mapping[str, Callable[[], DerainingModule]] = {
+    "outdet": OutDet,
+    "lisnownet": lambda: LiSnowNet(grid=GRID, width=2),
+}
+
+
+@pytest.fixture(params=NETWORKS)
+def network(request: pytest.FixtureRequest) -> Callable[[], DerainingModule]:
+    """Makes a network, the same one every time."""
+
+    def make() -> DerainingModule:
+        lightning.seed_everything(0)
+        return NETWORKS[request.param]()
+
+    return make
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Folder:
+    for number in range(SCANS):
+        scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
+        write_labels(tmp_path / f"{number}.label", SNOW * (np.arange(300) % 7 == 0))
+    parts = {"train": ["[012].bin"], "validation": ["3.bin"], "test": ["[23].bin"]}
+    return Folder(str(tmp_path), "wads", **parts, loading=LOADING)
+
+
+@pytest.fixture
+def scans(files: Folder) -> list[Scan]:
+    """What the files hold."""
+    label = SNOW * (np.arange(300) % 7 == 0)
+    paths = [files.root / f"{number}.bin" for number in range(SCANS)]
+    return [read_scan(path).with_label(label.astype(np.int64)) for path in paths]
+
+
+@pytest.fixture
+def memory(scans: list[Scan]) -> InMemory:
+    train, validation, test = ([scans[n] for n in part] for part in (TRAINED, VALIDATED, TESTED))
+    return InMemory(train, validation, test, card="wads", loading=LOADING)
+
+
+def assert_same(one: Mapping[str, Tensor], other: Mapping[str, Tensor]) -> None:
+    assert one.keys() == other.keys()
+    for name, value in one.items():
+        assert torch.equal(value, other[name]), name
+
+
+def test_files_memory_and_plain_loaders_train_the_same_network(
+    make_trainer: MakeTrainer,
+    files: Folder,
+    memory: InMemory,
+    network: Callable[[], DerainingModule],
+) -> None:
+    of_files, of_memory, of_loaders = network(), network(), network()
+    expected = make_trainer(epochs=2)
+    expected.fit(of_files, files)
+
+    in_memory = make_trainer(epochs=2)
+    in_memory.fit(of_memory, memory)
+    assert_same(of_memory.state_dict(), of_files.state_dict())
+    assert_same(in_memory.callback_metrics, expected.callback_metrics)
+
+    by_loaders = make_trainer(epochs=2)
+    task = agree(of_loaders, memory)
+    training = scan_loader(memory.source("train"), "train", task, LOADING)
+    validation = scan_loader(memory.source("validation"), "validation", task, LOADING)
+    by_loaders.fit(of_loaders, training, validation)
+    assert_same(of_loaders.state_dict(), of_files.state_dict())
+    assert_same(by_loaders.callback_metrics, expected.callback_metrics)
+    assert of_loaders.spec == of_memory.spec
+
+
+def test_files_memory_and_plain_loaders_are_measured_alike(
+    make_trainer: MakeTrainer,
+    files: Folder,
+    memory: InMemory,
+    outdet: Callable[..., OutDet],
+    tmp_path: Path,
+) -> None:
+    model = outdet()
+    scores, probabilities = [], []
+    task = agree(model, memory, training=False)
+    loaders = [
+        scan_loader(memory.source("test"), part, task, LOADING) for part in ("test", "predict")
+    ]
+    for tested, predicted in ((files, files), (memory, memory), loaders):
+        scores += make_trainer(1).test(model, tested, verbose=False)
+        batches = make_trainer(1).predict(model, predicted)
+        probabilities.append([one for batch in batches for one in batch])
+    assert scores[0] == scores[1] == scores[2]
+    assert len(probabilities[0]) == len(TESTED)
+    for found in probabilities[1:]:
+        for one, other in zip(found, probabilities[0], strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_what_is_predicted_of_scans_in_memory_is_written_by_their_keys(
+    make_trainer: MakeTrainer,
+    scans: list[Scan],
+    memory: InMemory,
+    outdet: Callable[..., OutDet],
+    tmp_path: Path,
+) -> None:
+    model, out = outdet(), tmp_path / "found"
+    writer = PredictionWriter(str(out))
+    make_trainer(1, callbacks=[writer]).predict(model, memory)
+    assert {path.name for path in out.iterdir()} == {"000000.label", "000001.label"}
+    (expected,) = make_trainer(1).predict(model, memory)
+    for place, probability in enumerate(expected):
+        label = np.fromfile(out / f"00000{place}.label", "<u4")
+        np.testing.assert_array_equal(label, probability > model.spec.threshold)
+    by_loader = tmp_path / "by_loader"
+    loader = scan_loader(memory.source("test"), "predict", agree(model, memory, training=False))
+    make_trainer(1, callbacks=[PredictionWriter(str(by_loader))]).predict(model, loader)
+    for path in out.iterdir():
+        assert (by_loader / path.name).read_bytes() == path.read_bytes()
+
+
+def test_batches_that_were_made_before_are_trained_on_too(
+    make_trainer: MakeTrainer, memory: InMemory, network: Callable[[], DerainingModule]
+) -> None:
+    model = network()
+    task = agree(model, memory)
+    made = [
+        list(scan_loader(memory.source(part), part, task, LOADING))
+        for part in ("train", "validation")
+    ]
+    for batch in made[0]:  # nothing but tensors
+        assert not batch.measured
+    before = {name: value.clone() for name, value in model.state_dict().items()}
+    trainer = make_trainer(epochs=1)
+    trainer.fit(model, *(DataLoader(batches, batch_size=None) for batches in made))
+    assert trainer.global_step == 2
+    assert any(not torch.equal(before[name], t) for name, t in model.state_dict().items())
+    assert trainer.callback_metrics["val/loss"].isfinite()
+
+
+def test_a_model_that_was_told_nothing_of_its_batches_says_what_it_lacks(
+    make_trainer: MakeTrainer, memory: InMemory
+) -> None:
+    loader = scan_loader(memory.source("train"), "train", agree(OutDet(), memory))
+    with pytest.raises(InputError, match=r"told nothing of them\. Call .*agree\(model, data\)"):
+        make_trainer(epochs=1).fit(OutDet(), loader)
+
+
+def test_callbacks_go_without_a_data_module(
+    make_trainer: MakeTrainer,
+    memory: InMemory,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+) -> None:
+    model = OutDet()
+    task = agree(model, memory)
+    loaders = {
+        part: scan_loader(memory.source(part), part, task) for part in ("train", "validation")
+    }
+    callbacks = [ScanCheck(), ScanPanels(), TestReport()]
+    make_trainer(1, callbacks=callbacks).fit(model, *loaders.values())
+    test = scan_loader(memory.source("test"), "test", task)
+    make_trainer(1, callbacks=callbacks, default_root_dir=tmp_path).test(model, test, verbose=False)
+    assert "WADS, 2 scans" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_what_a_worker_cannot_read_stops_a_plain_loader_with_its_name(
+    make_trainer: MakeTrainer, files: Folder, workers: int
+) -> None:
+    model = OutDet()
+    task = agree(model, files)
+    (files.root / "1.bin").write_bytes(b"damaged")
+    damaged = files.source("train")[1:2]  # a worker that is left in the middle takes seconds to end
+    loader = scan_loader(damaged, "train", task, Loading(workers=workers))
+    with pytest.raises(InputError, match=r"1\.bin: 7 bytes are not whole rows") as refusal:
+        make_trainer(epochs=1).fit(model, loader)
+    assert "Traceback" not in str(refusal.value)
+
+
+def test_a_run_of_loaders_goes_on_from_its_checkpoint(
+    make_trainer: MakeTrainer, memory: InMemory, tmp_path: Path
+) -> None:
+    def fit(epochs: int, checkpoint: Path | None = None, rows: int = 16) -> DerainingModule:
+        lightning.seed_everything(0)
+        model = LiSnowNet(grid={**GRID, "rows": rows}, width=2)
+        loader = scan_loader(memory.source("train"), "train", agree(model, memory), LOADING)
+        trainer = make_trainer(epochs=epochs)
+        trainer.fit(model, loader, ckpt_path=checkpoint)
+        trainer.save_checkpoint(tmp_path / f"{epochs}.ckpt")
+        return model
+
+    straight = fit(epochs=3)
+    fit(epochs=1)
+    assert_same(fit(3, tmp_path / "1.ckpt").state_dict(), straight.state_dict())
+    with pytest.raises(InputError, match="another view than the loader makes"):
+        fit(3, tmp_path / "1.ckpt", rows=32)
