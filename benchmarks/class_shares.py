@@ -11,7 +11,7 @@ import numpy as np
 
 from derain.cards.card import load_card
 from derain.datamodules.simulated import Simulated
-from derain.sources.contents import Contents, count_frame, find_sequences
+from derain.evaluation.contents import Contents, count_frame, find_sequences
 
 # Source: data_cfg.yaml of the SalsaNext model published with REHEARSE-3D.
 PUBLISHED = {

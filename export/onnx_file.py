@@ -103,13 +103,13 @@ def _named(scan: Scan) -> tuple[str, Scan]:
 
 def _hard_cases(spec: Spec) -> Iterator[tuple[str, Scan]]:
     """Hard scans that have the network's extra channels, with gaps, as fused scans have them."""
-    rng = np.random.default_rng(0)
+    generator = np.random.default_rng(0)
     statistics = dict(zip(spec.channels, zip(spec.mean, spec.std, strict=True), strict=True))
     for name, scan in hard_cases():
         columns = {}
         for channel in extra_channels(spec.channels):
-            column = rng.normal(*statistics[channel], len(scan))
-            columns[channel] = np.where(rng.random(len(scan)) < 0.1, np.nan, column)
+            column = generator.normal(*statistics[channel], len(scan))
+            columns[channel] = np.where(generator.random(len(scan)) < 0.1, np.nan, column)
         yield name, replace(scan, fields=columns)
 
 

@@ -53,7 +53,7 @@ class CalibrationScans(Collection[Scan]):
         return read_scan(path, self.columns).with_intensity_times(self.intensity_scale)
 
 
-class ScanReader(CalibrationDataReader):  # type: ignore[misc]
+class CalibrationReader(CalibrationDataReader):  # type: ignore[misc]
     """Gives onnxruntime the network's inputs, scan by scan.
 
     Args:
@@ -96,7 +96,7 @@ def quantised(proto: onnx.ModelProto, view: View, scans: Iterable[Scan]) -> onnx
         quantize_static(
             given,
             path,
-            ScanReader(view, scans),
+            CalibrationReader(view, scans),
             quant_format=QuantFormat.QDQ,
             op_types_to_quantize=["Conv"],
             per_channel=True,

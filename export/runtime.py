@@ -23,7 +23,7 @@ from derain.views.view import SeenScan, View
 __all__ = ["METADATA_KEY", "Derainer", "Judgement", "open_session"]
 
 # What onnxruntime calls the types of a view's inputs.
-TYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
+ONNX_TYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
 
 
 class Derainer:
@@ -249,7 +249,7 @@ def _refuse_other_network(session: onnxruntime.InferenceSession, view: View, pat
     empty = view(Scan.of(np.zeros((0, 4))))
     varying = empty.VARYING is not None
     wanted = {
-        name: (TYPES[array.dtype.name], array.shape[varying:])
+        name: (ONNX_TYPES[array.dtype.name], array.shape[varying:])
         for name, array in empty.inputs().items()
     }
     found = {

@@ -1,4 +1,4 @@
-"""Rooms import what CONTRIBUTING.md's table says, and what is to be light reaches nothing heavy."""
+"""Places import from those above them in CONTRIBUTING.md's table, and nothing heavy unasked."""
 
 import ast
 import re
@@ -31,7 +31,7 @@ LIBRARIES = {
 # What every room may import.
 LIGHT = {
     *("numpy", "yaml", "tqdm", "small_gicp", "onnxruntime"),
-    *("lzf", "flatbuffers", "libusb_package"),
+    *("lzf", "flatbuffers", "libusb_package", "_typeshed"),
 }
 
 # Modules that run on a small computer, and those that all others are made of.
@@ -57,15 +57,20 @@ def modules() -> dict[str, Path]:
 
 @cache
 def table() -> dict[str, set[str]]:
-    """Rooms and libraries that a room may import, by the room's folder."""
+    """Heavy libraries of each place, from the place that imports no other to the topmost."""
     text = (REPOSITORY / "CONTRIBUTING.md").read_text("utf-8")
-    rows = re.findall(r"^\| `([\w/]+/)` \|.*\| (.*) \|$", text, re.MULTILINE)
-    return {room: {item.strip("` ") for item in cell.split(",")} for room, cell in rows}
+    rows = re.findall(r"^\| (`[^|]+`) \|.*\|([^|]*)\|$", text, re.MULTILINE)
+    return {
+        place: set(filter(None, libraries.strip().split(", ")))
+        for places, libraries in rows
+        for place in re.findall(r"`([\w/.]+)`", places)
+    }
 
 
-def room_of(file: Path) -> str:
-    path = file.relative_to(REPOSITORY).as_posix()
-    return max((room for room in table() if path.startswith(room)), key=len)
+def place_of(module: str) -> str:
+    """The folder of a module, or its file where that has a row of its own."""
+    path = modules()[module].relative_to(REPOSITORY).as_posix()
+    return max((place for place in table() if path.startswith(place)), key=len)
 
 
 def imported(node: ast.AST, at_once: bool) -> Iterator[str]:
@@ -98,32 +103,29 @@ def resolved(name: str) -> str:
     return name
 
 
-def arrows(module: str) -> set[str]:
-    """Rooms and libraries that a module imports, its own room and light libraries left out."""
-    found = set()
-    for name in imports_of(module) - LIGHT:
-        own_room = name in modules() and name not in LIBRARIES
-        found.add(room_of(modules()[name]) if own_room else LIBRARIES.get(name, name))
-    return found - {room_of(modules()[module])}
+def test_the_table_names_a_place_for_every_module_and_no_other() -> None:
+    assert {place_of(module) for module in modules()} == set(table())
+    assert len(modules()) > 200
 
 
-def test_the_table_names_every_folder_of_the_package() -> None:
-    folders = {
-        f"{folder_of(package).relative_to(REPOSITORY)}/" for package in PACKAGING["packages"]
+@pytest.mark.parametrize("place", table())
+def test_a_place_imports_from_those_above_it_alone(place: str) -> None:
+    height = {name: number for number, name in enumerate(table())}
+    wrong = {
+        (module, name)
+        for module in modules()
+        if place_of(module) == place
+        for name in imports_of(module) & modules().keys()
+        if height[place_of(name)] > height[place]
     }
-    assert folders == set(table()) - {"benchmarks/"}
-    assert len(modules()) > 100
+    assert not wrong
 
 
-def modules_of(room: str) -> list[str]:
-    return [module for module, file in modules().items() if room_of(file) == room]
-
-
-@pytest.mark.parametrize("room", [room for room in table() if "everything" not in table()[room]])
-def test_a_room_imports_what_the_table_says_and_all_of_it(room: str) -> None:
-    by_module = {module: arrows(module) for module in modules_of(room)}
-    assert not {m: found - table()[room] for m, found in by_module.items() if found - table()[room]}
-    assert set().union(*by_module.values()) == table()[room] - {"nothing"}
+@pytest.mark.parametrize("place", table())
+def test_a_place_imports_the_heavy_libraries_of_its_row_and_all_of_them(place: str) -> None:
+    of_modules = [imports_of(module) for module in modules() if place_of(module) == place]
+    names = set().union(*of_modules) - (modules().keys() - LIBRARIES.keys()) - LIGHT
+    assert {LIBRARIES.get(name, name) for name in names} == table()[place]
 
 
 def test_no_module_is_loaded_to_load_itself() -> None:

@@ -14,6 +14,7 @@ from benchmarks.fuzzing.reader import Reader
 from derain.annotation.scene_file import read_scene, write_scene
 from derain.cards.card import load_card, packaged_cards
 from derain.cards.layout import Layout
+from derain.evaluation.contents import find_sequences
 from derain.evaluation.hard_cases import scene
 from derain.files.documents import Entry
 from derain.files.frame_times import read_frame_times
@@ -22,7 +23,6 @@ from derain.fusion.extrinsics import read_extrinsics
 from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MANIFEST, rates_of_sequences, read_manifest
 from derain.simulation.sensor import load_sensor, packaged_sensors
-from derain.sources.contents import find_sequences
 
 SCENE = """
 height: 0.1

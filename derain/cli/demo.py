@@ -22,7 +22,7 @@ of derain, printed before it runs; what it prints goes to log.txt.
 """
 
 # What the networks are called, and the beginning of their configurations' names.
-NETWORKS = {"3D-OutDet": "outdet", "SalsaNext": "salsanext", "LiSnowNet-L1": "lisnownet"}
+DEMO_NETWORKS = {"3D-OutDet": "outdet", "SalsaNext": "salsanext", "LiSnowNet-L1": "lisnownet"}
 
 # What they are compared with: a filter, and the baselines that every method has to beat.
 OTHERS = ("dror", "position", "intensity", "all", "none")
@@ -44,7 +44,7 @@ class Story:
     Attributes:
         out: Folder that everything is written to.
         streets: Options of ``derain simulate``.
-        networks: Networks that are trained, as ``NETWORKS`` calls them.
+        networks: Networks that are trained, as ``DEMO_NETWORKS`` calls them.
         others: Methods that they are compared with.
         fit: Options of every training.
         bench: Options of the comparison.
@@ -52,7 +52,7 @@ class Story:
 
     out: Path
     streets: Sequence[str] = STREETS
-    networks: Sequence[str] = tuple(NETWORKS)
+    networks: Sequence[str] = tuple(DEMO_NETWORKS)
     others: Sequence[str] = OTHERS
     fit: Sequence[str] = ()
     bench: Sequence[str] = ()
@@ -95,7 +95,7 @@ def tell(story: Story) -> None:
         _network(narrator, story, title, scan)
         if title == story.networks[0]:
             _clean(narrator, out, title, scan)
-    networks = [f"{title}={out / NETWORKS[title]}.onnx" for title in story.networks]
+    networks = [f"{title}={out / DEMO_NETWORKS[title]}.onnx" for title in story.networks]
     table = narrator.step(
         *("bench", "--data", str(data), "--out", str(out / "bench"), *story.bench),
         *("--methods", *networks, f"dsor, tuned={tuned}", *story.others),
@@ -110,7 +110,7 @@ def tell(story: Story) -> None:
 
 def _network(narrator: Narrator, story: Story, title: str, scan: Path) -> None:
     """Trains a network and exports it, timed on one scan."""
-    out, name = story.out, NETWORKS[title]
+    out, name = story.out, DEMO_NETWORKS[title]
     checkpoint = out / f"{name}.ckpt"
     checkpoint.unlink(missing_ok=True)
     narrator.step(
@@ -132,7 +132,7 @@ def _clean(narrator: Narrator, out: Path, title: str, scan: Path) -> None:
     from derain.files import read_scan
     from derain.pictures.scan_pictures import before_after_figure, save
 
-    model, picture = out / f"{NETWORKS[title]}.onnx", out / "before_after.png"
+    model, picture = out / f"{DEMO_NETWORKS[title]}.onnx", out / "before_after.png"
     narrator.step(
         *("run", str(model), str(scan.parent), "--out", str(out / "cleaned")), result=_last_line
     )

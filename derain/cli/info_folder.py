@@ -12,8 +12,7 @@ from derain.cards.card import DataCard, load_card
 from derain.cards.known import card_by_folders, known_layouts
 from derain.cards.layout import Layout
 from derain.errors import InputError
-from derain.evaluation.text_tables import plain_table
-from derain.sources.contents import (
+from derain.evaluation.contents import (
     Contents,
     class_name,
     count_frame,
@@ -21,6 +20,7 @@ from derain.sources.contents import (
     manifest_of,
     rate_name,
 )
+from derain.evaluation.text_tables import plain_table
 from derain.sources.folders import find_layout
 
 

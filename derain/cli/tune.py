@@ -151,8 +151,8 @@ def _read(data: "ScanDataModule", examiner: Examiner, notices: Notices, file: "F
 
 def _drawn(files: Sequence["Frame"], most: int, seed: int) -> list["Frame"]:
     """At most so many of the scans, drawn at random, in their order."""
-    chance = np.random.default_rng(seed)
-    chosen = chance.choice(len(files), min(most, len(files)), replace=False)
+    generator = np.random.default_rng(seed)
+    chosen = generator.choice(len(files), min(most, len(files)), replace=False)
     return [files[number] for number in np.sort(chosen)]
 
 

@@ -16,7 +16,7 @@ from derain.files.reading import is_file, reading
 METADATA = "metadata.csv"
 
 # Lines for a hundred thousand scans. What is read of a line takes up to forty times its length.
-LARGEST = 2**23
+LARGEST_METADATA = 2**23
 
 # Names of the columns that hold a scan's name and its time; those of REHEARSE-3D are not published.
 FRAME_COLUMNS = ("frame", "timestamp")
@@ -68,9 +68,9 @@ def _times(path: Path, frame: str, timestamp: str) -> dict[str, float]:
 def _lines(path: Path, *columns: str) -> Iterator[list[str | None]]:
     """What every line has in some columns."""
     with reading(path, UnicodeDecodeError, csv.Error), path.open("rb") as file:
-        if len(content := file.read(LARGEST + 1)) > LARGEST:
+        if len(content := file.read(LARGEST_METADATA + 1)) > LARGEST_METADATA:
             raise InputError(
-                path, f"has more than {LARGEST:,} bytes", "Leave a line for each scan."
+                path, f"has more than {LARGEST_METADATA:,} bytes", "Leave a line for each scan."
             )
         lines = csv.DictReader(
             io.StringIO(content.decode("utf-8-sig"), newline=""), skipinitialspace=True

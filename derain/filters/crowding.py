@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 # Places along the curve that are looked at to either side of a point. Four settle 86 of 100 points
 # of the WADS sample with DROR; eight settle one more, for twice the time.
-STEPS = 4
+CURVE_STEPS = 4
 
 # Closer to the radius than this share of it, the search decides, so that rounding never does.
 MARGIN = 1e-6
@@ -49,7 +49,7 @@ def few_around(
 def _found_along_curve(
     places: NDArray[np.float64], radius: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Counts points within the radius, the point itself and up to STEPS places to either side.
+    """Counts points within the radius: the point itself and CURVE_STEPS places to either side.
 
     Args:
         places: Positions in the order of the curve, float64 (M, 3), metres.
@@ -60,7 +60,7 @@ def _found_along_curve(
     """
     columns, limit = np.ascontiguousarray(places.T), np.square(radius)
     found = np.ones(len(places), np.int64)
-    for step in range(1, min(STEPS, len(places) - 1) + 1):
+    for step in range(1, min(CURVE_STEPS, len(places) - 1) + 1):
         squared = np.square(columns[:, step:] - columns[:, :-step]).sum(axis=0)
         found[step:] += squared <= limit[step:]
         found[:-step] += squared <= limit[:-step]

@@ -22,7 +22,7 @@ from derain.views.oddities import Oddity
 MOST_FILTER_NEIGHBOURS = 200
 
 # Beyond any limit that a filter may know, and a square of it is still a number.
-LARGEST = 1e100
+LARGEST_NUMBER = 1e100
 
 # Smallest and largest value of a parameter, whole numbers or not.
 Span = tuple[int, int] | tuple[float, float]
@@ -119,9 +119,9 @@ def _check_neighbours(filter_name: str, value: Any) -> None:
 
 def _check_number(filter_name: str, parameter: str, value: Any) -> None:
     number = isinstance(value, Real) and not isinstance(value, bool)
-    if not (number and 0 <= value <= LARGEST):
+    if not (number and 0 <= value <= LARGEST_NUMBER):
         raise InputError(
             filter_name,
             f"{parameter} is {shown(value)}",
-            f"Give a finite number that is not negative, {LARGEST:g} at most.",
+            f"Give a finite number that is not negative, {LARGEST_NUMBER:g} at most.",
         )

@@ -17,7 +17,7 @@ from derain.views.channels import extra_channels
 from derain.views.view import View
 
 # Scans that a view or a rule is fitted to; more change its grid by nothing.
-EXAMPLES = 20
+EXAMPLE_SCANS = 20
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def agree(model: Learner, data: TrainingData, training: bool = True) -> Task:
     if training:
         data.complete_card(columns, labelled)
     if training and not model.has_spec:
-        scans = list(data.training_scans(EXAMPLES, columns, labelled))
+        scans = list(data.training_scans(EXAMPLE_SCANS, columns, labelled))
         spec = replace(model.spec_for(data.card, scans), training=data.training_record())
     else:
         spec = model.spec

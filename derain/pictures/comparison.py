@@ -18,7 +18,7 @@ from derain.pictures.scan_pictures import (
 from derain.scan import Scan
 
 # Columns that a screen shows at once; further panels go below.
-MOST_COLUMNS = 5
+MOST_PANELS_IN_A_ROW = 5
 
 # Letters of a title that stay within their panel.
 TITLE_WIDTH = 44
@@ -40,7 +40,7 @@ def comparison_figure(
         title: Heading.
     """
     panels = dict(_panels(predicted, rain))
-    blocks = -(-len(panels) // MOST_COLUMNS)
+    blocks = -(-len(panels) // MOST_PANELS_IN_A_ROW)
     columns = -(-len(panels) // blocks)  # blocks of one width, as far as the panels allow
     figure = Figure(figsize=(4 * columns, 6 * blocks + 1), layout="constrained")
     figure.suptitle(title)

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from derain.sources.contents import Contents, class_name, rate_name
+from derain.evaluation.contents import Contents, class_name, rate_name
 
 # Clean air, then ever more rain; grey where it is not known.
 CLEAN, UNKNOWN = "#c9b458", "#9aa3ad"

@@ -15,7 +15,7 @@ REACH = 2
 # Steps (rows, columns) from a pixel to those of its window: to itself, then the nearest, then
 # row-major. What is undecided otherwise goes to the earlier step.
 _SPAN = range(-REACH, REACH + 1)
-STEPS = sorted(
+WINDOW_STEPS = sorted(
     ((row, column) for row in _SPAN for column in _SPAN),
     key=lambda step: (step[0] ** 2 + step[1] ** 2, step),
 )
@@ -26,7 +26,7 @@ STEPS = sorted(
 VOTERS = 5
 CUTOFF = 1.0
 SIGMA = 1.0
-_BELL = np.exp(-(np.array(STEPS) ** 2).sum(axis=1) / (2 * SIGMA**2))
+_BELL = np.exp(-(np.array(WINDOW_STEPS) ** 2).sum(axis=1) / (2 * SIGMA**2))
 WEIGHTS = (1 - _BELL / _BELL.sum()).astype(np.float32)
 
 # Points that vote at a time, which bounds the memory.
@@ -146,7 +146,7 @@ class _Window:
     Attributes:
         nearest: Range that each position shows, float32, infinite where there is no return.
         pixel: Pixel at each position, int64.
-        steps: Way to the positions of a window, in the order of ``STEPS``, int64 (25,).
+        steps: Way to the positions of a window, in the order of ``WINDOW_STEPS``, int64 (25,).
     """
 
     def __init__(self, points: ProjectedPoints) -> None:
@@ -155,7 +155,7 @@ class _Window:
         self.nearest = _padded(points.nearest, points.wraps, np.inf).ravel()
         self.pixel = _padded(number, points.wraps, -1).ravel()
         self._padded_width = self._width + 2 * REACH
-        self.steps = np.array([row * self._padded_width + column for row, column in STEPS])
+        self.steps = np.array([row * self._padded_width + column for row, column in WINDOW_STEPS])
 
     def position(self, pixel: NDArray[np.int64]) -> NDArray[np.int64]:
         """Positions of pixels in the padded image, int64 (N,)."""

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from derain import InputError, Scan
+from derain.evaluation.contents import count_frame
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
 from derain.files.frame_times import read_frame_times
 from derain.files.labels import label_beside
 from derain.files.names import beside, scan_stem, scan_suffix
-from derain.sources.contents import count_frame
 from derain.sources.folders import frame_of
 
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.pictures.comparison import MOST_COLUMNS, comparison_figure
+from derain.pictures.comparison import MOST_PANELS_IN_A_ROW, comparison_figure
 from derain.pictures.comparison_window import show_comparison
 from derain.pictures.scan_pictures import OUTCOMES
 from derain.scan import Scan
@@ -59,11 +59,11 @@ def test_without_truth_what_is_removed_is_shown() -> None:
 
 def test_panels_that_do_not_fit_side_by_side_go_below() -> None:
     scan = Scan.of(scene(50))
-    names = [f"m{number}" for number in range(MOST_COLUMNS)]
+    names = [f"m{number}" for number in range(MOST_PANELS_IN_A_ROW)]
     figure = comparison_figure(scan, dict.fromkeys(names, np.zeros(50, bool)), None, "many")
     assert [title.split(":")[0] for title in titles(figure)] == ["input", *names]
     drawn = [axes for axes in figure.axes if axes.collections]
-    assert len(drawn) == 2 * (MOST_COLUMNS + 1)
+    assert len(drawn) == 2 * (MOST_PANELS_IN_A_ROW + 1)
 
 
 @pytest.mark.parametrize("methods", [4, 5, 7])

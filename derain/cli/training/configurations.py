@@ -7,7 +7,7 @@ from pathlib import Path
 from derain.errors import InputError
 from derain.files.packaged import packaged
 
-OPTIONS = ("--config", "-c")
+CONFIG_OPTIONS = ("--config", "-c")
 
 # With one of these a run needs no configuration, or there is no run. --data.help and its kin show
 # the options of a class.
@@ -46,7 +46,7 @@ def require_configuration(arguments: Sequence[str]) -> None:
     Raises:
         InputError: None is given.
     """
-    if not any(a.startswith(OPTIONS) or _INSTEAD.match(a) for a in arguments):
+    if not any(a.startswith(CONFIG_OPTIONS) or _INSTEAD.match(a) for a in arguments):
         raise InputError(
             arguments[0],
             "no configuration is given",
@@ -60,7 +60,7 @@ def _with_names(arguments: Sequence[str]) -> list[tuple[str, str]]:
         ("--config=", argument.removeprefix("--config="))
         if argument.startswith("--config=")
         else ("", argument)
-        if previous in OPTIONS
+        if previous in CONFIG_OPTIONS
         else (argument, "")
         for previous, argument in zip(["", *arguments], arguments, strict=False)
     ]

@@ -16,7 +16,7 @@ from derain.files.text import LARGEST_HEADER, decode, parse_rows
 BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 # Type names of the specification, which every program reads, by NumPy's.
-TYPES = {
+PROPERTY_TYPES = {
     "i1": "char",
     "u1": "uchar",
     "i2": "short",
@@ -28,8 +28,8 @@ TYPES = {
 }
 # Both those and the names that many programs write: int8, float32, ...
 _KINDS = {
-    **{name: kind for kind, name in TYPES.items()},
-    **{np.dtype(kind).name: kind for kind in TYPES},
+    **{name: kind for kind, name in PROPERTY_TYPES.items()},
+    **{np.dtype(kind).name: kind for kind in PROPERTY_TYPES},
 }
 _END = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
 
@@ -49,8 +49,8 @@ class Property:
     length: str | None = None
 
     def __str__(self) -> str:
-        lists = "" if self.length is None else f"list {TYPES[self.length]} "
-        return f"property {lists}{TYPES[self.kind]} {self.name}"
+        lists = "" if self.length is None else f"list {PROPERTY_TYPES[self.length]} "
+        return f"property {lists}{PROPERTY_TYPES[self.kind]} {self.name}"
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ from matplotlib.colors import to_rgba
 
 from derain.cards.layout import Layout
 from derain.errors import InputError
+from derain.evaluation.contents import Contents, count_frame, find_sequences, rate_name
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
 from derain.files.labels import write_labels
 from derain.pictures.data_statistics import CLEAN, statistics_figure
 from derain.scan import Scan
 from derain.simulation.campaign import MAKER
-from derain.sources.contents import Contents, count_frame, find_sequences, rate_name
 from derain.sources.folders import find_layout, frame_of
 
 REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar="innoviz")
