@@ -11,10 +11,7 @@ import numpy as np
 
 from derain.cards.card import load_card
 from derain.datamodules.simulated import Simulated
-from derain.sources.contents import Tally, count_scan, find_sequences
-
-LAYOUT = (load_card("simulated").layout.scans, load_card("simulated").layout.labels)
-COLUMNS = ("x", "y", "z", "intensity")
+from derain.sources.contents import Contents, count_frame, find_sequences
 
 # Source: data_cfg.yaml of the SalsaNext model published with REHEARSE-3D.
 PUBLISHED = {
@@ -43,11 +40,11 @@ def main() -> None:
 
 
 def _print_shares(root: Path) -> None:
-    sequences = find_sequences(root, LAYOUT)
-    total = Tally()
+    sequences = find_sequences(root, load_card("simulated").layout)
+    total = Contents()
     for sequence in sequences:
-        for scan in sequence.scans:
-            total.add(count_scan(scan, LAYOUT, COLUMNS))
+        for frame in sequence.frames:
+            total.add(count_frame(frame))
     clean = sum(not sequence.rain_rate for sequence in sequences) / len(sequences)
     print("| | simulated | REHEARSE-3D |\n|---|---|---|")
     print(f"| points per scan | {total.points / total.scans:,.0f} | {PUBLISHED_POINTS:,} |")

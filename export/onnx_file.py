@@ -25,12 +25,12 @@ from derain.scan import Scan
 from derain.spec import Spec
 from derain.views.channels import extra_channels
 
-# Pinned: what a file may contain is then the same whatever torch exports by default.
-# 18 is the oldest opset that torch 2.13's exporter writes without converting.
+# The version of ONNX's operators, stated so that files do not change with torch's default. 18 is
+# the oldest that torch 2.13's exporter writes without converting.
 OPSET = 18
 
-# What a weight or a statistic may be without counting as 0. A processor computes several times more
-# slowly with subnormal numbers, less than 1e-38, and a product of two such small ones is subnormal.
+# Numbers in a graph that are smaller than this are set to 0. The product of two of them is below
+# 1e-38, where a number is subnormal, and a processor computes several times more slowly with those.
 NEGLIGIBLE = 1e-20
 
 
@@ -69,10 +69,10 @@ def export(model: DerainingModule, path: Path, calibration: Collection[Scan] = (
 
 
 def flush(proto: onnx.ModelProto) -> int:
-    """Sets to 0 what a graph holds of numbers below NEGLIGIBLE.
+    """Sets the numbers of a graph that are smaller than NEGLIGIBLE to 0.
 
     Returns:
-        How many it has set to 0.
+        How many they were.
     """
     flushed = 0
     for tensor in proto.graph.initializer:
@@ -92,7 +92,7 @@ def _proof(model: DerainingModule, path: Path, calibration: Collection[Scan]) ->
         assert FLOAT32.difference is not None
         bounds = replace(FLOAT32, difference=FLOAT32.difference * model.AMPLIFIES)
         return prove(model, path, _hard_cases(model.spec), bounds)
-    # Mapped, not looped over: a loop would hold on to one scan while the next is read.
+    # Mapped, for a loop would hold on to one scan while the next is read.
     seen = prove(model, path, map(_named, calibration), INT8)
     return Proof(seen.cases + prove(model, path, _hard_cases(model.spec), FINITE).cases)
 
@@ -119,7 +119,8 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
     example = spec.make_view()(Scan.of(scene(50)))
     inputs = {name: torch.from_numpy(array) for name, array in example.inputs().items()}
     varying = example.VARYING and torch.export.Dim(example.VARYING, min=0)
-    # The exporter's own parts warn of each other, and of torchvision; what it makes is checked.
+    # The exporter warns of what is deprecated in itself and of a missing torchvision, about which
+    # nobody here can do anything. What it makes is proved.
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -137,11 +138,12 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
     assert program is not None  # only None when it was told to write a file itself
     proto: onnx.ModelProto = program.model_proto
     if varying:
-        # The exporter writes the number of answers as a formula over 3D-OutDet's blocks.
+        # Where a network computes in blocks, as 3D-OutDet does, the exporter writes the number of
+        # scores as a formula over them. It is that of the inputs.
         proto.graph.output[0].type.tensor_type.shape.dim[0].dim_param = example.VARYING
     del proto.graph.value_info[:]
     for node in proto.graph.node:
-        # Where in which file each operator was called: longer than the graph, and of no one's use.
+        # The exporter notes the source line of every operator, which is longer than the graph.
         del node.metadata_props[:]
     return proto
 

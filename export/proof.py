@@ -28,8 +28,8 @@ class Bounds:
     Attributes:
         difference: Largest difference of a logit, as a share of the scan's largest logit where
             that is above 1; None where any may be.
-        flipped: Share of the cells that may change sides; None where any may. One always may: it is
-            no share of a small scan.
+        flipped: Share of the cells that may lie on the other side of the threshold; None where any
+            may. One cell always may, since in a small scan it is more than any such share.
         rain_iou: What the two must have in common: the cells with a return that both call rain, as
             a share of those that either does, over all scans of these bounds; None where it may be
             anything.
@@ -47,7 +47,8 @@ FLOAT32 = Bounds(difference=1e-4, flipped=1e-4)
 # that have hardly been trained, most of whose rain is near the threshold, have kept .82 of it.
 INT8 = Bounds(difference=None, flipped=None, rain_iou=0.7)
 
-# On scans unlike any that the eight bits were scaled for, the answer has to be one.
+# On scans unlike those that the eight bits were scaled for, the two may differ as they like, as
+# long as the scores are finite.
 FINITE = Bounds(difference=None, flipped=None)
 
 
@@ -158,7 +159,7 @@ def prove(
         bounds: What the two may differ by.
     """
     derainers = [Derainer(model, threads) for threads in THREADS]
-    # Mapped, not looped over: a loop would hold on to one scan while the next is read.
+    # Mapped, for a loop would hold on to one scan while the next is read.
     cases = map(partial(_compared, forward, derainers, bounds), scans)
     return Proof(tuple(chain.from_iterable(cases)))
 
@@ -175,7 +176,7 @@ def _compared(
     tensors = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
     with torch.inference_mode():
         expected = forward(**tensors).numpy()
-    # What would be rain if every point of the scan were.
+    # Cells with a return are those that would be rain if every point of the scan were.
     returned = view.target(np.ones(len(scan), bool)) == 1
     return [_case(name, view, returned, expected, derainer, bounds) for derainer in derainers]
 

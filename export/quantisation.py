@@ -62,7 +62,7 @@ class ScanReader(CalibrationDataReader):  # type: ignore[misc]
     """
 
     def __init__(self, view: View, scans: Iterable[Scan]) -> None:
-        # Mapped, not looped over: a loop would hold on to one scan while the next is read.
+        # Mapped, for a loop would hold on to one scan while the next is read.
         self._views: Iterator[SeenScan] = map(view, scans)
 
     def get_next(self) -> dict[str, NDArray[np.generic]] | None:
@@ -84,7 +84,8 @@ def quantised(proto: onnx.ModelProto, view: View, scans: Iterable[Scan]) -> onnx
         scans: Scans whose activations set the scales.
 
     Raises:
-        InputError: A model without convolutions, such as 3D-OutDet, whose time goes elsewhere.
+        InputError: A model without convolutions, such as 3D-OutDet: nothing else is
+            quantised.
     """
     if not any(node.op_type == "Conv" for node in proto.graph.node):
         raise InputError("--int8", "the network has no convolution to quantise", "Leave it out.")

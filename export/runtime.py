@@ -1,6 +1,7 @@
 """Runs an exported model on a CPU: NumPy, onnxruntime and the kNN library, nothing else."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,31 +12,18 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.export.model_file import METADATA_KEY, ModelFile
 from derain.scan import Scan
+from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.judgement import Judgement
+from derain.sources.recent_frames import FrameInWindow, RecentFrames
 from derain.system.cores import usable_cores
 from derain.system.stopwatch import Stopwatch
 from derain.views.probability import probability_of_rain
 from derain.views.view import SeenScan, View
 
-__all__ = ["METADATA_KEY", "Derainer", "open_session"]
+__all__ = ["METADATA_KEY", "Derainer", "Judgement", "open_session"]
 
 # What onnxruntime calls the types of a view's inputs.
 TYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
-
-
-@dataclass(frozen=True, eq=False)
-class Judgement:
-    """What a model says of a scan, in input order.
-
-    Attributes:
-        probability: That each point is rain, float32 (N,); 0 for rows that were not judged.
-        rain: True for rain, bool (N,).
-        judged: True for rows that the model saw, bool (N,): not for those that cannot be judged,
-            nor for points outside the grid of an image.
-    """
-
-    probability: NDArray[np.float32]
-    rain: NDArray[np.bool_]
-    judged: NDArray[np.bool_]
 
 
 class Derainer:
@@ -72,6 +60,7 @@ class Derainer:
         self.view = self.spec.make_view(self.threads)
         self.session = open_session(file, self.threads)
         _refuse_other_network(self.session, self.view, self.path)
+        self._recent = RecentFrames(self.view.window)
 
     def __call__(
         self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
@@ -116,16 +105,75 @@ class Derainer:
         Raises:
             InputError: A network that fails, or whose scores are not finite.
         """
-        stopwatch = stopwatch or Stopwatch()
         scan = Scan.of(points)
-        with stopwatch.stage("view"):
-            view = self.view(scan)
-        with stopwatch.stage("network"):
-            logits = self.logits(view)
-            self._refuse_senseless(logits, view, scan)
-        with stopwatch.stage("back"):
-            probability = view.back(probability_of_rain(logits))
-            return Judgement(probability, probability > self.spec.threshold, view.judged)
+        return self._judged(scan, lambda: self.view(scan), stopwatch or Stopwatch())
+
+    @property
+    def waiting(self) -> int:
+        """How many frames were pushed and are not answered for: they wait for frames after them."""
+        return self._recent.waiting
+
+    def starts_anew(self, frame: Frame) -> bool:
+        """Whether pushing a frame would let go of those that wait: it does not follow them."""
+        return self._recent.waiting > 0 and self._recent.starts_anew(frame)
+
+    def push(
+        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> Judgement | None:
+        """Takes the next frame of a recording.
+
+        Example:
+            >>> derainer = Derainer("model.onnx")
+            >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)
+            >>> judgement = derainer.push(points)  # and so on, with every scan that comes in
+            >>> len(judgement.rain), derainer.waiting
+            (820, 0)
+
+        A model whose view asks for scans after the one that it judges answers for an earlier frame,
+        as many frames back. One of another sequence, or after a gap, starts anew: call
+        :meth:`flush` before it, or the frames that still wait are let go of.
+
+        Args:
+            frame: A frame, which is read; or points, as for calling the model, of which each push
+                is taken for the next of one sequence.
+            stopwatch: Takes the times of the stages read, view, network and back.
+
+        Returns:
+            What the model says of the frame that has all of its window by now; None until there is
+            one.
+
+        Raises:
+            InputError: A frame that cannot be read, a network that fails, or whose scores are not
+                finite.
+        """
+        stopwatch = stopwatch or Stopwatch()
+        if isinstance(frame, Frame):
+            with stopwatch.stage("read"):
+                scan = frame.read()
+        else:
+            scan = Scan.of(frame)
+        if self._recent.window.is_one_scan:
+            judgement = self.judge(scan, stopwatch)
+            return replace(judgement, frame=frame) if isinstance(frame, Frame) else judgement
+        if not isinstance(frame, Frame):
+            number = self._recent.next_number
+            frame = MemoryFrame(key=f"{number:06d}", number=number, scan=scan)
+        ready = self._recent.take(frame, scan)
+        return None if ready is None else self._judged_in_window(ready, stopwatch)
+
+    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
+        """Answers for the frames that still wait, each with the scans after it that there are.
+
+        Where one cannot be judged, those after it go on waiting.
+
+        Args:
+            stopwatch: Takes the times of the stages view, network and back.
+
+        Raises:
+            InputError: A network that fails, or whose scores are not finite.
+        """
+        while self._recent.waiting:
+            yield self._judged_in_window(self._recent.give(), stopwatch or Stopwatch())
 
     def logits(self, view: SeenScan) -> NDArray[np.float32]:
         """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).
@@ -139,6 +187,22 @@ class Derainer:
             raise InputError(
                 self.path, f"its network fails ({error})", "Export it with `derain export`."
             ) from error
+
+    def _judged_in_window(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
+        scans = ready.scans
+        judgement = self._judged(scans.scan, lambda: self.view.of_window(scans), stopwatch)
+        return replace(judgement, frame=ready.frame)
+
+    def _judged(self, scan: Scan, see: Callable[[], SeenScan], stopwatch: Stopwatch) -> Judgement:
+        """What the model says of a scan, once it sees it."""
+        with stopwatch.stage("view"):
+            view = see()
+        with stopwatch.stage("network"):
+            logits = self.logits(view)
+            self._refuse_senseless(logits, view, scan)
+        with stopwatch.stage("back"):
+            probability = view.back(probability_of_rain(logits))
+            return Judgement(probability, probability > self.spec.threshold, view.judged, scan)
 
     def _refuse_senseless(self, logits: NDArray[np.float32], view: SeenScan, scan: Scan) -> None:
         """Refuses scores that would count as "not rain" because nothing compares with them."""

@@ -1,1 +1,1 @@
-"""LightningModules and their networks, one file a model."""
+"""Networks and the LightningModules that train them: a file, or a folder, for each."""

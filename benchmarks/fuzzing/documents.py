@@ -13,6 +13,7 @@ from benchmarks.fuzzing.mutations import as_json, changed
 from benchmarks.fuzzing.reader import Reader
 from derain.annotation.scene_file import read_scene, write_scene
 from derain.cards.card import load_card, packaged_cards
+from derain.cards.layout import Layout
 from derain.evaluation.hard_cases import scene
 from derain.files.documents import Entry
 from derain.files.frame_times import read_frame_times
@@ -184,5 +185,5 @@ def _read_weather(path: Path) -> None:
         (sequence / folder).mkdir(parents=True, exist_ok=True)
     (sequence / "velodyne" / "0.bin").write_bytes(b"")
     (sequence / "weather" / "0.csv").write_bytes(path.read_bytes())
-    (found,) = find_sequences(path.parent, ("velodyne", "labels"))
+    (found,) = find_sequences(path.parent, Layout())
     assert found.rain_rate is None or math.isfinite(found.rain_rate)

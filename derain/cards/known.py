@@ -1,5 +1,6 @@
 """What the names of folders tell: the layouts of the packaged data cards."""
 
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -44,6 +45,19 @@ def label_of(scan: Path) -> Path:
         if folder.name == layout.scans and layout.labels != Layout().labels:
             return folder.parent / layout.labels / f"{scan_stem(scan)}{LABEL}"
     return label_beside(scan)
+
+
+def label_places(scan: Path) -> Iterator[Path]:
+    """Where labels of a scan are looked for beside its folder, whether or not any are there."""
+    for folder in dict.fromkeys(layout.labels for layout in known_layouts()):
+        yield Layout(labels=folder).label_of(scan)
+
+
+@cache
+def lidar_folders() -> tuple[str, ...]:
+    """Names of folders with scans, those first that hold the scans of a LiDAR alone."""
+    alone = (layout.lidar for layout in known_layouts() if layout.lidar)
+    return tuple(dict.fromkeys([*alone, *(layout.scans for layout in known_layouts())]))
 
 
 @cache

@@ -1,9 +1,12 @@
 """Where the scans and labels of a data set lie."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from derain.files.documents import Entry
+from derain.files.labels import LABEL
+from derain.files.names import scan_stem
 
 
 @dataclass(frozen=True)
@@ -37,10 +40,19 @@ class Layout:
         names = dict.fromkeys(("sequences", "scans", "labels", "lidar"), _folder)
         return cls(**entry.record(names, required=()))
 
+    def label_of(self, scan: Path) -> Path:
+        """Where the labels of a scan in the folder of scans lie."""
+        return folder_above(folder_above(scan)) / self.labels / f"{scan_stem(scan)}{LABEL}"
+
 
 def sequence_of(scan: Path) -> str:
     """Name of the sequence that a scan lies in: ``<sequence>/<folder of scans>/<frame>.bin``."""
     return scan.absolute().parent.parent.name
+
+
+def folder_above(path: Path) -> Path:
+    """The folder that a file or folder lies in, also where it is named from within its own."""
+    return path.parent if path.name not in ("", "..") else Path(os.path.abspath(path)).parent
 
 
 def _folder(entry: Entry) -> str:

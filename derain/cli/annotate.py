@@ -4,7 +4,7 @@ import argparse
 import json
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from tqdm import tqdm
 
+from derain.cards.known import lidar_folders
 from derain.cli.arguments import factor
-from derain.cli.outputs import refuse_clashes, say
+from derain.cli.outputs import folder_sink, say
 from derain.cli.scan_options import add_columns
 from derain.errors import InputError
-from derain.files import find_scans, read_scan
-from derain.files.labels import LABEL, write_labels
-from derain.files.names import scan_stem
 from derain.fusion.label_transfer import LABEL_WITHIN, UNKNOWN, transfer_labels
 from derain.simulation.classes import TrackClass
-from derain.sources.contents import LAYOUTS
+from derain.sources.folders import named_frames
+from derain.sources.frame import Frame
+from derain.sources.sink import FolderSink
+from derain.sources.source import Source
 
 if TYPE_CHECKING:
     from derain.annotation.plane import Plane
@@ -57,9 +58,6 @@ is required: begin with it alone, and box what the picture shows in rain's colou
 Radar frames are paired with scans of the same name, in the LiDAR's frame, and labelled by the
 nearest LiDAR point, in the folder radar; `derain fuse` pairs frames in time and moves them there.
 """
-
-# Where a sequence's scans lie: those of REHEARSE-3D's LiDAR alone, before clouds merged with radar.
-SCAN_FOLDERS = ("innoviz", *dict(LAYOUTS))
 
 CLASS_NAMES = {kind.value: kind.name.lower() for kind in TrackClass} | {UNKNOWN: "unknown"}
 
@@ -97,26 +95,25 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     from derain.annotation.scene_file import read_scene
 
-    paths = find_scans(map(_folder_of_scans, arguments.scans))
-    sequence = arguments.sequence or _sequence_of(paths[0])
-    refuse_clashes(paths, arguments.out)
-    _refuse_their_labels(paths, arguments.out)
-    frames = _radar_frames(arguments.radar, paths)
+    folders = map(_folder_of_scans, arguments.scans)
+    source = named_frames(folders, arguments.columns, layouts=())  # one sequence, no data set
+    sequence = arguments.sequence or _sequence_of(Path(source[0].name))
+    sink = folder_sink(arguments.out, source)
+    radar = _radar_frames(arguments, source)
     scene = read_scene(arguments.scene).in_sequence(sequence)
-    columns = arguments.columns
 
-    plane = _road_plane(paths, scene, columns)
-    points = _label_all(paths, frames, scene, plane, arguments)
+    plane = _road_plane(source, scene)
+    points = _label_all(source, radar, scene, plane, sink, arguments.within)
     report: dict[str, Any] = {
         "sequence": sequence,
-        "scans": len(paths),
+        "scans": len(source),
         "points": sum(points.values()),
         "points_by_class": {name: points[id_] for id_, name in CLASS_NAMES.items()},
         "plane": {**asdict(plane), "slope": plane.slope},
     }
     if arguments.picture:
         picture = arguments.out / f"{sequence}.png"
-        _draw(read_scan(paths[len(paths) // 2], columns), scene, plane, sequence, picture)
+        _draw(source[len(source) // 2].read(), scene, plane, sequence, picture)
         report["picture"] = str(picture)
     say(json.dumps(report) if arguments.json else _as_text(report))
     return 0
@@ -124,63 +121,58 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _folder_of_scans(path: Path) -> Path:
     """The folder of scans in a sequence's folder; other paths stay."""
-    return next((path / name for name in SCAN_FOLDERS if os.path.isdir(path / name)), path)
+    return next((path / name for name in lidar_folders() if os.path.isdir(path / name)), path)
 
 
 def _sequence_of(scan: Path) -> str:
     folder = scan.absolute().parent
-    return folder.parent.name if folder.name in SCAN_FOLDERS else folder.name
+    return folder.parent.name if folder.name in lidar_folders() else folder.name
 
 
-def _refuse_their_labels(scans: Sequence[Path], out: Path) -> None:
-    """Refuses to overwrite labels that came with the scans."""
-    for scan in scans:
-        for _, labels in LAYOUTS:
-            if out.resolve() == (scan.parent.parent / labels).resolve():
-                raise InputError(
-                    out, f"is where labels of {scan} lie", "Give --out another folder."
-                )
-
-
-def _radar_frames(folder: Path | None, scans: Sequence[Path]) -> dict[str, Path]:
-    """Radar frames by the stem of the scan that each belongs to."""
-    frames = {} if folder is None else {scan_stem(frame): frame for frame in find_scans([folder])}
-    stems = set(map(scan_stem, scans))
-    for stem, frame in frames.items():
-        if stem not in stems:
+def _radar_frames(arguments: argparse.Namespace, source: Source) -> dict[str, Frame]:
+    """Radar frames by the key of the scan that each belongs to."""
+    if arguments.radar is None:
+        return {}
+    frames = named_frames([arguments.radar], arguments.radar_columns, layouts=())
+    keys = {frame.key for frame in source}
+    for frame in frames:
+        if frame.key not in keys:
             raise InputError(
-                frame, "no scan has its name", "Pair the frames in time with `derain fuse`."
+                frame.name, "no scan has its name", "Pair the frames in time with `derain fuse`."
             )
-    return frames
+    return {frame.key: frame for frame in frames}
 
 
-def _road_plane(paths: Sequence[Path], scene: "Scene", columns: Sequence[str]) -> "Plane":
+def _road_plane(source: Source, scene: "Scene") -> "Plane":
     from derain.annotation.steps import road_plane
 
-    chosen = np.linspace(0, len(paths) - 1, min(len(paths), scene.plane.scans)).round().astype(int)
-    return road_plane([read_scan(paths[number], columns) for number in chosen], scene)
+    most = min(len(source), scene.plane.scans)
+    chosen = np.linspace(0, len(source) - 1, most).round().astype(int)
+    return road_plane([source[number].read() for number in chosen.tolist()], scene)
 
 
 def _label_all(
-    paths: Sequence[Path],
-    frames: dict[str, Path],
+    source: Source,
+    radar: Mapping[str, Frame],
     scene: "Scene",
     plane: "Plane",
-    arguments: argparse.Namespace,
+    sink: FolderSink,
+    within: float,
 ) -> Counter[int]:
     """Writes the labels of all scans and radar frames; counts the scans' points by class."""
     from derain.annotation.steps import annotate
 
+    of_radar = FolderSink(sink.folder / "radar")
     points: Counter[int] = Counter()
-    for path in tqdm(paths, unit="scan", disable=None):
-        scan = read_scan(path, arguments.columns)
+    for frame in tqdm(source, unit="scan", disable=None):
+        scan = frame.read()
         label = annotate(scan, scene, plane)
-        write_labels(arguments.out / f"{scan_stem(path)}{LABEL}", label)
+        sink.write(frame, None, label)
         points.update(label.tolist())
-        if scan_stem(path) in frames:
-            frame = read_scan(frames[scan_stem(path)], arguments.radar_columns)
-            transferred = transfer_labels(scan.with_label(label), frame.xyz, arguments.within)
-            write_labels(arguments.out / "radar" / f"{scan_stem(path)}{LABEL}", transferred)
+        if frame.key in radar:
+            detections = radar[frame.key].read()
+            transferred = transfer_labels(scan.with_label(label), detections.xyz, within)
+            of_radar.write(radar[frame.key], None, transferred)
     return points
 
 

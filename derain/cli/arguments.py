@@ -20,6 +20,11 @@ def threads(text: str) -> int:
     return _at_least(0, text)
 
 
+def add_threads(parser: argparse.ArgumentParser) -> None:
+    """Declares how many threads a command may use."""
+    parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
+
+
 def factor(text: str) -> float:
     """A finite number above 0."""
     value = float(text)

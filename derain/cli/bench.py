@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from derain.cli.arguments import command_line, count, threads
+from derain.cli.arguments import add_threads, command_line, count
 from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='rain rate of each sequence in mm/h, as "005": 25 (default: a simulation\'s own)',
     )
     parser.add_argument("--paper", choices=TABLES, help="print beside this table")
-    parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
+    add_threads(parser)
     parser.add_argument(
         "--timed", type=count, default=10, help="scans to time on (default: %(default)s)"
     )

@@ -1,4 +1,4 @@
-"""``derain demo``: the whole story on simulated rain."""
+"""``derain demo``: every step from scans to a deployed model, on simulated rain."""
 
 import argparse
 import re
@@ -24,7 +24,7 @@ of derain, printed before it runs; what it prints goes to log.txt.
 # What the networks are called, and the beginning of their configurations' names.
 NETWORKS = {"3D-OutDet": "outdet", "SalsaNext": "salsanext", "LiSnowNet-L1": "lisnownet"}
 
-# What learns nothing, and what nothing worth having is worse than.
+# What they are compared with: a filter, and the baselines that every method has to beat.
 OTHERS = ("dror", "position", "intensity", "all", "none")
 
 # 16 streets to train on, 5 to choose by, 5 to test on.
@@ -39,13 +39,13 @@ SHOWN = ("method", "P", "R", "F1", "IoU", "IoU 95 %", "ms")
 
 @dataclass(frozen=True)
 class Story:
-    """What is told, and how long it takes.
+    """What the demonstration does. Another than the usual one takes less time.
 
     Attributes:
         out: Folder that everything is written to.
         streets: Options of ``derain simulate``.
         networks: Networks that are trained, as ``NETWORKS`` calls them.
-        others: Methods beside them.
+        others: Methods that they are compared with.
         fit: Options of every training.
         bench: Options of the comparison.
     """
@@ -72,7 +72,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def tell(story: Story) -> None:
-    """Runs every step, and prints what came of it.
+    """Runs every step, and prints its result.
 
     Raises:
         SystemExit: A step failed.
@@ -127,7 +127,7 @@ def _network(narrator: Narrator, story: Story, title: str, scan: Path) -> None:
 
 
 def _clean(narrator: Narrator, out: Path, title: str, scan: Path) -> None:
-    """Cleans the scans beside one, and draws that one before and after."""
+    """Cleans the folder of scans that one of them lies in, and draws that one before and after."""
     from derain.export.runtime import Derainer
     from derain.files import read_scan
     from derain.pictures.scan_pictures import before_after_figure, save
@@ -143,7 +143,7 @@ def _clean(narrator: Narrator, out: Path, title: str, scan: Path) -> None:
 
 
 def _rainiest(data: Path) -> Path:
-    """The last test scan of the sequence where it rains most."""
+    """The last scan of the test sequence with the highest rain rate."""
     from derain.cards.layout import sequence_of
     from derain.datamodules.labelled import rain_rates
     from derain.datamodules.simulated import Simulated
@@ -163,19 +163,19 @@ def _last_line(printed: Transcript) -> str:
 
 
 def _last_score(printed: Transcript) -> str:
-    """IoU on the validation scans, as the bar of the last epoch shows it."""
+    """IoU on the validation scans, as the progress bar of the last epoch shows it."""
     found = re.search(r"val_iou=([\d.]+)", printed.bar)
     return f": IoU {found[1]} on streets kept back" if found else ""
 
 
 def _proof(printed: Transcript) -> str:
-    """The largest difference to PyTorch in all cases."""
+    """The line of the export's proof that says how much the model differs from PyTorch."""
     proof = next(line for line in printed.said if "largest logit difference" in line)
     return f"beside PyTorch {proof.partition(': ')[2]}"
 
 
 def _narrowed(lines: Sequence[str]) -> list[str]:
-    """Of a table among these lines, the columns that say how good and how fast a method is."""
+    """The table that is among these lines, with no other columns than those of ``SHOWN``."""
     rows = [line.strip("|").split("|") for line in lines if line.startswith("|")]
     shown = [number for number, name in enumerate(rows[0]) if name.strip() in SHOWN]
     return ["|".join(["", *(row[number] for number in shown), ""]) for row in rows]

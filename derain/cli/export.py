@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("checkpoint", type=Path, help="checkpoint of derain")
     parser.add_argument("--out", type=Path, required=True, help="the ONNX file to write")
     parser.add_argument(
-        "--int8", action="store_true", help="compute in eight bits (SalsaNext and LiSnowNet)"
+        "--int8", action="store_true", help="compute in eight bits (networks with convolutions)"
     )
     parser.add_argument(
         "--calibration", type=Path, nargs="+", help="scans, or folders of scans, for --int8"
@@ -103,7 +103,7 @@ def _warn_of_odd(scans: Iterable["Scan"], spec: "Spec") -> None:
     def tell(scan: "Scan") -> None:
         notices.tell(scan.name, spec.oddities(scan))
 
-    # Mapped, not looped over: a loop would hold on to one scan while the next is read.
+    # Mapped, for a loop would hold on to one scan while the next is read.
     for _ in map(tell, scans):
         pass
     notices.tell_how_many_more()

@@ -11,18 +11,20 @@ from tqdm import tqdm
 
 from derain.cards.card import load_card
 from derain.cli.arguments import factor
-from derain.cli.outputs import refuse_clashes, say
+from derain.cli.outputs import folder_sink, say
 from derain.cli.scan_options import add_columns
 from derain.errors import InputError
-from derain.files import find_scans, read_scan, write_scan
+from derain.files import write_scan
 from derain.files.atomic import replacing
 from derain.files.frame_times import FRAME_COLUMNS, METADATA, read_frame_times
 from derain.files.labels import LABEL, instance, read_labels, semantic, write_labels
-from derain.files.names import scan_stem
 from derain.fusion.extrinsics import Extrinsics, read_extrinsics
 from derain.fusion.fuse import NO_DETECTIONS, fuse, nearest_in_time
 from derain.fusion.label_transfer import LABEL_WITHIN, UNKNOWN
 from derain.scan import Scan
+from derain.sources.folders import named_frames
+from derain.sources.frame import Frame
+from derain.sources.source import Source
 
 SUMMARY = "merge the frames of a LiDAR and of a 4D radar"
 
@@ -95,57 +97,52 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     _refuse_overwriting(arguments)
     extrinsics = read_extrinsics(arguments.extrinsics)
-    scans, frames = find_scans([arguments.lidar]), find_scans([arguments.radar])
-    refuse_clashes(scans, arguments.out / LAYOUT.scans)
-    times = read_frame_times(scans, arguments.metadata_columns)
-    frame_times = read_frame_times(frames, arguments.metadata_columns)
-    nearest = nearest_in_time(times, frame_times, arguments.within)
+    lidar = named_frames([arguments.lidar], arguments.lidar_columns, layouts=())
+    radar = named_frames([arguments.radar], arguments.radar_columns, layouts=())
+    folder_sink(arguments.out / LAYOUT.scans, lidar)
+    times = _times(lidar, arguments.metadata_columns)
+    nearest = nearest_in_time(times, _times(radar, arguments.metadata_columns), arguments.within)
     if (nearest < 0).all():
         raise InputError(
             arguments.radar,
             f"no frame is within {arguments.within:g} s of a LiDAR scan",
             "Check that the timestamps are seconds of one clock, or widen --within.",
         )
-    partners = [frames[number] if number >= 0 else None for number in nearest]
-    for scan, frame in tqdm(zip(scans, partners, strict=True), total=len(scans), disable=None):
-        _fuse(scan, frame, extrinsics, arguments)
-    _write_metadata(arguments.out / LAYOUT.scans / METADATA, scans, times, partners)
+    partners = [radar[number] if number >= 0 else None for number in nearest.tolist()]
+    for frame, partner in tqdm(zip(lidar, partners, strict=True), total=len(lidar), disable=None):
+        _fuse(frame, partner, extrinsics, arguments)
+    _write_metadata(arguments.out / LAYOUT.scans / METADATA, lidar, times, partners)
     alone = partners.count(None)
     folder = arguments.out / LAYOUT.scans
-    say(f"{len(scans)} scans in {folder}, {alone} of them without a radar frame")
+    say(f"{len(lidar)} scans in {folder}, {alone} of them without a radar frame")
     return 0
 
 
 def _fuse(
-    scan: Path, frame: Path | None, extrinsics: Extrinsics, arguments: argparse.Namespace
+    frame: Frame, partner: Frame | None, extrinsics: Extrinsics, arguments: argparse.Namespace
 ) -> None:
-    lidar = _read(scan, "lidar", arguments)
+    lidar = _read(frame, "--lidar-columns")
     raw = None
     if arguments.labels is not None:
-        raw = read_labels(arguments.labels / f"{scan_stem(scan)}{LABEL}", len(lidar))
+        raw = read_labels(arguments.labels / f"{frame.key}{LABEL}", len(lidar))
         lidar = lidar.with_label(semantic(raw))
-    radar = NO_DETECTIONS
-    if frame is not None:
-        radar = _read(frame, "radar", arguments)
+    radar = NO_DETECTIONS if partner is None else _read(partner, "--radar-columns")
     extra = list(filter(None, arguments.extra.split(",")))
     fused = fuse(lidar, radar, extrinsics, arguments.label_within, extra)
-    write_scan(
-        arguments.out / LAYOUT.scans / f"{scan_stem(scan)}{'.npz' if extra else '.bin'}", fused
-    )
+    suffix = ".npz" if extra else ".bin"
+    write_scan(arguments.out / LAYOUT.scans / f"{frame.key}{suffix}", fused)
     if fused.label is not None and raw is not None:
         instances = np.pad(instance(raw), (0, len(radar)))  # the radar's points are of none
-        write_labels(
-            arguments.out / LAYOUT.labels / f"{scan_stem(scan)}{LABEL}", fused.label, instances
-        )
+        labels = arguments.out / LAYOUT.labels / f"{frame.key}{LABEL}"
+        write_labels(labels, fused.label, instances)
 
 
-def _read(path: Path, sensor: str, arguments: argparse.Namespace) -> Scan:
-    """Reads a frame; what an error says of --columns is here the option of that sensor."""
+def _read(frame: Frame, option: str) -> Scan:
+    """Reads a frame; what an error says of --columns is here the option of its sensor."""
     try:
-        return read_scan(path, getattr(arguments, f"{sensor}_columns"))
+        return frame.read()
     except InputError as error:
         texts = str(error.subject), error.reason, error.remedy
-        option = f"--{sensor}-columns"
         raise InputError(*(text.replace("--columns", option) for text in texts)) from error
 
 
@@ -156,15 +153,20 @@ def _refuse_overwriting(arguments: argparse.Namespace) -> None:
             raise InputError(arguments.out, f"would overwrite {folder}", "Give another --out.")
 
 
+def _times(frames: Source, columns: Sequence[str]) -> NDArray[np.float64]:
+    """When each frame was taken, seconds, as its folder's metadata says."""
+    return read_frame_times([Path(frame.name) for frame in frames], columns)
+
+
 def _write_metadata(
-    path: Path, scans: Sequence[Path], times: NDArray[np.float64], partners: Sequence[Path | None]
+    path: Path, frames: Source, times: NDArray[np.float64], partners: Sequence[Frame | None]
 ) -> None:
     """Writes when each scan was taken, and which radar frame is in it."""
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow([*FRAME_COLUMNS, "radar_frame"])
-        for scan, time, frame in zip(scans, times.tolist(), partners, strict=True):
-            writer.writerow([scan_stem(scan), time, scan_stem(frame) if frame else ""])
+        for frame, time, partner in zip(frames, times.tolist(), partners, strict=True):
+            writer.writerow([frame.key, time, partner.key if partner else ""])
 
 
 def _two_names(text: str) -> list[str]:

@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--data", help="data card of what they were trained on (default: that of --stats)"
     )
     parser.add_argument(
-        "--grid", help="of a range image: semantickitti, rehearse3d or wads (not for outdet)"
+        "--grid", help="of a range image, where they see one: semantickitti, rehearse3d or wads"
     )
     parser.add_argument("--out", type=Path, required=True, help="the checkpoint to write")
 

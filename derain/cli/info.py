@@ -15,10 +15,10 @@ from derain.cli.info_folder import draw, facts_of_folder
 from derain.cli.outputs import say
 from derain.cli.scan_options import ListFormats, add_columns
 from derain.errors import InputError, printable
-from derain.files import find_scans, read_scan
 from derain.files.labels import read_labels, semantic
 from derain.files.reading import reading
 from derain.scan import Scan
+from derain.sources.folders import frame_of, named_frames
 from derain.views.directions import directions
 from derain.views.grid_fit import fit_grid
 from derain.views.morton import distinct_rows
@@ -52,7 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--json", action="store_true", help="print one JSON object a file or folder"
     )
     parser.add_argument(
-        "--card", help="data card that names a folder's classes (default: as its layout tells)"
+        "--card",
+        help="data card that names a folder's classes, and its folders (default: as those tell)",
     )
     parser.add_argument(
         "--layout",
@@ -70,8 +71,8 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     _refuse_unclear_picture(arguments)
     if arguments.grid:
-        scans = find_scans(arguments.files)
-        fit = fit_grid([read_scan(path, arguments.columns) for path in scans]).as_dict()
+        frames = named_frames(arguments.files, arguments.columns)
+        fit = fit_grid([frame.read() for frame in frames]).as_dict()
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0
     for path in arguments.files:
@@ -127,7 +128,7 @@ def _facts(path: Path, columns: Sequence[str]) -> dict[str, Any]:
                 "Make a checkpoint of them with `derain import-weights`.",
             )
         case _:
-            return _of_scan(read_scan(path, columns))
+            return _of_scan(frame_of(path, columns).read())
 
 
 def _of_scan(scan: Scan) -> dict[str, Any]:

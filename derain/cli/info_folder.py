@@ -2,26 +2,26 @@
 
 import argparse
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
 from derain.cards.card import DataCard, load_card
-from derain.cards.known import card_by_folders
+from derain.cards.known import card_by_folders, known_layouts
 from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.evaluation.text_tables import plain_table
 from derain.sources.contents import (
-    Tally,
+    Contents,
     class_name,
-    count_scan,
-    find_layout,
+    count_frame,
     find_sequences,
     manifest_of,
     rate_name,
 )
+from derain.sources.folders import find_layout
 
 
 @dataclass(frozen=True)
@@ -30,57 +30,62 @@ class FolderFacts:
 
     Attributes:
         folder: The folder.
-        layout: Names of its folders of scans and labels; None where scans lie directly in it.
+        layout: What its folders are called; None where scans lie directly in it.
         card: Name of the data card that names the classes; None where none does.
         classes: Names of the classes, by id.
-        tallies: What was counted, by rain rate in mm/h in ascending order; None last, for where it
-            is not known.
+        by_rain_rate: What was counted, by rain rate in mm/h in ascending order; None last, for
+            where it is not known.
     """
 
     folder: Path
-    layout: tuple[str, str] | None
+    layout: Layout | None
     card: str | None
     classes: Mapping[int, str]
-    tallies: Mapping[float | None, Tally]
+    by_rain_rate: Mapping[float | None, Contents]
 
     @property
-    def total(self) -> Tally:
+    def folders(self) -> list[str] | None:
+        """Names of its folders of scans and labels; None where scans lie directly in it."""
+        return None if self.layout is None else [self.layout.scans, self.layout.labels]
+
+    @property
+    def total(self) -> Contents:
         """What was counted at all rain rates together."""
-        total = Tally()
-        for tally in self.tallies.values():
-            total.add(tally)
+        total = Contents()
+        for contents in self.by_rain_rate.values():
+            total.add(contents)
         return total
 
     def as_dict(self) -> dict[str, Any]:
         """The same as JSON knows it."""
         return {
             "folder": str(self.folder),
-            "layout": self.layout,
+            "layout": self.folders,
             "card": self.card,
             **self.total.as_dict(self.classes),
             "by_rain_rate": {
-                "unknown" if rate is None else f"{rate:g}": tally.as_dict(self.classes)
-                for rate, tally in self.tallies.items()
+                "unknown" if rate is None else f"{rate:g}": contents.as_dict(self.classes)
+                for rate, contents in self.by_rain_rate.items()
             },
         }
 
     def as_text(self) -> str:
         """The same as a table: a line a class, a column a rain rate."""
-        total, names = self.total, [rate_name(rate) for rate in self.tallies]
-        columns = [total, *self.tallies.values()]
+        total, names = self.total, [rate_name(rate) for rate in self.by_rain_rate]
+        columns = [total, *self.by_rain_rate.values()]
         rows = [["", "all", "share", *names]]
         for title in ("sequences", "scans", "points"):
-            counts = [f"{getattr(tally, title):,}" for tally in columns]
+            counts = [f"{getattr(contents, title):,}" for contents in columns]
             rows.append([title, counts[0], "", *counts[1:]])
         for id_ in sorted(total.labelled):
-            counts = [f"{tally.labelled[id_]:,}" for tally in columns]
+            counts = [f"{contents.labelled[id_]:,}" for contents in columns]
             share = f"{total.labelled[id_] / total.labelled.total():.3%}"
             rows.append([class_name(id_, self.classes), counts[0], share, *counts[1:]])
         return f"{self.folder} ({self._explained})\n{plain_table(rows)}"
 
     @property
     def _explained(self) -> str:
-        layout = "a folder of scans" if self.layout is None else " and ".join(self.layout)
+        layout = "a folder of scans" if self.folders is None else " and ".join(self.folders)
         return f"{layout}; classes: {self.card or 'no data card'}"
 
 
@@ -94,23 +99,24 @@ def facts_of_folder(folder: Path, arguments: argparse.Namespace) -> FolderFacts:
     Raises:
         InputError: A folder without scans, a file in it that cannot be read, or no such data card.
     """
-    layout = find_layout(folder) if arguments.layout is None else _stated(arguments.layout)
-    card = _card(folder, layout, arguments.card)
-    sequences = find_sequences(folder, layout)
+    card = None if arguments.card is None else load_card(arguments.card)
+    layout = _layout(folder, card, arguments.layout)
+    card = card or _card(folder, layout)
+    sequences = find_sequences(folder, layout, arguments.columns)
     rates = sorted(
         {sequence.rain_rate for sequence in sequences}, key=lambda rate: (rate is None, rate or 0)
     )
-    tallies = {rate: Tally() for rate in rates}
-    scans = sum(len(sequence.scans) for sequence in sequences)
+    by_rain_rate = {rate: Contents() for rate in rates}
+    scans = sum(len(sequence.frames) for sequence in sequences)
     with tqdm(total=scans, unit="scan", disable=None) as progress:
         for sequence in sequences:
-            tally = tallies[sequence.rain_rate]
-            tally.sequences += 1
-            for scan in sequence.scans:
-                tally.add(count_scan(scan, layout, arguments.columns))
+            contents = by_rain_rate[sequence.rain_rate]
+            contents.sequences += 1
+            for frame in sequence.frames:
+                contents.add(count_frame(frame))
                 progress.update()
     classes = card.classes if card else {}
-    return FolderFacts(folder, layout, card.name if card else None, classes, tallies)
+    return FolderFacts(folder, layout, card.name if card else None, classes, by_rain_rate)
 
 
 def draw(facts: FolderFacts, picture: Path) -> None:
@@ -124,22 +130,24 @@ def draw(facts: FolderFacts, picture: Path) -> None:
 
     total = facts.total
     title = f"{facts.folder.absolute().name}: {total.scans:,} scans, {total.points:,} points"
-    save(statistics_figure(facts.tallies, facts.classes, title), picture)
+    save(statistics_figure(facts.by_rain_rate, facts.classes, title), picture)
 
 
-def _stated(layout: str) -> tuple[str, str]:
-    folders = layout.split(",")
+def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout | None:
+    """What a folder's folders are called: as stated, as its data card says, or as others do."""
+    if stated is None:
+        return find_layout(folder, [*([card.layout] if card else []), *known_layouts()])
+    folders = stated.split(",")
     if len(folders) != 2:
         raise InputError(
-            "--layout", f"'{layout}' does not name two folders", "Give e.g. velodyne,labels."
+            "--layout", f"'{stated}' does not name two folders", "Give e.g. velodyne,labels."
         )
     scans, labels = folders
-    return scans, labels
+    return replace(card.layout if card else Layout(), scans=scans, labels=labels)
 
 
-def _card(folder: Path, layout: tuple[str, str] | None, name: str | None) -> DataCard | None:
-    if name is None and manifest_of(folder):
-        name = "simulated"
-    elif name is None and layout is not None:
-        return card_by_folders(Layout(scans=layout[0], labels=layout[1]), "classes")
-    return None if name is None else load_card(name)
+def _card(folder: Path, layout: Layout | None) -> DataCard | None:
+    """The data card that a folder tells of by itself."""
+    if manifest_of(folder):
+        return load_card("simulated")
+    return None if layout is None else card_by_folders(layout, "classes")

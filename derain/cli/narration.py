@@ -1,4 +1,4 @@
-"""Runs commands of derain one after another, and tells on a few lines how they get on."""
+"""Runs commands of derain one after another, with a line or two on the screen for each."""
 
 import io
 import re
@@ -13,26 +13,27 @@ from pathlib import Path
 
 from derain.cli.outputs import refuse_unwritable
 
-# How often one learns how far a command is, in seconds: on a terminal, and in a file.
+# Seconds between reports of how far a command has come: on a terminal (True), and in a file.
 PERIODS = {True: 0.5, False: 15.0}
 
-# A progress bar, be it Lightning's or tqdm's: what is counted, and how far it is.
+# A progress bar of Lightning or tqdm: what is counted, and the share that is done.
 _BAR = re.compile(r"(?P<what>[^|\r\n]*?):?\s*(?P<share>\d+%)?\|.*\|\s*\d+/")
 _MOVES_OF_CURSOR = re.compile(r"\x1b\[[A-Z]")
 
 
 class Transcript(io.TextIOBase):
-    """Takes what a command prints: whole lines go to a file, bars of progress are looked at.
+    """Stands in for the stream that a command prints to.
 
-    Whoever keeps it, as a logger may, can go on writing to it when the command is over.
+    Whole lines are kept and written to a file; from progress bars it reads how far the command has
+    come. A logger that holds on to it may go on writing when the command is over.
 
     Args:
         log: The file.
 
     Attributes:
         said: The lines.
-        progress: How far the command is, as its last bar says; empty without one.
-        bar: The whole of that bar.
+        progress: What the last progress bar counts, and the share done; empty without a bar.
+        bar: The text of that bar.
     """
 
     def __init__(self, log: Path) -> None:
@@ -42,7 +43,7 @@ class Transcript(io.TextIOBase):
         self.progress = self.bar = ""
 
     def write(self, text: str) -> int:
-        """Takes some more of it."""
+        """Takes more text, which need not end with a line."""
         for part in _MOVES_OF_CURSOR.sub("", text).splitlines(keepends=True):
             self._unfinished += part
             if found := _BAR.search(self._unfinished):
@@ -53,7 +54,7 @@ class Transcript(io.TextIOBase):
         return len(text)
 
     def isatty(self) -> bool:
-        """Bars are wanted: they are how a command says how far it is."""
+        """True: commands draw progress bars on terminals only, and the bars are wanted."""
         return True
 
     def _end_line(self, *, is_bar: bool) -> None:
@@ -87,13 +88,13 @@ class Narrator:
 
         Args:
             command: Its arguments.
-            result: What is to be told of it, from what it printed.
+            result: Makes the line that is printed as its result, of what it printed itself.
 
         Returns:
             The lines that it printed.
 
         Raises:
-            SystemExit: It failed; why has been printed.
+            SystemExit: It failed, and the reason has been printed.
         """
         line = f"$ derain {shlex.join(command)}"
         print(line, flush=True)
@@ -121,7 +122,7 @@ class Narrator:
 
 @contextmanager
 def _told_how_far(transcripts: Sequence[Transcript], begun: float) -> Iterator[None]:
-    """Shows how far a command is while it runs: on one line of a terminal, or a line at times."""
+    """Shows how far a command has come: on one line of a terminal, or in a file, line by line."""
     out, done = sys.stdout, threading.Event()
     live = out.isatty()
 

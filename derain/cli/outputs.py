@@ -1,40 +1,41 @@
 """What commands print, and where they may write what they make of scans."""
 
+import json
 import sys
-from collections import Counter
-from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from tqdm import tqdm
 
-from derain.errors import InputError, printable
+from derain.errors import printable
 from derain.files.atomic import replacing
-from derain.files.labels import label_beside
-from derain.files.names import scan_stem
+from derain.sources.sink import FolderSink
+from derain.sources.source import Source
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
-def refuse_clashes(scans: Sequence[Path], out: Path) -> None:
-    """Refuses to overwrite a scan by what is made of it, or labels by others.
+def folder_sink(out: Path, source: Source) -> FolderSink:
+    """The folder that a command writes to, once it is known to overwrite nothing of the source.
 
     Args:
-        scans: What is read.
-        out: Folder where a file of each scan's name, and labels of that name, are to be written.
+        out: What ``--out`` names.
+        source: What is read.
 
     Raises:
-        InputError: It holds a scan or its labels, or two scans have one name.
+        InputError: It holds a scan or labels that would be overwritten, or two scans have one name.
     """
-    stems = Counter(map(scan_stem, scans))
-    for scan in scans:
-        if (out / scan.name).resolve() == scan.resolve():
-            raise InputError(out, f"would overwrite {scan}", "Give --out another folder.")
-        if out.resolve() == label_beside(scan).parent.resolve():
-            raise InputError(out, f"holds the labels of {scan}", "Give --out another folder.")
-        if stems[scan_stem(scan)] > 1:
-            raise InputError(
-                scan, "another scan has the same name", "Take them in two runs, each to its --out."
-            )
+    sink = FolderSink(out, again=False)
+    sink.refuse_clashes(source)
+    return sink
+
+
+def tell(facts: "DataclassInstance", as_json: bool) -> None:
+    """Prints what was done to a scan, above a progress bar: a line of text, or an object."""
+    tqdm.write(json.dumps(asdict(facts)) if as_json else str(facts), sys.stdout)
 
 
 def say(text: str, stream: TextIO | None = None) -> None:

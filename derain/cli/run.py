@@ -1,30 +1,25 @@
 """``derain run``: cleans scans with an exported model or a filter."""
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-from tqdm import tqdm
-
-from derain.cli.arguments import share, threads
+from derain.cli.arguments import add_threads, share
 from derain.cli.filter_help import list_filters
-from derain.cli.outputs import refuse_clashes
+from derain.cli.outputs import folder_sink, tell
+from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError, printable
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
-from derain.files import find_scans, read_scan, write_scan
-from derain.files.labels import LABEL, write_labels
-from derain.files.names import beside
-from derain.files.reading import reading
 from derain.filters import FilterDerainer, read_parameters
-from derain.scan import Scan
+from derain.sources.folders import named_frames
+from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
+from derain.sources.sink import Sink
 from derain.system.notices import Notices
 from derain.system.stopwatch import Stopwatch
 from derain.views.oddities import Oddity, left_out, much_removed, outside_view
@@ -39,11 +34,12 @@ rain, in the input's format with every field kept.
   derain run model.onnx scans/ more/scan.pcd --out cleaned --threads 2 --json
   derain run model.onnx nuscenes/ --out cleaned --columns x,y,z,intensity,ring
   derain run dror scans/ --out cleaned
+  derain run dror WADS/ --out cleaned
   derain run best.yaml scans/ --out cleaned
   derain run dsor scans/ --out cleaned --parameters best.yaml --set range_multiplier=0.08
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
-or a filter (below).
+or a filter (below). Of a data set, results are named by their paths in it.
 What is odd about a scan is warned of, each fault once. One of which more than --most-removed is
 called rain is left alone. It and a scan that cannot be read are reported and passed over; the exit
 code is then 2.
@@ -86,9 +82,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "method", metavar="METHOD", help="ONNX file, YAML file of parameters, or name of a filter"
     )
     list_filters(parser)
-    parser.add_argument("scans", nargs="+", type=Path, help="scans, or folders of scans")
+    parser.add_argument(
+        "scans", nargs="+", type=Path, help="scans, folders of scans, or a data set's folder"
+    )
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
-    parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
+    add_threads(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object a scan")
     add_columns(parser)
     add_intensity_scale(parser)
@@ -115,66 +113,78 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     method = load_method(*_named_method(arguments), arguments.threads)
-    scans = find_scans(arguments.scans)
-    refuse_clashes(scans, arguments.out)
-    notices = Notices()
-    done: list[Cleaned] = []
-    for path in tqdm(scans, unit="scan", disable=None):
-        try:
-            with reading(path):  # which knows what to say where the memory is full
-                cleaned = _clean(path, method, arguments, notices)
-        except InputError as error:
-            tqdm.write(f"derain: {error}", sys.stderr)
-            continue
-        done.append(cleaned)
-        tqdm.write(json.dumps(asdict(cleaned)) if arguments.json else str(cleaned), sys.stdout)
-    notices.tell_how_many_more()
-    if len(done) > 1:
-        print(_summary(done), file=sys.stderr if arguments.json else sys.stdout)
-    if failed := len(scans) - len(done):
-        print(f"derain: {failed} of {len(scans)} scans could not be cleaned", file=sys.stderr)
-    return 2 if failed else 0
+    source = named_frames(arguments.scans, arguments.columns)
+    cleaning = _Cleaning(method, folder_sink(arguments.out, source), arguments)
+    scans = ScanByScan(source)
+    for frame in scans:
+        if method.starts_anew(frame):
+            cleaning.finish(scans)
+        with scans.passing_over(frame):
+            cleaning.clean(frame)
+    cleaning.finish(scans)
+    cleaning.notices.tell_how_many_more()
+    if len(cleaning.done) > 1:
+        print(_summary(cleaning.done), file=sys.stderr if arguments.json else sys.stdout)
+    return scans.exit_code("{scans} could not be cleaned")
 
 
-def _clean(
-    path: Path, method: Derainer | FilterDerainer, arguments: argparse.Namespace, notices: Notices
-) -> Cleaned:
-    stopwatch = Stopwatch()
-    with stopwatch.stage("read"):
-        scan = read_scan(path, arguments.columns)
-    rain, odd = _judge(scan.with_intensity_times(arguments.intensity_scale), method, stopwatch)
-    valid, removed = int(scan.valid.sum()), int(rain.sum())
-    share_removed = removed / max(valid, 1)
-    odd += [*much_removed(share_removed), *left_out(scan)]
-    notices.tell(str(path), odd)
-    if share_removed > arguments.most_removed:
-        raise InputError(
-            path,
-            f"{share_removed:.1%} of its points are called rain, and nothing was written",
-            "See whether the method suits it, or raise --most-removed.",
-        )
-    with stopwatch.stage("write"):
-        _write(arguments.out / path.name, scan, rain)
-    return Cleaned(
-        str(path),
-        len(scan),
-        valid,
-        removed,
-        share_removed,
-        stopwatch.milliseconds,
-        [oddity.detail for oddity in odd],
-    )
+class _Cleaning:
+    """What cleans frame after frame, and remembers what was done."""
+
+    def __init__(
+        self, method: Derainer | FilterDerainer, sink: Sink, arguments: argparse.Namespace
+    ) -> None:
+        self.method = method
+        self.sink = sink
+        self.arguments = arguments
+        self.notices = Notices()
+        self.done: list[Cleaned] = []
+
+    def clean(self, frame: Frame) -> None:
+        """Judges the next frame, and writes what is known by then: of this one, or an earlier."""
+        stopwatch = Stopwatch()
+        frame = frame.with_intensity_times(self.arguments.intensity_scale)
+        judgement = self.method.push(frame, stopwatch)
+        if judgement is not None:
+            self._write(judgement, stopwatch)
+
+    def finish(self, scans: ScanByScan) -> None:
+        """Writes what still waits for scans after the last of a recording."""
+        while self.method.waiting:  # where one fails, the others go on waiting
+            with scans.passing_over(scans.source[-1]):
+                stopwatch = Stopwatch()
+                for judgement in self.method.flush(stopwatch):
+                    self._write(judgement, stopwatch)
+                    stopwatch.milliseconds.clear()
+
+    def _write(self, judgement: Judgement, stopwatch: Stopwatch) -> None:
+        scan, frame, rain = judgement.scan, judgement.frame, judgement.rain
+        assert frame is not None  # it was pushed
+        valid, removed = int(scan.valid.sum()), int(rain.sum())
+        share_removed = removed / max(valid, 1)
+        odd = [*_oddities(judgement, self.method), *much_removed(share_removed), *left_out(scan)]
+        self.notices.tell(frame.name, odd)
+        if share_removed > self.arguments.most_removed:
+            raise InputError(
+                frame.name,
+                f"{share_removed:.1%} of its points are called rain, and nothing was written",
+                "See whether the method suits it, or raise --most-removed.",
+            )
+        with stopwatch.stage("write"):
+            self.sink.write(frame, scan.take(~rain), rain)
+        told = [oddity.detail for oddity in odd]
+        times = dict(stopwatch.milliseconds)
+        cleaned = Cleaned(frame.name, len(scan), valid, removed, share_removed, times, told)
+        self.done.append(cleaned)
+        tell(cleaned, self.arguments.json)
 
 
-def _judge(
-    scan: Scan, method: Derainer | FilterDerainer, stopwatch: Stopwatch
-) -> tuple[NDArray[np.bool_], list[Oddity]]:
-    """Which points are rain, bool (N,), and what is odd about the scan for this method."""
+def _oddities(judgement: Judgement, method: Derainer | FilterDerainer) -> Sequence[Oddity]:
+    """What is odd about a scan for the method that judged it."""
     if isinstance(method, FilterDerainer):
-        return method(scan, stopwatch), list(method.filter.oddities(scan))
-    judgement = method.judge(scan, stopwatch)
-    outside = outside_view(scan, judgement.judged, method.spec.data)
-    return judgement.rain, [*method.spec.oddities(scan), *outside]
+        return list(method.filter.oddities(judgement.scan))
+    outside = outside_view(judgement.scan, judgement.judged, method.spec.data)
+    return [*method.spec.oddities(judgement.scan), *outside]
 
 
 def _summary(done: Sequence[Cleaned]) -> str:
@@ -214,9 +224,3 @@ def _assignment(text: str) -> tuple[str, int | float | str]:
         except ValueError:
             continue
     return name, value
-
-
-def _write(path: Path, scan: Scan, rain: NDArray[np.bool_]) -> None:
-    """Writes the cleaned scan, then its labels: where there are labels, the scan is complete."""
-    write_scan(path, scan.take(~rain))
-    write_labels(beside(path, LABEL), rain)

@@ -13,7 +13,7 @@ import yaml
 from tqdm import tqdm
 
 from derain import __version__
-from derain.cli.arguments import command_line, count, threads
+from derain.cli.arguments import add_threads, command_line, count
 from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=int, default=0, help="of what is drawn (default: 0)")
     parser.add_argument("--storage", type=Path, help="SQLite file that keeps a filter's study")
-    parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
+    add_threads(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -4,12 +4,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from derain.cli.arguments import threads
+from derain.cli.arguments import add_threads
 from derain.cli.filter_help import list_filters
 from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError
-from derain.files import read_scan
+from derain.sources.folders import frame_of
 from derain.system.notices import Notices
 from derain.views.oddities import outside_view
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from derain.export.bench.contestant import Contestant
     from derain.scan import Scan
+    from derain.sources.frame import Frame
 
 SUMMARY = "draw a scan as several methods clean it"
 
@@ -31,8 +32,8 @@ sensor sees it.
   derain view scan.bin --methods outdet.onnx --window
 
 A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), a filter (below), all or
-none. --card says what the scan's labels mean; without it there is no truth, and
-with it points whose label says that they are unknown are left out.
+none. --card says what the scan's labels mean; without it there is no truth, and with it points
+whose label says that they are unknown are left out.
 """
 
 
@@ -48,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_columns(parser)
     add_intensity_scale(parser)
-    parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
+    add_threads(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -58,13 +59,13 @@ def main(arguments: argparse.Namespace) -> int:
     if not (arguments.out or arguments.window):
         raise InputError(arguments.scan, "nothing is to be done with it", "Give --out or --window.")
     methods = contestants(arguments.methods)
-    scan = read_scan(arguments.scan, arguments.columns)
-    scan = scan.with_intensity_times(arguments.intensity_scale)
+    frame = frame_of(arguments.scan, arguments.columns)
+    scan = frame.with_intensity_times(arguments.intensity_scale).read()
     notices = Notices()
     for method in methods:
         if method.judges_by is not None:
-            notices.tell(str(arguments.scan), method.judges_by.oddities(scan), method.title)
-    truth = _truth(scan, arguments)
+            notices.tell(frame.name, method.judges_by.oddities(scan), method.title)
+    truth = _truth(scan, frame, arguments.card)
     predicted = {
         method.title: _rain(scan, method, arguments.threads, notices) for method in methods
     }
@@ -103,15 +104,13 @@ def _rain(
 
 
 def _truth(
-    scan: "Scan", arguments: argparse.Namespace
+    scan: "Scan", frame: "Frame", card_name: str | None
 ) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]] | None":
     """Which points are rain, and of which it is known; None where no card says what labels mean."""
     from derain.cards.card import load_card
-    from derain.cards.known import label_of
-    from derain.files.labels import read_labels, semantic
 
-    if arguments.card is None:
+    if card_name is None:
         return None
-    label = semantic(read_labels(label_of(arguments.scan), len(scan)))
-    card, labelled = load_card(arguments.card), scan.with_label(label)
+    labelled = scan.with_label(frame.read_label(len(scan)))
+    card = load_card(card_name)
     return card.rain_of(labelled), ~card.unknown_of(labelled)

@@ -1,6 +1,7 @@
-"""What shows whether a derainer has learnt rain at all: places alone, everything, nothing.
+"""Baselines: what a derainer has to beat before its scores say that it knows rain.
 
-The fourth, dim and near points, is :class:`derain.evaluation.intensity_rule.IntensityRule`.
+They call every point rain, or none, or whatever lies where it rained in the training scans. A
+fourth, whatever is dim and near, is in :mod:`derain.evaluation.intensity_rule`.
 """
 
 import math
@@ -31,14 +32,14 @@ def no_points(scan: Scan) -> NDArray[np.bool_]:
 
 
 def known_truth(scan: Scan, card: DataCard) -> tuple[Scan, NDArray[np.bool_]]:
-    """What a labelled scan teaches: the points of which it is known whether they are rain.
+    """The points of a labelled scan of which it is known whether they are rain.
 
     Args:
         scan: A scan with labels.
         card: Its data card.
 
     Returns:
-        The scan of these M points, and which of them are rain, bool (M,).
+        The scan of those M points, and which of them are rain, bool (M,).
     """
     known = ~card.unknown_of(scan)
     return scan.take(known), card.rain_of(scan)[known]
@@ -48,8 +49,9 @@ def known_truth(scan: Scan, card: DataCard) -> tuple[Scan, NDArray[np.bool_]]:
 class PositionPrior:
     """Calls a point rain if training scans mostly had rain where it lies.
 
-    It sees neither intensity nor neighbours. Where every scan shows one scene, as in REHEARSE-3D,
-    it is good without knowing what rain is: a method that does not beat it may have learnt places.
+    It sees neither intensity nor neighbours. Where all scans show the same scene, as those of
+    REHEARSE-3D do, it scores well without knowing what rain is. There, a method that does not beat
+    it may have learnt no more than places.
 
     Attributes:
         voxel: Edge of the voxels in metres, which are fixed to the sensor.
@@ -71,8 +73,9 @@ class PositionPrior:
     def learn(cls, scans: Iterable[tuple[Scan, NDArray[np.bool_]]], voxel: float = 0.5) -> Self:
         """Finds the voxels that, called rain, give the greatest IoU on the training scans.
 
-        They are those with the greatest shares of rain. A share is counted with one more point in
-        the voxel, which is rain as much as the average point is: a few points prove little.
+        They are those with the greatest shares of rain. To each voxel's points one more is added,
+        which counts as rain by the average share of all points: otherwise a voxel with a single
+        point, which happened to be rain, would come first.
 
         Args:
             scans: Scans, and their rain, bool (N,). One is in memory at a time.
@@ -121,13 +124,13 @@ class _Voxels(NamedTuple):
         order = np.argsort(-share, kind="stable")
         hits, called = np.cumsum(self.rain[order]), np.cumsum(self.points[order])
         iou = intersection_over_union(hits, total - hits + called - hits)
-        # Voxels of one share are called alike: only the last of them ends a choice.
+        # Voxels with equal shares are called alike, so that a choice ends at the last of them.
         iou[:-1][np.diff(share[order]) == 0] = 0
         return order[: np.argmax(iou) + 1]
 
 
 def _voxel_of(xyz: NDArray[np.float32], voxel: float) -> NDArray[np.int64]:
-    """Number of each point's voxel, int64 (N,); the outermost take in all that lies beyond."""
+    """Number of each point's voxel, int64 (N,); points beyond the outermost voxels lie in those."""
     half = 2 ** (AXIS_BITS - 1)
     cell = np.clip(np.floor(xyz.astype(np.float64) / voxel), -half, half - 1).astype(np.int64)
     x, y, z = (cell + half).T
@@ -138,7 +141,7 @@ def _voxel_of(xyz: NDArray[np.float32], voxel: float) -> NDArray[np.int64]:
 def _added_up(
     number: NDArray[np.int64], points: NDArray[np.int64], rain: NDArray[np.int64]
 ) -> _Voxels:
-    """Adds up what is counted more than once."""
+    """Distinct voxels: the counts of those that occur more than once are added up."""
     distinct, row = np.unique(number, return_inverse=True)
     # bincount adds in float64, which is exact up to 2⁵³ points.
     sums = (np.bincount(row, counts, len(distinct)) for counts in (points, rain))

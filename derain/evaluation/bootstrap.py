@@ -1,4 +1,4 @@
-"""How far a score hangs on which scans there happen to be: the bootstrap over scans."""
+"""How much scores would differ on other scans of the same kind: the bootstrap over scans."""
 
 from dataclasses import dataclass
 
@@ -18,9 +18,9 @@ class Bootstrap:
     """95 % intervals of every method's pooled IoU.
 
     Attributes:
-        iou: Of the IoU itself, one a method.
-        behind_best: Of what the best method's IoU has over it on the same draws, one a method; an
-            interval that holds 0 says that these scans do not tell the two apart.
+        iou: Interval of the IoU itself, one a method.
+        behind_best: Interval of the best method's IoU minus this method's, on the same draws, one a
+            method. Where it holds 0, these scans cannot tell which of the two is better.
     """
 
     iou: list[Interval]
@@ -32,9 +32,9 @@ def bootstrap(
 ) -> Bootstrap:
     """Draws as many scans as there are, with replacement, again and again.
 
-    Every method is scored on the same draws, so that a difference between two is not blurred by
-    what makes a scan hard for both. Scans that follow each other are alike, and the intervals
-    of few sequences are therefore too narrow.
+    Every method is scored on the same draws: a hard scan then lowers the IoU of all of them alike,
+    and hardly changes the difference between two. Scans that follow each other in a sequence are
+    alike, so that intervals over the scans of few sequences are too narrow.
 
     Args:
         found: Rain called rain, by method and scan, int64 (methods, scans).

@@ -98,7 +98,7 @@ def scans_by_group(
     table: PaperTable,
     scans_of_part: Callable[[str], Sequence[Item]],
     rain_rate_of: Callable[[Item], float | None],
-) -> dict[str, Sequence[Item]]:
+) -> Mapping[str, Sequence[Item]]:
     """The scans that each group of a table is measured on.
 
     Args:

@@ -1,4 +1,4 @@
-"""What methods score: counted over the points of all scans, and over many a part of them."""
+"""What methods score: over the points of all scans, and by scan, class, range and rain rate."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -73,7 +73,7 @@ def score(
 
 
 class _Scoring:
-    """Counts what one method makes of the scans."""
+    """Counts what one method calls rain in one scan after the other."""
 
     def __init__(self, card: DataCard) -> None:
         self.card = card

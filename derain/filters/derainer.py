@@ -1,6 +1,8 @@
 """A filter, ready to judge scans as an exported model does."""
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +12,15 @@ from derain.errors import InputError
 from derain.filters.point_filter import PointFilter
 from derain.filters.radius_filter import RadiusFilter
 from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
 from derain.system.cores import usable_cores
 from derain.system.stopwatch import Stopwatch
 from derain.views.morton import distinct_rows
 from derain.views.neighbours import NeighbourView
+
+# Which rows are rain, and which were judged at all, bool (N,) each.
+RainAndJudged = tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 
 class FilterDerainer:
@@ -53,22 +60,63 @@ class FilterDerainer:
         Returns:
             True for rain, bool (N,), in input order; False for rows that cannot be judged.
         """
+        return self.judge(points, stopwatch).rain
+
+    def judge(self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None) -> Judgement:
+        """Says all that the filter has to say of a scan.
+
+        Args:
+            points: As for calling the filter.
+            stopwatch: Takes the times of the stages view, network and back.
+        """
         scan, stopwatch = Scan.of(points), stopwatch or Stopwatch()
         if isinstance(self.filter, RadiusFilter):
-            return self._by_radius(self.filter, scan, stopwatch)
-        return self._by_neighbours(scan, stopwatch)
+            rain, judged = self._by_radius(self.filter, scan, stopwatch)
+        else:
+            rain, judged = self._by_neighbours(scan, stopwatch)
+        return Judgement(rain.astype(np.float32), rain, judged, scan)
 
-    def _by_neighbours(self, scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
+    @property
+    def waiting(self) -> int:
+        """How many frames were pushed and not answered for: none, a filter sees one at a time."""
+        return 0
+
+    def starts_anew(self, frame: Frame) -> bool:
+        """Whether pushing a frame would let go of those that wait: none do."""
+        return False
+
+    def push(
+        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> Judgement:
+        """Says what it has to say of the next frame of a recording, at once.
+
+        Args:
+            frame: A frame, which is read; or points, as for calling the filter.
+            stopwatch: Takes the times of the stages read, view, network and back.
+
+        Raises:
+            InputError: A frame that cannot be read.
+        """
+        stopwatch = stopwatch or Stopwatch()
+        if not isinstance(frame, Frame):
+            return self.judge(frame, stopwatch)
+        with stopwatch.stage("read"):
+            scan = frame.read()
+        return replace(self.judge(scan, stopwatch), frame=frame)
+
+    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
+        """Answers for the frames that wait for others after them: none do."""
+        return iter(())
+
+    def _by_neighbours(self, scan: Scan, stopwatch: Stopwatch) -> RainAndJudged:
         with stopwatch.stage("view"):
             view = filter_view(self.filter.neighbours, self.threads)(scan)
         with stopwatch.stage("network"):
             rain = self.filter.judge(view)
         with stopwatch.stage("back"):
-            return view.back(rain.astype(np.float32)) > 0
+            return view.back(rain.astype(np.float32)) > 0, view.judged
 
-    def _by_radius(
-        self, filter: RadiusFilter, scan: Scan, stopwatch: Stopwatch
-    ) -> NDArray[np.bool_]:
+    def _by_radius(self, filter: RadiusFilter, scan: Scan, stopwatch: Stopwatch) -> RainAndJudged:
         with stopwatch.stage("view"):
             first, inverse = distinct_rows(scan)
             xyz = scan.xyz.take(first, axis=0)
@@ -78,7 +126,7 @@ class FilterDerainer:
             rain = np.zeros(len(scan), bool)
             judged = inverse >= 0
             rain[judged] = few[inverse[judged]]
-            return rain
+            return rain, judged
 
 
 def filter_view(neighbours: int, threads: int = 0) -> NeighbourView:

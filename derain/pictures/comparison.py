@@ -41,7 +41,7 @@ def comparison_figure(
     """
     panels = dict(_panels(predicted, rain))
     blocks = -(-len(panels) // MOST_COLUMNS)
-    columns = -(-len(panels) // blocks)  # as many in each, so that none stands alone below
+    columns = -(-len(panels) // blocks)  # blocks of one width, as far as the panels allow
     figure = Figure(figsize=(4 * columns, 6 * blocks + 1), layout="constrained")
     figure.suptitle(title)
     axes = figure.subplots(2 * blocks, columns, squeeze=False, height_ratios=[3, 2] * blocks)

@@ -1,4 +1,4 @@
-"""The picture that a choice of a method is made by: error against milliseconds."""
+"""The picture of error against time, by which to choose a method."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-# An IoU nearer to 1 than this is drawn here: a logarithm has no place for an error of 0.
+# Smaller errors are drawn as this one: a logarithmic axis has no place for an error of 0.
 LEAST_ERROR = 1e-4
 
 COLOURS = {"network": "#1f77b4", "filter": "#d98200", "baseline": "#6b7280"}
@@ -25,7 +25,7 @@ DISTANCES = (8, 16, 28, 42, 60, 84)
 
 @dataclass(frozen=True)
 class Standing:
-    """Where a method stands.
+    """What the picture shows of one method.
 
     Attributes:
         title: What it is called.
@@ -114,14 +114,14 @@ def _label(axes: Axes, standings: Sequence[Standing]) -> None:
         for annotation in _candidates(axes, standing):
             letters = _letters(annotation)
             inside = all(map(axes.bbox.contains, *letters.corners().T))
-            # Without a line to lead to it, a label is read as the nearest marker's.
+            # A label without a line to its marker is taken for that of the nearest marker.
             gaps = _gaps(letters, places)
             clear = annotation.arrow_patch is not None or gaps[number] == gaps.min()
             if inside and clear and not letters.count_overlaps(taken):
                 break
             annotation.remove()
         else:
-            # No room at all: over others, rather than not at all.
+            # There is no free place: a label that covers others is better than none.
             letters = _letters(next(_candidates(axes, standing)))
         taken.append(letters)
 
@@ -137,7 +137,7 @@ def _candidates(axes: Axes, standing: Standing) -> Iterator[Annotation]:
                 ha="left" if x > 0.1 else "right" if x < -0.1 else "center",
                 va="bottom" if y > 0.1 else "top" if y < -0.1 else "center",
                 fontsize=9,
-                # Lets the front pass behind the letters.
+                # Keeps the letters readable where the line of the Pareto front passes them.
                 bbox={"boxstyle": "square,pad=0.1", "color": "white", "alpha": 0.8},
                 arrowprops={"arrowstyle": "-", "color": "#9ca3af", "linewidth": 0.6}
                 if distance > DISTANCES[0]

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files import DEFAULT_COLUMNS, read_scan
-from derain.files.format import format_of
+from derain.files import DEFAULT_COLUMNS, count_points, read_scan
 from derain.files.labels import read_labels, semantic
-from derain.files.names import is_compressed, scan_stem
+from derain.files.names import scan_stem
 from derain.files.reading import file_size, read_bytes, reading
 from derain.scan import Scan
 from derain.sources.frame import Frame
@@ -62,7 +61,7 @@ class FileFrame(Frame):
 
     def read(self) -> Scan:
         """Reads the scan, without labels."""
-        return read_scan(self.path, self.columns)
+        return read_scan(self.path, self.columns).with_intensity_times(self.intensity_scale)
 
     def read_label(self, points: int) -> NDArray[np.int64]:
         """Reads the semantic class ids of its points, int64 (N,)."""
@@ -72,9 +71,7 @@ class FileFrame(Frame):
 
     def count_points(self) -> int:
         """Number of points of the scan; the size of a file of plain rows tells it."""
-        format_ = format_of(self.path)
-        counted = None if is_compressed(self.path) else format_.count(self.path, self.columns)
-        return len(self.read()) if counted is None else counted
+        return count_points(self.path, self.columns)
 
     def fingerprint(self) -> str:
         """What tells the content of its file from that of others, 16 hexadecimal digits."""

@@ -3,32 +3,38 @@
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from glob import glob
+from glob import escape, glob
 from pathlib import Path
 
 from derain.cards.known import known_layouts, label_of
 from derain.cards.layout import Layout, sequence_of
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, find_scans
-from derain.files.labels import LABEL
-from derain.files.names import scan_stem
-from derain.files.reading import reading
+from derain.files.names import scan_stem, scan_suffix
 from derain.sources.file_frame import FileFrame
 from derain.sources.records import Records
 from derain.sources.source import Frames
 
+# Scans may be written as text, but beside folders of scans a text is a note or a record.
+TEXTS = (".csv", ".txt")
+
 
 def named_frames(
-    paths: Sequence[Path], columns: Sequence[str] = DEFAULT_COLUMNS, labelled: bool = False
+    paths: Iterable[Path],
+    columns: Sequence[str] = DEFAULT_COLUMNS,
+    labelled: bool = False,
+    layouts: Sequence[Layout] | None = None,
 ) -> Frames:
     """The scans that a user names.
 
     Args:
         paths: Scans, folders with scans directly in them, and data sets or parts of them whose
-            folders are called as a packaged data card says.
+            folders are called as a layout says.
         columns: Names of the columns of files that do not name them.
         labelled: Whether labels are to be read, from where :func:`~derain.cards.known.label_of`
             finds them.
+        layouts: What the folders of data sets may be called; by default as the packaged data cards
+            say. None of them takes no data sets.
 
     Returns:
         The scans in the order they are named, those of a folder sorted by name. Each has its stem
@@ -40,11 +46,28 @@ def named_frames(
     scans: list[Path] = []
     of_data_set = False
     for path in paths:
-        folders = _scan_folders_in(path)
+        folders = _scan_folders_in(path, layouts)
         of_data_set = of_data_set or len(folders) > 1
         scans += find_scans(folders or [path])
     where = label_of if labelled else _nowhere
     return frames_of(scans, where, columns, relative_keys(scans) if of_data_set else None)
+
+
+def frame_of(scan: Path, columns: Sequence[str] = DEFAULT_COLUMNS) -> FileFrame:
+    """The frame of one file, whose labels are looked for; whether it is there shows in reading.
+
+    Args:
+        scan: The file.
+        columns: Names of its columns, where it does not name them itself.
+    """
+    return FileFrame(
+        key=scan_stem(scan),
+        sequence=sequence_of(scan),
+        label_path=label_of(scan),
+        path=scan,
+        columns=tuple(columns),
+        records=Records(scan.parent),
+    )
 
 
 def frames_of(
@@ -93,20 +116,17 @@ def sequence_frames(
     Raises:
         InputError: A sequence without scans.
     """
-    scans = [scan for folder in folders for scan in find_scans([folder / layout.scans])]
-
-    def label_path(scan: Path) -> Path:
-        return scan.parent.parent / layout.labels / f"{scan_stem(scan)}{LABEL}"
-
-    return frames_of(scans, label_path, columns, relative_keys(scans))
+    scans = find_scans(folder / layout.scans for folder in folders)
+    return frames_of(scans, layout.label_of, columns, relative_keys(scans))
 
 
 def relative_keys(scans: Sequence[Path]) -> list[str]:
     """Paths without suffixes, from the folder that all the scans lie below."""
     if not scans:
         return []
-    root = os.path.commonpath([scan.parent for scan in scans])
-    relative = (Path(os.path.relpath(scan, root)) for scan in scans)
+    places = [Path(os.path.abspath(scan)) for scan in scans]
+    root = os.path.commonpath([place.parent for place in places])
+    relative = (place.relative_to(root) for place in places)
     return [path.with_name(scan_stem(path)).as_posix() for path in relative]
 
 
@@ -121,12 +141,12 @@ def scan_folders(root: Path, layout: Layout) -> list[Path]:
     Returns:
         None of them where the root is none of this.
     """
-    whole = root.absolute()
+    whole = Path(os.path.abspath(root))
     if whole.name == layout.scans and (whole.parent / layout.labels).is_dir():
         return [root]
-    for sequences in (f"{layout.sequences}/*/", "*/", ""):
+    for sequences in (f"{escape(layout.sequences)}/*/", "*/", ""):
         # Not Path.glob, which finds hidden folders too: what `derain simulate` has not finished.
-        if found := glob(f"{sequences}{layout.scans}/", root_dir=root):
+        if found := glob(f"{sequences}{escape(layout.scans)}/", root_dir=root):
             return [root / folder for folder in sorted(found)]
     return []
 
@@ -143,18 +163,18 @@ def find_layout(root: Path, layouts: Iterable[Layout] | None = None) -> Layout |
     return next((layout for layout in known if scan_folders(root, layout)), None)
 
 
-def _scan_folders_in(path: Path) -> list[Path]:
+def _scan_folders_in(path: Path, layouts: Sequence[Layout] | None) -> list[Path]:
     """The folders of scans of a data set; none for a scan or a folder of scans."""
-    with reading(path):
-        if not path.is_dir() or _holds_scans(path):
-            return []
-    layout = find_layout(path)
+    if not os.path.isdir(path) or _holds_scans(path):
+        return []
+    layout = find_layout(path, layouts)
     return [] if layout is None else scan_folders(path, layout)
 
 
 def _holds_scans(folder: Path) -> bool:
+    """Whether scans lie directly in a folder, not only texts that may be something else."""
     try:
-        return bool(find_scans([folder]))
+        return any(scan_suffix(scan) not in TEXTS for scan in find_scans([folder]))
     except InputError:
         return False
 

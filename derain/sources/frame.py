@@ -23,12 +23,14 @@ class Frame(ABC):
             sensor, one after the other.
         number: Its place in its sequence, from 0.
         label_path: Where its labels are, or should be; None where none are to be read.
+        intensity_scale: What takes its intensities to the unit in which they are to be seen.
     """
 
     key: str
     sequence: str = ""
     number: int = 0
     label_path: Path | None = None
+    intensity_scale: float = 1.0
 
     @property
     @abstractmethod
@@ -108,9 +110,24 @@ class Frame(ABC):
             InputError: A file that cannot be read.
         """
 
+    def follows(self, other: "Frame") -> bool:
+        """Whether it is the next of the same recording, with none between."""
+        return self.sequence == other.sequence and self.number == other.number + 1
+
     def without_labels(self) -> Self:
         """The same frame, whose labels nobody reads."""
         return replace(self, label_path=None)
+
+    def with_intensity_times(self, factor: float) -> Self:
+        """The same frame, whose intensities are read in another unit.
+
+        What is written of the scan is as it was in its file: see
+        :meth:`derain.scan.Scan.with_intensity_times`.
+
+        Args:
+            factor: What takes them there, such as 255 from 0..1 to 0..255.
+        """
+        return replace(self, intensity_scale=self.intensity_scale * factor)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -156,7 +173,7 @@ class MemoryFrame(Frame):
 
     def read(self) -> Scan:
         """The scan, without labels."""
-        return replace(self.scan, label=None)
+        return replace(self.scan, label=None).with_intensity_times(self.intensity_scale)
 
     def read_label(self, points: int) -> NDArray[np.int64]:
         """The semantic class ids of its points, int64 (N,)."""

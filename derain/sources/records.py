@@ -92,9 +92,10 @@ class Records:
         """
         rows = self._times if record == TIMES else self._poses
         assert rows is not None
-        if len(rows) == len(self._scans):
+        if len(rows) == len(self._scans) and scan.name in self._places:
             return self._places[scan.name]
         stem = scan_stem(scan)
+        # Only ASCII: other scripts have digits too, and int() reads them.
         if not (stem.isascii() and stem.isdigit() and int(stem) < len(rows)):
             raise InputError(
                 self._beside(record) or self.folder / METADATA,
@@ -140,8 +141,8 @@ def read_numbers(path: Path, columns: int) -> NDArray[np.float64]:
     """
     with reading(path, ValueError):
         text = read_bytes(path, LARGEST_RECORD).decode("utf-8")
-    lines = [line.split() for line in text.splitlines() if line.strip()]
-    rows = [_numbers(path, place, line, columns) for place, line in enumerate(lines, 1)]
+    lines = enumerate(text.splitlines(), 1)
+    rows = [_numbers(path, place, line.split(), columns) for place, line in lines if line.strip()]
     return np.array(rows, np.float64).reshape(-1, columns)
 
 

@@ -8,9 +8,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from derain.cards.known import label_places
+from derain.cards.layout import folder_above
 from derain.errors import InputError
 from derain.files import write_scan
-from derain.files.labels import LABEL, label_beside, write_labels
+from derain.files.labels import LABEL, write_labels
 from derain.files.names import beside
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
@@ -49,11 +51,13 @@ class FolderSink(Sink):
     Args:
         folder: The folder, made if missing.
         option: What a user calls it, for messages.
+        again: Whether a source may give a scan twice, as where two patterns find it.
     """
 
-    def __init__(self, folder: Path, option: str = "--out") -> None:
+    def __init__(self, folder: Path, option: str = "--out", again: bool = True) -> None:
         self.folder = folder
         self.option = option
+        self.again = again
 
     def scan_path(self, frame: Frame) -> Path:
         """Where a scan is written; one that came from no file is written as a PCD."""
@@ -71,7 +75,7 @@ class FolderSink(Sink):
                 self._refuse_own_files(frame)
             target = self.path(frame, LABEL)
             other = written.setdefault(os.path.realpath(target), frame)
-            if other.name != frame.name:  # patterns may well find a scan twice
+            if other is not frame and not (self.again and other.name == frame.name):
                 raise InputError(
                     frame.name,
                     f"another scan has the same name: what is made of it and of {other.name} would "
@@ -89,8 +93,13 @@ class FolderSink(Sink):
         remedy = f"Give {self.option} another folder."
         if os.path.realpath(self.scan_path(frame)) == os.path.realpath(frame.path):
             raise InputError(self.folder, f"would overwrite {frame.path}", remedy)
-        target = self.path(frame, LABEL)
-        for labels in (frame.label_path, label_beside(frame.path), beside(frame.path, LABEL)):
-            # Results that lie where labels are looked for would be taken for the truth.
-            if labels and os.path.realpath(target) == os.path.realpath(labels):
+        target = os.path.realpath(self.path(frame, LABEL))
+        places = [frame.label_path, beside(frame.path, LABEL)]
+        sequence = folder_above(folder_above(frame.path))
+        # Results that lie where labels are looked for would be taken for the truth. The data cards,
+        # which take a while to read, name only folders that lie beside that of the scans.
+        if os.path.dirname(os.path.dirname(target)) == os.path.realpath(sequence):
+            places += label_places(frame.path)
+        for labels in filter(None, places):
+            if os.path.realpath(labels) == target:
                 raise InputError(self.folder, f"holds the labels of {frame.path}", remedy)

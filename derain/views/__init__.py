@@ -1,1 +1,1 @@
-"""What networks and filters see of a scan, and the way back to its points."""
+"""What networks and filters see of a scan, and the back-projection to its points."""

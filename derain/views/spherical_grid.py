@@ -165,19 +165,6 @@ class SphericalGrid:
             "edges": list(self.edges),
         }
 
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any], source: str | Path) -> "SphericalGrid":
-        """Reads a grid back.
-
-        Args:
-            content: What :meth:`as_dict` gave.
-            source: The file it was found in, for messages.
-
-        Raises:
-            InputError: Something that is not a grid.
-        """
-        return grid_of(content, source)
-
 
 def grid_of(config: str | Mapping[str, Any], source: str | Path) -> SphericalGrid:
     """The grid that a user, or a Spec, describes.

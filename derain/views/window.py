@@ -34,11 +34,6 @@ class Window:
                 "window", f"{self.before} scans before and {self.after} after", "Give 0 or more."
             )
 
-    @property
-    def is_one_scan(self) -> bool:
-        """Whether nothing is asked for but the scan that is judged."""
-        return self == Window()
-
 
 @dataclass(frozen=True, eq=False)
 class PlacedScan:

@@ -112,7 +112,7 @@ class ContextBlock(nn.Module):
         return shortcut + self.layers(shortcut)
 
 
-class ResidualBlock(nn.Module):
+class DilatedBlock(nn.Module):
     """Dilated layers beside a shortcut."""
 
     def __init__(self, inputs: int, outputs: int) -> None:
@@ -189,13 +189,13 @@ class SalsaNextNetwork(nn.Module):
         self.context = nn.Sequential(
             ContextBlock(channels, width), ContextBlock(width, width), ContextBlock(width, width)
         )
-        self.encoder = nn.ModuleList(ResidualBlock(*pair) for pair in pairwise(encoder))
+        self.encoder = nn.ModuleList(DilatedBlock(*pair) for pair in pairwise(encoder))
         self.halve = nn.ModuleList(
             nn.Sequential(nn.Dropout2d(rate), nn.AvgPool2d(3, stride=2, padding=1))
             for rate in rates
         )
         self.bottleneck = nn.Sequential(
-            ResidualBlock(encoder[-1], decoder[0]), nn.Dropout2d(dropout)
+            DilatedBlock(encoder[-1], decoder[0]), nn.Dropout2d(dropout)
         )
         self.decoder = nn.ModuleList(
             DecoderBlock(*pair, rate)

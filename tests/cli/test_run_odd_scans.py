@@ -13,6 +13,7 @@ from derain.export.runtime import Derainer
 from derain.files import write_scan
 from derain.filters import FilterDerainer
 from derain.scan import Scan
+from derain.sources.judgement import Judgement
 from derain.views.spherical_grid import SphericalGrid
 
 
@@ -143,14 +144,14 @@ def test_parts_of_a_file_that_are_not_written_are_named(run_derain, tmp_path: Pa
 def test_a_scan_for_which_the_memory_is_too_small_does_not_end_the_run(
     run_derain, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    judge = FilterDerainer.__call__
+    judge = FilterDerainer.judge
 
-    def judge_if_small(self: FilterDerainer, scan: Scan, *more: Any) -> NDArray[np.bool_]:
+    def judge_if_small(self: FilterDerainer, scan: Scan, *more: Any) -> Judgement:
         if scan.name.endswith("a.bin"):
             raise MemoryError
         return judge(self, scan, *more)
 
-    monkeypatch.setattr(FilterDerainer, "__call__", judge_if_small)
+    monkeypatch.setattr(FilterDerainer, "judge", judge_if_small)
     outcome = run_derain("run", "dror", scans, "--out", tmp_path / "out")
     assert outcome.code == 2
     assert f"derain: {scans / 'a.bin'}: needs more memory than there is" in outcome.err

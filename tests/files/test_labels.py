@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from derain import InputError
-from derain.files.labels import instance, label_of, read_labels, semantic, write_labels
+from derain.cards.known import label_of
+from derain.files.labels import instance, read_labels, semantic, write_labels
 
 LABELS = arrays(np.uint32, st.integers(0, 20))
 

@@ -12,7 +12,8 @@ from derain.files import read_scan, write_scan
 from derain.files.frame_times import read_frame_times
 from derain.files.labels import label_beside
 from derain.files.names import beside, scan_stem, scan_suffix
-from derain.sources.contents import count_scan
+from derain.sources.contents import count_frame
+from derain.sources.folders import frame_of
 
 
 @pytest.mark.parametrize(
@@ -46,7 +47,7 @@ def test_labels_and_times_of_a_compressed_scan_are_found(tmp_path: Path) -> None
 def test_points_of_a_compressed_scan_are_counted_by_class(tmp_path: Path) -> None:
     write_scan(tmp_path / "scan.bin.gz", Scan(np.ones((3, 3), np.float32), np.ones(3, np.float32)))
     np.array([1, 0, 1], "<u4").tofile(tmp_path / "scan.label")
-    tally = count_scan(tmp_path / "scan.bin.gz", None, ("x", "y", "z", "intensity"))
+    tally = count_frame(frame_of(tmp_path / "scan.bin.gz"))
     assert (tally.points, dict(tally.labelled)) == (3, {0: 1, 1: 2})
 
 

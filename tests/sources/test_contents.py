@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
 
+from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
@@ -14,21 +15,16 @@ from derain.files.labels import write_labels
 from derain.pictures.data_statistics import CLEAN, statistics_figure
 from derain.scan import Scan
 from derain.simulation.campaign import MAKER
-from derain.sources.contents import (
-    Tally,
-    count_scan,
-    find_layout,
-    find_sequences,
-    rate_name,
-)
+from derain.sources.contents import Contents, count_frame, find_sequences, rate_name
+from derain.sources.folders import find_layout, frame_of
 
-REHEARSE3D = ("lidar_radar_pcd", "lidar_radar_labels")
-COLUMNS = ("x", "y", "z", "intensity")
+REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar="innoviz")
+OTHERS = Layout(scans="lidar", labels="classes")
 
 
-def add_scan(sequence: Path, layout: tuple[str, str], stem: str, label: list[int]) -> None:
-    write_scan(sequence / layout[0] / f"{stem}.bin", Scan.of(scene(len(label))))
-    write_labels(sequence / layout[1] / f"{stem}.label", np.array(label))
+def add_scan(sequence: Path, layout: Layout, stem: str, label: list[int]) -> None:
+    write_scan(sequence / layout.scans / f"{stem}.bin", Scan.of(scene(len(label))))
+    write_labels(sequence / layout.labels / f"{stem}.label", np.array(label))
 
 
 def record(sequence: Path, text: str, stem: str = "000000") -> None:
@@ -36,20 +32,20 @@ def record(sequence: Path, text: str, stem: str = "000000") -> None:
     (sequence / "weather" / f"{stem}.csv").write_text(text)
 
 
-@pytest.mark.parametrize("layout", [REHEARSE3D, ("velodyne", "labels")])
+@pytest.mark.parametrize("layout", [REHEARSE3D, Layout()])
 @pytest.mark.parametrize("root", ["", "sequences", "sequences/000", "sequences/000/{scans}"])
 def test_sequences_are_found_from_the_root_to_the_sequence(
-    tmp_path: Path, layout: tuple[str, str], root: str
+    tmp_path: Path, layout: Layout, root: str
 ) -> None:
     for name in ("001", "000"):
         add_scan(tmp_path / "sequences" / name, layout, "000001", [0] * 10)
         add_scan(tmp_path / "sequences" / name, layout, "000000", [0] * 10)
-    folder = tmp_path / root.format(scans=layout[0])
+    folder = tmp_path / root.format(scans=layout.scans)
     assert find_layout(folder) == layout
     sequences = find_sequences(folder, layout)
     expected = ["000"] if "000" in root else ["000", "001"]
     assert [sequence.name for sequence in sequences] == expected
-    assert [scan.name for scan in sequences[0].scans] == ["000000.bin", "000001.bin"]
+    assert [frame.key for frame in sequences[0].frames] == ["000000", "000001"]
     assert sequences[0].rain_rate is None
 
 
@@ -63,16 +59,16 @@ def test_a_folder_of_scans_is_one_sequence(tmp_path: Path) -> None:
     write_scan(tmp_path / "scan.ply", Scan.of(scene(30)))
     assert find_layout(tmp_path) is None
     (sequence,) = find_sequences(tmp_path, None)
-    assert [scan.name for scan in sequence.scans] == ["scan.ply"]
+    assert [frame.name for frame in sequence.frames] == [str(tmp_path / "scan.ply")]
 
 
 def test_other_folders_have_to_be_named(tmp_path: Path) -> None:
-    add_scan(tmp_path / "drive", ("lidar", "classes"), "0", [1, 2])
+    add_scan(tmp_path / "drive", OTHERS, "0", [1, 2])
     assert find_layout(tmp_path) is None
-    (sequence,) = find_sequences(tmp_path, ("lidar", "classes"))
+    (sequence,) = find_sequences(tmp_path, OTHERS)
     assert sequence.name == "drive"
     with pytest.raises(InputError, match="no sequence in it has a folder velodyne"):
-        find_sequences(tmp_path, ("velodyne", "labels"))
+        find_sequences(tmp_path, Layout())
 
 
 def test_the_manifest_states_rain_rates_before_the_weather_does(tmp_path: Path) -> None:
@@ -106,10 +102,11 @@ def test_points_are_counted_by_class_and_instances_are_not(tmp_path: Path) -> No
     add_scan(tmp_path, REHEARSE3D, "0", [3, 0, 3, 300, 7])
     path = tmp_path / "lidar_radar_labels/0.label"
     write_labels(path, np.array([3, 0, 3, 300, 7]), np.arange(5))
-    tally = count_scan(tmp_path / "lidar_radar_pcd/0.bin", REHEARSE3D, COLUMNS)
-    assert (tally.scans, tally.points) == (1, 5)
-    assert tally.labelled == {0: 1, 3: 2, 7: 1, 300: 1}
-    assert tally.as_dict({3: "rain", 0: "background", 7: "road"})["class_share"] == {
+    (sequence,) = find_sequences(tmp_path, REHEARSE3D)
+    contents = count_frame(sequence.frames[0])
+    assert (contents.scans, contents.points) == (1, 5)
+    assert contents.labelled == {0: 1, 3: 2, 7: 1, 300: 1}
+    assert contents.as_dict({3: "rain", 0: "background", 7: "road"})["class_share"] == {
         "background": 0.2,
         "rain": 0.4,
         "road": 0.2,
@@ -120,41 +117,43 @@ def test_points_are_counted_by_class_and_instances_are_not(tmp_path: Path) -> No
 def test_a_scan_without_labels_gives_its_points(tmp_path: Path) -> None:
     for suffix in ("bin", "pcd", "npz"):
         write_scan(tmp_path / f"scan.{suffix}", Scan.of(scene(40)))
-        tally = count_scan(tmp_path / f"scan.{suffix}", None, COLUMNS)
-        assert (tally.points, tally.labelled.total()) == (40, 0)
-        assert tally.as_dict({})["class_share"] == {}
+        contents = count_frame(frame_of(tmp_path / f"scan.{suffix}"))
+        assert (contents.points, contents.labelled.total()) == (40, 0)
+        assert contents.as_dict({})["class_share"] == {}
 
 
 def test_labels_beside_a_scan_are_found(tmp_path: Path) -> None:
     write_scan(tmp_path / "scan.pcd", Scan.of(scene(40)))
     write_labels(tmp_path / "scan.label", np.full(40, 110))
-    assert count_scan(tmp_path / "scan.pcd", None, COLUMNS).labelled == {110: 40}
+    assert count_frame(frame_of(tmp_path / "scan.pcd")).labelled == {110: 40}
 
 
 def test_labels_of_another_scan_are_refused(tmp_path: Path) -> None:
     add_scan(tmp_path, REHEARSE3D, "0", [3, 0, 3])
+    columns = ["x", "y", "z", "intensity", "ring", "time"]
+    (sequence,) = find_sequences(tmp_path, REHEARSE3D, columns)
     with pytest.raises(InputError, match="3 labels of 4 bytes for a scan of 2 points"):
-        count_scan(tmp_path / "lidar_radar_pcd/0.bin", REHEARSE3D, [*COLUMNS, "ring", "time"])
+        count_frame(sequence.frames[0])
 
 
 def test_real_scans_are_counted_as_numpy_counts_them(shared: Path) -> None:
     root = shared / "data" / "wads"
-    assert find_layout(root) == ("velodyne", "labels")
-    (sequence,) = find_sequences(root, ("velodyne", "labels"))
-    assert (sequence.name, len(sequence.scans)) == ("36", 10)
-    tally = count_scan(sequence.scans[0], ("velodyne", "labels"), COLUMNS)
-    label = root / "sequences/36/labels" / f"{sequence.scans[0].stem}.label"
+    assert find_layout(root) == Layout()
+    (sequence,) = find_sequences(root, Layout())
+    assert (sequence.name, len(sequence.frames)) == ("36", 10)
+    contents = count_frame(sequence.frames[0])
+    label = root / "sequences/36/labels" / f"{sequence.frames[0].key}.label"
     raw = np.fromfile(label, np.uint32) & 0xFFFF
-    assert tally.labelled[110] == (raw == 110).sum() > 0
-    assert tally.points == tally.labelled.total() == len(raw)
+    assert contents.labelled[110] == (raw == 110).sum() > 0
+    assert contents.points == contents.labelled.total() == len(raw)
 
 
 def test_the_picture_has_a_bar_for_each_class_and_rate_and_a_slice_for_each_rate() -> None:
-    tallies: dict[float | None, Tally] = {}
+    by_rate: dict[float | None, Contents] = {}
     for number, rate in enumerate((0.0, 10.0, 50.0, None)):
-        tallies[rate] = Tally(sequences=number + 1, scans=1, points=9)
-        tallies[rate].labelled.update({0: 5 + number, 3: 4})
-    figure = statistics_figure(tallies, {0: "background", 3: "rain"}, "data")
+        by_rate[rate] = Contents(sequences=number + 1, scans=1, points=9)
+        by_rate[rate].labelled.update({0: 5 + number, 3: 4})
+    figure = statistics_figure(by_rate, {0: "background", 3: "rain"}, "data")
     figure.draw_without_rendering()
     shares, points = figure.axes
     angles = [wedge.theta2 - wedge.theta1 for wedge in shares.patches]
@@ -164,5 +163,5 @@ def test_the_picture_has_a_bar_for_each_class_and_rate_and_a_slice_for_each_rate
     assert [tick.get_text() for tick in points.get_xticklabels()] == ["background", "rain"]
     assert points.patches[0].get_facecolor() == to_rgba(CLEAN)
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert legend == [rate_name(rate) for rate in tallies]
+    assert legend == [rate_name(rate) for rate in by_rate]
     assert legend == ["clean", "10 mm/h", "50 mm/h", "rain unknown"]

@@ -151,7 +151,7 @@ def test_no_points_have_no_pixels() -> None:
 @given(grids())
 def test_a_grid_comes_back_from_json_bit_for_bit(grid: SphericalGrid) -> None:
     content = json.loads(json.dumps(grid.as_dict()))
-    assert SphericalGrid.from_dict(content, "model.onnx") == grid
+    assert grid_of(content, "model.onnx") == grid
 
 
 @pytest.mark.parametrize(

@@ -50,8 +50,6 @@ def test_a_view_of_one_scan_sees_nothing_of_those_around_it(view: View) -> None:
 
 
 def test_a_window_does_not_ask_for_less_than_nothing() -> None:
-    assert Window().is_one_scan
-    assert not Window(before=1).is_one_scan
     for wrong in ({"before": -1}, {"after": -2}):
         with pytest.raises(InputError, match=r"window: .* Give 0 or more"):
             Window(**wrong)

@@ -1,0 +1,30 @@
+"""What a method says of a scan."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.scan import Scan
+from derain.sources.frame import Frame
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What a method says of a scan, in input order.
+
+    Attributes:
+        probability: That each point is rain, float32 (N,); 0 for rows that were not judged. Of a
+            method that gives no probabilities, 1 for what it calls rain.
+        rain: True for rain, bool (N,).
+        judged: True for rows that the method saw, bool (N,): not for those that cannot be judged,
+            nor for points outside the grid of an image.
+        scan: The scan.
+        frame: Its frame; None where points were judged by themselves.
+    """
+
+    probability: NDArray[np.float32]
+    rain: NDArray[np.bool_]
+    judged: NDArray[np.bool_]
+    scan: Scan
+    frame: Frame | None = None

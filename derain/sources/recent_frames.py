@@ -1,0 +1,84 @@
+"""The frames of a recording that a window asks for, kept as they come in."""
+
+from collections import deque
+from dataclasses import dataclass
+
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.views.window import PlacedScan, Window, WindowOfScans
+
+
+@dataclass(frozen=True, eq=False)
+class FrameInWindow:
+    """A frame that can be judged, with those around it.
+
+    Attributes:
+        frame: The frame.
+        scans: Its scan, and those before and after it.
+    """
+
+    frame: Frame
+    scans: WindowOfScans
+
+
+class RecentFrames:
+    """Takes frame after frame, and gives each back once those after it are there.
+
+    A frame that does not follow the one before it, in another sequence or with some missing
+    between, starts anew: no window reaches over the gap.
+
+    Args:
+        window: Frames before and after one that are to be seen with it.
+    """
+
+    def __init__(self, window: Window) -> None:
+        self.window = window
+        self._kept: deque[tuple[Frame, PlacedScan]] = deque()
+        self._given = 0  # so many of those kept were given back, and are there for later ones
+
+    @property
+    def waiting(self) -> int:
+        """How many frames were taken and not given back."""
+        return len(self._kept) - self._given
+
+    @property
+    def next_number(self) -> int:
+        """Number of the frame that would follow."""
+        return self._kept[-1][0].number + 1 if self._kept else 0
+
+    def starts_anew(self, frame: Frame) -> bool:
+        """Whether a frame does not follow those that were taken."""
+        return bool(self._kept) and not frame.follows(self._kept[-1][0])
+
+    def take(self, frame: Frame, scan: Scan) -> FrameInWindow | None:
+        """Takes the next frame; where it starts anew, those still waiting are let go of.
+
+        Args:
+            frame: The frame.
+            scan: Its scan.
+
+        Returns:
+            The frame that has all its window by now, if there is one.
+
+        Raises:
+            InputError: A record of times or poses that is damaged.
+        """
+        placed = PlacedScan(scan, frame.time, frame.pose)
+        if self.starts_anew(frame):
+            self._kept.clear()
+            self._given = 0
+        self._kept.append((frame, placed))
+        return self.give() if self.waiting > self.window.after else None
+
+    def give(self) -> FrameInWindow:
+        """Gives the oldest waiting frame with what there is of its window."""
+        place = self._given
+        frame, judged = self._kept[place]
+        scans = [placed for _, placed in self._kept]
+        after = scans[place + 1 : place + 1 + self.window.after]
+        before = scans[max(place - self.window.before, 0) : place]
+        self._given += 1
+        while self._given > self.window.before:  # no later window reaches back so far
+            self._kept.popleft()
+            self._given -= 1
+        return FrameInWindow(frame, WindowOfScans(judged, before, after))

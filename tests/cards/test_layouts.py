@@ -1,0 +1,83 @@
+"""Where the scans and labels of a data set lie, and what the packaged data cards tell of that."""
+
+from pathlib import Path
+
+import pytest
+
+from derain.cards.card import load_card, packaged_cards
+from derain.cards.known import (
+    card_by_folders,
+    known_layouts,
+    label_of,
+    label_places,
+    lidar_folders,
+)
+from derain.cards.layout import Layout, folder_above, sequence_of
+from derain.errors import InputError
+
+REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar="innoviz")
+CARD = "name: ours\nclasses: {0: dry, 1: wet}\nrain: [1]\n"
+
+
+def test_a_card_says_where_its_scans_lie(tmp_path: Path) -> None:
+    (tmp_path / "ours.yaml").write_text(f"{CARD}layout: {{sequences: drives, labels: truth}}")
+    layout = load_card(tmp_path / "ours.yaml").layout
+    assert layout == Layout(sequences="drives", scans="velodyne", labels="truth", lidar="")
+
+
+@pytest.mark.parametrize("name", ["''", ".", "..", "a/b", "/", "7", "[a]"])
+def test_a_folder_of_a_layout_is_one_name(tmp_path: Path, name: str) -> None:
+    (tmp_path / "ours.yaml").write_text(f"{CARD}layout: {{scans: {name}}}")
+    with pytest.raises(InputError, match=r"ours\.yaml"):
+        load_card(tmp_path / "ours.yaml")
+
+
+def test_every_packaged_layout_is_known_and_the_most_telling_first() -> None:
+    assert set(known_layouts()) == {load_card(name).layout for name in packaged_cards()}
+    assert known_layouts()[0] == REHEARSE3D
+    assert len(set(known_layouts())) == len(known_layouts())
+
+
+def test_scans_of_the_lidar_alone_go_before_merged_ones() -> None:
+    assert lidar_folders() == ("innoviz", "lidar_radar_pcd", "velodyne")
+
+
+def test_folders_tell_no_more_than_their_card_says() -> None:
+    by_folders = card_by_folders(REHEARSE3D, "rain")
+    assert by_folders is not None
+    assert by_folders.name == "REHEARSE-3D"
+    assert card_by_folders(Layout(), "rain") is None
+    of_velodyne = card_by_folders(Layout(), "classes")
+    assert of_velodyne is not None
+    assert of_velodyne.name == "WADS"
+
+
+@pytest.mark.parametrize(
+    ("scan", "label"),
+    [
+        ("7/lidar_radar_pcd/3.bin", "7/lidar_radar_labels/3.label"),
+        ("7/velodyne/3.bin.gz", "7/labels/3.label"),
+        ("7/anything/3.5.pcd", "7/labels/3.5.label"),
+    ],
+)
+def test_labels_are_looked_for_where_the_folders_say(tmp_path: Path, scan: str, label: str) -> None:
+    assert label_of(tmp_path / scan) == tmp_path / label
+    assert tmp_path / label in label_places(tmp_path / scan)
+
+
+def test_labels_beside_a_scan_go_before_those_in_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "3.label").touch()
+    assert label_of(tmp_path / "3.bin") == tmp_path / "3.label"
+
+
+def test_the_folder_above_is_found_from_within(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a/b").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "a/b")
+    assert folder_above(Path()) == tmp_path / "a"
+    assert folder_above(Path("..")) == tmp_path
+    assert folder_above(Path("scan.bin")) == Path()
+    assert folder_above(folder_above(Path("scan.bin"))) == tmp_path / "a"
+    assert folder_above(tmp_path / "a") == tmp_path
+    assert sequence_of(Path("scan.bin")) == "a"

@@ -1,0 +1,157 @@
+"""Scans as a user names them: keys, order, sequences, and where their labels lie."""
+
+import string
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from derain.cards.layout import Layout
+from derain.errors import InputError
+from derain.sources.folders import (
+    find_layout,
+    named_frames,
+    relative_keys,
+    scan_folders,
+    sequence_frames,
+)
+
+REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar="innoviz")
+DRIVES = Layout(sequences="drives", scans="lidar", labels="truth")
+
+
+def touch(*paths: Path) -> None:
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+
+
+@pytest.fixture
+def wads(tmp_path: Path) -> Path:
+    """A data set of two sequences of two scans each, and one that is not finished."""
+    root = tmp_path / "WADS"
+    for name in ("11", "02", ".03"):
+        for number in (1, 0):
+            touch(root / f"sequences/{name}/velodyne/{number:06d}.bin")
+    touch(root / "README.txt", root / "sequences/02/times.txt")
+    return root
+
+
+def test_scans_and_folders_come_in_the_order_they_are_named(tmp_path: Path) -> None:
+    touch(tmp_path / "b/2.bin", tmp_path / "b/1.pcd", tmp_path / "b/.0.bin", tmp_path / "a.bin")
+    frames = named_frames([tmp_path / "b", tmp_path / "a.bin"])
+    assert [frame.key for frame in frames] == ["1", "2", "a"]
+    assert [frame.suffix for frame in frames] == [".pcd", ".bin", ".bin"]
+    assert [frame.number for frame in frames] == [0, 1, 0]
+    assert [frame.sequence for frame in frames] == [*2 * [tmp_path.name], tmp_path.parent.name]
+    assert not any(frame.has_labels or frame.label_path for frame in frames)
+
+
+def test_a_data_set_is_its_sequences(wads: Path) -> None:
+    for named in (wads, wads / "sequences"):
+        frames = named_frames([named])
+        assert [frame.key for frame in frames] == [
+            *("02/velodyne/000000", "02/velodyne/000001"),
+            *("11/velodyne/000000", "11/velodyne/000001"),
+        ]
+        assert [frame.sequence for frame in frames] == ["02", "02", "11", "11"]
+        assert [frame.number for frame in frames] == [0, 1, 0, 1]
+
+
+def test_one_sequence_has_plain_names(wads: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for named in (wads / "sequences/02", wads / "sequences/02/velodyne"):
+        frames = named_frames([named])
+        assert [frame.key for frame in frames] == ["000000", "000001"]
+        assert {frame.sequence for frame in frames} == {"02"}
+    monkeypatch.chdir(wads / "sequences/02/velodyne")
+    assert [frame.key for frame in named_frames([Path()])] == ["000000", "000001"]
+    assert {frame.sequence for frame in named_frames([Path()])} == {"02"}
+
+
+def test_several_data_sets_and_scans_keep_apart(
+    wads: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    touch(tmp_path / "000000.bin")
+    monkeypatch.chdir(tmp_path)
+    frames = named_frames([wads, Path("000000.bin")])  # one path whole, one from here
+    assert [frame.key for frame in frames][-2:] == ["WADS/sequences/11/velodyne/000001", "000000"]
+    assert max(Counter(frame.key for frame in frames).values()) == 1
+
+
+def test_scans_beside_folders_of_scans_are_what_is_meant(tmp_path: Path) -> None:
+    touch(tmp_path / "own.bin", tmp_path / "velodyne/0.bin")
+    assert [frame.key for frame in named_frames([tmp_path])] == ["own"]
+
+
+def test_texts_are_scans_where_there_is_nothing_else(tmp_path: Path) -> None:
+    touch(tmp_path / "scan.csv")
+    assert [frame.name for frame in named_frames([tmp_path])] == [str(tmp_path / "scan.csv")]
+
+
+@pytest.mark.parametrize("layout", [Layout(), REHEARSE3D, DRIVES])
+def test_labels_lie_where_the_layout_says(tmp_path: Path, layout: Layout) -> None:
+    sequence = tmp_path / layout.sequences / "7"
+    touch(sequence / layout.scans / "3.bin.gz", sequence / layout.labels / "3.label")
+    (frame,) = sequence_frames([sequence], layout)
+    assert frame.label_path == sequence / layout.labels / "3.label"
+    assert frame.has_labels
+    if layout is not DRIVES:  # which no packaged card has
+        (named,) = named_frames([tmp_path], labelled=True)
+        assert named.label_path == frame.label_path
+
+
+def test_labels_are_found_from_within_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    touch(tmp_path / "7/lidar/3.bin", tmp_path / "7/truth/3.label")
+    for inside, root in (("7", "."), ("7/lidar", "."), ("7/truth", "../lidar")):
+        monkeypatch.chdir(tmp_path / inside)
+        folders = scan_folders(Path(root), DRIVES)
+        assert [folder.resolve() for folder in folders] == [tmp_path / "7/lidar"]
+        assert DRIVES.label_of(folders[0] / "3.bin").samefile(tmp_path / "7/truth/3.label")
+
+
+@pytest.mark.parametrize("root", ["", "drives", "drives/1", "drives/1/lidar"])
+def test_a_layout_is_known_from_the_root_to_the_scans(tmp_path: Path, root: str) -> None:
+    touch(tmp_path / "drives/1/lidar/0.bin", tmp_path / "drives/1/truth/0.label")
+    assert find_layout(tmp_path / root) is None
+    assert find_layout(tmp_path / root, [REHEARSE3D, DRIVES]) == DRIVES
+    assert [frame.key for frame in named_frames([tmp_path / root], layouts=[DRIVES])] == ["0"]
+
+
+def test_the_likelier_layout_is_asked_first(tmp_path: Path) -> None:
+    touch(tmp_path / "0/lidar_radar_pcd/0.bin", tmp_path / "0/velodyne/0.bin")
+    assert find_layout(tmp_path) == REHEARSE3D
+    assert find_layout(tmp_path, [Layout(), REHEARSE3D]) == Layout()
+
+
+def test_names_of_folders_are_no_patterns(tmp_path: Path) -> None:
+    odd = Layout(sequences="s*", scans="[lidar]", labels="?")
+    touch(tmp_path / "s*/1/[lidar]/0.bin", tmp_path / "sx/2/l/0.bin")
+    assert scan_folders(tmp_path, odd) == [tmp_path / "s*/1/[lidar]"]
+
+
+@pytest.mark.parametrize(("name", "reason"), [("none", "no such file or"), ("empty", "no scans")])
+def test_what_holds_nothing_is_refused(tmp_path: Path, name: str, reason: str) -> None:
+    (tmp_path / "empty/velodyne").mkdir(parents=True)
+    with pytest.raises(InputError, match=reason):
+        named_frames([tmp_path / name])
+
+
+NAMES = st.text(string.ascii_lowercase + "0.é", min_size=1, max_size=4).filter(
+    lambda name: name.strip(".") == name
+)
+
+
+@given(st.sets(st.lists(NAMES, min_size=1, max_size=4).map("/".join), min_size=1), st.booleans())
+def test_keys_are_unlike_one_another_and_lead_to_the_scans(paths: set[str], whole: bool) -> None:
+    base = Path("/data" if whole else "data")
+    scans = [base / f"{path}.bin" for path in paths]
+    keys = relative_keys(scans)
+    assert len(set(keys)) == len(scans)
+    # From the folder that all lie below, every key with the suffix is the path again.
+    ends = {str(scan).removesuffix(f"{key}.bin") for scan, key in zip(scans, keys, strict=True)}
+    assert len(ends) == 1
+    assert not any(Path(key).is_absolute() or ".." in Path(key).parts for key in keys)

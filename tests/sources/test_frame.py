@@ -1,0 +1,132 @@
+"""One scan in its sequence: in a file, or in memory."""
+
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.cards.card import load_card
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.files import write_scan
+from derain.files.labels import write_labels
+from derain.scan import Scan
+from derain.sources.file_frame import FileFrame
+from derain.sources.folders import frame_of
+from derain.sources.frame import MemoryFrame
+from derain.sources.labelled import with_labels
+
+
+@pytest.fixture
+def labelled(tmp_path: Path) -> FileFrame:
+    """A scan of 50 points with labels beside it, those of ten of them 110."""
+    scene(50).tofile(tmp_path / "scan.bin")
+    write_labels(tmp_path / "scan.label", np.where(np.arange(50) < 10, 110, 0), np.arange(50))
+    return frame_of(tmp_path / "scan.bin")
+
+
+@pytest.mark.parametrize("name", ["scan.bin", "scan.pcd", "SCAN.BIN.GZ", "1.5.ply", "scan.npz"])
+def test_key_and_suffix_make_the_name_of_the_file(name: str) -> None:
+    frame = frame_of(Path("folder") / name)
+    assert frame.key + frame.suffix == name
+    assert frame.name == str(Path("folder") / name)
+
+
+def test_a_file_is_read_when_it_is_told_to(labelled: FileFrame) -> None:
+    np.testing.assert_array_equal(labelled.read().xyz, scene(50)[:, :3])
+    assert labelled.read().label is None
+    assert labelled.has_labels
+    label = labelled.read_label(50)
+    assert (label.dtype, np.bincount(label)[110]) == (np.int64, 10)  # instances are left out
+    frame_of(Path("nowhere.bin"))
+    with pytest.raises(InputError, match=r"nowhere\.bin: there is no such file"):
+        frame_of(Path("nowhere.bin")).read()
+
+
+def test_labels_that_nobody_reads_are_not_there(labelled: FileFrame) -> None:
+    bare = labelled.without_labels()
+    assert not bare.has_labels
+    assert bare.checksums() == (labelled.checksums()[0], None)
+    with pytest.raises(InputError, match="it has no labels"):
+        bare.read_label(50)
+
+
+def test_labels_that_the_card_does_not_know_are_named(labelled: FileFrame) -> None:
+    scan = with_labels(labelled.read(), labelled, load_card("wads"))
+    assert (scan.label == 110).sum() == 10
+    with pytest.raises(InputError, match=r"scan\.label: ids \[110\] are no classes of REHEARSE-3D"):
+        with_labels(labelled.read(), labelled, load_card("rehearse3d"))
+
+
+@pytest.mark.parametrize("suffix", [".bin", ".pcd", ".bin.gz", ".npy"])
+def test_points_are_counted_as_they_are_read(tmp_path: Path, suffix: str) -> None:
+    write_scan(tmp_path / f"scan{suffix}", Scan.of(scene(37)))
+    assert frame_of(tmp_path / f"scan{suffix}").count_points() == 37
+
+
+def test_columns_are_those_of_the_frame(tmp_path: Path) -> None:
+    wide = np.column_stack([scene(20), np.arange(20, dtype=np.float32)])
+    wide.tofile(tmp_path / "wide.bin")
+    frame = frame_of(tmp_path / "wide.bin", ("x", "y", "z", "intensity", "ring"))
+    assert frame.count_points() == 20
+    np.testing.assert_array_equal(frame.read().fields["ring"], np.arange(20))
+
+
+def test_intensities_are_seen_in_another_unit_and_kept_as_they_are(labelled: FileFrame) -> None:
+    memory = MemoryFrame(key="0", scan=labelled.read())
+    for frame in (labelled, memory):
+        scan = frame.with_intensity_times(2).with_intensity_times(3).read()
+        np.testing.assert_array_equal(scan.intensity, scene(50)[:, 3] * np.float32(6))
+        np.testing.assert_array_equal(scan.fields["intensity"], scene(50)[:, 3])
+        assert frame.read().intensity[0] == scene(50)[0, 3]
+
+
+def test_a_fingerprint_tells_files_apart_by_their_ends(tmp_path: Path) -> None:
+    long = np.zeros(2**18, np.uint8)
+    contents = {"same": long, "first": long.copy(), "last": long.copy(), "longer": np.zeros(2**19)}
+    contents["first"][0] = contents["last"][-1] = 1
+    prints = set()
+    for name, content in contents.items():
+        content.tofile(tmp_path / f"{name}.bin")
+        prints.add(frame_of(tmp_path / f"{name}.bin").fingerprint())
+    assert len(prints) == 4
+    assert all(len(text) == 16 and int(text, 16) >= 0 for text in prints)
+    long.tofile(tmp_path / "copy.bin")
+    assert frame_of(tmp_path / "copy.bin").fingerprint() in prints
+
+
+def test_checksums_are_those_that_everybody_computes(labelled: FileFrame, tmp_path: Path) -> None:
+    names = ("scan.bin", "scan.label")
+    assert labelled.checksums() == tuple(
+        sha256((tmp_path / name).read_bytes()).hexdigest() for name in names
+    )
+
+
+def test_a_scan_in_memory_is_a_frame_like_any(labelled: FileFrame) -> None:
+    scan = Scan.of(scene(50), "mine").with_label(labelled.read_label(50))
+    pose = np.eye(4)
+    frame = MemoryFrame(key="0", scan=scan, seconds=1.5, sensor_to_world=pose)
+    assert (frame.name, frame.suffix, frame.time, frame.count_points()) == ("mine", "", 1.5, 50)
+    assert frame.pose is pose
+    assert frame.has_labels
+    assert frame.read().label is None
+    np.testing.assert_array_equal(frame.read_label(50), scan.label)
+    bare = frame.without_labels()
+    assert not bare.has_labels
+    assert bare.checksums() == (frame.checksums()[0], None)
+    brighter = replace(scan, intensity=scan.intensity + 1)
+    other = MemoryFrame(key="0", scan=brighter)
+    assert other.fingerprint() != frame.fingerprint()
+    assert other.checksums()[1] == frame.checksums()[1]
+
+
+def test_a_frame_follows_the_one_before_it_in_its_sequence() -> None:
+    def frame(sequence: str, number: int) -> MemoryFrame:
+        return MemoryFrame(key="", sequence=sequence, number=number, scan=Scan.of(scene(1)))
+
+    assert frame("a", 1).follows(frame("a", 0))
+    assert not frame("a", 2).follows(frame("a", 0))
+    assert not frame("a", 0).follows(frame("a", 0))
+    assert not frame("b", 1).follows(frame("a", 0))

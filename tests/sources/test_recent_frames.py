@@ -1,0 +1,90 @@
+"""Windows of frames as they come in, held against windows cut from the whole recording."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from derain.evaluation.hard_cases import scene
+from derain.scan import Scan
+from derain.sources.frame import MemoryFrame
+from derain.sources.recent_frames import FrameInWindow, RecentFrames
+from derain.views.window import Window
+
+SCAN = Scan.of(scene(1))
+
+
+def frames(*lengths: int) -> list[MemoryFrame]:
+    """Sequences of so many frames, one after the other, each taken at its place in all of them."""
+    pairs = [(name, number) for name, length in enumerate(lengths) for number in range(length)]
+    return [
+        MemoryFrame(key="", sequence=str(name), number=number, scan=SCAN, seconds=place)
+        for place, (name, number) in enumerate(pairs)
+    ]
+
+
+def seen(given: FrameInWindow) -> tuple[list[float | None], ...]:
+    """Times of the frames before, of the frame, and of those after."""
+    scans = given.scans
+    assert scans.judged.time == given.frame.time
+    parts = (scans.before, [scans.judged], scans.after)
+    return tuple([placed.time for placed in part] for part in parts)
+
+
+@given(
+    lengths=st.lists(st.integers(1, 6), min_size=1, max_size=3),
+    before=st.integers(0, 3),
+    after=st.integers(0, 3),
+)
+def test_windows_are_those_of_the_whole_recording(
+    lengths: list[int], before: int, after: int
+) -> None:
+    recent = RecentFrames(Window(before, after))
+    found = []
+    for frame in frames(*lengths):
+        if recent.starts_anew(frame):
+            found += [recent.give() for _ in range(recent.waiting)]
+        given_back = recent.take(frame, SCAN)
+        found += [given_back] if given_back else []
+        assert recent.waiting <= after
+    found += [recent.give() for _ in range(recent.waiting)]
+
+    expected, start = [], 0
+    for length in lengths:
+        times = [*range(start, start + length)]
+        expected += [
+            (times[max(place - before, 0) : place], [time], times[place + 1 : place + 1 + after])
+            for place, time in enumerate(times)
+        ]
+        start += length
+    assert list(map(seen, found)) == expected
+
+
+def test_nothing_is_kept_that_no_window_asks_for() -> None:
+    recent = RecentFrames(Window(1, 2))
+    for frame in frames(50):
+        recent.take(frame, SCAN)
+    assert len(recent._kept) == 3  # one given back, two that wait
+
+
+@pytest.mark.parametrize("number", [0, 3, 5])
+def test_a_gap_starts_anew(number: int) -> None:
+    recent = RecentFrames(Window(1, 1))
+    all_of_them = frames(10)
+    recent.take(all_of_them[2], SCAN)
+    recent.take(all_of_them[3], SCAN)
+    assert recent.starts_anew(all_of_them[number])
+    assert recent.take(all_of_them[number], SCAN) is None
+    assert recent.waiting == 1
+    assert seen(recent.give()) == ([], [number], [])
+
+
+def test_who_goes_on_after_flushing_sees_what_was_before() -> None:
+    recent = RecentFrames(Window(2, 1))
+    all_of_them = frames(5)
+    for frame in all_of_them[:3]:
+        recent.take(frame, SCAN)
+    assert seen(recent.give()) == ([0, 1], [2], [])
+    assert recent.take(all_of_them[3], SCAN) is None
+    given_back = recent.take(all_of_them[4], SCAN)
+    assert given_back is not None
+    assert seen(given_back) == ([1, 2], [3], [4])

@@ -1,0 +1,127 @@
+"""What is made of frames goes to a folder, and takes the place of nothing it was made of."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.files import read_scan
+from derain.files.labels import read_labels
+from derain.scan import Scan
+from derain.sources.folders import frame_of, frames_of, named_frames
+from derain.sources.frame import MemoryFrame
+from derain.sources.sink import FolderSink
+from derain.sources.source import Frames
+
+
+def write(*paths: Path) -> None:
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        scene(30).tofile(path)
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+def test_a_scan_and_its_labels_are_named_by_the_key(tmp_path: Path) -> None:
+    write(tmp_path / "scans/1.bin")
+    (frame,) = named_frames([tmp_path / "scans"])
+    sink, rain = FolderSink(tmp_path / "out"), np.arange(30) < 4
+    sink.write(frame, frame.read().take(~rain), rain)
+    assert names(tmp_path / "out") == ["1.bin", "1.label"]
+    np.testing.assert_array_equal(read_labels(tmp_path / "out/1.label", 30), rain)
+    assert (tmp_path / "out/1.bin").read_bytes() == scene(30)[4:].tobytes()
+
+
+def test_keys_with_folders_make_folders(tmp_path: Path) -> None:
+    for sequence in "ab":
+        write(tmp_path / f"data/sequences/{sequence}/velodyne/0.bin.gz")
+    source = named_frames([tmp_path / "data"])
+    sink = FolderSink(tmp_path / "out")
+    sink.refuse_clashes(source)
+    for frame in source:
+        sink.write(frame, None, np.zeros(30, bool))
+    assert names(tmp_path / "out") == ["a/velodyne/0.label", "b/velodyne/0.label"]
+    assert sink.scan_path(source[0]) == tmp_path / "out/a/velodyne/0.bin.gz"
+    assert sink.path(source[1], ".png") == tmp_path / "out/b/velodyne/0.png"
+
+
+def test_a_scan_from_memory_is_written_as_a_pcd(tmp_path: Path) -> None:
+    (frame,) = Frames.of_scans([Scan.of(scene(30))])
+    FolderSink(tmp_path).write(frame, frame.read(), np.zeros(30, bool))
+    assert names(tmp_path) == ["000000.label", "000000.pcd"]
+    np.testing.assert_array_equal(read_scan(tmp_path / "000000.pcd").xyz, scene(30)[:, :3])
+
+
+def test_without_its_scan_there_are_no_labels(tmp_path: Path) -> None:
+    (tmp_path / "000000.pcd").mkdir()
+    (frame,) = Frames.of_scans([Scan.of(scene(30))])
+    with pytest.raises(InputError, match="is not a file that can be replaced"):
+        FolderSink(tmp_path).write(frame, frame.read(), np.zeros(30, bool))
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("out", "reason"),
+    [
+        ("1/velodyne", "would overwrite"),
+        ("1/labels", "holds the labels of"),
+        ("1/lidar_radar_labels", "holds the labels of"),  # where the scans might be taken for those
+        ("1/other/../labels", "holds the labels of"),
+    ],
+)
+def test_neither_scans_nor_labels_are_overwritten(tmp_path: Path, out: str, reason: str) -> None:
+    write(tmp_path / "1/velodyne/0.bin")
+    (tmp_path / "1/other").mkdir()
+    for source in (named_frames([tmp_path / "1"]), named_frames([tmp_path / "1"], labelled=True)):
+        with pytest.raises(InputError, match=reason) as error:
+            FolderSink(tmp_path / out, option="--into").refuse_clashes(source)
+        assert str(tmp_path / "1/velodyne/0.bin") in str(error.value)
+        assert error.value.remedy == "Give --into another folder."
+    FolderSink(tmp_path / "1/cleaned").refuse_clashes(source)
+
+
+def test_labels_that_lie_where_the_frame_says_are_not_overwritten(tmp_path: Path) -> None:
+    scan = tmp_path / "lidar/0.bin"
+    write(scan)
+    source = frames_of([scan], lambda scan: tmp_path / "truth/0.label", ("x", "y", "z", "i"))
+    with pytest.raises(InputError, match="holds the labels of"):
+        FolderSink(tmp_path / "truth").refuse_clashes(source)
+
+
+def test_a_data_set_is_not_overwritten_through_its_own_root(tmp_path: Path) -> None:
+    for sequence in "ab":
+        write(tmp_path / f"sequences/{sequence}/velodyne/0.bin")
+    source = named_frames([tmp_path])
+    with pytest.raises(InputError, match="would overwrite"):
+        FolderSink(tmp_path / "sequences").refuse_clashes(source)
+    FolderSink(tmp_path).refuse_clashes(source)
+
+
+def test_a_link_to_the_scans_is_their_folder(tmp_path: Path) -> None:
+    write(tmp_path / "scans/0.bin")
+    (tmp_path / "link").symlink_to(tmp_path / "scans", target_is_directory=True)
+    with pytest.raises(InputError, match="would overwrite"):
+        FolderSink(tmp_path / "link").refuse_clashes(named_frames([tmp_path / "scans"]))
+
+
+def test_two_scans_of_one_key_are_refused(tmp_path: Path) -> None:
+    write(tmp_path / "a/0.bin", tmp_path / "b/0.npy")
+    source = named_frames([tmp_path / "a", tmp_path / "b/0.npy"])
+    with pytest.raises(InputError, match="another scan has the same name") as error:
+        FolderSink(tmp_path / "out").refuse_clashes(source)
+    assert all(name in str(error.value) for name in ("a/0.bin", "b/0.npy", "out/0.label"))
+    scans = [MemoryFrame(key="0", scan=Scan.of(scene(3), name)) for name in ("x", "y")]
+    with pytest.raises(InputError, match="another scan has the same name"):
+        FolderSink(tmp_path / "out").refuse_clashes(scans)
+
+
+def test_one_scan_twice_is_refused_where_it_is_not_expected(tmp_path: Path) -> None:
+    write(tmp_path / "0.bin")
+    twice = [frame_of(tmp_path / "0.bin"), frame_of(tmp_path / "0.bin")]
+    FolderSink(tmp_path / "out").refuse_clashes(twice)
+    with pytest.raises(InputError, match="another scan has the same name"):
+        FolderSink(tmp_path / "out", again=False).refuse_clashes(twice)
