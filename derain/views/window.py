@@ -34,6 +34,11 @@ class Window:
                 "window", f"{self.before} scans before and {self.after} after", "Give 0 or more."
             )
 
+    @property
+    def is_one_scan(self) -> bool:
+        """Whether the view asks for nothing but the scan that is judged."""
+        return not (self.before or self.after)
+
 
 @dataclass(frozen=True, eq=False)
 class PlacedScan:
