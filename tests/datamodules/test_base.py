@@ -45,7 +45,11 @@ def folder(tmp_path: Path, write: Write) -> Callable[..., Folder]:
 
 def batches(data: ScanDataModule, part: str) -> list[Batch]:
     """One epoch, as the trainer gives it to the model."""
-    return list(getattr(data, f"{part}_dataloader")())
+    try:
+        return list(getattr(data, f"{part}_dataloader")())
+    except InputError as error:
+        # A traceback that pytest keeps would keep the loader, whose worker then ends late.
+        raise error.with_traceback(None) from None
 
 
 def scans(data: ScanDataModule, part: str) -> list[Scan]:
@@ -287,7 +291,7 @@ def test_a_file_that_cannot_be_used_is_named_from_a_worker_as_well(
     workers: int,
 ) -> None:
     data = connect(folder(workers=workers))
-    # The last of the scans: a worker that is left in the middle takes seconds to end.
+    # The last of the scans, for a worker that is left in the middle takes seconds to end.
     if damage == "unknown class":
         write_labels(tmp_path / "5.label", np.resize([778, 0, 777], 45))
     elif damage == "short labels":
