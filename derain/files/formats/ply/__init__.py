@@ -15,7 +15,13 @@ from derain.files.columns import describable_columns, records, scan_of
 from derain.files.content import Content
 from derain.files.format import FORMATS, Format
 from derain.files.formats.ply.faces import Faces, read_faces
-from derain.files.formats.ply.header import TYPES, Element, Property, parse_header, read_rows
+from derain.files.formats.ply.header import (
+    PROPERTY_TYPES,
+    Element,
+    Property,
+    parse_header,
+    read_rows,
+)
 from derain.files.reading import reading
 from derain.files.text import encode, format_rows
 from derain.scan import Scan
@@ -73,7 +79,7 @@ class Ply(Format):
         Raises:
             InputError: A column that no PLY can hold.
         """
-        columns = describable_columns(path, scan, TYPES)
+        columns = describable_columns(path, scan, PROPERTY_TYPES)
         for name, column in columns.items():
             if column.ndim > 1:
                 raise InputError(
