@@ -21,7 +21,7 @@ from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.learning.batch import Batch
-from derain.learning.task import EXAMPLES
+from derain.learning.task import EXAMPLE_SCANS
 from derain.models.base import DerainingModule
 from derain.models.lisnownet.network import LiSnowNetwork
 from derain.models.lisnownet.selection_rule import SelectionRule
@@ -243,7 +243,7 @@ class LiSnowNet(DerainingModule, Published):
         training = self.trainer.state.fn == "fit" and not self.trainer.sanity_checking
         if not training or "residual" in self.hparams["rule"]:
             return
-        changes = [self._changes(scan) for scan in self.validation_scans(EXAMPLES)]
+        changes = [self._changes(scan) for scan in self.validation_scans(EXAMPLE_SCANS)]
         if not changes:  # batches that were made elsewhere
             return
         rule = self.selection.with_residual_of(np.concatenate(changes))
