@@ -13,6 +13,7 @@ from derain.datamodules.sequences import Sequences as Sequences
 from derain.datamodules.simulated import Simulated as Simulated
 from derain.datamodules.wads import Wads as Wads
 from derain.errors import InputError as InputError
+from derain.export.bench.bench import bench as bench
 from derain.export.runtime import Derainer as Derainer
 from derain.files import read_scan as read_scan
 from derain.files import write_scan as write_scan
@@ -30,5 +31,7 @@ from derain.models.outdet import OutDetNetwork as OutDetNetwork
 from derain.models.salsanext import SalsaNext as SalsaNext
 from derain.models.salsanext import SalsaNextNetwork as SalsaNextNetwork
 from derain.scan import Scan as Scan
+from derain.sources.folders import named_frames as named_frames
+from derain.sources.source import Frames as Frames
 
 __version__: str

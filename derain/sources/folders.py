@@ -27,6 +27,11 @@ def named_frames(
 ) -> Frames:
     """The scans that a user names.
 
+    Example:
+        >>> source = named_frames([Path("scan.bin")], labelled=True)
+        >>> [(frame.key, len(frame.read()), frame.has_labels) for frame in source]
+        [('scan', 820, True)]
+
     Args:
         paths: Scans, folders with scans directly in them, and data sets or parts of them whose
             folders are called as a layout says.

@@ -10,7 +10,7 @@ from derain.cards.card import DataCard, load_card
 from derain.datamodules.in_memory import InMemory
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.learning.task import EXAMPLES, Task, agree
+from derain.learning.task import EXAMPLE_SCANS, Task, agree
 from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNext
@@ -44,7 +44,7 @@ def test_both_are_given_the_card_that_the_training_scans_complete() -> None:
 def test_the_view_is_fitted_to_training_scans() -> None:
     data = InMemory(scans(3), card=CARD)
     task = agree(SalsaNext(width=4), data)
-    fitted = SalsaNext(width=4).spec_for(data.card, list(data.training_scans(EXAMPLES)))
+    fitted = SalsaNext(width=4).spec_for(data.card, list(data.training_scans(EXAMPLE_SCANS)))
     assert task.spec.view == fitted.view
 
 
