@@ -47,30 +47,30 @@ class Augmentation:
         return max(self.rotation_probability, self.mirror_probability) > 0
 
     def __call__(
-        self, scan: Scan, rng: np.random.Generator, azimuth: tuple[float, float] = ALL_AROUND
+        self, scan: Scan, generator: np.random.Generator, azimuth: tuple[float, float] = ALL_AROUND
     ) -> Scan:
         """Returns a changed copy; labels and intensities stay with their points, in their order.
 
         Args:
             scan: The scan.
-            rng: Draws what is changed.
+            generator: Draws what is changed.
             azimuth: What the network sees: right and left bound, degrees counter-clockwise from x.
         """
         right, left = azimuth
         sees_all_around = left - right == FULL_CIRCLE
         valid = scan.valid  # no return is no return, wherever it is turned
         moved = scan.xyz[valid]
-        if rng.random() < self.rotation_probability and sees_all_around:
-            moved = moved @ _turn(rng.uniform(0, 2 * np.pi))
-        if rng.random() < self.jitter_probability:
-            moved = moved + rng.normal(0, self.jitter, moved.shape).astype(np.float32)
-        if rng.random() < self.mirror_probability:
+        if generator.random() < self.rotation_probability and sees_all_around:
+            moved = moved @ _turn(generator.uniform(0, 2 * np.pi))
+        if generator.random() < self.jitter_probability:
+            moved = moved + generator.normal(0, self.jitter, moved.shape).astype(np.float32)
+        if generator.random() < self.mirror_probability:
             moved = moved @ _mirror(0.0 if sees_all_around else math.radians(left + right) / 2)
         xyz = scan.xyz.copy()
         xyz[valid] = moved
         changed = replace(scan, xyz=xyz)
-        if rng.random() < self.dropping_probability:
-            return changed.take(rng.random(len(scan)) >= rng.uniform(0, self.dropping))
+        if generator.random() < self.dropping_probability:
+            return changed.take(generator.random(len(scan)) >= generator.uniform(0, self.dropping))
         return changed
 
 

@@ -22,7 +22,7 @@ CONSTANTS_LEFT = {
     *("OPTIONS", "STEPS", "TYPES", "WARM_UP"),
 }
 GENERATORS_LEFT = {
-    *("datamodules/augmentation.py", "derain/cli/tune.py", "derain/evaluation/hard_cases.py"),
+    *("derain/cli/tune.py", "derain/evaluation/hard_cases.py"),
     "export/onnx_file.py",
 }
 
