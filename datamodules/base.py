@@ -9,7 +9,7 @@ from torch.utils.data import DataLoader
 from derain.cards.card import DataCard
 from derain.datamodules.loader import scan_loader, with_needed_labels
 from derain.datamodules.loading import Loading, Part
-from derain.datamodules.reader import ScanReader
+from derain.datamodules.reader import FrameReader
 from derain.datamodules.statistics import measured
 from derain.errors import InputError
 from derain.learning.batch import Sample
@@ -112,7 +112,7 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
             InputError: A scan or labels that cannot be read.
         """
         frames = with_needed_labels(self.source("train"), "train", labelled)
-        reader = ScanReader(self.card, self.loading.intensity_scale, columns)
+        reader = FrameReader(self.card, self.loading.intensity_scale, columns)
         return map(reader.read, evenly_spaced(frames, most))
 
     def training_record(self) -> dict[str, tuple[str, ...]]:
@@ -144,6 +144,6 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
         return scan_loader(self.source(part), part, self.task, self.loading, processes, process)
 
     @property
-    def _reader(self) -> ScanReader:
+    def _reader(self) -> FrameReader:
         columns = None if self.task is None else self.task.columns
-        return ScanReader(self.card, self.loading.intensity_scale, columns)
+        return FrameReader(self.card, self.loading.intensity_scale, columns)

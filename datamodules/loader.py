@@ -4,7 +4,7 @@ from torch.utils.data import DataLoader
 
 from derain.datamodules.loading import Loading, Part
 from derain.datamodules.order import MeasuringOrder, TrainingOrder
-from derain.datamodules.reader import ScanReader
+from derain.datamodules.reader import FrameReader
 from derain.datamodules.scan_dataset import LateLoader, ScanDataset, packed
 from derain.errors import InputError
 from derain.learning.batch import Sample
@@ -59,7 +59,7 @@ def scan_loader(
             "would turn a scan and leave those around it, which the network sees too",
             "Set rotation_probability and mirror_probability to 0.",
         )
-    reader = ScanReader(task.card, loading.intensity_scale, task.columns)
+    reader = FrameReader(task.card, loading.intensity_scale, task.columns)
     once = loading.counts_once(task.card)
     dataset = ScanDataset(
         # Of frames to predict, whoever writes beside them has to know where their labels are.

@@ -12,7 +12,7 @@ from derain.views.morton import first_rows
 
 
 @dataclass(frozen=True)
-class ScanReader:
+class FrameReader:
     """Reads scans in the unit of their data card, with the labels that their frames have.
 
     Attributes:

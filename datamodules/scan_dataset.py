@@ -8,7 +8,7 @@ from torch.utils.data import DataLoader, Dataset
 from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.order import Pick
-from derain.datamodules.reader import ScanReader
+from derain.datamodules.reader import FrameReader
 from derain.datamodules.windows import seen
 from derain.errors import InputError
 from derain.learning.batch import Batch, Sample
@@ -36,7 +36,7 @@ class ScanDataset(Dataset[Sample | InputError]):
         frames: Sequence[Frame],
         read: Callable[[Frame], Scan],
         view: View,
-        reader: ScanReader,
+        reader: FrameReader,
         augmentation: Augmentation | None = None,
         seed: int = 0,
     ) -> None:

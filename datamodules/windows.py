@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.views.view import SeenScan, View
-from derain.views.window import PlacedScan, WindowOfScans
+from derain.views.window import PlacedScan, Window, WindowOfScans
 
 
 def seen(
@@ -30,14 +30,24 @@ def seen(
     window = view.window
     if window.is_one_scan:
         return view(scan)
-    first = max(number - window.before, 0)
-    before, after = frames[first:number], frames[number + 1 : number + 1 + window.after]
-    own = frames[number]
 
-    def placed(frame: Frame, scan: Scan) -> PlacedScan:
-        return PlacedScan(scan, frame.time, frame.pose)
+    def placed(place: int) -> PlacedScan:
+        frame = frames[place]
+        return PlacedScan(scan if place == number else read(frame), frame.time, frame.pose)
 
-    def of_sequence(around: Sequence[Frame]) -> list[PlacedScan]:
-        return [placed(frame, read(frame)) for frame in around if frame.sequence == own.sequence]
+    first, last = _reach(frames, number, window)
+    before, after = range(first, number), range(number + 1, last + 1)
+    return view.of_window(
+        WindowOfScans(placed(number), [*map(placed, before)], [*map(placed, after)])
+    )
 
-    return view.of_window(WindowOfScans(placed(own, scan), of_sequence(before), of_sequence(after)))
+
+def _reach(frames: Sequence[Frame], number: int, window: Window) -> tuple[int, int]:
+    """The first and the last frame of a window, which reaches over no gap in a sequence."""
+    first = last = number
+    while first > max(number - window.before, 0) and frames[first].follows(frames[first - 1]):
+        first -= 1
+    end = min(number + window.after, len(frames) - 1)
+    while last < end and frames[last + 1].follows(frames[last]):
+        last += 1
+    return first, last

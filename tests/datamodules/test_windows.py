@@ -68,6 +68,16 @@ def test_scans_around_one_are_of_its_sequence_the_oldest_first(
         assert placed.pose[0, 0] == which(placed.scan) + 1
 
 
+def test_a_window_reaches_over_no_gap() -> None:
+    frames, told = drives(5), []
+    view: Any = SimpleNamespace(window=Window(before=9, after=9), of_window=told.append)
+    gap = Frames([*frames[:2], *frames[3:]])
+    for number in range(4):
+        seen(view, gap[number].read(), gap, number, lambda frame: frame.read())
+    around = [[which(placed.scan) for placed in (*w.before, w.judged, *w.after)] for w in told]
+    assert around == [[0, 1], [0, 1], [3, 4], [3, 4]]
+
+
 def test_a_view_of_one_scan_pays_for_no_other() -> None:
     def read(frame: Frame) -> Scan:
         raise AssertionError(frame)
