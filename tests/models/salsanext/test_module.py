@@ -277,4 +277,4 @@ def test_a_scan_without_labels_is_one_error_that_names_it(
     (tmp_path / missing).unlink()
     with pytest.raises(InputError, match=r"its labels are not at .*Add them or leave") as refusal:
         make_trainer(epochs=1).fit(SalsaNext(small_grid, width=4), data)
-    assert refusal.value.subject == (tmp_path / missing).with_suffix(".bin")
+    assert refusal.value.subject == str((tmp_path / missing).with_suffix(".bin"))
