@@ -19,7 +19,7 @@ from lightning import Trainer
 
 import derain
 
-from .examples import prepare
+from .folder_of_examples import prepare
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 STUB = REPOSITORY / "derain" / "__init__.pyi"

@@ -103,7 +103,7 @@ def test_the_streets_of_the_demo_have_rain_to_choose_by_and_to_test_on() -> None
     campaign = Campaign(*partition(int(options["--sequences"])), rain_rates=rates)
     for part in ("validation", "test"):
         assert max(campaign.rain_rate[name] for name in campaign.split[part]) == max(rates)
-    assert set(demo.NETWORKS.values()) == {"outdet", "salsanext", "lisnownet"}
+    assert set(demo.DEMO_NETWORKS.values()) == {"outdet", "salsanext", "lisnownet"}
 
 
 @pytest.fixture

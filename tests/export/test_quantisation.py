@@ -16,7 +16,7 @@ from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file, quantisation
 from derain.export.onnx_file import export
 from derain.export.proof import FINITE, INT8, THREADS, Proof
-from derain.export.quantisation import CalibrationScans, ScanReader
+from derain.export.quantisation import CalibrationReader, CalibrationScans
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.models.base import DerainingModule
@@ -112,7 +112,7 @@ def test_every_row_of_a_hard_scan_gets_an_answer(int8: tuple[Path, Proof], scan:
 
 def test_a_reader_gives_the_inputs_of_every_scan_once(image_model: DerainingModule) -> None:
     view = image_model.spec.make_view()
-    reader = ScanReader(view, CALIBRATION)
+    reader = CalibrationReader(view, CALIBRATION)
     for scan in CALIBRATION:
         inputs = reader.get_next()
         assert inputs is not None
@@ -177,7 +177,7 @@ def test_one_calibration_scan_is_held_at_a_time(
         return scan
 
     def gone_through(proto: onnx.ModelProto, view: View, scans: Iterable[Scan]) -> onnx.ModelProto:
-        reader = ScanReader(view, scans)
+        reader = CalibrationReader(view, scans)
         while reader.get_next() is not None:
             pass
         return proto
