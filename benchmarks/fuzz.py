@@ -24,7 +24,7 @@ from threading import Lock
 
 from tqdm import tqdm
 
-from benchmarks.fuzzing import documents, models, scans
+from benchmarks.fuzzing import documents, models, records, scans
 from benchmarks.fuzzing.reader import Reader
 from benchmarks.fuzzing.worker import REFUSED, RIGHT, Outcome, Worker
 
@@ -56,7 +56,12 @@ def all_readers(models_folder: Path) -> dict[str, Reader]:
     Args:
         models_folder: Holds undamaged models and checkpoints.
     """
-    found = [*scans.readers(), *documents.readers(), *models.readers(models_folder)]
+    found = [
+        *scans.readers(),
+        *documents.readers(),
+        *records.readers(),
+        *models.readers(models_folder),
+    ]
     return {reader.name: reader for reader in found}
 
 

@@ -1,0 +1,50 @@
+"""Records of when and where scans were taken: times, poses and the calibration beside them."""
+
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.fuzzing.reader import Reader
+from derain.sources.records import CALIBRATION, POSES, TIMES, read_numbers, read_poses
+
+POSE = "1 0 0 0.5 0 1 0 -0.25 0 0 1 0\n"
+TURNED = "0 -1 0 1.5e+00 1 0 0 2 0 0 1 -3.25\n"
+TO_CAMERA = "P0: 1 2 3\nTr: 0 -1 0 0.1 0 0 -1 0.2 1 0 0 0.3\n"
+
+
+def readers() -> list[Reader]:
+    """One for each kind of record."""
+    hostile = [
+        lambda: b"1e999 " * 12,
+        lambda: b"nan " * 12,
+        lambda: b"0 " * 12,
+        lambda: b"1e300 " * 12,
+        lambda: b"\xff\xfe1\x00",
+        lambda: b"1\n" * 300_000,
+        lambda: b"9" * 5000,
+    ]
+    poses = (POSE + TURNED).encode()
+    return [
+        Reader("poses", POSES, _read_poses, lambda: [poses], hostile),
+        Reader("calib", CALIBRATION, _read_calibration, lambda: [TO_CAMERA.encode()], hostile),
+        Reader("seconds", TIMES, _read_seconds, lambda: [b"0.0\n1.036e-01\n2\n"], hostile),
+    ]
+
+
+def _read_poses(path: Path) -> None:
+    poses = read_poses(path)
+    assert poses.shape[1:] == (4, 4)
+    turned = poses[:, :3, :3] @ poses[:, :3, :3].transpose(0, 2, 1)
+    assert np.abs(turned - np.eye(3)).max(initial=0) < 0.01
+    assert np.isfinite(poses).all()
+
+
+def _read_calibration(path: Path) -> None:
+    path.with_name(POSES).write_text(POSE + TURNED)
+    _read_poses(path.with_name(POSES))
+
+
+def _read_seconds(path: Path) -> None:
+    seconds = read_numbers(path, 1)
+    assert seconds.shape[1:] == (1,)
+    assert np.isfinite(seconds).all()
