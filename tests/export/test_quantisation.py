@@ -13,15 +13,17 @@ import pytest
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.export import onnx_file, quantisation
+from derain.export import onnx_file
 from derain.export.onnx_file import export
 from derain.export.proof import FINITE, INT8, THREADS, Proof
-from derain.export.quantisation import CalibrationScans, ScanReader
+from derain.export.quantisation import CalibrationReader, CalibrationScans
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
 from derain.scan import Scan
+from derain.sources import file_frame
+from derain.sources.folders import named_frames
 from derain.views.probability import probability_of_rain
 from derain.views.view import View
 
@@ -112,7 +114,7 @@ def test_every_row_of_a_hard_scan_gets_an_answer(int8: tuple[Path, Proof], scan:
 
 def test_a_reader_gives_the_inputs_of_every_scan_once(image_model: DerainingModule) -> None:
     view = image_model.spec.make_view()
-    reader = ScanReader(view, CALIBRATION)
+    reader = CalibrationReader(view, CALIBRATION)
     for scan in CALIBRATION:
         inputs = reader.get_next()
         assert inputs is not None
@@ -177,16 +179,16 @@ def test_one_calibration_scan_is_held_at_a_time(
         return scan
 
     def gone_through(proto: onnx.ModelProto, view: View, scans: Iterable[Scan]) -> onnx.ModelProto:
-        reader = ScanReader(view, scans)
+        reader = CalibrationReader(view, scans)
         while reader.get_next() is not None:
             pass
         return proto
 
-    monkeypatch.setattr(quantisation, "read_scan", counted)
+    monkeypatch.setattr(file_frame, "read_scan", counted)
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(image_onnx))
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [])
     monkeypatch.setattr(onnx_file, "quantised", gone_through)
-    scans = CalibrationScans(paths, ("x", "y", "z", "intensity"))
+    scans = CalibrationScans(named_frames(paths))
     assert export(image_model, tmp_path / "model.onnx", scans).holds
     # Once to be scaled by, and once to be proved on; none while another is held.
     assert read == [(path, 0) for path in (*paths, *paths)]
