@@ -9,13 +9,13 @@ from torch.utils.data import DataLoader
 from derain.cards.card import DataCard
 from derain.datamodules.loader import scan_loader, with_needed_labels
 from derain.datamodules.loading import Loading, Part
-from derain.datamodules.reader import FrameReader
 from derain.datamodules.statistics import measured
 from derain.errors import InputError
 from derain.learning.batch import Sample
 from derain.learning.task import Task
 from derain.scan import Scan
 from derain.sources.frame import Frame
+from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import by_fingerprint

@@ -53,12 +53,10 @@ class InMemory(ScanDataModule):
         loading: Loading = Loading(),
     ) -> None:
         super().__init__(card if isinstance(card, DataCard) else load_card(card), loading)
-        test = _source(test, "test")
         self.sources: dict[Part, Source] = {
-            "train": _source(train, "train"),
-            "validation": _source(validation, "validation"),
-            "test": test,
-            "predict": test,
+            "train": _source(train),
+            "validation": _source(validation),
+            "test": _source(test),
         }
 
     def source(self, part: Part) -> Source:
@@ -67,11 +65,11 @@ class InMemory(ScanDataModule):
         Raises:
             InputError: A part without scans.
         """
-        if not self.sources[part]:
-            name = "test" if part == "predict" else part
+        name: Part = "test" if part == "predict" else part
+        if not self.sources[name]:
             raise InputError(name, "there are no scans for it", f"Give scans: {name}=[...].")
-        return self.sources[part]
+        return self.sources[name]
 
 
-def _source(scans: Scans, part: str) -> Source:
-    return scans if isinstance(scans, Source) else Frames.of_scans(scans, part)
+def _source(scans: Scans) -> Source:
+    return scans if isinstance(scans, Source) else Frames.of_scans(scans)

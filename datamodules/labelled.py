@@ -2,17 +2,18 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from derain.cards.card import DataCard, load_card, packaged_cards
-from derain.cards.known import card_by_folders, known_layouts
+from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
 from derain.datamodules.base import Loading, Part, ScanDataModule
 from derain.datamodules.sequences import SequenceDataModule
 from derain.errors import InputError
 from derain.files.documents import Entry
-from derain.simulation.manifest import RAIN_RATE, rates_of_sequences, read_manifest
-from derain.sources.folders import named_frames
+from derain.simulation.manifest import RAIN_RATE, manifest_of, rates_of_sequences, read_manifest
+from derain.sources.folders import find_layout, named_frames
 from derain.sources.source import Source
 
 
@@ -22,8 +23,8 @@ class NamedScans(ScanDataModule):
     A scan's labels are ``<stem>.label`` beside it or in the sibling folder of labels.
 
     Args:
-        paths: Scans, and folders with scans directly in them.
-        card: Data card of the scans.
+        paths: Scans, folders with scans directly in them, and sequences.
+        card: Data card of the scans, by whose layout sequences and labels are found before others.
         loading: How the scans are read.
     """
 
@@ -37,7 +38,8 @@ class NamedScans(ScanDataModule):
         Raises:
             InputError: A path that does not exist, or a folder without scans.
         """
-        return named_frames(self.paths, self.loading.columns, labelled=True)
+        layouts = layouts_for(self.card)
+        return named_frames(self.paths, self.loading.columns, labelled=True, layouts=layouts)
 
 
 def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> ScanDataModule:
@@ -50,11 +52,19 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> S
         loading: How the scans are read.
 
     Raises:
-        InputError: A root whose sequences hold no folder of scans that is known.
+        InputError: A root beside other paths, or whose sequences hold no folder of scans that is
+            known.
     """
-    root = paths[0]
-    if len(paths) > 1 or not os.path.isdir(root / card.layout.sequences):
+    roots = [path for path in paths if os.path.isdir(path / card.layout.sequences)]
+    if not roots:
         return NamedScans(paths, card, loading)
+    root = roots[0]
+    if len(paths) > 1:
+        raise InputError(
+            root,
+            "is a data set, of which no part can be taken beside other scans",
+            "Name it alone, or its sequences one by one.",
+        )
     split = read_manifest(root).get("split")
     return SequenceDataModule(str(root), card, _layout_of(root, card), split, loading)
 
@@ -64,8 +74,8 @@ def card_of(paths: Sequence[Path], name: str | None) -> DataCard:
 
     Args:
         paths: Scans and folders of scans, or the root of one data set.
-        name: A packaged card or a YAML file; None asks a simulated data set's manifest, and knows
-            REHEARSE-3D by its folders.
+        name: A packaged card or a YAML file; None asks the manifest of the simulated data set that
+            the first of them is or lies in, and else knows REHEARSE-3D by its folders.
 
     Raises:
         InputError: No such card, or data that do not say whose they are.
@@ -73,9 +83,9 @@ def card_of(paths: Sequence[Path], name: str | None) -> DataCard:
     if name is not None:
         return load_card(name)
     root = paths[0]
-    if read_manifest(root):
+    if manifest_of(root):
         return load_card("simulated")
-    layout = _layout_in(root)
+    layout = find_layout(root)
     if layout is not None and (card := card_by_folders(layout, "rain")):
         return card
     raise InputError(
@@ -96,26 +106,20 @@ def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
         InputError: A file that is not of this kind.
     """
     if file is None:
-        return dict(read_manifest(paths[0]).get(RAIN_RATE, {}))
+        return dict(manifest_of(paths[0]).get(RAIN_RATE, {}))
     return rates_of_sequences(Entry.of_yaml(file))
 
 
-def _layout_in(root: Path, first: Layout | None = None) -> Layout | None:
-    """The layout of a data set's folders; None where none is known."""
-    layouts = dict.fromkeys([*([first] if first else []), *known_layouts()])
-    return next(
-        (layout for layout in layouts if any(root.glob(f"{layout.sequences}/*/{layout.scans}"))),
-        None,
-    )
-
-
 def _layout_of(root: Path, card: DataCard) -> Layout:
-    layout = _layout_in(root, card.layout)
+    """What the folders of a data set's sequences are called: as its card says, or as others do."""
+    sequences, layouts = root / card.layout.sequences, layouts_for(card)
+    layout = find_layout(sequences, layouts)
     if layout is None:
-        folders = dict.fromkeys(known.scans for known in (card.layout, *known_layouts()))
+        folders = dict.fromkeys(known.scans for known in layouts)
         raise InputError(
-            root / card.layout.sequences,
+            sequences,
             f"no sequence has a folder {' or '.join(folders)}",
             "Name the folders of scans themselves, or say in --card what they are called.",
         )
-    return layout
+    # Others may call the folder of sequences otherwise, and this one was found by its card's name.
+    return replace(layout, sequences=card.layout.sequences)

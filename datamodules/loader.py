@@ -4,13 +4,13 @@ from torch.utils.data import DataLoader
 
 from derain.datamodules.loading import Loading, Part
 from derain.datamodules.order import MeasuringOrder, TrainingOrder
-from derain.datamodules.reader import FrameReader
 from derain.datamodules.scan_dataset import LateLoader, ScanDataset, packed
 from derain.errors import InputError
 from derain.learning.batch import Sample
 from derain.learning.seeds import run_seed
 from derain.learning.task import Task
 from derain.sources.frame import Frame
+from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 
 

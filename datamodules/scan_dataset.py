@@ -8,13 +8,13 @@ from torch.utils.data import DataLoader, Dataset
 from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.order import Pick
-from derain.datamodules.reader import FrameReader
 from derain.datamodules.windows import seen
 from derain.errors import InputError
 from derain.learning.batch import Batch, Sample
 from derain.learning.seeds import Draw, generator_of
 from derain.scan import Scan
 from derain.sources.frame import Frame
+from derain.sources.reader import FrameReader
 from derain.sources.spread import evenly_spaced
 from derain.views.view import View
 

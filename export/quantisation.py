@@ -16,8 +16,8 @@ from onnxruntime.quantization import (
 )
 
 from derain.errors import InputError
-from derain.files import read_scan
 from derain.scan import Scan
+from derain.sources.frame import Frame
 from derain.views.view import SeenScan, View
 
 # Scans that the ranges of activations are taken from; they are held in memory one at a time.
@@ -28,29 +28,20 @@ class CalibrationScans(Collection[Scan]):
     """Scans that are read one at a time, anew whenever they are gone through.
 
     Args:
-        paths: Their files.
-        columns: Names of the columns of files that do not name them.
-        intensity_scale: What takes their intensities to the unit of the model, e.g. 255.
+        frames: Their frames, whose intensities are in the unit of the model.
     """
 
-    def __init__(
-        self, paths: Sequence[Path], columns: Sequence[str], intensity_scale: float = 1.0
-    ) -> None:
-        self.paths = paths
-        self.columns = columns
-        self.intensity_scale = intensity_scale
+    def __init__(self, frames: Sequence[Frame]) -> None:
+        self.frames = frames
 
     def __len__(self) -> int:
-        return len(self.paths)
+        return len(self.frames)
 
     def __contains__(self, scan: object) -> bool:
-        return isinstance(scan, Scan) and scan.name in map(str, self.paths)
+        return isinstance(scan, Scan) and scan.name in [frame.name for frame in self.frames]
 
     def __iter__(self) -> Iterator[Scan]:
-        return map(self._read, self.paths)
-
-    def _read(self, path: Path) -> Scan:
-        return read_scan(path, self.columns).with_intensity_times(self.intensity_scale)
+        return (frame.read() for frame in self.frames)
 
 
 class CalibrationReader(CalibrationDataReader):  # type: ignore[misc]

@@ -162,9 +162,10 @@ class Derainer:
         return None if ready is None else self._judged_in_window(ready, stopwatch)
 
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
-        """Answers for the frames that still wait, each with the scans after it that there are.
+        """Ends a recording: answers for the frames that still wait, with the scans that there are.
 
-        Where one cannot be judged, those after it go on waiting.
+        What is pushed afterwards is of another recording. Where one of those that wait cannot be
+        judged, those after it go on waiting.
 
         Args:
             stopwatch: Takes the times of the stages view, network and back.
@@ -174,6 +175,7 @@ class Derainer:
         """
         while self._recent.waiting:
             yield self._judged_in_window(self._recent.give(), stopwatch or Stopwatch())
+        self._recent = RecentFrames(self.view.window)
 
     def logits(self, view: SeenScan) -> NDArray[np.float32]:
         """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).

@@ -1,6 +1,6 @@
 """What the names of folders tell: the layouts of the packaged data cards."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -8,6 +8,9 @@ from derain.cards.card import DataCard, FoldersTell, load_card, packaged_cards
 from derain.cards.layout import Layout
 from derain.files.labels import LABEL, label_beside
 from derain.files.names import scan_stem
+
+# The folder of labels where nothing else is said; only then may they lie beside the scans instead.
+USUAL_LABELS = Layout().labels
 
 
 @cache
@@ -38,13 +41,26 @@ def card_by_folders(layout: Layout, tell: FoldersTell) -> DataCard | None:
     )
 
 
-def label_of(scan: Path) -> Path:
-    """Where a scan's labels lie: in the folder that its layout has for them, or beside it."""
+def layouts_for(card: DataCard | None) -> tuple[Layout, ...]:
+    """The layouts that data of a card may have: the card's own first, then the packaged ones."""
+    own = () if card is None else (card.layout,)
+    return tuple(dict.fromkeys((*own, *known_layouts())))
+
+
+def label_of(scan: Path, layouts: Iterable[Layout] | None = None) -> Path:
+    """Where a scan's labels lie: in the folder that its layout has for them, or beside it.
+
+    Args:
+        scan: The scan.
+        layouts: Those that it may have, the likeliest first; by default those of the packaged data
+            cards.
+    """
     folder = scan.absolute().parent
-    for layout in known_layouts():
-        if folder.name == layout.scans and layout.labels != Layout().labels:
-            return folder.parent / layout.labels / f"{scan_stem(scan)}{LABEL}"
-    return label_beside(scan)
+    known = known_layouts() if layouts is None else layouts
+    labels = next((layout.labels for layout in known if layout.scans == folder.name), USUAL_LABELS)
+    if labels == USUAL_LABELS:
+        return label_beside(scan)
+    return folder.parent / labels / f"{scan_stem(scan)}{LABEL}"
 
 
 def label_places(scan: Path) -> Iterator[Path]:

@@ -9,7 +9,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from tqdm import tqdm
 
 from derain.cards.known import lidar_folders
@@ -23,6 +22,7 @@ from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
+from derain.sources.spread import evenly_spaced
 
 if TYPE_CHECKING:
     from derain.annotation.plane import Plane
@@ -146,9 +146,8 @@ def _radar_frames(arguments: argparse.Namespace, source: Source) -> dict[str, Fr
 def _road_plane(source: Source, scene: "Scene") -> "Plane":
     from derain.annotation.steps import road_plane
 
-    most = min(len(source), scene.plane.scans)
-    chosen = np.linspace(0, len(source) - 1, most).round().astype(int)
-    return road_plane([source[number].read() for number in chosen.tolist()], scene)
+    chosen = evenly_spaced(source, scene.plane.scans)
+    return road_plane([frame.read() for frame in chosen], scene)
 
 
 def _label_all(

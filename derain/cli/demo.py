@@ -129,14 +129,14 @@ def _network(narrator: Narrator, story: Story, title: str, scan: Path) -> None:
 def _clean(narrator: Narrator, out: Path, title: str, scan: Path) -> None:
     """Cleans the folder of scans that one of them lies in, and draws that one before and after."""
     from derain.export.runtime import Derainer
-    from derain.files import read_scan
     from derain.pictures.scan_pictures import before_after_figure, save
+    from derain.sources.folders import frame_of
 
     model, picture = out / f"{DEMO_NETWORKS[title]}.onnx", out / "before_after.png"
     narrator.step(
         *("run", str(model), str(scan.parent), "--out", str(out / "cleaned")), result=_last_line
     )
-    before = read_scan(scan)
+    before = frame_of(scan).read()
     heading = f"Simulated rain, cleaned by {title}"
     save(before_after_figure(before, Derainer(model)(before), heading), picture)
     print(f"  one of them before and after: {picture}")
@@ -144,14 +144,12 @@ def _clean(narrator: Narrator, out: Path, title: str, scan: Path) -> None:
 
 def _rainiest(data: Path) -> Path:
     """The last scan of the test sequence with the highest rain rate."""
-    from derain.cards.layout import sequence_of
     from derain.datamodules.labelled import rain_rates
     from derain.datamodules.simulated import Simulated
 
     rates = rain_rates([data], None)
     frames = Simulated(str(data), make=False).frames("test")
-    scans = [Path(frame.name) for frame in frames]
-    return max(scans, key=lambda scan: (rates[sequence_of(scan)], scan))
+    return Path(max(frames, key=lambda frame: (rates[frame.sequence], frame.key)).name)
 
 
 def _first_line(printed: Transcript) -> str:

@@ -82,15 +82,17 @@ def _calibration(arguments: argparse.Namespace) -> Collection["Scan"]:
     """Scans that an eight-bit model is scaled by; none for one in float32."""
     from derain.errors import InputError
     from derain.export.quantisation import CALIBRATION_SCANS, CalibrationScans
-    from derain.files import find_scans
+    from derain.sources.folders import named_frames
     from derain.sources.spread import evenly_spaced
 
     if arguments.int8 != bool(arguments.calibration):
         raise InputError(
             "--int8", "needs --calibration, and that needs it", "Give both or neither."
         )
-    found = evenly_spaced(find_scans(arguments.calibration or []), CALIBRATION_SCANS)
-    return CalibrationScans(found, arguments.columns, arguments.intensity_scale)
+    source = named_frames(arguments.calibration or [], arguments.columns)
+    frames = evenly_spaced(source, CALIBRATION_SCANS)
+    scale = arguments.intensity_scale
+    return CalibrationScans([frame.with_intensity_times(scale) for frame in frames])
 
 
 def _warn_of_odd(scans: Iterable["Scan"], spec: "Spec") -> None:

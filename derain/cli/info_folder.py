@@ -9,7 +9,7 @@ from typing import Any
 from tqdm import tqdm
 
 from derain.cards.card import DataCard, load_card
-from derain.cards.known import card_by_folders, known_layouts
+from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.evaluation.contents import (
@@ -17,10 +17,10 @@ from derain.evaluation.contents import (
     class_name,
     count_frame,
     find_sequences,
-    manifest_of,
     rate_name,
 )
 from derain.evaluation.text_tables import plain_table
+from derain.simulation.manifest import manifest_of
 from derain.sources.folders import find_layout
 
 
@@ -136,7 +136,7 @@ def draw(facts: FolderFacts, picture: Path) -> None:
 def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout | None:
     """What a folder's folders are called: as stated, as its data card says, or as others do."""
     if stated is None:
-        return find_layout(folder, [*([card.layout] if card else []), *known_layouts()])
+        return find_layout(folder, layouts_for(card))
     folders = stated.split(",")
     if len(folders) != 2:
         raise InputError(

@@ -65,9 +65,9 @@ def rain_on_scans(arguments: argparse.Namespace) -> int:
     sink = folder_sink(arguments.out, source)
     scans = ScanByScan(source)
     for number, frame in enumerate(scans):
-        chance = np.random.SeedSequence(arguments.seed, spawn_key=(number,))
+        seed = np.random.SeedSequence(arguments.seed, spawn_key=(number,))
         with scans.passing_over(frame):
-            generator = np.random.default_rng(chance)
+            generator = np.random.default_rng(seed)
             rained = _rain_on(frame, rain, sensor, generator, sink, arguments.picture)
             tell(rained, arguments.json)
     return scans.exit_code("it could not rain on {scans}")

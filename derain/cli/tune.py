@@ -68,13 +68,13 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     notices = Notices()
     data = labelled(arguments, arguments.data)
-    files = _drawn(data.frames(arguments.part), arguments.scans, arguments.seed)
+    frames = _drawn(data.frames(arguments.part), arguments.scans, arguments.seed)
     refuse_unwritable(arguments.out)
     tune = _tuned_filter if arguments.method in FILTERS else _tuned_model
-    tuned = tune(arguments, data, files, notices)
+    tuned = tune(arguments, data, frames, notices)
     notices.tell_how_many_more()
     facts = (
-        f"IoU {tuned.iou:.4f} on {len(files)} scans of {data.card.name}, "
+        f"IoU {tuned.iou:.4f} on {len(frames)} scans of {data.card.name}, "
         f"{tuned.default_iou:.4f} with the defaults"
     )
     _write(arguments, tuned, facts)
@@ -87,7 +87,7 @@ def main(arguments: argparse.Namespace) -> int:
 def _tuned_filter(
     arguments: argparse.Namespace,
     data: "ScanDataModule",
-    files: list["Frame"],
+    frames: list["Frame"],
     notices: Notices,
 ) -> "Tuned":
     from derain.export.tuning import LabelledNeighbourhoods, Search, neighbours_to_find, tune_filter
@@ -95,8 +95,8 @@ def _tuned_filter(
     neighbours = neighbours_to_find(arguments.method)
     read = partial(_read, data, filter_from(arguments.method, {}), notices)
     scans = [
-        LabelledNeighbourhoods.of(read(file), data.card, neighbours, arguments.threads)
-        for file in tqdm(files, desc="finding neighbours", unit="scan", disable=None)
+        LabelledNeighbourhoods.of(read(frame), data.card, neighbours, arguments.threads)
+        for frame in tqdm(frames, desc="finding neighbours", unit="scan", disable=None)
     ]
     if not any(scan.rain.any() for scan in scans):
         raise _no_rain(data)
@@ -105,7 +105,7 @@ def _tuned_filter(
             arguments.trials,
             arguments.seed,
             arguments.storage,
-            [file.name for file in files],
+            [frame.name for frame in frames],
             progress.update,
         )
         return tune_filter(arguments.method, scans, search)
@@ -114,7 +114,7 @@ def _tuned_filter(
 def _tuned_model(
     arguments: argparse.Namespace,
     data: "ScanDataModule",
-    files: list["Frame"],
+    frames: list["Frame"],
     notices: Notices,
 ) -> "Tuned":
     from derain.export.methods import load_method
@@ -125,15 +125,15 @@ def _tuned_model(
     assert isinstance(derainer, Derainer)  # filters are tuned by _tuned_filter
 
     def judged() -> Iterator[tuple[Any, Any]]:
-        for file in tqdm(files, desc="judging", unit="scan", disable=None):
-            scan = _read(data, derainer.spec, notices, file)
+        for frame in tqdm(frames, desc="judging", unit="scan", disable=None):
+            scan = _read(data, derainer.spec, notices, frame)
             known = scan.valid & ~data.card.unknown_of(scan)
             judgement = derainer.judge(scan)
             outside = outside_view(scan, judgement.judged, derainer.spec.data)
-            notices.tell(file.name, outside)
+            notices.tell(frame.name, outside)
             yield judgement.probability[known], data.card.rain_of(scan)[known]
 
-    note = overlap(arguments.method, derainer.spec, data.card, files)
+    note = overlap(arguments.method, derainer.spec, data.card, frames)
     if note is not None:
         tqdm.write(f"derain: warning: {note}", sys.stderr)
     scans = list(judged())
@@ -142,18 +142,18 @@ def _tuned_model(
     return tune_threshold(scans, derainer.spec.threshold)
 
 
-def _read(data: "ScanDataModule", examiner: Examiner, notices: Notices, file: "Frame") -> "Scan":
+def _read(data: "ScanDataModule", examiner: Examiner, notices: Notices, frame: "Frame") -> "Scan":
     """Reads a scan, and warns of what is odd about it for the method."""
-    scan = data.read_measured(file)
-    notices.tell(file.name, examiner.oddities(scan))
+    scan = data.read_measured(frame)
+    notices.tell(frame.name, examiner.oddities(scan))
     return scan
 
 
-def _drawn(files: Sequence["Frame"], most: int, seed: int) -> list["Frame"]:
+def _drawn(frames: Sequence["Frame"], most: int, seed: int) -> list["Frame"]:
     """At most so many of the scans, drawn at random, in their order."""
     generator = np.random.default_rng(seed)
-    chosen = generator.choice(len(files), min(most, len(files)), replace=False)
-    return [files[number] for number in np.sort(chosen)]
+    chosen = generator.choice(len(frames), min(most, len(frames)), replace=False)
+    return [frames[number] for number in np.sort(chosen)]
 
 
 def _no_rain(data: "ScanDataModule") -> InputError:

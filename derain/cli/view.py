@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from derain.cards.card import DataCard, load_card
+from derain.cards.known import layouts_for
 from derain.cli.arguments import add_threads
 from derain.cli.filter_help import list_filters
 from derain.cli.outputs import say
@@ -59,13 +61,14 @@ def main(arguments: argparse.Namespace) -> int:
     if not (arguments.out or arguments.window):
         raise InputError(arguments.scan, "nothing is to be done with it", "Give --out or --window.")
     methods = contestants(arguments.methods)
-    frame = frame_of(arguments.scan, arguments.columns)
+    card = None if arguments.card is None else load_card(arguments.card)
+    frame = frame_of(arguments.scan, arguments.columns, layouts_for(card))
     scan = frame.with_intensity_times(arguments.intensity_scale).read()
     notices = Notices()
     for method in methods:
         if method.judges_by is not None:
             notices.tell(frame.name, method.judges_by.oddities(scan), method.title)
-    truth = _truth(scan, frame, arguments.card)
+    truth = None if card is None else _truth(scan, frame, card)
     predicted = {
         method.title: _rain(scan, method, arguments.threads, notices) for method in methods
     }
@@ -104,13 +107,8 @@ def _rain(
 
 
 def _truth(
-    scan: "Scan", frame: "Frame", card_name: str | None
-) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]] | None":
-    """Which points are rain, and of which it is known; None where no card says what labels mean."""
-    from derain.cards.card import load_card
-
-    if card_name is None:
-        return None
+    scan: "Scan", frame: "Frame", card: DataCard
+) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]]":
+    """Which points are rain, and of which it is known."""
     labelled = scan.with_label(frame.read_label(len(scan)))
-    card = load_card(card_name)
     return card.rain_of(labelled), ~card.unknown_of(labelled)

@@ -16,7 +16,7 @@ from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, find_scans
 from derain.files.labels import label_beside
 from derain.files.reading import reading
-from derain.simulation.manifest import RAIN_RATE, read_manifest
+from derain.simulation.manifest import RAIN_RATE, manifest_of
 from derain.sources.folders import frames_of, scan_folders
 from derain.sources.frame import Frame
 from derain.sources.source import Source
@@ -120,16 +120,6 @@ def find_sequences(
         rate = rates[name] if name in rates else _recorded_rate(folder_above(folder) / "weather")
         sequences.append(SequenceOfFrames(name, frames, rate))
     return sequences
-
-
-def manifest_of(root: Path) -> dict[str, Any]:
-    """The manifest of the simulated data set that a folder is, or is part of; empty if of none.
-
-    Args:
-        root: The data set, its folder of sequences, a sequence, or a sequence's folder of scans.
-    """
-    root = root.absolute()
-    return next(filter(None, map(read_manifest, (root, *root.parents[:3]))), {})
 
 
 def count_frame(frame: Frame) -> Contents:

@@ -59,6 +59,16 @@ def read_manifest(root: Path) -> dict[str, Any]:
     return content
 
 
+def manifest_of(root: Path) -> dict[str, Any]:
+    """The manifest of the simulated data set that a folder is, or is part of; empty if of none.
+
+    Args:
+        root: The data set, its folder of sequences, a sequence, or a sequence's folder of scans.
+    """
+    root = root.absolute()
+    return next(filter(None, map(read_manifest, (root, *root.parents[:3]))), {})
+
+
 def rates_of_sequences(entry: Entry) -> dict[str, float]:
     """Rain rates in mm/h by the name of the sequence, which must be in quotes.
 

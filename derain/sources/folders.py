@@ -3,6 +3,7 @@
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from glob import escape, glob
 from pathlib import Path
 
@@ -37,9 +38,9 @@ def named_frames(
             folders are called as a layout says.
         columns: Names of the columns of files that do not name them.
         labelled: Whether labels are to be read, from where :func:`~derain.cards.known.label_of`
-            finds them.
-        layouts: What the folders of data sets may be called; by default as the packaged data cards
-            say. None of them takes no data sets.
+            finds them by the layouts.
+        layouts: What the folders of data sets may be called, the likeliest first; by default as the
+            packaged data cards say. An empty sequence takes no data sets.
 
     Returns:
         The scans in the order they are named, those of a folder sorted by name. Each has its stem
@@ -54,21 +55,26 @@ def named_frames(
         folders = _scan_folders_in(path, layouts)
         of_data_set = of_data_set or len(folders) > 1
         scans += find_scans(folders or [path])
-    where = label_of if labelled else _nowhere
+    where = partial(label_of, layouts=layouts) if labelled else _nowhere
     return frames_of(scans, where, columns, relative_keys(scans) if of_data_set else None)
 
 
-def frame_of(scan: Path, columns: Sequence[str] = DEFAULT_COLUMNS) -> FileFrame:
+def frame_of(
+    scan: Path,
+    columns: Sequence[str] = DEFAULT_COLUMNS,
+    layouts: Sequence[Layout] | None = None,
+) -> FileFrame:
     """The frame of one file, whose labels are looked for; whether it is there shows in reading.
 
     Args:
         scan: The file.
         columns: Names of its columns, where it does not name them itself.
+        layouts: By which its labels are looked for; by default those of the packaged data cards.
     """
     return FileFrame(
         key=scan_stem(scan),
         sequence=sequence_of(scan),
-        label_path=label_of(scan),
+        label_path=label_of(scan, layouts),
         path=scan,
         columns=tuple(columns),
         records=Records(scan.parent),

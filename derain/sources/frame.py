@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.errors import InputError
 from derain.scan import Scan
 
 
@@ -177,7 +178,8 @@ class MemoryFrame(Frame):
 
     def read_label(self, points: int) -> NDArray[np.int64]:
         """The semantic class ids of its points, int64 (N,)."""
-        assert self.scan.label is not None  # has_labels was asked
+        if self.scan.label is None:
+            raise InputError(self.name, "it has no labels", "Give the scan its labels.")
         return self.scan.label
 
     def count_points(self) -> int:

@@ -28,18 +28,20 @@ def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> So
     if isinstance(scans, Source):
         return scans
     given = [scans] if isinstance(scans, Scan | Frame | str | Path) else list(scans)
-    frames = [frame for item in given for frame in _frames_of(item, columns)]
+    frames = [
+        frame for place, item in enumerate(given) for frame in _frames_of(item, place, columns)
+    ]
     if not frames:
         raise InputError("scans", "there are none", "Give one or more.")
     return Frames(frames)
 
 
-def _frames_of(item: object, columns: Sequence[str]) -> Sequence[Frame]:
+def _frames_of(item: object, place: int, columns: Sequence[str]) -> Sequence[Frame]:
     match item:
         case Frame():
             return [item]
         case Scan():
-            return [MemoryFrame(key=item.name, scan=item)]
+            return [MemoryFrame(key=f"{place:06d}", number=place, scan=item)]
         case str() | Path():
             return named_frames([Path(item)], columns, labelled=True)
     raise InputError(

@@ -75,7 +75,7 @@ class FolderSink(Sink):
                 self._refuse_own_files(frame)
             target = self.path(frame, LABEL)
             other = written.setdefault(os.path.realpath(target), frame)
-            if other is not frame and not (self.again and other.name == frame.name):
+            if other is not frame and not (self.again and _is_one_file(other, frame)):
                 raise InputError(
                     frame.name,
                     f"another scan has the same name: what is made of it and of {other.name} would "
@@ -103,3 +103,8 @@ class FolderSink(Sink):
         for labels in filter(None, places):
             if os.path.realpath(labels) == target:
                 raise InputError(self.folder, f"holds the labels of {frame.path}", remedy)
+
+
+def _is_one_file(one: Frame, other: Frame) -> bool:
+    """Whether two frames are of the same file, so that what is made of them is the same."""
+    return isinstance(one, FileFrame) and isinstance(other, FileFrame) and one.name == other.name

@@ -57,12 +57,15 @@ class Frames(Source):
     def of_scans(cls, scans: Iterable[Scan], sequence: str = "") -> "Frames":
         """Scans in memory as one sequence, with the labels that they have.
 
+        Several sequences are one source by ``Frames([*first, *second])``.
+
         Args:
             scans: The scans, in time order.
-            sequence: What the sequence is called.
+            sequence: What the sequence is called; its frames have keys such as ``drive/000001``.
         """
+        folder = f"{sequence}/" if sequence else ""
         return cls(
-            MemoryFrame(key=f"{number:06d}", sequence=sequence, number=number, scan=scan)
+            MemoryFrame(key=f"{folder}{number:06d}", sequence=sequence, number=number, scan=scan)
             for number, scan in enumerate(scans)
         )
 

@@ -11,9 +11,8 @@ from derain.errors import InputError
 from derain.evaluation.baselines import known_truth
 from derain.scan import Scan
 from derain.sources.frame import Frame
-from derain.sources.labelled import with_labels
+from derain.sources.reader import FrameReader
 from derain.sources.spread import evenly_spaced
-from derain.views.morton import first_rows
 
 # Scans that a baseline learns from, at most.
 MOST_TRAINING_SCANS = 200
@@ -55,8 +54,7 @@ class LabelledFrames:
         Raises:
             InputError: A file that cannot be read, or labels that are not on the data card.
         """
-        scan = frame.read().with_intensity_times(self.intensity_scale)
-        return with_labels(scan, frame, self.card)
+        return self._reader.read(frame)
 
     def rain_rate(self, frame: Frame) -> float | None:
         """Rain rate of a scan in mm/h; None where it is not known."""
@@ -68,6 +66,10 @@ class LabelledFrames:
         Raises:
             InputError: A file that cannot be read, or labels that are not on the data card.
         """
+        read = self._reader.read_distinct if self.distinct else self._reader.read
         for frame in evenly_spaced(self.frames, MOST_TRAINING_SCANS):
-            scan = self.read(frame)
-            yield known_truth(scan.take(first_rows(scan)) if self.distinct else scan, self.card)
+            yield known_truth(read(frame), self.card)
+
+    @property
+    def _reader(self) -> FrameReader:
+        return FrameReader(self.card, self.intensity_scale)

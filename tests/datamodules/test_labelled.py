@@ -126,3 +126,37 @@ def test_what_is_no_file_of_rain_rates_is_refused(tmp_path: Path, text: str) -> 
     with pytest.raises(InputError, match=r"rates\.yaml: ") as refusal:
         rain_rates([tmp_path], rates)
     assert len(str(refusal.value)) < len(str(rates)) + 500
+
+
+def test_a_card_says_where_the_labels_of_sequences_and_of_scans_lie(
+    tmp_path: Path, write: Write
+) -> None:
+    ours = tmp_path / "ours.yaml"
+    ours.write_text(
+        "name: ours\nclasses: {0: dry, 3: wet}\nrain: [3]\n"
+        "layout: {sequences: drives, scans: lidar, labels: truth}\nsplit: {test: [b]}\n"
+    )
+    root = tmp_path / "ours"
+    for name in ("a", "b"):
+        write(root / f"drives/{name}/lidar/0.bin", root / f"drives/{name}/truth/0.label", [0, 3])
+    for paths, labels in (
+        ([root], ["b"]),
+        ([root / "drives"], ["a", "b"]),
+        ([root / "drives/a", root / "drives/b/lidar/0.bin"], ["a", "b"]),
+    ):
+        frames = labelled_scans(paths, load_card(ours), Loading()).frames("test")
+        expected = [root / f"drives/{name}/truth/0.label" for name in labels]
+        assert [frame.label_path for frame in frames] == expected
+
+
+def test_a_data_set_is_named_alone(simulated: Path, tmp_path: Path) -> None:
+    for paths in ([simulated, simulated], [tmp_path, simulated]):
+        with pytest.raises(InputError, match="is a data set, of which no part can be taken beside"):
+            labelled_scans(paths, load_card("simulated"), Loading())
+
+
+def test_a_part_of_a_simulated_data_set_is_known_as_simulated(simulated: Path) -> None:
+    part = simulated / "sequences/002"
+    assert card_of([part], None) == load_card("simulated")
+    assert rain_rates([part], None)["002"] == 25.0
+    assert found([part], "simulated") == ["002/lidar_radar_labels/0.label"]

@@ -129,6 +129,17 @@ def test_points_without_a_frame_are_one_sequence(onnx_model: Path) -> None:
 
 
 @pytest.mark.usefixtures("windowed")
+def test_points_after_the_end_of_a_recording_are_of_another(onnx_model: Path) -> None:
+    derainer = Derainer(onnx_model, 1)
+    for points in (scene(POINTS, seed) for seed in range(3)):
+        derainer.push(points)
+    assert len(list(derainer.flush())) == 1
+    assert derainer.push(scene(POINTS, 3)) is None
+    (answer,) = derainer.flush()
+    assert_seen(answer, derainer, before=0, after=0)
+
+
+@pytest.mark.usefixtures("windowed")
 def test_another_sequence_starts_anew(onnx_model: Path) -> None:
     derainer = Derainer(onnx_model, 1)
     scans = [Scan.of(scene(POINTS, seed)) for seed in range(2)]

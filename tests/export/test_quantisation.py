@@ -13,7 +13,7 @@ import pytest
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.export import onnx_file, quantisation
+from derain.export import onnx_file
 from derain.export.onnx_file import export
 from derain.export.proof import FINITE, INT8, THREADS, Proof
 from derain.export.quantisation import CalibrationReader, CalibrationScans
@@ -22,6 +22,8 @@ from derain.files import read_scan
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
 from derain.scan import Scan
+from derain.sources import file_frame
+from derain.sources.folders import named_frames
 from derain.views.probability import probability_of_rain
 from derain.views.view import View
 
@@ -182,11 +184,11 @@ def test_one_calibration_scan_is_held_at_a_time(
             pass
         return proto
 
-    monkeypatch.setattr(quantisation, "read_scan", counted)
+    monkeypatch.setattr(file_frame, "read_scan", counted)
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(image_onnx))
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [])
     monkeypatch.setattr(onnx_file, "quantised", gone_through)
-    scans = CalibrationScans(paths, ("x", "y", "z", "intensity"))
+    scans = CalibrationScans(named_frames(paths))
     assert export(image_model, tmp_path / "model.onnx", scans).holds
     # Once to be scaled by, and once to be proved on; none while another is held.
     assert read == [(path, 0) for path in (*paths, *paths)]

@@ -97,6 +97,8 @@ def test_labels_lie_where_the_layout_says(tmp_path: Path, layout: Layout) -> Non
     (frame,) = sequence_frames([sequence], layout)
     assert frame.label_path == sequence / layout.labels / "3.label"
     assert frame.has_labels
+    (named,) = named_frames([tmp_path], labelled=True, layouts=[layout])
+    assert named.label_path == frame.label_path
     if layout is not DRIVES:  # which no packaged card has
         (named,) = named_frames([tmp_path], labelled=True)
         assert named.label_path == frame.label_path

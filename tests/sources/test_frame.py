@@ -16,7 +16,7 @@ from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 from derain.sources.folders import frame_of
 from derain.sources.frame import MemoryFrame
-from derain.sources.labelled import with_labels
+from derain.sources.reader import FrameReader
 
 
 @pytest.fixture
@@ -54,10 +54,10 @@ def test_labels_that_nobody_reads_are_not_there(labelled: FileFrame) -> None:
 
 
 def test_labels_that_the_card_does_not_know_are_named(labelled: FileFrame) -> None:
-    scan = with_labels(labelled.read(), labelled, load_card("wads"))
+    scan = FrameReader(load_card("wads")).read(labelled)
     assert (scan.label == 110).sum() == 10
     with pytest.raises(InputError, match=r"scan\.label: ids \[110\] are no classes of REHEARSE-3D"):
-        with_labels(labelled.read(), labelled, load_card("rehearse3d"))
+        FrameReader(load_card("rehearse3d")).read(labelled)
 
 
 @pytest.mark.parametrize("suffix", [".bin", ".pcd", ".bin.gz", ".npy"])

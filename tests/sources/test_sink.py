@@ -114,9 +114,20 @@ def test_two_scans_of_one_key_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="another scan has the same name") as error:
         FolderSink(tmp_path / "out").refuse_clashes(source)
     assert all(name in str(error.value) for name in ("a/0.bin", "b/0.npy", "out/0.label"))
-    scans = [MemoryFrame(key="0", scan=Scan.of(scene(3), name)) for name in ("x", "y")]
-    with pytest.raises(InputError, match="another scan has the same name"):
-        FolderSink(tmp_path / "out").refuse_clashes(scans)
+    for names_in_memory in (("x", "y"), ("array", "array")):
+        scans = [MemoryFrame(key="0", scan=Scan.of(scene(3), name)) for name in names_in_memory]
+        with pytest.raises(InputError, match="another scan has the same name"):
+            FolderSink(tmp_path / "out").refuse_clashes(scans)
+
+
+def test_sequences_in_memory_go_to_folders_of_their_own(tmp_path: Path) -> None:
+    scans = [Scan.of(scene(30))]
+    source = Frames([*Frames.of_scans(scans, "a"), *Frames.of_scans(scans, "b")])
+    sink = FolderSink(tmp_path)
+    sink.refuse_clashes(source)
+    for frame in source:
+        sink.write(frame, None, np.zeros(30, bool))
+    assert names(tmp_path) == ["a/000000.label", "b/000000.label"]
 
 
 def test_one_scan_twice_is_refused_where_it_is_not_expected(tmp_path: Path) -> None:

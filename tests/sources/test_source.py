@@ -20,7 +20,7 @@ def points(source: Frames) -> list[int]:
 
 def test_scans_in_memory_are_one_sequence() -> None:
     source = Frames.of_scans(SCANS, "drive")
-    assert [frame.key for frame in source] == [f"{number:06d}" for number in range(5)]
+    assert [frame.key for frame in source] == [f"drive/{number:06d}" for number in range(5)]
     assert [frame.number for frame in source] == [*range(5)]
     assert {frame.sequence for frame in source} == {"drive"}
     assert points(source) == [1, 2, 3, 4, 5]

@@ -1,12 +1,14 @@
-"""How the scan of a frame is read for a model or a measurement."""
+"""How the scan of a frame is read for a model or a measurement: in its unit, with its labels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from derain.cards.card import DataCard
+from derain.errors import InputError
 from derain.scan import Scan
 from derain.sources.frame import Frame
-from derain.sources.labelled import with_labels
 from derain.views.channels import with_columns
 from derain.views.morton import first_rows
 
@@ -34,7 +36,7 @@ class FrameReader:
         """
         scan = self.read_unlabelled(frame)
         wanted = frame.label_path is not None or frame.has_labels
-        return with_labels(scan, frame, self.card) if wanted else scan
+        return self._with_labels(scan, frame) if wanted else scan
 
     def read_unlabelled(self, frame: Frame) -> Scan:
         """Reads all rows of a scan, whether or not there are labels.
@@ -53,3 +55,15 @@ class FrameReader:
         """
         scan = self.read(frame)
         return scan.take(first_rows(scan))
+
+    def _with_labels(self, scan: Scan, frame: Frame) -> Scan:
+        """The scan with the labels of its frame, none of which the data card does not know."""
+        label = frame.read_label(len(scan))
+        unknown = np.setdiff1d(label, list(self.card.classes))
+        if len(unknown):
+            raise InputError(
+                frame.label_path or frame.name,
+                f"ids {unknown[:5].tolist()} are no classes of {self.card.name}",
+                "Name them in the data card.",
+            )
+        return scan.with_label(label)
