@@ -58,6 +58,20 @@ def load_method(
     return _with_threshold(Derainer(name, threads), name, parameters)
 
 
+def require_one_scan(derainer: Derainer) -> None:
+    """Refuses a model that sees several scans at a time, where scans are measured one by one.
+
+    Raises:
+        InputError: Such a model: it would be measured without what it was trained to see.
+    """
+    if not derainer.view.window.is_one_scan:
+        raise InputError(
+            derainer.path,
+            "sees the scans around the one that it judges, which are not given to it here",
+            "Use `derain run` or `derain test`, which take recordings whole.",
+        )
+
+
 def _with_threshold(derainer: Derainer, name: str, parameters: Mapping[str, Any]) -> Derainer:
     if unknown := sorted(set(parameters) - {"threshold"}):
         raise InputError(

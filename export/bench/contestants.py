@@ -20,7 +20,7 @@ from derain.evaluation.baselines import PositionPrior, all_points, no_points
 from derain.evaluation.intensity_rule import IntensityRule
 from derain.export.bench.contestant import Contestant
 from derain.export.bench.functions import TimedFunction
-from derain.export.methods import load_method, named_method
+from derain.export.methods import load_method, named_method, require_one_scan
 from derain.export.runtime import Derainer
 from derain.filters import FilterDerainer, PointFilter
 from derain.scan import Scan
@@ -122,6 +122,7 @@ def _filter(
 def _model(
     title: str, name: str, derainer: Derainer, ready: Callable[[int], FilterDerainer | Derainer]
 ) -> Contestant:
+    require_one_scan(derainer)
     spec = derainer.spec
     facts = {
         "model": name,

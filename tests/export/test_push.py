@@ -1,8 +1,10 @@
 """Methods that are given frame after frame: at once, or when those after a frame are there."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -205,3 +207,22 @@ def test_poses_that_a_window_needs_are_told_when_they_are_damaged(
     assert outcome.code == 2
     assert outcome.said[0].startswith(f"derain: {drive.parent / 'poses.txt'}: line 1 is not 12")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("windowed")
+@pytest.mark.parametrize("command", ["bench", "tune", "view"])
+def test_a_model_of_windows_is_not_measured_on_single_scans(
+    run_derain: Callable[..., Any], onnx_model: Path, tmp_path: Path, command: str
+) -> None:
+    scan = tmp_path / "0.bin"
+    scene(50).tofile(scan)
+    (tmp_path / "0.label").write_bytes(np.resize(np.array([0, 110], "<u4"), 50).tobytes())
+    arguments = {
+        "bench": ["--data", scan, "--card", "wads", "--methods", onnx_model],
+        "tune": [onnx_model, "--data", scan, "--card", "wads"],
+        "view": [scan, "--methods", onnx_model],
+    }
+    outcome = run_derain(command, *arguments[command], "--out", tmp_path / "out.png")
+    assert outcome.code == 2
+    assert "sees the scans around the one that it judges" in outcome.err
+    assert not (tmp_path / "out.png").exists()
