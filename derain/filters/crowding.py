@@ -60,7 +60,7 @@ def _found_along_curve(
     """
     columns, limit = np.ascontiguousarray(places.T), np.square(radius)
     found = np.ones(len(places), np.int64)
-    # Every step writes into the same array: to get new memory for each takes longer than to compute.
+    # Every step writes into the same array, which is faster than to make one for each.
     room = np.empty_like(columns)
     for step in range(1, min(CURVE_STEPS, len(places) - 1) + 1):
         apart = np.subtract(columns[:, step:], columns[:, :-step], out=room[:, step:])
