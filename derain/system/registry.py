@@ -1,5 +1,6 @@
 """What there is of one kind, by name: a file enters by being there."""
 
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from inspect import isabstract
@@ -31,8 +32,8 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         mine = "my_package.my_filter"
 
     That module is imported when derain's own files do not have the name that is asked for, or when
-    somebody asks what there is. One that cannot be imported is warned of, and the others stay
-    usable. The names come in alphabetical order, whatever was imported first.
+    somebody asks what there is. One that cannot be imported is warned of and brings nothing, and
+    the others stay usable. The names come in alphabetical order, whatever was imported first.
 
     Args:
         package: Package whose modules bring members, such as ``derain.filters``.
@@ -63,7 +64,7 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
 
         def added(member: Member) -> Member:
             if isabstract(member):
-                missing = ", ".join(sorted(member.__abstractmethods__))
+                missing = ", ".join(sorted(getattr(member, "__abstractmethods__", ())))
                 raise InputError(
                     f"{self.group}: {names[0]}",
                     f"{_origin(member)} is without {missing}",
@@ -129,7 +130,17 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
                 try:
                     entry.load()
                 except Exception as error:  # whatever the code of others raises
+                    self._forget_unfinished()
                     _warn_of_broken(entry, error)
+
+    def _forget_unfinished(self) -> None:
+        """Lets go of what a module has added before it failed, which no other process could load.
+
+        Python takes a module that fails from those that are imported.
+        """
+        for name, member in list(self._members.items()):
+            if getattr(member, "__module__", None) not in (None, *sys.modules):
+                del self._members[name]
 
 
 def _warn_of_broken(entry: "EntryPoint", error: Exception) -> None:

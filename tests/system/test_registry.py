@@ -142,6 +142,13 @@ def test_a_package_that_cannot_be_imported_is_warned_of_once_and_keeps_no_other_
     assert capsys.readouterr().err == ""
 
 
+def test_a_package_that_fails_half_way_brings_nothing(things: Registry[type], write: Write) -> None:
+    write("foreign_bad.py", member("cobble", "Cobble") + "\nraise OSError('no licence')")
+    installed(write, "foreign_bad", bad="foreign_bad")
+    assert list(things) == ["brick", "pebble"]
+    assert "cobble" not in things
+
+
 def test_a_file_of_the_package_that_cannot_be_imported_is_an_error_every_time(
     things: Registry[type], write: Write
 ) -> None:
