@@ -91,16 +91,18 @@ def main() -> None:
 def _print_table(grids: dict[str, SphericalGrid], scans: Sequence[Scan], repeats: int) -> None:
     card = load_card("wads")
     rain = [card.rain_of(scan) for scan in scans]
-    print("| grid | size | way back | points hidden | pixels empty | IoU | view ms | back ms |")
+    print(
+        "| grid | size | back-projection | points hidden | pixels empty | IoU | view ms | back ms |"
+    )
     print("|---|---|---|---:|---:|---:|---:|---:|")
-    for name, grid in grids.items():
-        for way_back in BACK_PROJECTIONS:
-            view, counts = RangeView(grid, way_back=way_back), GridCounts()
+    for title, grid in grids.items():
+        for name in BACK_PROJECTIONS:
+            view, counts = RangeView(grid, way_back=name), GridCounts()
             for _ in range(repeats):
                 for scan, truth in zip(scans, rain, strict=True):
                     counts.add(view, scan, truth)
             size = f"{grid.rows}x{grid.columns}"
-            print("|", " | ".join([name, size, way_back, *counts.cells()]), "|")
+            print("|", " | ".join([title, size, name, *counts.cells()]), "|")
 
 
 if __name__ == "__main__":

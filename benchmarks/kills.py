@@ -83,7 +83,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of moments and signals (default: 0)")
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
     arguments = parser.parse_args()
-    chance = random.Random(arguments.seed)
+    generator = random.Random(arguments.seed)
     with tempfile.TemporaryDirectory() as name:
         root = Path(name)
         inputs, victims = SmallInputs(root / "inputs"), {}
@@ -93,7 +93,7 @@ def main() -> int:
                 if command not in victims:
                     victims[command] = undisturbed(COMMANDS[command](inputs), root / command)
                 victim, again = victims[command], number // len(arguments.commands) % 2 == 1
-                for fault in kill_once(victim, chance, root / f"kill {number}", again):
+                for fault in kill_once(victim, generator, root / f"kill {number}", again):
                     print(f"kill {number}, {command}: {fault}", file=sys.stderr, flush=True)
     total: Counter[str] = sum((victim.counts for victim in victims.values()), Counter())
     counted = {**{command: victim.counts for command, victim in victims.items()}, "all": total}
@@ -111,21 +111,21 @@ def undisturbed(arguments: Sequence[str | Path], folder: Path) -> Victim:
     return Victim(arguments, folder, time.monotonic() - begun)
 
 
-def kill_once(victim: Victim, chance: random.Random, folder: Path, again: bool) -> list[str]:
+def kill_once(victim: Victim, generator: random.Random, folder: Path, again: bool) -> list[str]:
     """Kills a command once, counts what became of it, and tells what fell short.
 
     Args:
         victim: The command.
-        chance: Where moment and signal come from.
+        generator: Where moment and signal come from.
         folder: An empty folder to run it in.
         again: Whether it was finished there before.
     """
     if again:
         shutil.copytree(victim.folder / "out", folder / "out")
-    by = chance.choice([signal.SIGKILL] * 3 + [signal.SIGTERM])
+    by = generator.choice([signal.SIGKILL] * 3 + [signal.SIGTERM])
     process = started(victim.arguments, folder)
     try:
-        ended(process, within=chance.uniform(0, victim.seconds))
+        ended(process, within=generator.uniform(0, victim.seconds))
     except subprocess.TimeoutExpired:
         process.send_signal(by)
     code, counts = ended(process), Counter(kills=1)

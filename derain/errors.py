@@ -51,3 +51,8 @@ def printable(text: str) -> str:
     the direction of writing, and bytes that are no text.
     """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def reason_of(error: Exception) -> str:
+    """What an error says, in one line; its kind where it says nothing, as a bare assert does."""
+    return " ".join(str(error).split()) or type(error).__name__

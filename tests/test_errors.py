@@ -3,7 +3,9 @@
 import os
 import pickle
 
-from derain.errors import LONGEST_REASON, InputError
+import pytest
+
+from derain.errors import LONGEST_REASON, InputError, reason_of
 
 
 def test_what_a_terminal_must_not_be_sent_is_escaped() -> None:
@@ -24,3 +26,17 @@ def test_a_long_reason_is_cut() -> None:
 def test_an_error_crosses_processes() -> None:
     error = InputError("file", "x" * 10**4, "Remedy.")
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (ValueError("a bad\n  value"), "a bad value"),
+        (InputError("scan.bin", "it is damaged", "Write it again."), None),
+        (AssertionError(), "AssertionError"),
+    ],
+)
+def test_the_reason_of_an_error_is_one_line_and_never_empty(
+    error: Exception, told: str | None
+) -> None:
+    assert reason_of(error) == (told or str(error))

@@ -29,9 +29,9 @@ def test_a_killed_command_leaves_whole_files_and_can_be_run_again(
 ) -> None:
     inputs = kills.SmallInputs(tmp_path / "inputs")
     victim = kills.undisturbed(kills.COMMANDS["fuse"](inputs), tmp_path / "undisturbed")
-    chance = random.Random(0)
+    generator = random.Random(0)
     for number, again in enumerate((False, True)):
-        assert kills.kill_once(victim, chance, tmp_path / f"kill {number}", again) == []
+        assert kills.kill_once(victim, generator, tmp_path / f"kill {number}", again) == []
     assert victim.counts["kills"] == 2
     assert victim.counts["failed again"] == 0
 

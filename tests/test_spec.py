@@ -197,7 +197,7 @@ def test_a_network_that_sees_no_intensity_has_no_unit_of_it() -> None:
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        ({"way_back": "guess"}, "no such way back: 'guess'"),
+        ({"way_back": "guess"}, "no such back-projection: 'guess'"),
         ({"way_back": 3}, "view.way_back: 3 is no text"),
         ({"grid": {"columns": 8}}, "view.grid: its rows are described by nothing"),
         ({"grid": None}, "view.grid: None is not a mapping"),

@@ -4,15 +4,14 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from typing import TYPE_CHECKING, Literal, Protocol, TypeVar
-
-import yaml
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import SCORES, mean_over_scans
 from derain.evaluation.text_tables import markdown_table
+from derain.files.documents import Entry
+from derain.files.packaged import packaged
 
 if TYPE_CHECKING:
     from derain.evaluation.scores import Scores
@@ -88,8 +87,8 @@ def paper_table(name: str) -> PaperTable:
     Source: A. M. Raisuddin et al., "REHEARSE-3D: A Multi-modal Emulated Rain Dataset for 3D Point
         Cloud De-raining", tables II and III.
     """
-    file = resources.files("derain.evaluation").joinpath("published_tables.yaml")
-    table = yaml.safe_load(file.read_text("utf-8"))[name]
+    file = packaged("derain.evaluation")["published_tables"]
+    table = Entry.of_yaml(file).members()[name].value
     rows = [PublishedRow(**{**row, "scores": tuple(row["scores"])}) for row in table["rows"]]
     return PaperTable(table["title"], table["groups"], rows)
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
+from derain.errors import reason_of
 from derain.evaluation.counts import Counts
 from derain.evaluation.metrics import ClassCounts, RainMetrics
 from derain.scan import Scan
@@ -86,7 +87,7 @@ class _Scoring:
         try:
             predicted = method(scan)
         except Exception as error:  # whatever its libraries raise is told in the method's row
-            self.failures[scan.name] = str(error)
+            self.failures[scan.name] = reason_of(error)
             predicted = np.zeros(len(scan), bool)
         scan, predicted = scan.take(counted), predicted[counted]
         self.metrics.update_scan(scan, predicted)

@@ -60,8 +60,11 @@ def _found_along_curve(
     """
     columns, limit = np.ascontiguousarray(places.T), np.square(radius)
     found = np.ones(len(places), np.int64)
+    # Every step writes into the same array, which is faster than to make one for each.
+    room = np.empty_like(columns)
     for step in range(1, min(CURVE_STEPS, len(places) - 1) + 1):
-        squared = np.square(columns[:, step:] - columns[:, :-step]).sum(axis=0)
+        apart = np.subtract(columns[:, step:], columns[:, :-step], out=room[:, step:])
+        squared = np.square(apart, out=apart).sum(axis=0)
         found[step:] += squared <= limit[step:]
         found[:-step] += squared <= limit[:-step]
     return found

@@ -1,11 +1,17 @@
 """What there is of one kind, by name: a file enters by being there."""
 
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
+from inspect import isabstract
 from pkgutil import iter_modules
-from typing import Generic, TypeVar, cast
+from threading import RLock
+from typing import TYPE_CHECKING, Generic, TypeVar, cast
 
 from derain.errors import InputError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 Kind = TypeVar("Kind")
 Member = TypeVar("Member")
@@ -26,8 +32,8 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         mine = "my_package.my_filter"
 
     That module is imported when derain's own files do not have the name that is asked for, or when
-    somebody asks what there is. One that cannot be imported is warned of, and the others stay
-    usable. The names come in alphabetical order, whatever was imported first.
+    somebody asks what there is. One that cannot be imported is warned of and brings nothing, and
+    the others stay usable. The names come in alphabetical order, whatever was imported first.
 
     Args:
         package: Package whose modules bring members, such as ``derain.filters``.
@@ -45,15 +51,25 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         self._members: dict[str, Kind] = {}
         self._has_own = False
         self._has_others = False
+        # Re-entrant, for a module of another package may ask what there is while it is imported.
+        self._importing_others = RLock()
 
     def add(self, *names: str) -> Callable[[Member], Member]:
         """Decorates a member, which is then found by these names.
 
         Raises:
-            InputError: A name that another member has.
+            InputError: A name that another member has, or a class that leaves out a method which
+                its base class asks for.
         """
 
         def added(member: Member) -> Member:
+            if isabstract(member):
+                missing = ", ".join(sorted(getattr(member, "__abstractmethods__", ())))
+                raise InputError(
+                    f"{self.group}: {names[0]}",
+                    f"{_origin(member)} is without {missing}",
+                    "Its base class says what every method does: define it.",
+                )
             for name in names:
                 former = _origin(self._members.get(name, member))
                 if former != _origin(member):
@@ -99,26 +115,45 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         self._has_own = True
 
     def _import_others(self) -> None:
-        """Imports what other packages bring, once; warns of what cannot be imported."""
-        if self._has_others:
-            return
-        self._has_others = True  # before, for one of them may ask what there is
-        # Both are imported here, for most commands never ask other packages.
-        from importlib.metadata import entry_points
+        """Imports what other packages bring, once; warns of what cannot be imported.
 
-        from derain.system.notices import warn
+        A thread that asks while another imports waits for it, and finds all that there is.
+        """
+        with self._importing_others:
+            if self._has_others:
+                return
+            self._has_others = True  # before, for one of them may ask what there is
+            # Imported here, for most commands never ask other packages.
+            from importlib.metadata import entry_points
 
-        for entry in sorted(entry_points(group=self.group), key=lambda entry: entry.name):
-            try:
-                entry.load()
-            except Exception as error:  # whatever the code of others raises
-                package = entry.dist.name if entry.dist else "that brings it"
-                problem = InputError(
-                    f"{entry.group}: {entry.name}",
-                    f"{entry.value} cannot be imported ({type(error).__name__}: {error})",
-                    f"Repair or uninstall the package {package}.",
-                )
-                warn(str(problem))
+            for entry in sorted(entry_points(group=self.group), key=lambda entry: entry.name):
+                try:
+                    entry.load()
+                except Exception as error:  # whatever the code of others raises
+                    self._forget_unfinished()
+                    _warn_of_broken(entry, error)
+
+    def _forget_unfinished(self) -> None:
+        """Lets go of what a module has added before it failed, which no other process could load.
+
+        Python takes a module that fails from those that are imported.
+        """
+        for name, member in list(self._members.items()):
+            if getattr(member, "__module__", None) not in (None, *sys.modules):
+                del self._members[name]
+
+
+def _warn_of_broken(entry: "EntryPoint", error: Exception) -> None:
+    """Says of another package that what it brings cannot be imported."""
+    from derain.system.notices import warn  # here: it brings progress bars with it
+
+    package = entry.dist.name if entry.dist else "that brings it"
+    problem = InputError(
+        f"{entry.group}: {entry.name}",
+        f"{entry.value} cannot be imported ({type(error).__name__}: {error})",
+        f"Repair or uninstall the package {package}.",
+    )
+    warn(str(problem))
 
 
 def _origin(member: object) -> str:

@@ -14,7 +14,7 @@ from derain.views.scan_pattern import (
     FINEST_STEP,
     REAL_GAP,
     Extent,
-    Look,
+    ReturnAngles,
     azimuth_extent,
     azimuth_step,
     find_beams,
@@ -82,14 +82,14 @@ def fit_grid(scans: Sequence[Scan]) -> GridFit:
     Raises:
         InputError: Not one valid point.
     """
-    looks = [look for scan in scans if len((look := Look.at(scan)).azimuth)]
-    if not looks:
+    seen = [angles for scan in scans if len((angles := ReturnAngles.of(scan)).azimuth)]
+    if not seen:
         raise InputError("grid", "there is no valid point to fit it to", "Give a grid by its name.")
-    inclinations = np.concatenate([look.inclination for look in looks])
-    azimuth = azimuth_extent(np.concatenate([look.azimuth for look in looks]))
+    inclinations = np.concatenate([angles.inclination for angles in seen])
+    azimuth = azimuth_extent(np.concatenate([angles.azimuth for angles in seen]))
     inclination = inclination_extent(inclinations)
-    returns = len(inclinations) / len(looks)
-    some = looks[:: math.ceil(len(looks) / SCANS)]
+    returns = len(inclinations) / len(seen)
+    some = seen[:: math.ceil(len(seen) / SCANS)]
     beams = find_beams(some)
     if beams.size:
         edges = list(SphericalGrid.of_beams(beams.tolist(), columns=1).edges)

@@ -36,12 +36,13 @@ def morton_code(xyz: NDArray[np.float32]) -> NDArray[np.uint64]:
     """
     if not len(xyz):
         return np.zeros(0, np.uint64)
-    columns = np.ascontiguousarray(xyz.T, dtype=np.float64)
-    lowest = columns.min(axis=1, keepdims=True)
-    size = float((columns.max(axis=1, keepdims=True) - lowest).max())
+    columns = np.array(xyz.T, np.float64, order="C")
+    columns -= columns.min(axis=1, keepdims=True)
+    size = float(columns.max())
     # All points in one place: any scale will do.
     scale = (2**BITS_PER_AXIS - 1) / size if size > 0 else 0.0
-    x, y, z = ((columns - lowest) * scale).astype(np.uint16)
+    columns *= scale
+    x, y, z = columns.astype(np.uint16)
     code: NDArray[np.uint64] = _SPREAD[x] | _SPREAD[y] << np.uint64(1) | _SPREAD[z] << np.uint64(2)
     return code
 

@@ -144,7 +144,7 @@ class RangeView(View):
         if self.way_back not in BACK_PROJECTIONS:
             raise InputError(
                 "way_back",
-                f"no such way back: '{self.way_back}'",
+                f"no such back-projection: '{self.way_back}'",
                 f"Known are {', '.join(BACK_PROJECTIONS)}.",
             )
 

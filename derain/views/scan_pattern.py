@@ -39,7 +39,7 @@ Extent = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class ReturnAngles:
     """Where the returns of one scan came from.
 
     Attributes:
@@ -53,8 +53,8 @@ class Look:
     row: NDArray[np.int64] | None
 
     @classmethod
-    def at(cls, scan: Scan) -> Self:
-        """Takes the directions of a scan's valid points."""
+    def of(cls, scan: Scan) -> Self:
+        """The angles of a scan's valid points."""
         valid = np.flatnonzero(scan.valid)
         azimuth, inclination = directions(scan.xyz.take(valid, axis=0))
         return cls(azimuth, inclination, valid // scan.shape[1] if scan.shape else None)
@@ -93,45 +93,45 @@ def inclination_extent(inclination: NDArray[np.float64]) -> Extent:
     return float(inside.min()), float(inside.max())
 
 
-def find_beams(looks: Sequence[Look]) -> NDArray[np.float64]:
+def find_beams(scans: Sequence[ReturnAngles]) -> NDArray[np.float64]:
     """Inclinations of the sensor's beams, where they can be told.
 
     Args:
-        looks: Returns of one or more scans of one sensor.
+        scans: Angles of the returns of one or more scans of one sensor.
 
     Returns:
         Inclinations from top to bottom, float64 (beams,), degrees; none where the returns of
         different beams mingle.
     """
-    inclination = np.concatenate([look.inclination for look in looks])
-    rows = [look.row for look in looks if look.row is not None]
-    beams = _of_rows(inclination, np.concatenate(rows)) if len(rows) == len(looks) else np.zeros(0)
+    inclination = np.concatenate([scan.inclination for scan in scans])
+    rows = [scan.row for scan in scans if scan.row is not None]
+    beams = _of_rows(inclination, np.concatenate(rows)) if len(rows) == len(scans) else np.zeros(0)
     return (beams if beams.size else _of_clusters(np.sort(inclination)))[::-1]
 
 
-def azimuth_step(looks: Sequence[Look], borders: Sequence[float]) -> float:
+def azimuth_step(scans: Sequence[ReturnAngles], borders: Sequence[float]) -> float:
     """Azimuth from a return to the next of the same beam, degrees.
 
     Args:
-        looks: Returns of one or more scans of one sensor.
+        scans: Angles of the returns of one or more scans of one sensor.
         borders: Inclinations between which the returns are of one beam, ascending, degrees.
     """
     return _median_gap(
-        [(look.azimuth, np.searchsorted(borders, look.inclination)) for look in looks]
+        [(scan.azimuth, np.searchsorted(borders, scan.inclination)) for scan in scans]
     )
 
 
-def inclination_step(looks: Sequence[Look], azimuth_step: float) -> float:
+def inclination_step(scans: Sequence[ReturnAngles], azimuth_step: float) -> float:
     """Inclination from a return to the next of the same shot, degrees.
 
     Args:
-        looks: Returns of one or more scans of one sensor.
+        scans: Angles of the returns of one or more scans of one sensor.
         azimuth_step: Azimuth from one shot to the next, degrees.
     """
     # A little less than a step, or else evenly spaced shots could come to lie two in one slab.
     slab = 0.95 * azimuth_step
     return _median_gap(
-        [(look.inclination, np.floor(look.azimuth / slab).astype(np.int64)) for look in looks]
+        [(scan.inclination, np.floor(scan.azimuth / slab).astype(np.int64)) for scan in scans]
     )
 
 

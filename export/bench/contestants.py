@@ -50,9 +50,11 @@ def contestants(
         learn_from: Scans for position and intensity; None where there are none to learn from.
 
     Raises:
-        InputError: A method that is not known or cannot be read, one that has nothing to learn
-            from, or two of one title.
+        InputError: No method; one that is not known or cannot be read, or has nothing to learn
+            from; or two of one title.
     """
+    if not methods:
+        raise InputError("methods", "there are none", "Give one or more.")
     if isinstance(methods, Mapping):
         rows = [
             replace(_contestant(method, learn_from), title=printable(title))
@@ -82,11 +84,12 @@ def _contestant(method: GivenMethod, learn_from: LearnFrom | None) -> Contestant
         case Derainer(path=path, spec=spec):
             ready = partial(load_method, str(path), {"threshold": spec.threshold})
             return _model(printable(path.stem), str(path), method, ready)
-        case _ if callable(method):
+        case _ if callable(method) and not isinstance(method, type):
             return _function(method)
+    kind = f"the class {method.__name__}" if isinstance(method, type) else type(method).__name__
     raise InputError(
         "methods",
-        f"{type(method).__name__} is no method",
+        f"{kind} is no method",
         "Give a name, a file, a derainer, a filter, or a function of a scan.",
     )
 

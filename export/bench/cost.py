@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.errors import reason_of
 from derain.export.bench.contestant import Contestant
 from derain.export.timing import RunTimes, timed_runs
 from derain.scan import Scan
@@ -69,7 +70,7 @@ def measure_cost(contestant: Contestant, timing: Timing) -> Cost:
                 measured = pool.submit(timed_here, contestant, timing)
             return measured.result()
     except Exception as error:  # whatever its libraries raise is told in the method's row
-        return Cost(RunTimes.of_no_runs(), None, str(error), contestant.can_be_sent)
+        return Cost(RunTimes.of_no_runs(), None, reason_of(error), contestant.can_be_sent)
 
 
 def timed_here(contestant: Contestant, timing: Timing) -> Cost:

@@ -36,7 +36,7 @@ def write_report(rows: Sequence[Row], facts: Mapping[str, Any], out: Path) -> No
 
     Args:
         rows: The rows of the table.
-        facts: What the bench depends on; see :func:`.bench.provenance`.
+        facts: What the bench depends on besides its methods, as :class:`.bench.Bench` has it.
         out: The folder, made if missing.
 
     Raises:

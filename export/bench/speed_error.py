@@ -15,7 +15,7 @@ def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) 
 
     Args:
         rows: The rows of the table.
-        facts: What the bench depends on; see :func:`.bench.provenance`.
+        facts: What the bench depends on besides its methods, as :class:`.bench.Bench` has it.
         path: PNG file to write.
 
     Raises:

@@ -126,7 +126,7 @@ print(Derainer(sys.argv[1], threads=1)(scene()).nonzero()[0].tolist())
 
 
 def with_way_back(derainer: Derainer, model: Path, way_back: str, path: Path) -> Derainer:
-    """The same file, but for the way back in its Spec."""
+    """The same file, but for the back-projection in its Spec."""
     spec = replace(derainer.spec, view={**derainer.spec.view, "way_back": way_back})
     proto = onnx.load(model)
     onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps({"spec": spec.as_dict()})})

@@ -111,7 +111,7 @@ def test_a_batch_that_is_measured_carries_the_scans_and_one_that_is_not_tensors_
     assert untold.cells == told.cells
     tensors = sum(tensor.nbytes for tensor in untold.inputs.values())
     assert len(pickle.dumps(untold)) < tensors + 2000  # names, shapes and types
-    # Of a point its coordinates, intensity, range and the way back, of a pixel what it shows.
+    # Of a point its coordinates, intensity, range and pixel; of a pixel what it shows.
     most = sum(44 * len(scan) + 4 * viewed.size for scan, viewed in zip(scans, seen, strict=True))
     assert len(pickle.dumps(told)) < tensors + most + 5000
 

@@ -2,7 +2,9 @@
 
 import importlib
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -140,6 +142,13 @@ def test_a_package_that_cannot_be_imported_is_warned_of_once_and_keeps_no_other_
     assert capsys.readouterr().err == ""
 
 
+def test_a_package_that_fails_half_way_brings_nothing(things: Registry[type], write: Write) -> None:
+    write("foreign_bad.py", member("cobble", "Cobble") + "\nraise OSError('no licence')")
+    installed(write, "foreign_bad", bad="foreign_bad")
+    assert list(things) == ["brick", "pebble"]
+    assert "cobble" not in things
+
+
 def test_a_file_of_the_package_that_cannot_be_imported_is_an_error_every_time(
     things: Registry[type], write: Write
 ) -> None:
@@ -160,6 +169,34 @@ def test_two_of_one_name_are_refused_and_both_are_named(things: Registry[type]) 
     assert str(refusal.value).startswith(reason)
     assert str(refusal.value).endswith("<locals>.Other. Remove or rename one.")
     assert "cobble" not in things
+
+
+def test_a_class_without_a_method_of_its_base_is_refused_and_the_method_is_named(
+    things: Registry[type],
+) -> None:
+    class Base(ABC):
+        @abstractmethod
+        def carry(self) -> None: ...
+
+        @abstractmethod
+        def break_(self) -> None: ...
+
+    class Sand(Base):
+        def break_(self) -> None: ...
+
+    with pytest.raises(InputError, match=r"things: sand: .*Sand is without carry\. Its base"):
+        things.add("sand")(Sand)
+    assert "sand" not in things
+
+
+def test_a_thread_that_asks_while_another_imports_finds_all_that_there_is(
+    things: Registry[type], write: Write
+) -> None:
+    write("foreign_cobble.py", "import time; time.sleep(0.2)\n" + member("cobble", "Cobble"))
+    installed(write, "foreign_cobble", anything="foreign_cobble")
+    with ThreadPoolExecutor(4) as threads:
+        found = list(threads.map(lambda _: list(things), range(4)))
+    assert found == 4 * [["brick", "cobble", "pebble"]]
 
 
 def test_one_member_may_have_several_names_and_answers_to_the_first(

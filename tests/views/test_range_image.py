@@ -150,7 +150,7 @@ def test_packing_keeps_every_scan_to_its_own_image() -> None:
 
 
 def test_an_unknown_back_projection_is_refused() -> None:
-    with pytest.raises(InputError, match="no such way back: 'knn'"):
+    with pytest.raises(InputError, match="no such back-projection: 'knn'"):
         RangeView(FULL, way_back="knn")
 
 

@@ -148,6 +148,10 @@ def test_a_function_that_gives_no_mask_is_told_in_its_row(labelled: LabelledFram
 def test_what_cannot_be_benched_is_refused(labelled: LabelledFrames, tmp_path: Path) -> None:
     (scan, *_) = (labelled.read(frame) for frame in labelled.frames)
     card = labelled.card
+    with pytest.raises(InputError, match="methods: there are none"):
+        bench([], [scan], card)
+    with pytest.raises(InputError, match="methods: the class DSOR is no method"):
+        bench([DSOR], [scan], card)  # type: ignore[list-item]
     with pytest.raises(InputError, match="methods: int is no method"):
         bench([3], [scan], card)  # type: ignore[list-item]
     with pytest.raises(InputError, match="position: it has no scans to learn from"):
