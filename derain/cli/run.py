@@ -20,6 +20,7 @@ from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.sink import Sink
+from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices
 from derain.system.stopwatch import Stopwatch
 from derain.views.oddities import Oddity, left_out, much_removed, outside_view
@@ -112,6 +113,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
+    keep_freed_memory()
     method = load_method(*_named_method(arguments), arguments.threads)
     source = named_frames(arguments.scans, arguments.columns)
     cleaning = _Cleaning(method, folder_sink(arguments.out, source), arguments)
