@@ -16,7 +16,7 @@ if {keep}:
 np.ones(2_000_000)
 before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
 for _ in range(20):
-    arrays = [np.ones(size) for size in (2_000_000, 500_000, 1_000_000)]
+    arrays = [np.ones(1_900_000) for _ in range(6)]
     del arrays
 print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
 """
