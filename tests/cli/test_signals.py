@@ -12,7 +12,7 @@ from derain.files.atomic import replacing
 
 # `derain info` that writes its argument, slowly.
 WRITES = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
 from derain.cli.main import COMMANDS, main
 from derain.files.atomic import replacing
@@ -24,6 +24,8 @@ def write(arguments):
         time.sleep(60)
 
 COMMANDS["info"].main = write
+# A shell that starts the tests in the background has them ignore what a terminal would send.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.exit(main(["info", "scan.bin"]))
 """
 

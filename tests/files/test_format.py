@@ -124,7 +124,7 @@ def test_a_suffix_is_taken_once() -> None:
     with pytest.raises(InputError, match=r"derain\.formats: \.pcd: two are called so"):
 
         @FORMATS.add(".pcd")
-        class Another(Format):
+        class Another(FORMATS[".ply"]):
             """Another format of this suffix."""
 
 
