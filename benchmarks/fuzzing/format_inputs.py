@@ -5,7 +5,6 @@ import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from random import Random
-from typing import ClassVar
 
 import numpy as np
 
@@ -20,13 +19,7 @@ BOMB = 1500
 
 
 class FormatInputs(ABC):
-    """What one format is given, by its suffixes: ``@INPUTS.add(".pcd")``.
-
-    Attributes:
-        OWN_DAMAGE: Whether it damages files in a way of its own, by `damaged`.
-    """
-
-    OWN_DAMAGE: ClassVar[bool] = False
+    """What one format is given, by its suffixes: ``@INPUTS.add(".pcd")``."""
 
     @abstractmethod
     def hostile(self, suffix: str) -> Sequence[Callable[[], bytes]]:
@@ -40,9 +33,9 @@ class FormatInputs(ABC):
         """Sound files such as other programs write."""
         return ()
 
-    def damaged(self, generator: Random) -> bytes:
-        """A damaged file, made by what is known of the format."""
-        raise NotImplementedError
+    def own_damage(self) -> Callable[[Random], bytes] | None:
+        """What makes a damaged file by what is known of the format; None where nothing is."""
+        return None
 
 
 INPUTS: Registry[type[FormatInputs]] = Registry("benchmarks.fuzzing.formats")

@@ -37,7 +37,7 @@ def _reader(suffix: str) -> Reader:
     def seeds() -> list[bytes]:
         return [*_written(suffix), *inputs.by_others(suffix)]
 
-    change = inputs.damaged if inputs.OWN_DAMAGE else None
+    change = inputs.own_damage()
     hostile = inputs.hostile(suffix)
     return Reader(suffix[1:], f"scan{suffix}", _read_scan, seeds, hostile, change)
 

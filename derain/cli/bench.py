@@ -22,6 +22,7 @@ from derain.files.atomic import replacing
 
 if TYPE_CHECKING:
     from derain.datamodules.base import ScanDataModule
+    from derain.datamodules.loading import Part
     from derain.export.bench.bench import Bench
     from derain.export.bench.contestant import Contestant
     from derain.export.bench.contestants import LearnFrom
@@ -132,12 +133,11 @@ def _bench(
     return bench
 
 
-def _frames(data: "ScanDataModule", part: str) -> "Frames":
+def _frames(data: "ScanDataModule", part: "Part") -> "Frames":
     """The scans of a part; one that is named twice is one."""
     from derain.sources.source import Frames
 
-    frames = data.frames(part)  # type: ignore[arg-type]
-    return Frames({frame.name: frame for frame in frames}.values())
+    return Frames({frame.name: frame for frame in data.frames(part)}.values())
 
 
 def _labelled_frames(

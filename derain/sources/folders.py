@@ -9,9 +9,10 @@ from pathlib import Path
 
 from derain.cards.known import known_layouts, label_of
 from derain.cards.layout import Layout, sequence_of
-from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, find_scans
+from derain.files.format import FORMATS
 from derain.files.names import scan_stem, scan_suffix
+from derain.files.reading import reading
 from derain.sources.file_frame import FileFrame
 from derain.sources.records import Records
 from derain.sources.source import Frames
@@ -183,11 +184,18 @@ def _scan_folders_in(path: Path, layouts: Sequence[Layout] | None) -> list[Path]
 
 
 def _holds_scans(folder: Path) -> bool:
-    """Whether scans lie directly in a folder, not only texts that may be something else."""
-    try:
-        return any(scan_suffix(scan) not in TEXTS for scan in find_scans([folder]))
-    except InputError:
-        return False
+    """Whether scans lie directly in a folder, not only texts that may be something else.
+
+    The first that is met says so: a folder of a hundred thousand is not listed twice.
+    """
+    with reading(folder), os.scandir(folder) as entries:
+        return any(
+            (suffix := scan_suffix(Path(entry.name))) not in TEXTS
+            and suffix in FORMATS
+            and not entry.name.startswith(".")
+            and entry.is_file()
+            for entry in entries
+        )
 
 
 def _nowhere(scan: Path) -> Path | None:

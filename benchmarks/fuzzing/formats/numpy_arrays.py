@@ -42,24 +42,13 @@ class NpyInputs(FormatInputs):
 class NpzInputs(FormatInputs):
     """Several arrays."""
 
-    OWN_DAMAGE = True
-
     def hostile(self, suffix: str) -> Sequence[Callable[[], bytes]]:
         """An archive that unfolds to more than the memory."""
         return (_zip_bomb,)
 
-    def damaged(self, generator: Random) -> bytes:
+    def own_damage(self) -> Callable[[Random], bytes]:
         """Arrays that are damaged one by one, in a sound archive."""
-        columns = dict(zip(("x", "y", "z", "intensity"), scene(POINTS).T, strict=True))
-        method = generator.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED))
-        file = io.BytesIO()
-        with zipfile.ZipFile(file, "w", method) as archive:
-            for name, column in columns.items():
-                content = npy(column)
-                if generator.random() < 0.3:
-                    content = damaged(content, _structured(), generator)
-                archive.writestr(f"{name}.npy", content)
-        return file.getvalue()
+        return _damaged_arrays
 
 
 def _structured() -> bytes:
@@ -90,3 +79,16 @@ def _zip_bomb() -> bytes:
         + central
         + struct.pack("<4s4H2IH", b"PK\5\6", 0, 0, 1, 1, len(central), len(local), 0)
     )
+
+
+def _damaged_arrays(generator: Random) -> bytes:
+    columns = dict(zip(("x", "y", "z", "intensity"), scene(POINTS).T, strict=True))
+    method = generator.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED))
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", method) as archive:
+        for name, column in columns.items():
+            content = npy(column)
+            if generator.random() < 0.3:
+                content = damaged(content, _structured(), generator)
+            archive.writestr(f"{name}.npy", content)
+    return file.getvalue()
