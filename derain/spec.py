@@ -10,6 +10,7 @@ from derain.errors import InputError
 from derain.files.documents import Entry, shown
 from derain.files.labels import LARGEST_ID
 from derain.scan import Scan
+from derain.views.candidates import Candidates, bounded_channels, candidates_at
 from derain.views.channels import MOST_CHANNELS
 from derain.views.oddities import Oddity, intensity_unlike_training, missing_channels
 from derain.views.registry import VIEWS
@@ -36,6 +37,7 @@ class Spec:
         threshold: A point is rain where its probability is greater.
         data: Name of the training data.
         licence: Licence of the training data.
+        candidates: Bounds outside which it calls nothing rain; None where it judges every point.
         training: What it was trained on, as `derain.sources.training_record` says it: names of
             sequences, fingerprints of scans. Empty where that is not known.
         schema: Version of this layout.
@@ -53,6 +55,7 @@ class Spec:
     units: tuple[str, ...]
     rule: Mapping[str, float] = field(default_factory=dict)
     threshold: float = 0.5
+    candidates: Candidates | None = None
     training: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     schema: int = SCHEMA
 
@@ -116,7 +119,7 @@ class Spec:
             threads: Threads it may use; 0 takes every core this process may use.
 
         Raises:
-            InputError: A kind of view that this derain does not know.
+            InputError: A kind of view that this derain does not know, or that has no candidates.
         """
         return _view_of(Entry(self.network, "view", dict(self.view)), self, threads)
 
@@ -127,11 +130,12 @@ class Spec:
 
 
 def _view_of(entry: Entry, spec: Spec, threads: int = 0) -> View:
-    """The view that an entry describes, with the channels of a Spec."""
+    """The view that an entry describes, with the channels and the candidates of a Spec."""
     kind = entry.members().get("kind", Entry(entry.source, f"{entry.key}.kind", None))
     if not isinstance(kind.value, str) or kind.value not in VIEWS:
         raise kind.fault(f"unknown view {shown(kind.value)}", "Upgrade derain.")
-    return VIEWS[kind.value].of(entry, spec.channels, spec.means, threads)
+    view = VIEWS[kind.value].of(entry, spec.channels, spec.means, threads)
+    return view if spec.candidates is None else view.judging(spec.candidates)
 
 
 def _refuse_newer(entry: Entry) -> None:
@@ -151,6 +155,9 @@ def _refuse_contradictions(spec: Spec, entry: Entry) -> None:
         raise entry.fault(
             f"channels {shown(spec.channels)} are none, or not distinct", "Name them."
         )
+    bounds = () if spec.candidates is None else spec.candidates.bounds
+    if not {bound.channel for bound in bounds} <= set(bounded_channels(spec.channels)):
+        raise entry.fault("its candidates are bounded by what it does not see", "Leave them out.")
     if not set(spec.rain) <= set(spec.classes):
         raise entry.fault(f"rain {shown(spec.rain)} is not of its classes", "Name ids of them.")
 
@@ -185,6 +192,7 @@ _PARSERS: dict[str, Callable[[Entry], Any]] = {
     "units": Entry.texts,
     "rule": lambda entry: {name: part.number() for name, part in entry.members().items()},
     "threshold": lambda entry: entry.within(0, 1),
+    "candidates": candidates_at,
     "training": lambda entry: {name: part.texts() for name, part in entry.members().items()},
     "schema": lambda entry: entry.whole(1, SCHEMA),
 }

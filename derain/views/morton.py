@@ -62,7 +62,7 @@ def distinct_positions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDA
         ``xyz[first][inverse]`` equals ``xyz``.
     """
     code = morton_code(xyz)
-    order = np.argsort(code, kind="stable")
+    order = _ascending(code)
     code, points = code[order], xyz.take(order, axis=0)
     new_cell = np.ones(len(xyz), bool)
     new_cell[1:] = code[1:] != code[:-1]
@@ -80,6 +80,16 @@ def distinct_positions(xyz: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDA
     inverse = np.empty(len(xyz), np.int64)
     inverse[order] = np.cumsum(new_point) - 1
     return order[new_point], inverse
+
+
+def _ascending(code: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """What sorts cell numbers, equal ones in their order; of int64 (N,)."""
+    # NumPy sorts 16 bits by radix, which thrice is twice as fast as sorting 48 by comparison.
+    order = np.argsort(code.astype(np.uint16), kind="stable")
+    for shift in (16, 32):
+        part = (code >> np.uint64(shift)).astype(np.uint16)
+        order = order.take(np.argsort(part.take(order), kind="stable"))
+    return order
 
 
 def distinct_rows(scan: Scan) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

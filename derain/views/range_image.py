@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +33,6 @@ class RangeImage(SeenScan):
         wraps: True where the last column is the neighbour of the first.
         way_back: Name of the back-projection, by which points that are not shown get a score.
     """
-
-    VARYING: ClassVar[str | None] = None
 
     image: NDArray[np.float32]
     valid: NDArray[np.bool_]

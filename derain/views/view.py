@@ -7,8 +7,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.scan import Scan
+from derain.views.candidates import Candidates
 from derain.views.window import Window, WindowOfScans
 
 # In a target: nothing is there to be judged, such as in a pixel without a return.
@@ -19,14 +21,16 @@ BackProjection = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 
 class SeenScan(ABC):
-    """One scan as a network sees it, in cells: points of a neighbour view, pixels of an image.
+    """One scan as a network sees it, in cells: points of a neighbour view, pixels of an image."""
 
-    Attributes:
-        VARYING: Name of the inputs' first axis where it is as long as the scan is; None where the
-            inputs of all scans have one size.
-    """
+    @property
+    def varying(self) -> Mapping[str, str]:
+        """Inputs whose first axis is longer in some scans than in others, and what is on it.
 
-    VARYING: ClassVar[str | None]
+        Inputs that have the same things on it are equally long. By default there are none: the
+        inputs of all scans have one size.
+        """
+        return {}
 
     @property
     @abstractmethod
@@ -66,7 +70,7 @@ class SeenScan(ABC):
 
         Returns:
             One value per row of the scan in its order, float32 (N,); 0 for rows that are not
-            ``judged``.
+            ``judged``, or that the view's candidates leave out.
         """
         return self.back_projection()(score)
 
@@ -121,6 +125,22 @@ class View(ABC):
     def window(self) -> Window:
         """The scans that it sees: by default the one that is judged, alone."""
         return Window()
+
+    def judging(self, candidates: Candidates) -> "View":
+        """The same view with cells for candidates alone; all other points are given score 0.
+
+        What the network says of a candidate must not change by it: whatever its score depends on
+        is seen as before. A view that cannot tell them apart refuses, as this one does.
+
+        Args:
+            candidates: Which points may be rain.
+
+        Raises:
+            InputError: A view that sees every point alike.
+        """
+        raise InputError(
+            self.NAME, "the view cannot leave points out", "Use the model without candidates."
+        )
 
     @abstractmethod
     def __call__(self, scan: Scan) -> SeenScan:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from derain.scan import Scan
 from derain.views.morton import distinct_positions, distinct_rows, first_rows, morton_code
-from derain.views.neighbours import Neighbourhoods, NeighbourView, nearest_neighbours
+from derain.views.neighbour_search import NeighbourSearch
+from derain.views.neighbours import Neighbourhoods, NeighbourView
 
 # Few values on a coarse grid: many duplicates and many equal distances.
 gridded = hnp.arrays(
@@ -42,9 +43,9 @@ def test_neighbours_equal_brute_force(
 ) -> None:
     xyz = np.unique(data.draw(clouds), axis=0)
     if not len(xyz):
-        assert nearest_neighbours(xyz, k)[0].shape == (0, k)
+        assert NeighbourSearch(xyz)(k)[0].shape == (0, k)
         return
-    neighbours, distances = nearest_neighbours(xyz, k)
+    neighbours, distances = NeighbourSearch(xyz)(k)
     expected, expected_distances = brute_force(xyz, k)
     np.testing.assert_array_equal(neighbours, expected)
     np.testing.assert_allclose(distances, expected_distances, rtol=1e-6, atol=1e-12)
@@ -57,8 +58,8 @@ def test_the_answer_does_not_depend_on_the_order_inside(xyz: NDArray[np.float32]
     if not len(xyz):
         return
     shuffle = np.array(random.sample(range(len(xyz)), len(xyz)))
-    neighbours, _ = nearest_neighbours(xyz, 5)
-    shuffled, _ = nearest_neighbours(xyz[shuffle], 5, rank=shuffle)
+    neighbours, _ = NeighbourSearch(xyz)(5)
+    shuffled, _ = NeighbourSearch(xyz[shuffle], rank=shuffle)(5)
     np.testing.assert_array_equal(shuffle[shuffled], neighbours[shuffle])
 
 

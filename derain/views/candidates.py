@@ -1,0 +1,140 @@
+"""Candidates: the few bounds outside which no point is rain, so that nobody need look there."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.files.documents import Entry
+from derain.scan import Scan
+from derain.views.channels import MOST_CHANNELS
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What a channel of rain is at least, and at most.
+
+    Attributes:
+        channel: Its name, as :meth:`Scan.channel` takes it.
+        least: Smallest value of rain, in the channel's unit; None where there is no such bound.
+        most: Largest value of rain.
+    """
+
+    channel: str
+    least: float | None = None
+    most: float | None = None
+
+    def holds(self, values: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """True for values within the bound, bool (N,); of what is not known, NaN, it says True."""
+        outside = np.zeros(len(values), bool)
+        # Nothing is less or greater than NaN. A bound as float32 compares as fast as can be.
+        if self.least is not None:
+            outside |= values < np.float32(self.least)
+        if self.most is not None:
+            outside |= values > np.float32(self.most)
+        return ~outside
+
+    def __str__(self) -> str:
+        match self.least, self.most:
+            case least, None:
+                return f"{self.channel} of at least {least:g}"
+            case None, most:
+                return f"{self.channel} of at most {most:g}"
+            case least, most:
+                return f"{self.channel} from {least:g} to {most:g}"
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Points that may be rain: those within all of some bounds. Whatever is outside is not rain.
+
+    Attributes:
+        bounds: The bounds, one a channel.
+        points: Share of the points that they were fitted to which are candidates.
+        rain: Share of the rain there which is.
+        rain_share: Share of rain among the candidates there.
+    """
+
+    bounds: tuple[Bound, ...]
+    points: float = 1.0
+    rain: float = 1.0
+    rain_share: float = 0.0
+
+    def among(self, scan: Scan) -> NDArray[np.bool_]:
+        """Which rows of a scan are candidates.
+
+        A channel that the scan has not got, or a value that it lacks, excludes no point.
+
+        Args:
+            scan: The scan, its intensities in the unit of the data that the bounds were fitted to.
+
+        Returns:
+            bool (N,). Of rows that cannot be judged it says nothing.
+        """
+        candidate = np.ones(len(scan), bool)
+        for bound in self.bounds:
+            values = scan.channel(bound.channel)
+            if values is not None:
+                candidate &= bound.holds(values)
+        return candidate
+
+    def __str__(self) -> str:
+        bounds = ", ".join(map(str, self.bounds))
+        return f"{bounds}: {self.points:.1%} of the points, {self.rain:.2%} of their rain"
+
+
+def candidates_at(entry: Entry) -> Candidates | None:
+    """The candidates that stand in a document, which is not trusted; None where it has none.
+
+    Raises:
+        InputError: Something that does not describe them.
+    """
+    if entry.value is None:
+        return None
+    return Candidates(**entry.record(_PARSERS, required=("bounds",)))
+
+
+def bounded_channels(channels: Sequence[str]) -> tuple[str, ...]:
+    """What candidates of a network may be bounded by: range, height, and what else it sees.
+
+    A place to the left or right, or before or behind, tells nothing of rain but where it fell. And
+    what the network is blind to, such as the intensity of an unknown sensor, its candidates must
+    not depend on either.
+
+    Args:
+        channels: Input channels of the network.
+    """
+    return ("range", "z", *(name for name in channels if name not in ("range", "x", "y", "z")))
+
+
+def _bounds(entry: Entry) -> tuple[Bound, ...]:
+    bounds = tuple(_bound(item) for item in entry.items()[: MOST_CHANNELS + 1])
+    channels = [bound.channel for bound in bounds]
+    if len(set(channels)) < len(channels) or not 0 < len(channels) <= MOST_CHANNELS:
+        raise entry.fault("it bounds no channel, or one twice", "Write one bound a channel.")
+    return bounds
+
+
+def _bound(entry: Entry) -> Bound:
+    bound = Bound(**entry.record(_BOUND_PARSERS, required=("channel",)))
+    if bound.least is None is bound.most:
+        raise entry.fault("it has neither least nor most", "Write one of them.")
+    return bound
+
+
+def _number_or_none(entry: Entry) -> float | None:
+    return None if entry.value is None else entry.number()
+
+
+_BOUND_PARSERS: dict[str, Callable[[Entry], Any]] = {
+    "channel": Entry.text,
+    "least": _number_or_none,
+    "most": _number_or_none,
+}
+
+_PARSERS: dict[str, Callable[[Entry], Any]] = {
+    "bounds": _bounds,
+    **dict.fromkeys(("points", "rain", "rain_share"), lambda entry: entry.within(0, 1)),
+}
