@@ -23,7 +23,9 @@ from derain.files.atomic import replacing
 from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.spec import Spec
+from derain.views.candidates import Bound, Candidates
 from derain.views.channels import extra_channels
+from derain.views.view import SeenScan
 
 # The version of ONNX's operators, stated so that files do not change with torch's default. 18 is
 # the oldest that torch 2.13's exporter writes without converting.
@@ -115,10 +117,9 @@ def _hard_cases(spec: Spec) -> Iterator[tuple[str, Scan]]:
 
 def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
     """The deployed network as an ONNX graph, for scans of any size where its view varies."""
-    # 50 points: neither 0 nor 1, which the exporter would take for constants, nor any other size.
-    example = spec.make_view()(Scan.of(scene(50)))
+    example = _example(spec)
     inputs = {name: torch.from_numpy(array) for name, array in example.inputs().items()}
-    varying = example.VARYING and torch.export.Dim(example.VARYING, min=0)
+    lengths = {axis: torch.export.Dim(axis, min=0) for axis in example.varying.values()}
     # The exporter warns of what is deprecated in itself and of a missing torchvision, about which
     # nobody here can do anything. What it makes is proved.
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)
@@ -132,20 +133,36 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
             opset_version=OPSET,
             dynamo=True,
             external_data=False,
-            dynamic_shapes={name: {0: varying} for name in inputs} if varying else None,
+            dynamic_shapes={
+                name: {0: lengths[example.varying[name]]} if name in example.varying else None
+                for name in inputs
+            },
             verbose=False,
         )
     assert program is not None  # only None when it was told to write a file itself
     proto: onnx.ModelProto = program.model_proto
-    if varying:
+    if scored := list(example.varying.values()):
         # Where a network computes in blocks, as 3D-OutDet does, the exporter writes the number of
-        # scores as a formula over them. It is that of the inputs.
-        proto.graph.output[0].type.tensor_type.shape.dim[0].dim_param = example.VARYING
+        # scores as a formula over them. It is that of the last input's rows.
+        proto.graph.output[0].type.tensor_type.shape.dim[0].dim_param = scored[-1]
     del proto.graph.value_info[:]
     for node in proto.graph.node:
         # The exporter notes the source line of every operator, which is longer than the graph.
         del node.metadata_props[:]
     return proto
+
+
+def _example(spec: Spec) -> SeenScan:
+    """What the network sees of a small scan, for the exporter to follow through it.
+
+    No length may be 0 or 1, which it would take for constants, or that of another axis.
+    """
+    scan = Scan.of(scene(50))
+    if spec.candidates is not None:
+        # So many that the neighbourhoods of those around them are not all that there are.
+        near = Bound("range", most=float(np.sort(scan.range)[5]))
+        spec = replace(spec, candidates=Candidates((near,)))
+    return spec.make_view()(scan)
 
 
 def _describe(proto: onnx.ModelProto, spec: Spec, known: dict[str, object]) -> None:

@@ -249,13 +249,14 @@ def _refuse_other_network(session: onnxruntime.InferenceSession, view: View, pat
         InputError: Other names, types or shapes.
     """
     empty = view(Scan.of(np.zeros((0, 4))))
-    varying = empty.VARYING is not None
+    varying = empty.varying
     wanted = {
-        name: (ONNX_TYPES[array.dtype.name], array.shape[varying:])
+        name: (ONNX_TYPES[array.dtype.name], array.shape[name in varying :])
         for name, array in empty.inputs().items()
     }
     found = {
-        value.name: (value.type, tuple(value.shape[varying:])) for value in session.get_inputs()
+        value.name: (value.type, tuple(value.shape[value.name in varying :]))
+        for value in session.get_inputs()
     }
     scores = [(value.type, tuple(value.shape[1:])) for value in session.get_outputs()]
     if found != wanted or scores != [("tensor(float)", (2,))]:

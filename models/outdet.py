@@ -96,23 +96,33 @@ class OutDetNetwork(nn.Module):
         neighbours = tensors["distance_weight"].numel()
         return network_of(lambda: cls(neighbours), tensors, "3D-OutDet")
 
-    def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
-        """Scores every point.
+    def forward(
+        self,
+        points: Tensor,
+        distances: Tensor,
+        neighbours: Tensor,
+        candidates: Tensor | None = None,
+    ) -> Tensor:
+        """Scores every point, or every candidate.
 
         Args:
             points: Normalised channels, float (M, C).
-            distances: Distances to the neighbours in metres, float (M, k).
-            neighbours: The point itself, then its neighbours, as rows of ``points``, int64 (M, k).
+            distances: Distances to the neighbours in metres, float (F, k).
+            neighbours: The point itself, then its neighbours, as rows of ``points``, int64 (F, k).
+            candidates: Neighbourhoods of the points around each candidate, as rows of
+                ``neighbours``, the first being its own, int64 (J, k). None where all M points are
+                judged, each by its own neighbourhood: F = J = M.
 
         Returns:
-            Logits of "not rain" and "rain", float (M, 2).
+            Logits of "not rain" and "rain", float (J, 2).
         """
         weighted = self.distance_weight * (distances + DISTANCE_OFFSET)
         seen = torch.cat([points[neighbours], weighted[..., None]], dim=-1)
         features = convolve(seen, self.weight1) + self.bias1
         features = functional.leaky_relu(self.norm1(features), 0.2)
-        features = self.norm2(convolve(features[neighbours], self.weight2))
-        features = features + points @ self.shortcut[..., 0].T
+        own, around = _judged(points, neighbours, candidates)
+        features = self.norm2(convolve(features[around], self.weight2))
+        features = features + own @ self.shortcut[..., 0].T
         features = functional.leaky_relu(features, 0.2)
         return self.head(self.dropout(features))
 
@@ -128,6 +138,16 @@ def convolve(seen: Tensor, weight: Tensor) -> Tensor:
         Features, float (M, outputs).
     """
     return seen.flatten(1) @ weight.permute(2, 0, 1).flatten(0, 1)
+
+
+def _judged(
+    points: Tensor, neighbours: Tensor, candidates: Tensor | None
+) -> tuple[Tensor, Tensor]:
+    """The points that are judged, and the rows of the features of their neighbours."""
+    if candidates is None:
+        return points, neighbours
+    own = neighbours[: candidates.shape[0], 0]
+    return functional.embedding(own, points), candidates
 
 
 class FoldedOutDet(nn.Module):
@@ -169,27 +189,35 @@ class FoldedOutDet(nn.Module):
         self.head = _constant(exact["head.weight"].T)
         self.head_bias = _constant(exact["head.bias"])
 
-    def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
-        """Scores every point.
+    def forward(
+        self,
+        points: Tensor,
+        distances: Tensor,
+        neighbours: Tensor,
+        candidates: Tensor | None = None,
+    ) -> Tensor:
+        """Scores every point, or every candidate; arguments as for :class:`OutDetNetwork`.
 
         Args:
             points: Raw channels in the units of the Spec, float32 (M, C).
-            distances: Distances to the neighbours in metres, float32 (M, k).
-            neighbours: The point itself, then its neighbours, as rows of ``points``, int64 (M, k).
+            distances: float32 (F, k).
+            neighbours: int64 (F, k).
+            candidates: int64 (J, k).
 
         Returns:
-            Logits of "not rain" and "rain", float32 (M, 2).
+            Logits of "not rain" and "rain", float32 (J, 2).
         """
         # An embedding exports as Gather, which runs faster than the GatherND of plain indexing.
         features = functional.embedding(neighbours, points).flatten(1) @ self.on_points + self.bias1
         features = functional.leaky_relu(features + distances @ self.on_distances, 0.2)
-        size = (neighbours.shape[0] + BLOCKS - 1) // BLOCKS
+        own, around = _judged(points, neighbours, candidates)
+        size = (around.shape[0] + BLOCKS - 1) // BLOCKS
         blocks = [
-            functional.embedding(neighbours[start * size : (start + 1) * size], features).flatten(1)
+            functional.embedding(around[start * size : (start + 1) * size], features).flatten(1)
             @ self.weight2
             for start in range(BLOCKS)
         ]
-        features = torch.cat(blocks) + self.bias2 + points @ self.shortcut
+        features = torch.cat(blocks) + self.bias2 + own @ self.shortcut
         features = functional.leaky_relu(features, 0.2)
         return features @ self.head + self.head_bias
 
@@ -276,9 +304,16 @@ class OutDet(SupervisedModule, Published):
         """Whether the network can take what a Spec's view gives: as many neighbours as it has."""
         return isinstance(view, NeighbourView) and view.neighbours == self.hparams["neighbours"]
 
-    def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
-        """Logits, float (M, 2), of raw points; arguments as for :class:`FoldedOutDet`."""
-        return self.network((points - self.mean) / self.std, distances, neighbours)
+    def forward(
+        self,
+        points: Tensor,
+        distances: Tensor,
+        neighbours: Tensor,
+        candidates: Tensor | None = None,
+    ) -> Tensor:
+        """Logits, float (J, 2), of raw points; arguments as for :class:`FoldedOutDet`."""
+        normalised = (points - self.mean) / self.std
+        return self.network(normalised, distances, neighbours, candidates)
 
     def deployed(self) -> FoldedOutDet:
         """The network as it is exported, in fewer steps."""
