@@ -19,6 +19,7 @@ from derain.learning.task import Task, TrainingData, agree
 from derain.models.measured import MeasuredModule
 from derain.scan import Scan
 from derain.spec import Spec
+from derain.views.candidates import Candidates
 from derain.views.view import View
 
 
@@ -110,6 +111,16 @@ class DerainingModule(MeasuredModule):
         """
         return {}
 
+    def candidates_for(self, card: DataCard, scans: Sequence[Scan]) -> Candidates | None:
+        """Bounds outside which nothing is rain, fitted to training scans; by default none.
+
+        Args:
+            card: Data card of the scans.
+            scans: Training scans, with the labels that the network learns from; none for published
+                weights.
+        """
+        return None
+
     def adopt_rule(self, rule: Entry) -> None:
         """Takes over the constants of the network's own rule, as its Spec says them.
 
@@ -167,7 +178,8 @@ class DerainingModule(MeasuredModule):
 
         Args:
             card: Its data card.
-            scans: Training scans that view and rule are fitted to, if they are not stated.
+            scans: Training scans that view, rule and candidates are fitted to, if they are not
+                stated.
 
         Raises:
             InputError: A data card without statistics, or no scans where they are needed.
@@ -184,6 +196,7 @@ class DerainingModule(MeasuredModule):
             classes=card.classes,
             rain=card.rain,
             threshold=self.hparams["threshold"],
+            candidates=self.candidates_for(card, scans),
             data=card.name,
             licence=card.licence,
         )

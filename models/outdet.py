@@ -140,9 +140,7 @@ def convolve(seen: Tensor, weight: Tensor) -> Tensor:
     return seen.flatten(1) @ weight.permute(2, 0, 1).flatten(0, 1)
 
 
-def _judged(
-    points: Tensor, neighbours: Tensor, candidates: Tensor | None
-) -> tuple[Tensor, Tensor]:
+def _judged(points: Tensor, neighbours: Tensor, candidates: Tensor | None) -> tuple[Tensor, Tensor]:
     """The points that are judged, and the rows of the features of their neighbours."""
     if candidates is None:
         return points, neighbours
@@ -253,6 +251,9 @@ class OutDet(SupervisedModule, Published):
         milestones: Epochs after which the learning rate falls.
         decay: Factor by which it falls.
         threshold: A point is rain where its probability is greater.
+        candidates: Share of the training scans' rain that must lie within a few bounds (range,
+            height, intensity), outside which no point is judged, nor is any rain, such as 0.999.
+            As published, None: all are judged.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 
     Source: sporsho/3D_OutDet, train_wads.py.
@@ -272,6 +273,7 @@ class OutDet(SupervisedModule, Published):
         milestones: tuple[int, ...] = (30, 40, 45),
         decay: float = 0.1,
         threshold: float = 0.5,
+        candidates: float | None = None,
         spec: dict[str, Any] | None = None,
     ) -> None:
         super().__init__(channels)

@@ -5,11 +5,15 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.learning.batch import Batch
 from derain.learning.losses import SegmentationLoss, class_weights, segmentation_loss
 from derain.learning.task import Task
 from derain.models.base import DerainingModule
+from derain.scan import Scan
+from derain.views.candidate_fit import fit_candidates
+from derain.views.candidates import Candidates
 from derain.views.view import IGNORED
 
 
@@ -42,12 +46,29 @@ class SupervisedModule(DerainingModule):
     def take(self, task: Task) -> None:
         """Takes over what was agreed with the data, and weighs the classes by their shares there.
 
+        Of a network that judges candidates alone, they are the shares among them.
+
         Raises:
             InputError: A Spec of another network.
         """
         super().take(task)
-        if (share := self.card.rain_share) is not None:
+        candidates = self.spec.candidates
+        share = self.card.rain_share if candidates is None else candidates.rain_share
+        if share is not None:
             self.class_weight.copy_(class_weights([1 - share, share]))
+
+    def candidates_for(self, card: DataCard, scans: Sequence[Scan]) -> Candidates | None:
+        """Bounds that hold as much of the training scans' rain as ``candidates`` asks for.
+
+        Raises:
+            InputError: ``candidates`` that is no share between 0 and 1.
+        """
+        inside = self.hparams.get("candidates")
+        if inside is None or not scans:
+            return None
+        known = [scan.take(~card.unknown_of(scan)) for scan in scans]
+        labelled = ((scan, card.rain_of(scan)) for scan in known)
+        return fit_candidates(labelled, self.channels, inside)
 
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
         """Loss with its parts, and logits."""

@@ -60,11 +60,14 @@ class NeighbourSearch:
             of_tied = tied if queries is None else queries[tied]
             settled = self._in_order((rows[tied], squared[tied]), of_tied, found)
             rows[tied, :found], squared[tied, :found] = settled
-        rows, squared = rows[:, :found], squared[:, :found]
+        rows, squared = np.ascontiguousarray(rows[:, :found]), squared[:, :found]
         if found < k:
             missing = ((0, 0), (0, k - found))
-            rows, squared = (np.pad(each, missing, mode="edge") for each in (rows, squared))
-        return np.ascontiguousarray(rows), np.sqrt(squared.astype(np.float32))
+            rows, squared = (
+                np.pad(rows, missing, mode="edge"),
+                np.pad(squared, missing, mode="edge"),
+            )
+        return rows, np.sqrt(squared.astype(np.float32))
 
     def _nearest(self, queries: NDArray[np.int64] | None, k: int) -> Found:
         assert self._tree is not None  # without points there are no queries

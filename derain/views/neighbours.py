@@ -76,12 +76,14 @@ class Neighbourhoods(SeenScan):
 
     def inputs(self) -> dict[str, NDArray[Any]]:
         """The network's inputs, in its order: points, distances, neighbours, and any candidates."""
-        inputs = {
+        inputs: dict[str, NDArray[Any]] = {
             "points": self.points,
             "distances": self.distances,
             "neighbours": self.neighbours,
         }
-        return inputs if self.candidates is None else {**inputs, "candidates": self.candidates}
+        if self.candidates is not None:
+            inputs["candidates"] = self.candidates
+        return inputs
 
     def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
         """What the network is to say of each point that it scores.
@@ -92,13 +94,14 @@ class Neighbourhoods(SeenScan):
         Returns:
             1 for rain, 0 for everything else, int64 (J,).
         """
-        return rain[self.first[self._scored]].astype(np.int64)
+        first = self.first if self.candidates is None else self.first[self._of_candidates]
+        return rain[first].astype(np.int64)
 
     def back_projection(self) -> BackProjection:
         """What gives every row the score of its point, and 0 where that has none."""
         if self.candidates is None:
             return partial(_to_rows, self.inverse)
-        return partial(_of_candidates_to_rows, self.inverse, self._scored, len(self.points))
+        return partial(_of_candidates_to_rows, self.inverse, self._of_candidates, len(self.points))
 
     @staticmethod
     def pack(seen: Sequence["Neighbourhoods"]) -> dict[str, NDArray[Any]]:
@@ -122,10 +125,9 @@ class Neighbourhoods(SeenScan):
         }
 
     @property
-    def _scored(self) -> slice | NDArray[np.int64]:
-        """The points that the network scores: all, or rows of ``points``, int64 (J,)."""
-        if self.candidates is None:
-            return slice(None)
+    def _of_candidates(self) -> NDArray[np.int64]:
+        """Each candidate as a row of ``points``, int64 (J,)."""
+        assert self.candidates is not None
         return self.neighbours[: len(self.candidates), 0]
 
 
@@ -229,11 +231,11 @@ def _to_rows(inverse: NDArray[np.int64], score: NDArray[np.float32]) -> NDArray[
 
 def _of_candidates_to_rows(
     inverse: NDArray[np.int64],
-    scored: NDArray[np.int64],
+    candidates: NDArray[np.int64],
     points: int,
     score: NDArray[np.float32],
 ) -> NDArray[np.float32]:
     # The last place is for rows at no point, whose number is -1.
     of_points = np.zeros(points + 1, np.float32)
-    of_points[scored] = score
+    of_points[candidates] = score
     return of_points.take(inverse)

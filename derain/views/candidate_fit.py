@@ -1,0 +1,142 @@
+"""Fits candidates to scans of which it is known what is rain."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.scan import Scan
+from derain.views.candidates import Bound, Candidates, bounded_channels
+from derain.views.channels import channel_values
+from derain.views.morton import first_rows
+
+# Share of the rain that candidates hold, unless another is asked for.
+RAIN_INSIDE = 0.999
+LEAST_INSIDE = 0.5
+
+# A bound has to leave out at least this share of the points; others are not worth a comparison.
+WORTH = 0.05
+
+# Bounds are rounded outwards to so many digits, so that they can be read.
+DIGITS = 3
+
+
+def fit_candidates(
+    scans: Iterable[tuple[Scan, NDArray[np.bool_]]],
+    channels: Sequence[str],
+    inside: float = RAIN_INSIDE,
+) -> Candidates | None:
+    """Finds bounds that hold a stated share of the rain with a margin, and leave out what they can.
+
+    Each side of each channel is allowed an equal part of the rain that may be left out, and the
+    bound found so is moved outwards by a margin that the rain's own tail says: as far again as
+    from ten times that part to the part itself. Of a tail that falls exponentially, a tenth of the
+    part is left out then, in scans alike. Sides that leave out hardly a point are not bounded.
+
+    Args:
+        scans: Scans, and for each which of its rows are rain, bool (N,).
+        channels: Input channels of the network; see :func:`bounded_channels`.
+        inside: Share of the rain that is to be within all bounds, from 0.5 to below 1.
+
+    Returns:
+        The candidates; None where there is no rain, or where it is as the rest is.
+
+    Raises:
+        InputError: Another share.
+    """
+    if not LEAST_INSIDE <= inside < 1:
+        raise InputError(
+            "candidates",
+            f"{inside:g} is no share of the rain",
+            f"Give one from {LEAST_INSIDE:g} to below 1, such as {RAIN_INSIDE:g}.",
+        )
+    names = bounded_channels(channels)
+    values, rain = _gathered(scans, names)
+    outside = 1 - inside
+    every = [
+        _Side(name, is_most, of_channel if is_most else -of_channel, rain)
+        for name, of_channel in zip(names, values, strict=True)
+        for is_most in (False, True)
+    ]
+    sides = [side for side in every if side.leaves_out(side.limit(outside)).mean() >= WORTH]
+    limits = {side: side.limit(outside / len(sides)) for side in sides}
+    candidate = np.ones(len(rain), bool)
+    for side, limit in limits.items():
+        candidate &= ~side.leaves_out(limit)
+    if not rain.any() or candidate.mean() > 1 - WORTH:
+        return None
+    return Candidates(
+        _bounds(limits),
+        points=float(candidate.mean()),
+        rain=float(candidate[rain].mean()),
+        rain_share=float(rain[candidate].mean()),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One side of a channel, seen so that rain is what lies low.
+
+    Attributes:
+        channel: Name of the channel.
+        is_most: Whether it is that of large values.
+        values: Those of all points, of the other side with their sign changed, float32 (M,); NaN
+            where a point has none.
+        rain: Which points are rain, bool (M,).
+    """
+
+    channel: str
+    is_most: bool
+    values: NDArray[np.float32]
+    rain: NDArray[np.bool_]
+
+    def limit(self, outside: float) -> float:
+        """What is above this is no rain; infinite where no rain has a value.
+
+        Args:
+            outside: Share of the rain that may be above it, were there no margin.
+        """
+        rain = self.values[self.rain]
+        rain = rain[~np.isnan(rain)]
+        if not len(rain):
+            return math.inf
+        before, edge = np.quantile(
+            rain, [max(1 - 10 * outside, 0.5), 1 - outside], method="higher"
+        ).astype(float)
+        return _rounded_up(edge + (edge - before))
+
+    def leaves_out(self, limit: float) -> NDArray[np.bool_]:
+        """True for points above a limit, bool (M,)."""
+        return self.values > np.float32(limit)
+
+
+def _gathered(
+    scans: Iterable[tuple[Scan, NDArray[np.bool_]]], channels: Sequence[str]
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Values of all distinct positions, float32 (C, M), and which are rain, bool (M,)."""
+    values, rain = [np.zeros((len(channels), 0), np.float32)], [np.zeros(0, bool)]
+    for scan, is_rain in scans:
+        rows = first_rows(scan)
+        values.append(channel_values(scan, rows, channels))
+        rain.append(is_rain[rows])
+    return np.concatenate(values, axis=1), np.concatenate(rain)
+
+
+def _bounds(limits: Mapping[_Side, float]) -> tuple[Bound, ...]:
+    """The limits as bounds, one for each channel that has any."""
+    by_channel: dict[str, dict[str, float]] = {}
+    for side, limit in limits.items():
+        bound = {"most": limit} if side.is_most else {"least": -limit}
+        by_channel.setdefault(side.channel, {}).update(bound)
+    return tuple(Bound(channel, **bound) for channel, bound in by_channel.items())
+
+
+def _rounded_up(number: float) -> float:
+    """The next number of so many digits that is not less."""
+    if not number:
+        return 0.0
+    digits = DIGITS - 1 - math.floor(math.log10(abs(number)))
+    return round(math.ceil(number * 10.0**digits) / 10.0**digits, max(digits, 0))
