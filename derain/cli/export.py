@@ -2,15 +2,19 @@
 
 import argparse
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from derain.cli.arguments import count, threads
+from derain.cli.arguments import count, share, threads
 from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.system.notices import Notices
+from derain.views.candidate_fit import RAIN_INSIDE
+from derain.views.channels import extra_channels
 
 if TYPE_CHECKING:
+    from derain.models.base import DerainingModule
     from derain.scan import Scan
     from derain.spec import Spec
 
@@ -22,6 +26,12 @@ Exports a checkpoint as one ONNX file, proves it against PyTorch, and times it.
   derain export outdet.ckpt --out outdet.onnx
   derain export outdet.ckpt --out outdet.onnx --scan scans/000000.bin --threads 2
   derain export salsanext.ckpt --out salsanext.onnx --int8 --calibration scans/
+  derain export outdet.ckpt --out outdet.onnx --candidates WADS/sequences/36 --card wads
+
+With --candidates, the model judges no point outside a few bounds (range, height, intensity). They
+are fitted to labelled scans so that they hold, with a margin, all but a thousandth of the rain that
+the network finds there, and what that costs is printed. Of a candidate, the model says what it says
+without.
 
 Where the proof fails, no file is left. With --int8, convolutions compute in eight bits, scaled by
 what they see in scans of the calibration folder. They must find the rain there that the network
@@ -40,10 +50,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--calibration", type=Path, nargs="+", help="scans, or folders of scans, for --int8"
     )
     parser.add_argument(
+        "--candidates",
+        type=Path,
+        nargs="+",
+        metavar="DATA",
+        help="labelled scans, folders of them, or a data set, that bounds of rain are fitted to",
+    )
+    parser.add_argument(
+        "--inside",
+        type=share,
+        default=RAIN_INSIDE,
+        help="share of the rain found that is within the bounds (default: %(default)s)",
+    )
+    parser.add_argument("--card", help="data card of the labelled scans (default: as they tell)")
+    parser.add_argument(
         "--scan", type=Path, help="time the model on this scan; by default on a made-up one"
     )
     add_columns(parser)
-    add_intensity_scale(parser, of="calibration ")
+    add_intensity_scale(parser, of="calibration and labelled ")
     parser.add_argument(
         "--threads", type=threads, default=0, help="threads to time with (default all)"
     )
@@ -63,6 +87,8 @@ def main(arguments: argparse.Namespace) -> int:
     model = load_model(arguments.checkpoint)
     calibration = _calibration(arguments)
     _warn_of_odd(calibration, model.spec)
+    if arguments.candidates:
+        _fit_candidates(model, arguments)
     proof = export(model, arguments.out, calibration)
     print(proof)
     say(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
@@ -93,6 +119,19 @@ def _calibration(arguments: argparse.Namespace) -> Collection["Scan"]:
     frames = evenly_spaced(source, CALIBRATION_SCANS)
     scale = arguments.intensity_scale
     return CalibrationScans([frame.with_intensity_times(scale) for frame in frames])
+
+
+def _fit_candidates(model: "DerainingModule", arguments: argparse.Namespace) -> None:
+    """Lets a model judge candidates alone, and says what they are and what they cost."""
+    from derain.cli.labelled_data import labelled
+    from derain.export.candidates import candidates_of_findings
+    from derain.learning.task import EXAMPLE_SCANS
+
+    data = labelled(arguments, arguments.candidates)
+    scans = data.training_scans(EXAMPLE_SCANS, extra_channels(model.channels))
+    fitted = candidates_of_findings(model, scans, data.card, arguments.inside)
+    model.adopt(replace(model.spec, candidates=fitted.candidates))
+    print(fitted)
 
 
 def _warn_of_odd(scans: Iterable["Scan"], spec: "Spec") -> None:

@@ -15,10 +15,12 @@ from derain.cli.info_folder import draw, facts_of_folder
 from derain.cli.outputs import say
 from derain.cli.scan_options import ListFormats, add_columns
 from derain.errors import InputError, printable
+from derain.files.documents import Entry
 from derain.files.labels import read_labels, semantic
 from derain.files.reading import reading
 from derain.scan import Scan
 from derain.sources.folders import frame_of, named_frames
+from derain.views.candidates import candidates_at
 from derain.views.directions import directions
 from derain.views.grid_fit import fit_grid
 from derain.views.morton import distinct_rows
@@ -182,11 +184,18 @@ def _span(values: NDArray[Any]) -> dict[str, float] | str:
 
 
 def _in_brief(facts: dict[str, Any]) -> dict[str, Any]:
-    """The same with the record of a model's training as counts: it may name 2,000 scans."""
+    """The same with a model's candidates in words, and the record of its training as counts.
+
+    That may name 2,000 scans.
+    """
     match facts:
         case {"spec": {"training": dict(training)}}:
             counts = {kind: f"{len(names):,}" for kind, names in training.items()}
-            return {**facts, "spec": {**facts["spec"], "training": counts}}
+            candidates = candidates_at(
+                Entry("model", "candidates", facts["spec"].get("candidates"))
+            )
+            brief = {"training": counts, "candidates": candidates or "every point"}
+            return {**facts, "spec": {**facts["spec"], **brief}}
     return facts
 
 

@@ -82,7 +82,7 @@ class Candidates:
 
     def __str__(self) -> str:
         bounds = ", ".join(map(str, self.bounds))
-        return f"{bounds}: {self.points:.1%} of the points, {self.rain:.2%} of their rain"
+        return f"{bounds}: {self.points:.1%} of the points, {self.rain:.2%} of the rain"
 
 
 def candidates_at(entry: Entry) -> Candidates | None:
