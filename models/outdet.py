@@ -144,7 +144,8 @@ def _judged(points: Tensor, neighbours: Tensor, candidates: Tensor | None) -> tu
     """The points that are judged, and the rows of the features of their neighbours."""
     if candidates is None:
         return points, neighbours
-    own = neighbours[: candidates.shape[0], 0]
+    # The first neighbour of each is the point itself. This exports as Gather; see FoldedOutDet.
+    own = neighbours[:, 0].index_select(0, candidates[:, 0])
     return functional.embedding(own, points), candidates
 
 

@@ -92,7 +92,7 @@ def test_a_newer_schema_asks_for_an_upgrade(schema: int) -> None:
         Spec.from_dict(newer, "m.onnx")
 
 
-DEFAULTS = {"rule": {}, "threshold": 0.5, "training": {}, "schema": SCHEMA}
+DEFAULTS = {"rule": {}, "threshold": 0.5, "candidates": None, "training": {}, "schema": SCHEMA}
 
 
 @pytest.mark.parametrize("name", DEFAULTS)

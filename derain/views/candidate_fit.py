@@ -55,6 +55,8 @@ def fit_candidates(
         )
     names = bounded_channels(channels)
     values, rain = _gathered(scans, names)
+    if not rain.any():
+        return None
     outside = 1 - inside
     every = [
         _Side(name, is_most, of_channel if is_most else -of_channel, rain)
@@ -66,7 +68,7 @@ def fit_candidates(
     candidate = np.ones(len(rain), bool)
     for side, limit in limits.items():
         candidate &= ~side.leaves_out(limit)
-    if not rain.any() or candidate.mean() > 1 - WORTH:
+    if candidate.mean() > 1 - WORTH:
         return None
     return Candidates(
         _bounds(limits),

@@ -18,6 +18,7 @@ from derain.learning.batch import Batch, Sample
 from derain.models.outdet import PUBLISHED_KEYS, OutDet, OutDetNetwork
 from derain.models.published import read_state_dict
 from derain.scan import Scan
+from derain.views.candidates import Bound, Candidates
 from derain.views.neighbours import NeighbourView
 
 MakeModel = Callable[..., OutDet]
@@ -105,6 +106,20 @@ def test_training_drops_half_of_the_features_and_doubles_the_rest(
     kept = dropped != 0
     assert kept.float().mean() == pytest.approx(0.5, abs=0.03)
     torch.testing.assert_close(dropped[kept], 2 * whole[kept])
+
+
+@torch.no_grad()
+def test_candidates_are_scored_as_they_are_among_all(outdet: MakeModel, sample: MakeSample) -> None:
+    model = outdet(seed=6)
+    candidates = Candidates((Bound("range", most=20.0),))
+    scans = [Scan.of(scene(size, size)) for size in (300, 5, 200)]
+    view = NeighbourView(9, threads=1)
+    whole = [Sample(scan, view(scan), None) for scan in scans]
+    part = [Sample(scan, view.judging(candidates)(scan), None) for scan in scans]
+    among = [candidates.among(each.scan)[each.view.first] for each in whole]
+    for network in (model, model.deployed()):
+        expected = network(**Batch.of(whole).inputs)[np.concatenate(among)]
+        torch.testing.assert_close(network(**Batch.of(part).inputs), expected)
 
 
 def test_it_has_as_many_parameters_as_published() -> None:

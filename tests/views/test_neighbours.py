@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
+from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
+from derain.views.candidates import Bound, Candidates
 from derain.views.morton import distinct_positions, distinct_rows, first_rows, morton_code
 from derain.views.neighbour_search import NeighbourSearch
 from derain.views.neighbours import Neighbourhoods, NeighbourView
@@ -171,6 +173,61 @@ def test_packing_keeps_every_scan_to_itself() -> None:
         np.testing.assert_array_equal(packed["points"][rows], view.points)
         start = rows.stop
     assert len(packed["distances"]) == start
+
+
+# In a scene, these hold the drops and some of the road.
+NEAR_AND_LOW = Candidates((Bound("range", most=15.0), Bound("intensity", most=30.0)))
+
+
+@settings(deadline=None)
+@given(st.integers(0, 200), st.integers(0, 50), st.integers(1, 9), st.floats(0, 60))
+def test_candidates_have_the_neighbourhoods_that_they_have_among_all(
+    points: int, seed: int, k: int, farthest: float
+) -> None:
+    scan = Scan.of(np.repeat(scene(points + 10, seed)[:points], 2, axis=0))
+    candidates = Candidates((Bound("range", most=farthest),))
+    view = NeighbourView(k)
+    whole, part = view(scan), view.judging(candidates)(scan)
+    candidate = np.flatnonzero(candidates.among(scan)[whole.first])
+    assert part.candidates is not None
+    assert part.size == len(part.candidates) == len(candidate)
+    np.testing.assert_array_equal(part.points, whole.points)
+    # Whose neighbourhoods there are: first those of the candidates.
+    centres = part.neighbours[:, 0]
+    np.testing.assert_array_equal(centres[: part.size], candidate)
+    assert set(centres) == set(candidate) | set(whole.neighbours[candidate].ravel())
+    assert len(set(centres)) == len(centres)
+    np.testing.assert_array_equal(part.neighbours, whole.neighbours[centres])
+    np.testing.assert_array_equal(part.distances, whole.distances[centres])
+    np.testing.assert_array_equal(centres[part.candidates], whole.neighbours[candidate])
+
+
+def test_candidates_get_their_own_score_and_all_else_gets_none() -> None:
+    scan = Scan.of(np.concatenate([scene(300), scene(100), np.full((5, 4), np.nan)]))
+    whole = NeighbourView()(scan)
+    part = NeighbourView(candidates=NEAR_AND_LOW)(scan)
+    rain = np.random.default_rng(0).random(len(scan)) < 0.5
+    among = NEAR_AND_LOW.among(scan)[whole.first]
+    np.testing.assert_array_equal(part.target(rain), whole.target(rain)[among])
+    score = np.random.default_rng(1).random(len(whole.points)).astype(np.float32)
+    expected = whole.back(np.where(among, score, np.float32(0)))
+    np.testing.assert_array_equal(part.back(score[among]), expected)
+    np.testing.assert_array_equal(part.judged, whole.judged)
+
+
+def test_packing_keeps_the_candidates_of_every_scan_to_themselves() -> None:
+    view = NeighbourView(4, candidates=NEAR_AND_LOW)
+    views = [view(Scan.of(scene(n + 10, n)[:n])) for n in (100, 0, 3, 70)]
+    packed = Neighbourhoods.pack(views)
+    row = point = candidate = 0
+    for one in views:
+        assert one.candidates is not None
+        rows, those = slice(row, row + len(one.neighbours)), slice(candidate, candidate + one.size)
+        np.testing.assert_array_equal(packed["neighbours"][rows], one.neighbours + point)
+        np.testing.assert_array_equal(packed["distances"][rows], one.distances)
+        np.testing.assert_array_equal(packed["candidates"][those], one.candidates + row)
+        row, point, candidate = rows.stop, point + len(one.points), those.stop
+    assert (len(packed["points"]), len(packed["candidates"])) == (point, candidate)
 
 
 def test_threads_do_not_change_the_view() -> None:

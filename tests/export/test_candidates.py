@@ -1,0 +1,107 @@
+"""A model that judges candidates says of each what it says without, and nothing else is rain."""
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+
+from derain.cards.card import load_card
+from derain.errors import InputError
+from derain.evaluation.counts import Counts
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.export.candidates import candidates_of_findings
+from derain.export.onnx_file import export
+from derain.export.runtime import Derainer
+from derain.models.outdet import OutDet
+from derain.scan import Scan
+from derain.views.candidates import Bound, Candidates
+
+NEAR_AND_DIM = Candidates((Bound("range", most=25.0), Bound("intensity", most=40.0)))
+WADS = load_card("wads")
+
+
+@pytest.fixture(scope="module")
+def judging_candidates(random_outdet: OutDet, made_once: Callable[..., Path]) -> Path:
+    """The same network as ``onnx_model``, exported with candidates."""
+    model = deepcopy(random_outdet)
+    model.adopt(replace(model.spec, candidates=NEAR_AND_DIM))
+    return made_once("candidates.onnx", partial(export, model))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_what_it_says_of_candidates_is_bit_for_bit_what_it_says_without(
+    onnx_model: Path, judging_candidates: Path, threads: int
+) -> None:
+    of_all, of_candidates = Derainer(onnx_model, threads), Derainer(judging_candidates, threads)
+    cases = [*hard_cases(), *((str(seed), Scan.of(scene(2000, seed))) for seed in range(5))]
+    judged = 0
+    for name, scan in cases:
+        # Rows at one position are given one score, and whether it is a candidate its first says.
+        first = of_all.view(scan)
+        among = np.zeros(len(scan), bool)
+        among[first.judged] = NEAR_AND_DIM.among(scan)[first.first][first.inverse[first.judged]]
+        expected = np.where(among, of_all.probability(scan), np.float32(0))
+        np.testing.assert_array_equal(of_candidates.probability(scan), expected, err_msg=name)
+        judged += int(among.sum())
+    assert judged > 1000
+
+
+def test_each_input_of_its_graph_has_a_length_of_its_own(judging_candidates: Path) -> None:
+    graph = onnx.load(judging_candidates).graph
+    lengths = {
+        value.name: value.type.tensor_type.shape.dim[0].dim_param
+        for value in (*graph.input, *graph.output)
+    }
+    assert lengths == {
+        "points": "points",
+        "distances": "neighbourhoods",
+        "neighbours": "neighbourhoods",
+        "candidates": "candidates",
+        "logits": "candidates",
+    }
+
+
+@pytest.fixture(scope="module")
+def labelled() -> list[Scan]:
+    """Two scenes whose drops are snow; one drop in twenty is of unknown class."""
+    scans = []
+    for seed in range(2):
+        points = scene(2000, seed)
+        drops = np.arange(len(points)) >= len(points) - 200
+        label = np.where(drops, 110, 40)
+        label[np.flatnonzero(drops)[::20]] = 0
+        scans.append(Scan.of(points).with_label(label))
+    return scans
+
+
+def test_they_are_fitted_to_the_rain_that_the_network_finds(
+    random_outdet: OutDet, onnx_model: Path, labelled: list[Scan]
+) -> None:
+    card = replace(WADS, unknown=(0,))
+    fitted = candidates_of_findings(random_outdet, labelled, card, inside=0.9)
+    derainer = Derainer(onnx_model, 1)
+    before, after = Counts(), Counts()
+    inside = found = 0
+    for scan in labelled:
+        known = scan.label != 0
+        called, rain = derainer(scan)[known], (scan.label == 110)[known]
+        among = fitted.candidates.among(scan)[known]
+        before += Counts.of(called, rain)
+        after += Counts.of(called & among, rain)
+        inside += int((called & rain & among).sum())
+        found += int((called & rain).sum())
+    assert (fitted.before, fitted.after, fitted.scans) == (before, after, 2)
+    assert before != after
+    assert inside >= 0.9 * found > 0
+    assert fitted.candidates.points < 0.9
+
+
+def test_bounds_of_nothing_are_refused(random_outdet: OutDet, labelled: list[Scan]) -> None:
+    dry = [scan.with_label(np.full(len(scan), 40)) for scan in labelled]
+    with pytest.raises(InputError, match=r"--candidates: no bounds tell rain .* leave it out"):
+        candidates_of_findings(random_outdet, dry, WADS)

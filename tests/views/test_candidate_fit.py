@@ -1,0 +1,95 @@
+"""Fitted candidates hold the rain that was asked for, and leave out what can be left out."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.scan import Scan
+from derain.views.candidate_fit import WORTH, fit_candidates
+
+CHANNELS = ("x", "y", "z", "intensity")
+
+
+def street(points: int, seed: int, drops: float = 0.2) -> tuple[Scan, NDArray[np.bool_]]:
+    """A scan whose rain is near, high and dim, but for a few drops that may be anywhere."""
+    generator = np.random.default_rng(seed)
+    rain = generator.random(points) < drops
+    distance = np.where(rain, generator.exponential(5, points), generator.uniform(2, 80, points))
+    azimuth = generator.uniform(-np.pi, np.pi, points)
+    height = np.where(rain, generator.normal(1, 0.5, points), generator.uniform(-2, 3, points))
+    intensity = np.where(rain, generator.exponential(2, points), generator.uniform(0, 200, points))
+    xyz = np.stack([distance * np.cos(azimuth), distance * np.sin(azimuth), height], axis=1)
+    return Scan.of(np.column_stack([xyz, intensity])), rain
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.tuples(st.integers(1, 2000), st.integers(0, 99)), min_size=1, max_size=3),
+    st.sampled_from([0.5, 0.9, 0.99, 0.999]),
+)
+def test_candidates_hold_at_least_the_rain_that_was_asked_for(
+    sizes: list[tuple[int, int]], inside: float
+) -> None:
+    scans = [street(points, seed) for points, seed in sizes]
+    candidates = fit_candidates(scans, CHANNELS, inside)
+    if candidates is None:
+        return
+    among = np.concatenate([candidates.among(scan) for scan, _ in scans])
+    rain = np.concatenate([rain for _, rain in scans])
+    assert among[rain].mean() >= inside
+    assert among.mean() <= 1 - WORTH
+    assert candidates.points == pytest.approx(among.mean())
+    assert candidates.rain == pytest.approx(among[rain].mean())
+    assert candidates.rain_share == pytest.approx(rain[among].mean())
+
+
+def test_a_margin_keeps_rain_of_other_scans_inside() -> None:
+    candidates = fit_candidates([street(50_000, 1)], CHANNELS, 0.99)
+    assert candidates is not None
+    assert {bound.channel for bound in candidates.bounds} == {"range", "z", "intensity"}
+    scan, rain = street(200_000, 2)
+    # Tails that fall exponentially leave out a tenth of the hundredth that was allowed.
+    assert 1 - candidates.among(scan)[rain].mean() == pytest.approx(0.001, abs=0.0005)
+
+
+def test_the_bounds_follow_the_unit_of_the_data() -> None:
+    (scan, rain) = street(20_000, 3)
+    of_bytes = fit_candidates([(scan, rain)], CHANNELS)
+    of_shares = fit_candidates([(scan.with_intensity_times(1 / 255), rain)], CHANNELS)
+    assert of_bytes is not None
+    assert of_shares is not None
+    brightest = [
+        next(bound.most for bound in fitted.bounds if bound.channel == "intensity")
+        for fitted in (of_bytes, of_shares)
+    ]
+    assert brightest[0] == pytest.approx(255 * brightest[1], rel=0.02)
+
+
+def test_a_network_blind_to_intensity_has_no_bound_on_it() -> None:
+    fitted = fit_candidates([street(5000, 4)], ("x", "y", "z"))
+    assert fitted is not None
+    assert {bound.channel for bound in fitted.bounds} == {"range", "z"}
+
+
+def test_a_scan_without_intensity_bounds_none() -> None:
+    scan, rain = street(5000, 5)
+    fitted = fit_candidates([(Scan(scan.xyz), rain)], CHANNELS)
+    assert fitted is not None
+    assert {bound.channel for bound in fitted.bounds} == {"range", "z"}
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_where_rain_is_as_the_rest_is_or_is_not_there_are_no_bounds(share: float) -> None:
+    scan, _ = street(5000, 6)
+    anywhere = np.random.default_rng(7).random(5000) < share
+    assert fit_candidates([(scan, anywhere)], CHANNELS) is None
+    assert fit_candidates([], CHANNELS) is None
+
+
+@pytest.mark.parametrize("inside", [0.0, 0.4, 1.0, 1.5, float("nan")])
+def test_a_share_that_is_none_is_refused(inside: float) -> None:
+    with pytest.raises(InputError, match="is no share of the rain"):
+        fit_candidates([street(100, 8)], CHANNELS, inside)

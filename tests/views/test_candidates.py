@@ -1,0 +1,114 @@
+"""Candidates are the points within all bounds, and are read back as they were written."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from derain.errors import InputError
+from derain.files.documents import Entry
+from derain.scan import Scan
+from derain.spec import Spec
+from derain.views.candidates import Bound, Candidates, bounded_channels, candidates_at
+
+numbers = st.none() | st.floats(-50, 50, width=32)
+bounds = st.builds(
+    Bound, st.sampled_from(["range", "z", "intensity", "doppler"]), numbers, numbers
+).filter(lambda bound: (bound.least, bound.most) != (None, None))
+rules = st.lists(bounds, min_size=1, unique_by=lambda bound: bound.channel).map(
+    lambda several: Candidates(tuple(several), 0.25, 0.5, 0.75)
+)
+
+
+def a_scan(seed: int, intensity: bool) -> Scan:
+    """A scan whose speeds are not known of every point."""
+    generator = np.random.default_rng(seed)
+    points = generator.uniform(-40, 40, (60, 4 if intensity else 3))
+    doppler = np.where(generator.random(60) < 0.3, np.nan, generator.uniform(-40, 40, 60))
+    scan = Scan.of(points)
+    return Scan(scan.xyz, scan.intensity, fields={"doppler": doppler.astype(np.float32)})
+
+
+@given(rules, st.integers(0, 1000), st.booleans())
+def test_candidates_are_what_no_bound_leaves_out(
+    candidates: Candidates, seed: int, intensity: bool
+) -> None:
+    scan = a_scan(seed, intensity)
+    expected = []
+    for row in range(len(scan)):
+        inside = True
+        for bound in candidates.bounds:
+            channel = scan.channel(bound.channel)
+            value = None if channel is None else float(channel[row])
+            if value is None or np.isnan(value):
+                continue  # what is not known leaves nothing out
+            inside &= bound.least is None or value >= bound.least
+            inside &= bound.most is None or value <= bound.most
+        expected.append(inside)
+    assert candidates.among(scan).tolist() == expected
+
+
+@given(rules)
+def test_candidates_survive_json_and_say_each_of_their_numbers(candidates: Candidates) -> None:
+    content = [{"channel": b.channel, "least": b.least, "most": b.most} for b in candidates.bounds]
+    document = {"bounds": content, "points": 0.25, "rain": 0.5, "rain_share": 0.75}
+    assert candidates_at(Entry("model", "", json.loads(json.dumps(document)))) == candidates
+    text = str(candidates)
+    assert "25.0% of the points" in text
+    for bound in candidates.bounds:
+        assert all(f"{limit:g}" in text for limit in (bound.least, bound.most) if limit is not None)
+
+
+NEAR = {"channel": "range", "most": 30.0}
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ([], r"c: \[\] is not a mapping"),
+        ({}, "c: bounds is missing"),
+        ({"bounds": []}, r"c\.bounds: it bounds no channel, or one twice"),
+        ({"bounds": [NEAR, NEAR]}, r"c\.bounds: it bounds no channel, or one twice"),
+        ({"bounds": [{"channel": "z"}]}, r"c\.bounds\[0\]: it has neither least nor most"),
+        ({"bounds": [{"most": 1.0}]}, r"c\.bounds\[0\]: channel is missing"),
+        ({"bounds": [{**NEAR, "most": "far"}]}, r"c\.bounds\[0\]\.most: 'far' is not a finite"),
+        ({"bounds": [{**NEAR, "most": float("nan")}]}, r"most: nan is not a finite number"),
+        ({"bounds": [NEAR], "rain": 1.5}, r"c\.rain: 1\.5 is not within 0 and 1"),
+        ({"bounds": [NEAR], "sky": 0}, r"c\.sky: there is no such key"),
+    ],
+)
+def test_what_does_not_describe_candidates_is_refused(content: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        candidates_at(Entry("model", "c", content))
+
+
+def test_candidates_are_bounded_by_range_and_height_and_what_the_network_sees() -> None:
+    assert bounded_channels(("x", "y", "z", "intensity")) == ("range", "z", "intensity")
+    assert bounded_channels(("range", "doppler")) == ("range", "z", "doppler")
+
+
+@pytest.mark.parametrize(("channel", "refused"), [("range", False), ("z", False), ("x", True)])
+def test_a_spec_refuses_candidates_bounded_by_what_its_network_does_not_see(
+    channel: str, refused: bool
+) -> None:
+    spec = Spec(
+        network="outdet",
+        view={"kind": "neighbours", "neighbours": 7},
+        mean=(0.0,),
+        std=(1.0,),
+        classes={0: "road", 1: "rain"},
+        rain=(1,),
+        data="somewhere",
+        licence="MIT",
+        channels=("x",),
+        units=("m",),
+        candidates=Candidates((Bound(channel, most=3.0),)),
+    )
+    if refused:
+        with pytest.raises(InputError, match="bounded by what it does not see"):
+            Spec.from_dict(spec.as_dict(), "model")
+    else:
+        assert Spec.from_dict(spec.as_dict(), "model") == spec
