@@ -142,9 +142,9 @@ class Scan:
         alike = len(values) >= FEWEST_ALIKE and values.min() == values.max()
         return None if alike else self.intensity
 
-    @property
+    @cached_property  # whatever looks at a scan asks for it
     def valid(self) -> NDArray[np.bool_]:
-        """True for the points that can be judged, bool (N,).
+        """True for the points that can be judged, bool (N,), read-only.
 
         Not valid: coordinates or intensity not finite or beyond any sensor's reach, points exactly
         at the origin (no return), and cells that hold −1 in every column (no return in
@@ -162,7 +162,9 @@ class Scan:
         if self.intensity is not None and self._knows_intensity:
             valid &= np.abs(self.intensity) <= LARGEST_VALUE
             sentinel &= self.intensity == SENTINEL
-        return valid & ~at_origin & ~sentinel
+        valid &= ~(at_origin | sentinel)
+        valid.setflags(write=False)  # it is everybody's
+        return valid
 
     def channel(self, name: str) -> NDArray[np.float32] | None:
         """One value per point, by name.

@@ -9,6 +9,7 @@ from derain.errors import InputError
 from derain.export.runtime import Derainer
 from derain.files.reading import is_file
 from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
+from derain.filters.parameters import CANDIDATES
 
 PARAMETER_SUFFIXES = (".yaml", ".yml")
 CHECKPOINT_SUFFIX = ".ckpt"
@@ -33,7 +34,8 @@ def load_method(
 
     Args:
         name: A filter (one of ``FILTERS``), or an ONNX file written by ``derain export``.
-        parameters: Parameters by name: those of the filter, or the ``threshold`` of the model.
+        parameters: Parameters by name: those of the filter and its ``candidates``, or the
+            ``threshold`` of the model.
         threads: Threads to use; 0 takes every core this process may use.
 
     Raises:
@@ -42,7 +44,8 @@ def load_method(
     """
     # What has a suffix is a file, for which other packages need not be asked.
     if not Path(name).suffix and name in FILTERS:
-        return FilterDerainer(filter_from(name, parameters), threads)
+        of_filter = {key: value for key, value in parameters.items() if key != CANDIDATES}
+        return FilterDerainer(filter_from(name, of_filter), threads, parameters.get(CANDIDATES))
     if not is_file(Path(name)):
         raise InputError(
             name,

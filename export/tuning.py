@@ -13,6 +13,7 @@ from derain.errors import InputError
 from derain.evaluation.counts import Counts, intersection_over_union
 from derain.filters import FILTERS, PointFilter, Span, filter_from, filter_view
 from derain.scan import Scan
+from derain.views.candidates import Candidates
 from derain.views.neighbours import Neighbourhoods
 
 if TYPE_CHECKING:
@@ -42,15 +43,22 @@ class LabelledNeighbourhoods:
         view: Its neighbourhoods, M points with as many neighbours as any trial looks at.
         rain: Points of rain, bool (M,).
         solid: Points of what is not rain, bool (M,). Points whose class is not known are neither.
+        candidate: Points that may be called rain, bool (M,).
     """
 
     view: Neighbourhoods
     rain: NDArray[np.bool_]
     solid: NDArray[np.bool_]
+    candidate: NDArray[np.bool_]
 
     @classmethod
     def of(
-        cls, scan: Scan, card: DataCard, neighbours: int, threads: int
+        cls,
+        scan: Scan,
+        card: DataCard,
+        neighbours: int,
+        threads: int,
+        candidates: Candidates | None = None,
     ) -> "LabelledNeighbourhoods":
         """Finds the neighbours of a labelled scan's distinct valid positions.
 
@@ -60,13 +68,15 @@ class LabelledNeighbourhoods:
             neighbours: How many of each point, the point itself included; see
                 :func:`neighbours_to_find`.
             threads: Threads of the search; 0 takes every core this process may use.
+            candidates: Bounds outside which nothing is called rain; None where anything may be.
 
         Raises:
             InputError: A scan without labels.
         """
         view = filter_view(neighbours, threads)(scan)
         rain, unknown = card.rain_of(scan)[view.first], card.unknown_of(scan)[view.first]
-        return cls(view, rain, ~(rain | unknown))
+        among = np.ones(len(scan), bool) if candidates is None else candidates.among(scan)
+        return cls(view, rain, ~(rain | unknown), among[view.first])
 
 
 @dataclass(frozen=True)
@@ -224,7 +234,8 @@ def pooled_iou(filter: PointFilter, scans: Sequence[LabelledNeighbourhoods]) -> 
     total = Counts()
     for scan in scans:
         known = scan.rain | scan.solid
-        total += Counts.of(filter.judge(scan.view)[known], scan.rain[known])
+        called = filter.judge(scan.view) & scan.candidate
+        total += Counts.of(called[known], scan.rain[known])
     return total.iou
 
 
@@ -242,11 +253,13 @@ def _stored(name: str, scans: Sequence[LabelledNeighbourhoods], search: Search) 
         direction="maximize",
         load_if_exists=True,
     )
-    facts = {
+    facts: dict[str, Any] = {
         "scans": list(search.data),
         "rain_and_solid": [[int(s.rain.sum()), int(s.solid.sum())] for s in scans],
         "bounds": {k: list(v) for k, v in space_of(name).items()},
     }
+    if not all(s.candidate.all() for s in scans):
+        facts["candidates"] = [int(s.candidate.sum()) for s in scans]
     if study.trials and study.user_attrs != facts:
         raise InputError(
             str(search.storage),

@@ -4,6 +4,7 @@ import argparse
 import os
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,15 +14,18 @@ import yaml
 from tqdm import tqdm
 
 from derain import __version__
-from derain.cli.arguments import add_threads, command_line, count
+from derain.cli.arguments import add_threads, command_line, count, share
 from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.filters import FILTERS, filter_from
+from derain.filters.parameters import CANDIDATES
 from derain.sources.training_record import overlap
 from derain.system.notices import Notices
+from derain.views.candidate_fit import RAIN_INSIDE, fit_candidates
+from derain.views.candidates import Candidates
 from derain.views.oddities import Examiner, outside_view
 
 if TYPE_CHECKING:
@@ -43,6 +47,8 @@ labelled scans, and writes them for `derain run --parameters` and `derain bench 
 
 A filter is searched by Optuna, from its default parameters on; each scan's neighbours are found
 once, and take some 150 bytes a point. With --storage, a second call goes on to --trials.
+With --candidates, it calls nothing rain outside bounds of range, height and intensity that hold a
+share of the scans' rain, and those who run it need search there alone.
 A model's threshold is found exactly, from its probabilities, without trials.
 """
 
@@ -60,6 +66,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--trials", type=count, default=100, help="trials of a filter (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="of what is drawn (default: 0)")
+    parser.add_argument(
+        "--candidates",
+        type=share,
+        nargs="?",
+        const=RAIN_INSIDE,
+        metavar="SHARE",
+        help="bound a filter's rain, so that this share of it is inside (%(const)s if not said)",
+    )
     parser.add_argument("--storage", type=Path, help="SQLite file that keeps a filter's study")
     add_threads(parser)
 
@@ -80,7 +94,8 @@ def main(arguments: argparse.Namespace) -> int:
     _write(arguments, tuned, facts)
     say(f"{arguments.method}: {facts}")
     for name, value in tuned.parameters.items():
-        print(f"  {name}: {value}")
+        if name != CANDIDATES:  # they were said when they were found
+            print(f"  {name}: {value}")
     return 0
 
 
@@ -94,8 +109,9 @@ def _tuned_filter(
 
     neighbours = neighbours_to_find(arguments.method)
     read = partial(_read, data, filter_from(arguments.method, {}), notices)
+    candidates = _candidates(arguments, data, frames)
     scans = [
-        LabelledNeighbourhoods.of(read(frame), data.card, neighbours, arguments.threads)
+        LabelledNeighbourhoods.of(read(frame), data.card, neighbours, arguments.threads, candidates)
         for frame in tqdm(frames, desc="finding neighbours", unit="scan", disable=None)
     ]
     if not any(scan.rain.any() for scan in scans):
@@ -108,7 +124,29 @@ def _tuned_filter(
             [frame.name for frame in frames],
             progress.update,
         )
-        return tune_filter(arguments.method, scans, search)
+        tuned = tune_filter(arguments.method, scans, search)
+    if candidates is None:
+        return tuned
+    bounded = {**tuned.parameters, CANDIDATES: candidates.as_dict()}
+    return replace(tuned, parameters=bounded)
+
+
+def _candidates(
+    arguments: argparse.Namespace, data: "ScanDataModule", frames: list["Frame"]
+) -> Candidates | None:
+    """Bounds of the scans' rain, where they are asked for and there are any."""
+    if arguments.candidates is None:
+        return None
+
+    def known() -> Iterator[tuple[Any, Any]]:
+        for frame in tqdm(frames, desc="bounding rain", unit="scan", disable=None):
+            scan = data.read_measured(frame)
+            scan = scan.take(~data.card.unknown_of(scan))
+            yield scan, data.card.rain_of(scan)
+
+    candidates = fit_candidates(known(), ("intensity",), arguments.candidates)
+    say(f"candidates: {candidates or 'every point, for no bounds tell rain from the rest'}")
+    return candidates
 
 
 def _tuned_model(
@@ -121,6 +159,8 @@ def _tuned_model(
     from derain.export.runtime import Derainer
     from derain.export.tuning import tune_threshold
 
+    if arguments.candidates is not None:
+        raise InputError("--candidates", "a model has its own", "Give it to `derain export`.")
     derainer = load_method(arguments.method, {}, arguments.threads)
     assert isinstance(derainer, Derainer)  # filters are tuned by _tuned_filter
     require_one_scan(derainer)

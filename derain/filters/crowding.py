@@ -6,8 +6,9 @@ made for the remaining ones only.
 """
 
 import numpy as np
-import small_gicp
 from numpy.typing import NDArray
+
+from derain.views.neighbour_search import NeighbourSearch
 
 # Places along the curve that are looked at to either side of a point. Four settle 86 of 100 points
 # of the WADS sample with DROR; eight settle one more, for twice the time.
@@ -18,7 +19,11 @@ MARGIN = 1e-6
 
 
 def few_around(
-    xyz: NDArray[np.float32], radius: NDArray[np.float64], count: int, threads: int
+    xyz: NDArray[np.float32],
+    radius: NDArray[np.float64],
+    count: int,
+    threads: int,
+    asked: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
     """Finds the points that have fewer than ``count`` points within their radius.
 
@@ -27,18 +32,21 @@ def few_around(
         radius: Metres, float64 (M,); a point at exactly this distance is within.
         count: Number of points, the point itself included.
         threads: Threads of the search.
+        asked: Points that are asked about, bool (M,); None for all.
 
     Returns:
-        bool (M,); the same in whatever order the points are, but sooner along a curve.
+        bool (M,), False for points that are not asked about; the same in whatever order the points
+        are, but sooner along a curve.
     """
-    few = np.ones(len(xyz), bool)
-    if len(xyz) < count:
+    few = np.ones(len(xyz), bool) if asked is None else asked.copy()
+    if len(xyz) < count or not few.any():
         return few
     places = xyz.astype(np.float64)
     few[_found_along_curve(places, radius * (1 - MARGIN)) >= count] = False
     unsettled = np.flatnonzero(few)
-    tree = small_gicp.KdTree(places, num_threads=threads)
-    _, squared = tree.batch_knn_search(places[unsettled], count, num_threads=threads)
+    if not len(unsettled):
+        return few
+    _, squared = NeighbourSearch(xyz, threads=threads).nearest(unsettled, count)
     # Rounded to float32 as the distances of the neighbour view are, so that a filter says the same
     # whether it judges alone or shares a view with others.
     distance = np.sqrt(squared[:, count - 1].astype(np.float32))

@@ -16,8 +16,9 @@ from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.system.cores import usable_cores
 from derain.system.stopwatch import Stopwatch
+from derain.views.candidates import Candidates
 from derain.views.morton import distinct_rows
-from derain.views.neighbours import NeighbourView
+from derain.views.neighbours import Neighbourhoods, NeighbourView
 
 # Which rows are rain, and which were judged at all, bool (N,) each.
 RainAndJudged = tuple[NDArray[np.bool_], NDArray[np.bool_]]
@@ -36,16 +37,20 @@ class FilterDerainer:
     Args:
         filter: The filter.
         threads: Threads of the view; 0 takes every core this process may use.
+        candidates: Bounds outside which nothing is rain; None where anything may be.
 
     Raises:
         InputError: A negative number of threads.
     """
 
-    def __init__(self, filter: PointFilter, threads: int = 0) -> None:
+    def __init__(
+        self, filter: PointFilter, threads: int = 0, candidates: Candidates | None = None
+    ) -> None:
         if threads < 0:
             raise InputError("threads", f"{threads} is negative", "Give 0 for every core.")
         self.filter = filter
         self.threads = threads or usable_cores()
+        self.candidates = candidates
 
     def __call__(
         self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
@@ -112,7 +117,7 @@ class FilterDerainer:
         with stopwatch.stage("view"):
             view = filter_view(self.filter.neighbours, self.threads)(scan)
         with stopwatch.stage("network"):
-            rain = self.filter.judge(view)
+            rain = rain_among(self.filter, view, scan, self.candidates)
         with stopwatch.stage("back"):
             return view.back(rain.astype(np.float32)) > 0, view.judged
 
@@ -121,12 +126,34 @@ class FilterDerainer:
             first, inverse = distinct_rows(scan)
             xyz = scan.xyz.take(first, axis=0)
         with stopwatch.stage("network"):
-            few = filter.judge_alone(xyz, self.threads)
+            among = None if self.candidates is None else self.candidates.among(scan)[first]
+            few = filter.judge_alone(xyz, self.threads, among)
         with stopwatch.stage("back"):
             rain = np.zeros(len(scan), bool)
             judged = inverse >= 0
             rain[judged] = few[inverse[judged]]
             return rain, judged
+
+
+def rain_among(
+    filter: PointFilter, view: Neighbourhoods, scan: Scan, candidates: Candidates | None
+) -> NDArray[np.bool_]:
+    """What a filter calls rain among candidates.
+
+    A filter looks at all points to say what is usual, whether or not they are candidates. So what
+    it says of a candidate is what it says without bounds.
+
+    Args:
+        filter: The filter.
+        view: What it sees of the scan, M points.
+        scan: The scan.
+        candidates: Bounds outside which nothing is rain; None where anything may be.
+
+    Returns:
+        True for rain, bool (M,).
+    """
+    rain = filter.judge(view)
+    return rain if candidates is None else rain & candidates.among(scan)[view.first]
 
 
 def filter_view(neighbours: int, threads: int = 0) -> NeighbourView:

@@ -5,6 +5,10 @@ from typing import Any
 
 from derain.files.documents import Entry
 from derain.files.reading import is_file
+from derain.views.candidates import candidates_at
+
+# What bounds are called among the parameters of a filter; they are the same for every one.
+CANDIDATES = "candidates"
 
 
 def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
@@ -14,12 +18,13 @@ def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
         path: A YAML file that names a ``method``, and parameters of it by name beside it.
 
     Returns:
-        The method, and its parameters as the file has them: texts, finite numbers, true or false.
+        The method, and its parameters as the file has them: texts, finite numbers, true or false;
+        ``candidates``, if there are any, as such.
         A model is sought from the file's own folder first, wherever the command runs; where it is
         not there, its name stays as it is.
 
     Raises:
-        InputError: A missing file, or one that names no method.
+        InputError: A missing file, one that names no method, or candidates that are none.
     """
     path = Path(path)
     document = Entry.of_yaml(path)
@@ -31,4 +36,7 @@ def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
     method = values.pop("method").text()
     beside = path.parent / method
     named = str(beside) if Path(method).suffix and is_file(beside) else method
-    return named, {name: entry.scalar() for name, entry in values.items()}
+    return named, {
+        name: candidates_at(entry) if name == CANDIDATES else entry.scalar()
+        for name, entry in values.items()
+    }

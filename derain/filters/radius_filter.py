@@ -41,14 +41,17 @@ class RadiusFilter(PointFilter):
         lonely: NDArray[np.bool_] = last > self.radius_at(view.points)
         return lonely
 
-    def judge_alone(self, xyz: NDArray[np.float32], threads: int) -> NDArray[np.bool_]:
+    def judge_alone(
+        self, xyz: NDArray[np.float32], threads: int, candidate: NDArray[np.bool_] | None = None
+    ) -> NDArray[np.bool_]:
         """Says the same without the neighbours of every point, which is faster.
 
         Args:
             xyz: Distinct positions along a Morton curve, float32 (M, 3), metres.
             threads: Threads to use.
+            candidate: Which points may be rain, bool (M,); None for all.
 
         Returns:
             True for rain, bool (M,).
         """
-        return few_around(xyz, self.radius_at(xyz), self.neighbours, threads)
+        return few_around(xyz, self.radius_at(xyz), self.neighbours, threads, candidate)

@@ -1,7 +1,7 @@
 """Candidates: the few bounds outside which no point is rain, so that nobody need look there."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -79,6 +79,10 @@ class Candidates:
             if values is not None:
                 candidate &= bound.holds(values)
         return candidate
+
+    def as_dict(self) -> dict[str, Any]:
+        """The candidates as JSON-able primitives, which :func:`candidates_at` reads back."""
+        return {**asdict(self), "bounds": [asdict(bound) for bound in self.bounds]}
 
     def __str__(self) -> str:
         bounds = ", ".join(map(str, self.bounds))

@@ -1,10 +1,13 @@
 """Exact search for the nearest neighbours of points at distinct positions."""
 
 import numpy as np
-import small_gicp
 from numpy.typing import NDArray
 
 from derain.system.cores import usable_cores
+from derain.system.waiting import sleeping_threads
+
+with sleeping_threads():
+    import small_gicp
 
 # Rows of points, and squared distances to them in square metres.
 Found = tuple[NDArray[np.int64], NDArray[np.float64]]
@@ -54,7 +57,7 @@ class NeighbourSearch:
             return np.zeros((0, k), np.int64), np.zeros((0, k), np.float32)
         found = min(k, len(self._xyz))
         # One more than asked for shows whether the last neighbour has an equal just behind it.
-        rows, squared = self._nearest(queries, min(k + 1, len(self._xyz)))
+        rows, squared = self.nearest(queries, min(k + 1, len(self._xyz)))
         tied = _rows_with_equals(squared)
         if len(tied):
             of_tied = tied if queries is None else queries[tied]
@@ -69,7 +72,17 @@ class NeighbourSearch:
             )
         return rows, np.sqrt(squared.astype(np.float32))
 
-    def _nearest(self, queries: NDArray[np.int64] | None, k: int) -> Found:
+    def nearest(self, queries: NDArray[np.int64] | None, k: int) -> Found:
+        """Finds nearest neighbours, equally near ones in whatever order.
+
+        Args:
+            queries: Rows of points, int64 (Q,); None for all. There must be some.
+            k: Neighbours to find, the point itself included; no more than there are points.
+
+        Returns:
+            Rows of ``xyz``, int64 (Q, k), and squared distances in square metres, float64 (Q, k),
+            ascending.
+        """
         assert self._tree is not None  # without points there are no queries
         # take is four times faster than indexing for rows of three numbers.
         places = self._xyz if queries is None else self._xyz.take(queries, axis=0)
@@ -100,7 +113,7 @@ class NeighbourSearch:
             pending = pending[open_ended & (width < len(self._xyz))]
             if not len(pending):
                 return rows, squared
-            near = self._nearest(queries[pending], min(2 * width, len(self._xyz)))
+            near = self.nearest(queries[pending], min(2 * width, len(self._xyz)))
 
 
 def _rows_with_equals(ascending: NDArray[np.float64]) -> NDArray[np.int64]:

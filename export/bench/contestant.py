@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from derain.filters import PointFilter
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
+from derain.views.candidates import Candidates
 from derain.views.oddities import Examiner
 
 # Judges a scan, bool (N,), and gives the stopwatch its stages.
@@ -28,6 +29,7 @@ class Contestant:
         ready: Makes the method, with a number of threads.
         facts: What the method is, for whoever repeats the bench: file or parameters.
         filter: The filter, where it is one: filters share one search for neighbours.
+        candidates: Bounds outside which that filter calls nothing rain, if it has any.
         judges_by: What it judges by, as far as a scan may not suit it.
     """
 
@@ -36,6 +38,7 @@ class Contestant:
     ready: Callable[[int], TimedMethod]
     facts: dict[str, Any] = field(default_factory=dict)
     filter: PointFilter | None = None
+    candidates: Candidates | None = None
     judges_by: Examiner | None = None
 
     @cached_property

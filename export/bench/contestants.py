@@ -23,6 +23,7 @@ from derain.export.bench.functions import TimedFunction
 from derain.export.methods import load_method, named_method, require_one_scan
 from derain.export.runtime import Derainer
 from derain.filters import FilterDerainer, PointFilter
+from derain.filters.parameters import CANDIDATES
 from derain.scan import Scan
 
 # A method as a user gives it: a name or a file, a derainer, a filter, or a function that says which
@@ -78,9 +79,9 @@ def _contestant(method: GivenMethod, learn_from: LearnFrom | None) -> Contestant
         case Path():
             return _deployable(printable(method.stem), *named_method(str(method)))
         case PointFilter():
-            return _filter(method.name, method, partial(FilterDerainer, method))
-        case FilterDerainer(filter=filter):
-            return _filter(filter.name, filter, partial(FilterDerainer, filter))
+            return _filter(method.name, FilterDerainer(method))
+        case FilterDerainer():
+            return _filter(method.filter.name, method)
         case Derainer(path=path, spec=spec):
             ready = partial(load_method, str(path), {"threshold": spec.threshold})
             return _model(printable(path.stem), str(path), method, ready)
@@ -110,16 +111,19 @@ def _deployable(title: str, name: str, parameters: dict[str, Any]) -> Contestant
     """What ``derain run`` runs; made here once, so that it is refused before any work."""
     ready = partial(load_method, name, parameters)
     match ready(1):
-        case FilterDerainer(filter=filter):
-            return _filter(title, filter, ready)
+        case FilterDerainer() as derainer:
+            return _filter(title, derainer)
         case Derainer() as derainer:
             return _model(title, name, derainer, ready)
 
 
-def _filter(
-    title: str, filter: PointFilter, ready: Callable[[int], FilterDerainer | Derainer]
-) -> Contestant:
-    return Contestant(title, filter.name, ready, {"parameters": filter.as_dict()}, filter, filter)
+def _filter(title: str, derainer: FilterDerainer) -> Contestant:
+    filter, candidates = derainer.filter, derainer.candidates
+    facts = {"parameters": filter.as_dict()}
+    if candidates is not None:
+        facts[CANDIDATES] = str(candidates)
+    ready = partial(FilterDerainer, filter, candidates=candidates)
+    return Contestant(title, filter.name, ready, facts, filter, candidates, judges_by=filter)
 
 
 def _model(

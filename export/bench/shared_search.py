@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from derain.evaluation.scores import Method
 from derain.export.bench.contestant import Contestant, TimedMethod
 from derain.filters import PointFilter
-from derain.filters.derainer import filter_view
+from derain.filters.derainer import filter_view, rain_among
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
+from derain.views.candidates import Candidates
 
 
 def scored_methods(contestants: Sequence[Contestant], threads: int) -> list[Method]:
@@ -23,7 +24,9 @@ def scored_methods(contestants: Sequence[Contestant], threads: int) -> list[Meth
     """
     shared = SharedSearch([row.filter for row in contestants if row.filter], threads)
     return [
-        partial(shared.judge, row.filter) if row.filter else partial(_untimed, row.ready(threads))
+        partial(shared.judge, row.filter, row.candidates)
+        if row.filter
+        else partial(_untimed, row.ready(threads))
         for row in contestants
     ]
 
@@ -41,11 +44,14 @@ class SharedSearch:
         self._view = filter_view(most, threads)
         self._scan: Scan | None = None
 
-    def judge(self, filter: PointFilter, scan: Scan) -> NDArray[np.bool_]:
-        """Which points one of the filters calls rain, bool (N,)."""
+    def judge(
+        self, filter: PointFilter, candidates: Candidates | None, scan: Scan
+    ) -> NDArray[np.bool_]:
+        """Which points one of the filters calls rain among candidates, bool (N,)."""
         if scan is not self._scan:
             self._scan, self._seen = scan, self._view(scan)
-        return self._seen.back(filter.judge(self._seen).astype(np.float32)) > 0
+        rain = rain_among(filter, self._seen, scan, candidates)
+        return self._seen.back(rain.astype(np.float32)) > 0
 
 
 def _untimed(method: TimedMethod, scan: Scan) -> NDArray[np.bool_]:
