@@ -11,6 +11,7 @@ import torch
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.runtime import Derainer
+from derain.files import read_scan
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import save_model
 from derain.scan import Scan
@@ -39,6 +40,58 @@ def test_a_checkpoint_becomes_a_model_with_its_proof_and_times(
     np.testing.assert_allclose(
         first.probability(scene()), second.probability(scene()), rtol=0, atol=1e-6
     )
+
+
+@pytest.mark.usefixtures("one_block")
+def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_said(
+    run_derain, checkpoint: Path, onnx_model: Path, write_labelled, tmp_path: Path
+) -> None:
+    for number in range(2):
+        stem = tmp_path / "scans" / str(number)
+        write_labelled(stem.with_suffix(".bin"), stem.with_suffix(".label"), rain=110)
+    options = ["--candidates", tmp_path / "scans", "--card", "wads", "--inside", "0.9"]
+    out = tmp_path / "candidates.onnx"
+    outcome = run_derain("export", checkpoint, "--out", out, *options, "--repeats", "1")
+    assert outcome.code == 0, outcome.err
+    derainer, of_all = Derainer(out, 1), Derainer(onnx_model, 1)
+    candidates = derainer.spec.candidates
+    assert candidates is not None
+    assert f"Candidates: {candidates} that the network finds\n" in outcome.out
+    assert "IoU on these 2 scans 0." in outcome.out
+    for path in sorted((tmp_path / "scans").glob("*.bin")):
+        scan = read_scan(path)
+        expected = of_all(scan) & candidates.among(scan)
+        np.testing.assert_array_equal(derainer(scan), expected)
+    told = run_derain("info", out)
+    assert f"candidates: {candidates}" in told.out
+    assert "candidates: every point" in run_derain("info", onnx_model).out
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--candidates", "scans"], "nothing in it says which labels are rain"),
+        (["--candidates", "scans", "--card", "wads"], "0.bin: its labels are not at"),
+        (["--candidates", "nowhere", "--card", "wads"], "nowhere: "),
+    ],
+    ids=["no card", "no labels", "no scans"],
+)
+def test_candidates_need_labelled_scans(
+    run_derain,
+    checkpoint: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    options: list[str],
+    message: str,
+) -> None:
+    (tmp_path / "scans").mkdir()
+    scene(50).tofile(tmp_path / "scans/0.bin")
+    monkeypatch.chdir(tmp_path)
+    outcome = run_derain("export", checkpoint, "--out", "model.onnx", *options)
+    assert (outcome.code, outcome.out) == (2, "")
+    (line,) = outcome.err.splitlines()
+    assert message in line
+    assert not (tmp_path / "model.onnx").exists()
 
 
 @pytest.fixture

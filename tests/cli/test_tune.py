@@ -11,7 +11,8 @@ import yaml
 from derain.export.bench.contestants import contestants
 from derain.export.runtime import Derainer
 from derain.files import read_scan
-from derain.filters import filter_from, read_parameters
+from derain.files.labels import read_labels
+from derain.filters import FilterDerainer, filter_from, read_parameters
 
 
 @pytest.fixture
@@ -39,6 +40,49 @@ def test_run_takes_what_tune_wrote(run_derain, data: list[str | Path], tmp_path:
     scans = tmp_path / "velodyne"
     cleaned = run_derain("run", "dsor", scans, "--out", tmp_path / "o", "--parameters", best)
     assert cleaned.code == 0
+
+
+def test_run_and_bench_keep_to_the_candidates_that_tune_fitted(
+    run_derain, data: list[str | Path], tmp_path: Path
+) -> None:
+    best = tmp_path / "best.yaml"
+    options = ["--trials", "3", "--candidates", "0.9", "--out", best]
+    outcome = run_derain("tune", "dror", *data, *options)
+    assert outcome.code == 0, outcome.err
+    method, parameters = read_parameters(best)
+    candidates = parameters.pop("candidates")
+    assert f"candidates: {candidates}" in outcome.out.splitlines()
+    scans = [read_scan(path) for path in sorted((tmp_path / "velodyne").iterdir())]
+    drops = [candidates.among(scan)[270:].mean() for scan in scans]
+    assert np.mean(drops) >= 0.9
+    assert run_derain("run", best, tmp_path / "velodyne", "--out", tmp_path / "o").code == 0
+    unbounded = FilterDerainer(filter_from(method, parameters))
+    called = []
+    for number, scan in enumerate(scans):
+        expected = unbounded(scan) & candidates.among(scan)
+        np.testing.assert_array_equal(read_labels(tmp_path / f"o/{number}.label", 300), expected)
+        called.append(expected)
+    rain = np.tile(np.arange(300) >= 270, 3)
+    iou = np.count_nonzero(np.concatenate(called) & rain) / np.count_nonzero(
+        np.concatenate(called) | rain
+    )
+    assert f"dror: IoU {iou:.4f} " in outcome.out
+    benched = run_derain(
+        *("bench", *data, "--part", "validation", "--methods", best, "--out", tmp_path / "bench"),
+        *("--repeats", "1"),
+    )
+    assert benched.code == 0, benched.err
+    assert f" {iou:.3f} |" in benched.out
+
+
+def test_a_model_has_candidates_of_its_own(
+    run_derain, data: list[str | Path], tmp_path: Path, onnx_model: Path
+) -> None:
+    outcome = run_derain("tune", onnx_model, *data, "--candidates", "--out", tmp_path / "b.yaml")
+    assert outcome.code == 2
+    assert outcome.err.strip() == (
+        "derain: --candidates: a model has its own. Give it to `derain export`."
+    )
 
 
 def test_the_threshold_of_a_model_is_tuned(

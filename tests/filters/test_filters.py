@@ -23,6 +23,7 @@ from derain.filters import (
 )
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
+from derain.views.candidates import Bound, Candidates
 
 HARD_CASES = dict(hard_cases(largest=5000))
 every_filter = pytest.mark.parametrize("name", FILTERS)
@@ -63,6 +64,24 @@ def test_copies_of_points_change_nothing_and_share_their_verdict(name: str) -> N
     points = scene()
     rain = derainer(points)
     np.testing.assert_array_equal(derainer(np.repeat(points, 3, axis=0)), np.repeat(rain, 3))
+
+
+@every_filter
+def test_candidates_are_judged_as_without_bounds_and_nothing_else_is_rain(name: str) -> None:
+    filter_ = filter_from(name, MIXED[name])
+    candidates = Candidates((Bound("range", most=30.0), Bound("z", least=-1.0)))
+    points = scene()
+    # Copies of one position share the verdict of the first, whatever they measured.
+    scan = Scan.of(np.concatenate([points, points[::7] * np.float32([1, 1, 1, 3])]))
+    rain, of_candidates = (
+        FilterDerainer(filter_)(scan),
+        FilterDerainer(filter_, 0, candidates)(scan),
+    )
+    among = candidates.among(scan)
+    np.testing.assert_array_equal(of_candidates, rain & among)
+    assert 0 < of_candidates.sum() < rain.sum()
+    for hard in HARD_CASES.values():
+        assert not FilterDerainer(filter_, 0, candidates)(hard)[~candidates.among(hard)].any()
 
 
 @every_filter

@@ -244,6 +244,44 @@ def test_a_checkpoint_of_a_run_is_a_model(
     assert_same(copy, model)
 
 
+def test_a_network_of_candidates_learns_from_them_and_judges_them_alone(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+) -> None:
+    data, trainer = scenes(batch_size=2), make_trainer(epochs=2)
+    model = OutDet(candidates=0.9)
+    trainer.fit(model, data)
+    candidates = model.spec.candidates
+    assert candidates is not None
+    assert {bound.channel for bound in candidates.bounds} <= {"range", "z", "intensity"}
+    shares = [1 - candidates.rain_share, candidates.rain_share]
+    assert torch.equal(model.class_weight, class_weights(shares))
+    (batch,) = data.val_dataloader()
+    scan = data.read(data.frames("validation")[0])
+    among = candidates.among(scan)
+    assert 30 < batch.cells[0] == among.sum() < 300
+    assert batch.target.sum() == (scan.label[among] == RAIN).sum()
+    (probability,) = trainer.predict(model, data)[0]
+    assert (probability[among] > 0).all()
+    assert (probability[~among] == 0).all()
+    (scores,) = trainer.test(model, data, verbose=False)
+    rain = scan.label == RAIN
+    assert scores["test/iou"] == pytest.approx(iou(probability > model.spec.threshold, rain))
+    trainer.save_checkpoint(tmp_path / "run.ckpt")
+    assert load_model(tmp_path / "run.ckpt").spec == model.spec
+
+
+def test_rain_that_is_everywhere_has_no_candidates(
+    make_trainer: MakeTrainer, scenes: Callable[..., Folder], tmp_path: Path
+) -> None:
+    data = scenes()
+    for number in range(4):
+        anywhere = np.random.default_rng(number).random(300) < 0.3
+        write_labels(tmp_path / f"{number}.label", RAIN * anywhere)
+    model = OutDet(candidates=0.999)
+    make_trainer(epochs=1).fit(model, data)
+    assert model.spec.candidates is None
+
+
 def test_clean_data_teach_a_network_of_labels_nothing(
     make_trainer: MakeTrainer, tmp_path: Path
 ) -> None:
