@@ -69,7 +69,7 @@ def test_copies_of_points_change_nothing_and_share_their_verdict(name: str) -> N
 @every_filter
 def test_candidates_are_judged_as_without_bounds_and_nothing_else_is_rain(name: str) -> None:
     filter_ = filter_from(name, MIXED[name])
-    candidates = Candidates((Bound("range", most=30.0), Bound("z", least=-1.0)))
+    candidates = Candidates((Bound("range", most=15.0), Bound("z", least=-1.0)))
     points = scene()
     # Copies of one position share the verdict of the first, whatever they measured.
     scan = Scan.of(np.concatenate([points, points[::7] * np.float32([1, 1, 1, 3])]))
