@@ -216,7 +216,7 @@ class SalsaNextLiteNetwork(nn.Module):
 
 @NETWORKS.add("salsanext_lite")
 class SalsaNextLite(SalsaNextModule):
-    """SalsaNext that folds, trained as SalsaNext is; arguments are those of its base class.
+    """The variant of SalsaNext that folds, trained as SalsaNext is.
 
     Example:
         >>> model = SalsaNextLite(grid="wads", width=16)

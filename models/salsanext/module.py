@@ -21,7 +21,7 @@ from derain.models.salsanext.training import SalsaNextModule
 
 @NETWORKS.add("salsanext")
 class SalsaNext(SalsaNextModule, Published):
-    """SalsaNext as published, trained on rain; its arguments are those of its base class.
+    """SalsaNext as published, trained on rain.
 
     Example:
         >>> model = SalsaNext(grid="rehearse3d", width=8)
