@@ -30,6 +30,8 @@ from derain.models.outdet import OutDet as OutDet
 from derain.models.outdet import OutDetNetwork as OutDetNetwork
 from derain.models.salsanext import SalsaNext as SalsaNext
 from derain.models.salsanext import SalsaNextNetwork as SalsaNextNetwork
+from derain.models.salsanext_lite import SalsaNextLite as SalsaNextLite
+from derain.models.salsanext_lite import SalsaNextLiteNetwork as SalsaNextLiteNetwork
 from derain.scan import Scan as Scan
 from derain.sources.folders import named_frames as named_frames
 from derain.sources.source import Frames as Frames

@@ -57,7 +57,7 @@ def export(model: DerainingModule, path: Path, calibration: Collection[Scan] = (
         proto = _traced(model, model.spec)
         flushed = flush(proto)
         if calibration:
-            proto = quantised(proto, model.spec.make_view(), calibration)
+            proto = quantised(proto, model.spec.make_view(), calibration, model.INTEGER_OPERATORS)
         _describe(proto, model.spec, {})
         onnx.save(proto, temporary)
         proof = _proof(model, temporary, calibration)

@@ -62,8 +62,13 @@ class CalibrationReader(CalibrationDataReader):  # type: ignore[misc]
         return None if view is None else view.inputs()
 
 
-def quantised(proto: onnx.ModelProto, view: View, scans: Iterable[Scan]) -> onnx.ModelProto:
-    """The same model with convolutions that compute in eight bits.
+def quantised(
+    proto: onnx.ModelProto,
+    view: View,
+    scans: Iterable[Scan],
+    operators: Sequence[str] = ("Conv",),
+) -> onnx.ModelProto:
+    """The same model with convolutions, and other operators, that compute in eight bits.
 
     Weights are int8 with a scale per output channel, activations uint8, as the integer dot products
     of AVX-512 VNNI take them. The normalisation of the input, which spans kilometres and
@@ -73,6 +78,7 @@ def quantised(proto: onnx.ModelProto, view: View, scans: Iterable[Scan]) -> onnx
         proto: The model in float32.
         view: The network's view.
         scans: Scans whose activations set the scales.
+        operators: Names of the operators, in ONNX, that compute in eight bits.
 
     Raises:
         InputError: A model without convolutions, such as 3D-OutDet: nothing else is
@@ -89,7 +95,7 @@ def quantised(proto: onnx.ModelProto, view: View, scans: Iterable[Scan]) -> onnx
             path,
             CalibrationReader(view, scans),
             quant_format=QuantFormat.QDQ,
-            op_types_to_quantize=["Conv"],
+            op_types_to_quantize=list(operators),
             per_channel=True,
             activation_type=QuantType.QUInt8,
             weight_type=QuantType.QInt8,

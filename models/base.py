@@ -39,6 +39,7 @@ class DerainingModule(MeasuredModule):
         NAME: Name of the network in a Spec and on the command line; the decorator sets it.
         VIEW: Kind of the view that it sees a scan through.
         AMPLIFIES: How many times more than other networks' its logits amplify rounding.
+        INTEGER_OPERATORS: What computes in eight bits in a model that is exported so; ONNX names.
         channels: Names of its input channels, as :meth:`Scan.channel` takes them.
         network: The network itself.
         card: Data card of the data it is trained or tested on, once that is agreed with them.
@@ -50,6 +51,7 @@ class DerainingModule(MeasuredModule):
     NAME: ClassVar[str]
     VIEW: ClassVar[type[View]]
     AMPLIFIES: ClassVar[float] = 1.0
+    INTEGER_OPERATORS: ClassVar[tuple[str, ...]] = ("Conv",)
     network: nn.Module
     mean: Tensor
     std: Tensor

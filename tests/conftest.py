@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from derain.models.base import DerainingModule
     from derain.models.lisnownet import LiSnowNet
     from derain.models.outdet import OutDet
-    from derain.models.salsanext import SalsaNext
+    from derain.models.salsanext import SalsaNextModule
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
@@ -154,16 +154,31 @@ def small_grid() -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
-def random_salsanext(small_grid: dict[str, Any]) -> "SalsaNext":
+def random_salsanext(small_grid: dict[str, Any]) -> "SalsaNextModule":
     """A narrow SalsaNext of random weights; it calls half of a scene rain."""
+    from derain.models.salsanext import SalsaNext
+
+    return _random_segmenter(SalsaNext, small_grid)
+
+
+@pytest.fixture(scope="session")
+def random_salsanext_lite(small_grid: dict[str, Any]) -> "SalsaNextModule":
+    """The same of the variant that folds."""
+    from derain.models.salsanext_lite import SalsaNextLite
+
+    return _random_segmenter(SalsaNextLite, small_grid)
+
+
+def _random_segmenter(
+    model_class: "type[SalsaNextModule]", grid: dict[str, Any]
+) -> "SalsaNextModule":
     import torch
 
     from derain.cards.card import load_card
-    from derain.models.salsanext import SalsaNext
 
     with torch.random.fork_rng(), torch.no_grad():
         torch.manual_seed(0)
-        model = SalsaNext(grid=small_grid, width=4).eval()
+        model = model_class(grid=grid, width=4).eval()
         model.adopt(model.spec_for(load_card("wads")))
         _randomise(model.network, gain=1.4)
         view = model.spec.make_view()(Scan.of(scene()))
@@ -202,9 +217,9 @@ def _randomise(network: "nn.Module", gain: float) -> None:
             tensor.uniform_(centre - 0.2, centre + 0.2)
 
 
-@pytest.fixture(scope="session", params=["salsanext", "lisnownet"])
+@pytest.fixture(scope="session", params=["salsanext", "salsanext_lite", "lisnownet"])
 def image_model(request: pytest.FixtureRequest) -> "DerainingModule":
-    """Each of the two networks on range images."""
+    """Each of the networks on range images."""
     return request.getfixturevalue(f"random_{request.param}")
 
 

@@ -94,6 +94,13 @@ def of_image_network(model: DerainingModule, prefix: str = "") -> dict[str, Tens
     return {f"{prefix}{key(name)}": tensor for name, tensor in model.network.state_dict().items()}
 
 
+# Weights were published of these.
+published_image_models = pytest.mark.parametrize(
+    "image_model", ["salsanext", "lisnownet"], indirect=True
+)
+
+
+@published_image_models
 @pytest.mark.parametrize(("prefix", "grid"), [("", "wads"), ("module.", "semantickitti")])
 def test_weights_of_networks_on_range_images_come_with_their_grid(
     run_derain, image_model: DerainingModule, tmp_path: Path, prefix: str, grid: str
@@ -131,6 +138,7 @@ def training_checkpoint(model: DerainingModule) -> dict[str, object]:
     }
 
 
+@published_image_models
 def test_a_whole_training_checkpoint_of_an_image_network_will_do(
     run_derain, image_model: DerainingModule, tmp_path: Path
 ) -> None:
@@ -158,6 +166,7 @@ def assert_imported(
         assert torch.equal(imported[name], tensor), name
 
 
+@published_image_models
 @pytest.mark.parametrize(
     ("options", "reason"),
     [

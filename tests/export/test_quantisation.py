@@ -178,7 +178,9 @@ def test_one_calibration_scan_is_held_at_a_time(
         held.add(scan)
         return scan
 
-    def gone_through(proto: onnx.ModelProto, view: View, scans: Iterable[Scan]) -> onnx.ModelProto:
+    def gone_through(
+        proto: onnx.ModelProto, view: View, scans: Iterable[Scan], *_: object
+    ) -> onnx.ModelProto:
         reader = CalibrationReader(view, scans)
         while reader.get_next() is not None:
             pass

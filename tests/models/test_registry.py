@@ -9,18 +9,28 @@ from derain.models.outdet import OutDet
 from derain.models.published import Published
 from derain.models.registry import NETWORKS
 from derain.models.salsanext import SalsaNext
+from derain.models.salsanext_lite import SalsaNextLite
 
 
 def test_derain_has_these_networks_and_each_knows_its_name() -> None:
-    assert dict(NETWORKS) == {"lisnownet": LiSnowNet, "outdet": OutDet, "salsanext": SalsaNext}
+    assert dict(NETWORKS) == {
+        "lisnownet": LiSnowNet,
+        "outdet": OutDet,
+        "salsanext": SalsaNext,
+        "salsanext_lite": SalsaNextLite,
+    }
     assert {name: network.NAME for name, network in NETWORKS.items()} == {
         name: name for name in NETWORKS
     }
 
 
 @pytest.mark.parametrize("network", [LiSnowNet, OutDet, SalsaNext])
-def test_of_each_of_them_weights_were_published(network: type[DerainingModule]) -> None:
+def test_of_these_weights_were_published(network: type[DerainingModule]) -> None:
     assert issubclass(network, Published)
+
+
+def test_of_our_own_variant_none_were() -> None:
+    assert not issubclass(SalsaNextLite, Published)
 
 
 def test_a_network_that_was_given_no_name_is_told_how_to_get_one() -> None:

@@ -77,13 +77,13 @@ SMALL_GRID = ["--model.grid", "{rows: 18, columns: 60, inclination: [-30, 20]}"]
 # What makes a network on range images quick; the simulated sensor's fitted grid is small itself.
 QUICK_MODELS = {
     f"{network}_{data}.yaml": NARROW + (SMALL_GRID if data != "simulated" else [])
-    for network in ("salsanext", "lisnownet")
+    for network in ("salsanext", "salsanext_lite", "lisnownet")
     for data in DATA_SETS
 }
 
 PREPARATIONS = {
     f"{network}_{data}.yaml": prepare
-    for network in ("lisnownet", "outdet", "salsanext")
+    for network in ("lisnownet", "outdet", "salsanext_lite", "salsanext")
     for data, prepare in DATA_SETS.items()
 }
 

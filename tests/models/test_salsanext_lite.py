@@ -1,0 +1,171 @@
+"""The variant of SalsaNext that folds: it computes on images of any size, and really folds."""
+
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import onnx
+import onnxruntime
+import pytest
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import cross_entropy
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.export import onnx_file
+from derain.export.onnx_file import export
+from derain.models.layers.batch_norm import PixelBatchNorm
+from derain.models.salsanext_lite import SalsaNextLite, SalsaNextLiteNetwork
+from derain.scan import Scan
+
+from .conftest import randomise
+
+
+def small(channels: int = 5, width: int = 4, classes: int = 2) -> SalsaNextLiteNetwork:
+    """A network with weights and statistics that leave no BatchNorm without effect."""
+    network = SalsaNextLiteNetwork(channels, width, classes)
+    randomise(network, seed=0)
+    return network.eval()
+
+
+def image(height: int, width: int, channels: int = 5, scans: int = 1) -> Tensor:
+    generator = torch.Generator().manual_seed(height * 1000 + width)
+    return torch.randn(scans, channels, height, width, generator=generator)
+
+
+def loss_of(network: nn.Module, batch: Tensor) -> Tensor:
+    return cross_entropy(network(batch).float(), (batch[:, 0] > 0).long())
+
+
+@pytest.mark.parametrize(
+    ("height", "width"), [(1, 1), (2, 17), (15, 16), (20, 37), (32, 48), (64, 130)]
+)
+@torch.no_grad()
+def test_an_image_of_any_size_counts_as_continued_by_empty_pixels(height: int, width: int) -> None:
+    network, seen = small(), image(height, width)
+    padded = torch.zeros(1, 5, -(-height // 16) * 16, -(-width // 16) * 16)
+    padded[..., :height, :width] = seen
+    logits = network(seen)
+    assert logits.shape == (1, 2, height, width)
+    torch.testing.assert_close(logits, network(padded)[..., :height, :width], rtol=0, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("channels", "width", "classes"), [(5, 16, 2), (1, 1, 2), (7, 3, 20), (4, 8, 1)]
+)
+@torch.no_grad()
+def test_every_width_and_number_of_channels_will_do(
+    channels: int, width: int, classes: int
+) -> None:
+    network = small(channels, width, classes)
+    assert (network.channels, network.width, network.classes) == (channels, width, classes)
+    assert network(image(16, 32, channels)).shape == (1, classes, 16, 32)
+
+
+@pytest.mark.parametrize("width", [-2, 0])
+def test_a_width_of_nothing_is_refused(width: int) -> None:
+    with pytest.raises(InputError, match=f"width: {width} is not positive"):
+        SalsaNextLiteNetwork(width=width)
+
+
+@pytest.mark.parametrize("training", [False, True], ids=["evaluation", "training"])
+@pytest.mark.parametrize("value", [0.0, 1.0, -1.0, 1e4])
+def test_a_constant_image_gives_finite_logits(value: float, training: bool) -> None:
+    network = small().train(training)
+    assert network(torch.full((1, 5, 32, 32), value)).isfinite().all()
+
+
+def test_the_gradient_reaches_every_parameter() -> None:
+    # At the bottleneck 3×3 pixels: in fewer, some taps of its kernels only ever see the padding.
+    network = small(width=8).train()
+    loss_of(network, image(48, 48, scans=2)).backward()
+    for name, parameter in network.named_parameters():
+        assert parameter.grad is not None
+        assert parameter.grad.isfinite().all(), name
+        assert parameter.grad.any(), name
+
+
+def test_features_are_dropped_everywhere_but_at_full_resolution() -> None:
+    network = SalsaNextLiteNetwork(width=4, dropout=0.3).train()
+    dropped: list[tuple[int, float]] = []
+
+    def record(layer: nn.Dropout2d, inputs: tuple[Tensor], _: Tensor) -> None:
+        dropped.append((inputs[0].shape[-1], layer.p))
+
+    for layer in network.modules():
+        if isinstance(layer, nn.Dropout2d):
+            layer.register_forward_hook(record)
+    network(image(64, 64))
+    # Once on the way down; on the way up before the layers and after them; once at the bottom.
+    expected = {(32, 0.3): 3, (16, 0.3): 3, (8, 0.3): 3, (4, 0.3): 1}
+    assert Counter(drop for drop in dropped if drop[1] > 0) == expected
+    assert {size for size, rate in dropped if rate == 0} == {64}
+
+
+@torch.no_grad()
+def test_folded_it_computes_the_same_without_a_batch_norm() -> None:
+    network, seen = small(width=8), image(32, 64)
+    kept = {name: tensor.clone() for name, tensor in network.state_dict().items()}
+    folded = network.folded()
+    assert not any(isinstance(layer, PixelBatchNorm) for layer in folded.modules())
+    torch.testing.assert_close(folded(seen), network(seen), rtol=1e-4, atol=1e-5)
+    # The one that goes on being trained is left as it was.
+    assert network.state_dict().keys() == kept.keys()
+    assert all(torch.equal(network.state_dict()[name], kept[name]) for name in kept)
+
+
+def operators(path: Path) -> Counter[str]:
+    return Counter(node.op_type for node in onnx.load(path).graph.node)
+
+
+def optimised(path: Path, folder: Path) -> Counter[str]:
+    """Operators that onnxruntime runs, but for what it does for one kind of processor alone."""
+    options = onnxruntime.SessionOptions()
+    options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_EXTENDED
+    options.optimized_model_filepath = str(folder / "optimised.onnx")
+    options.log_severity_level = 3
+    onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+    return operators(folder / "optimised.onnx")
+
+
+@pytest.fixture(scope="module")
+def exported(
+    random_salsanext_lite: SalsaNextLite, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[bool], Path]:
+    """Exports the network in float32 or in eight bits, proved on one scene."""
+    folder = tmp_path_factory.mktemp("salsanext_lite")
+
+    def make(integer: bool) -> Path:
+        path = folder / f"{integer}.onnx"
+        if not path.exists():
+            scenes = [Scan.of(scene(3000, seed), f"scene {seed}") for seed in range(2)]
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(onnx_file, "hard_cases", lambda: [("a scene", scenes[0])])
+                assert export(random_salsanext_lite, path, scenes if integer else ()).holds
+        return path
+
+    return make
+
+
+def test_the_exported_graph_has_its_convolutions_and_no_batch_norm(
+    random_salsanext_lite: SalsaNextLite, exported: Callable[[bool], Path], tmp_path: Path
+) -> None:
+    found = operators(exported(False))
+    layers = random_salsanext_lite.network.modules()
+    assert found["Conv"] == sum(isinstance(layer, nn.Conv2d) for layer in layers)
+    assert not found.keys() & {"BatchNormalization", "DepthToSpace"}
+    # Every ReLU is part of the convolution before it, or of the sum that it ends in.
+    run = optimised(exported(False), tmp_path)
+    assert run["Conv"] + run["FusedConv"] == found["Conv"]
+    assert run["Relu"] <= found["Add"]
+
+
+def test_in_eight_bits_nothing_leaves_the_integers_between_image_and_scores(
+    random_salsanext_lite: SalsaNextLite, exported: Callable[[bool], Path], tmp_path: Path
+) -> None:
+    run = optimised(exported(True), tmp_path)
+    layers = random_salsanext_lite.network.modules()
+    assert run["QLinearConv"] == sum(isinstance(layer, nn.Conv2d) for layer in layers)
+    assert run["QuantizeLinear"] == run["DequantizeLinear"] == 1
+    assert not run.keys() & {"Conv", "FusedConv", "Relu", "Add", "Concat"}
