@@ -79,6 +79,8 @@ class SalsaNextModule(SupervisedModule):
         published_loss: Train as published: empty pixels count as background, and the Lovász loss
             sees rain pixels only, so that it knows no false positive.
         threshold: A point is rain where its probability is greater.
+        candidates: Share of the training scans' rain that must lie within a few bounds (range,
+            height, intensity), outside which nothing is learnt from or called rain; None for none.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 
     Source: TiagoCortinhal/SalsaNext, salsanext.yml, trainer.py, warmupLR.py.
@@ -101,6 +103,7 @@ class SalsaNextModule(SupervisedModule):
         decay: float = 0.99,
         published_loss: bool = False,
         threshold: float = 0.5,
+        candidates: float | None = None,
         spec: dict[str, Any] | None = None,
     ) -> None:
         super().__init__(channels)
