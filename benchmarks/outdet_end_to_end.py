@@ -16,12 +16,13 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from labelled import read_labelled
 from numpy.typing import NDArray
 from published_outdet import PublishedPipeline
 from turns import milliseconds_in_turns
 
-from derain.cards.card import load_card
+from derain.cards.card import DataCard, load_card
+from derain.datamodules.base import Loading
+from derain.datamodules.labelled import labelled_scans
 from derain.evaluation.counts import Counts
 from derain.export.candidates import candidates_of_findings
 from derain.export.machine import versions
@@ -46,24 +47,27 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=6)
     parser.add_argument("--leaf-size", type=int, default=200, help="of the rival's KDTree")
     parser.add_argument("--candidates", type=Path, nargs="+", default=[], help="labelled scans")
+    parser.add_argument("--card", default="wads", help="data card of the labels")
     arguments = parser.parse_args()
 
     torch.set_num_threads(arguments.threads)
     points = np.fromfile(arguments.scan, np.float32).reshape(-1, 4)
-    weights, card = read_state_dict(arguments.weights), load_card("wads")
-    model = OutDet.from_published(weights, card)
+    weights, wads = read_state_dict(arguments.weights), load_card("wads")
+    card = load_card(arguments.card)
+    model = OutDet.from_published(weights, wads)
     methods: dict[str, Method] = {
-        "published": PublishedPipeline(weights, card.mean, card.std, arguments.leaf_size),
+        "published": PublishedPipeline(weights, wads.mean, wads.std, arguments.leaf_size),
         "derain": _deployed(model, arguments.threads),
     }
     if arguments.candidates:
-        scans = [read_labelled(path) for path in arguments.candidates]
-        fitted = candidates_of_findings(model, scans, card)
+        fitted = candidates_of_findings(model, _labelled(arguments.candidates, card), card)
         print(fitted)
         model.adopt(replace(model.spec, candidates=fitted.candidates))
         methods["candidates"] = _deployed(model, arguments.threads)
     _report_times(methods, points, arguments)
-    _report_masks(methods, points, arguments.scan)
+    _report_masks(methods, points)
+    if arguments.candidates:
+        _report_iou(methods, arguments.scan, card)
     print(versions())
 
 
@@ -86,7 +90,7 @@ def _report_times(
         print(f"{name:10} p10 {low:8.1f}  p50 {median:8.1f}  p90 {high:8.1f} ms {ratio:8.1f} times")
 
 
-def _report_masks(methods: dict[str, Method], points: NDArray[np.float32], path: Path) -> None:
+def _report_masks(methods: dict[str, Method], points: NDArray[np.float32]) -> None:
     masks = {name: method(points) for name, method in methods.items()}
     differ = int((masks["published"] != masks["derain"]).sum())
     print(f"masks of published and derain differ on {differ} points")
@@ -96,10 +100,18 @@ def _report_masks(methods: dict[str, Method], points: NDArray[np.float32], path:
         among = candidates.among(Scan.of(points))
         wrong = int((masks["candidates"] != (masks["derain"] & among)).sum())
         print(f"{among.mean():.1%} are candidates, on which the masks differ on {wrong} points")
-    if path.with_suffix(".label").is_file():
-        label = read_labelled(path).label
-        for name, mask in masks.items():
-            print(f"{name:10} IoU {Counts.of(mask, label == 110).iou:.4f}")
+
+
+def _report_iou(methods: dict[str, Method], path: Path, card: DataCard) -> None:
+    (scan,) = _labelled([path], card)
+    points, rain = np.column_stack([scan.xyz, scan.intensity]), card.rain_of(scan)
+    for name, method in methods.items():
+        print(f"{name:10} IoU {Counts.of(method(points), rain).iou:.4f}")
+
+
+def _labelled(paths: list[Path], card: DataCard) -> list[Scan]:
+    data = labelled_scans(paths, card, Loading())
+    return [data.read(frame) for frame in data.frames("train")]
 
 
 if __name__ == "__main__":
