@@ -81,3 +81,31 @@ def filled_values(
     for of_channel, name in zip(values, channels, strict=True):
         of_channel[np.isnan(of_channel)] = stand_in.get(name, 0.0)
     return values
+
+
+def channel_image(
+    scan: Scan,
+    winner: NDArray[np.int64],
+    channels: Sequence[str],
+    stand_in: Mapping[str, float],
+) -> NDArray[np.float32]:
+    """What the points in the pixels of an image measure, and a stand-in for what they lack.
+
+    Args:
+        scan: The scan.
+        winner: Row of the point in each pixel, one that is valid, int64 (M,); -1 in empty pixels.
+        channels: Names of C channels.
+        stand_in: What stands in for a value that is missing, by channel; 0 if not named.
+
+    Returns:
+        float32 (C, M), finite; 0 in empty pixels.
+    """
+    image = np.empty((len(channels), len(winner)), np.float32)
+    for of_channel, name in zip(image, channels, strict=True):
+        column = scan.channel(name)
+        if column is None:
+            column = np.full(len(scan), np.nan, np.float32)
+        # The last value is what row -1 has, so that no pass over the empty pixels is needed.
+        of_channel[:] = np.append(column, np.float32(0))[winner]
+        of_channel[np.isnan(of_channel)] = stand_in.get(name, 0.0)
+    return image

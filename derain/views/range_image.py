@@ -1,7 +1,8 @@
 """The range view: a scan as the image that the sensor saw."""
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Self
 
@@ -12,10 +13,16 @@ from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.scan import Scan
 from derain.views.back_projection import BACK_PROJECTIONS, ProjectedPoints
-from derain.views.channels import filled_values
+from derain.views.candidates import Candidates
+from derain.views.channels import channel_image
 from derain.views.registry import VIEWS
 from derain.views.spherical_grid import SphericalGrid, grid_at
 from derain.views.view import IGNORED, BackProjection, SeenScan, View
+
+# What a pixel shows. Taken as one integer, what is nearer is less, and of equally near points the
+# lower row: the bits of ranges, none of which is negative, ascend as the ranges do.
+SHOWN_POINT = np.dtype([("row", "<i4"), ("range", "<f4")])
+NOTHING_SHOWN = np.array((-1, np.inf), SHOWN_POINT).view("<i8")[()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,18 +36,23 @@ class RangeImage(SeenScan):
         pixel: Pixel of each row of the scan, int64 (N,); -1 for invalid rows and for points
             outside the grid.
         winner: Row of the scan that each pixel shows, int64 (H · W,); -1 where nothing returned.
+        nearest: Range that each pixel shows, float32 (H, W), metres; infinite where nothing
+            returned.
         range: Range of each row of the scan, float32 (N,), metres.
         wraps: True where the last column is the neighbour of the first.
         way_back: Name of the back-projection, by which points that are not shown get a score.
+        candidate: Rows of the scan that may be rain, bool (N,); None where all may be.
     """
 
     image: NDArray[np.float32]
     valid: NDArray[np.bool_]
     pixel: NDArray[np.int64]
     winner: NDArray[np.int64]
+    nearest: NDArray[np.float32]
     range: NDArray[np.float32]
     wraps: bool
     way_back: str
+    candidate: NDArray[np.bool_] | None = None
 
     @property
     def size(self) -> int:
@@ -55,7 +67,7 @@ class RangeImage(SeenScan):
     @property
     def hidden(self) -> NDArray[np.bool_]:
         """True for points on the grid whose pixel shows a nearer return, bool (N,)."""
-        return self.judged & (self.range > self._nearest().take(self.pixel))
+        return self.judged & (self.range > self.nearest.ravel()[self.pixel])
 
     def inputs(self) -> dict[str, NDArray[Any]]:
         """The network's inputs, a batch of one: image (1, C, H, W) and valid (1, 1, H, W)."""
@@ -68,23 +80,26 @@ class RangeImage(SeenScan):
             rain: Truth for every row of the scan, bool (N,).
 
         Returns:
-            1 for rain, 0 for everything else, ``IGNORED`` where nothing returned, int64 (H · W,).
+            1 for rain, 0 for everything else, ``IGNORED`` where nothing returned that may be rain,
+            int64 (H · W,).
         """
         result = np.full(self.size, IGNORED)
-        shown = self.winner >= 0
-        result[shown] = rain[self.winner[shown]]
+        asked = np.flatnonzero(self._shows_candidate())
+        result[asked] = rain[self.winner[asked]]
         return result
 
     def back_projection(self) -> BackProjection:
-        """What gives points scores of pixels as ``way_back`` says, and 0 to rows off the grid."""
-        judged = np.flatnonzero(self.judged)
-        points = ProjectedPoints(
-            self.pixel[judged],
-            self.range[judged],
-            self._nearest().reshape(self.valid.shape),
-            self.wraps,
-        )
-        return partial(_to_rows, self.way_back, points, judged, len(self.pixel))
+        """What gives points scores of pixels as ``way_back`` says.
+
+        Rows off the grid, and rows that are no candidates, have 0; a pixel that shows what is no
+        candidate counts as scored 0, whatever the network says of it.
+        """
+        if self.candidate is None:
+            rows, asked = np.flatnonzero(self.judged), None
+        else:
+            rows, asked = np.flatnonzero(self.judged & self.candidate), self._shows_candidate()
+        points = ProjectedPoints(self.pixel[rows], self.range[rows], self.nearest, self.wraps)
+        return partial(_to_rows, self.way_back, points, rows, len(self.pixel), asked)
 
     @staticmethod
     def pack(seen: Sequence["RangeImage"]) -> dict[str, NDArray[Any]]:
@@ -94,23 +109,27 @@ class RangeImage(SeenScan):
             "valid": np.stack([one.valid[None] for one in seen]),
         }
 
-    def _nearest(self) -> NDArray[np.float32]:
-        """Range that each pixel shows, float32 (H · W,); infinite where nothing returned."""
-        nearest = np.full(self.size, np.inf, np.float32)
-        shown = self.winner >= 0
-        nearest[shown] = self.range[self.winner[shown]]
-        return nearest
+    def _shows_candidate(self) -> NDArray[np.bool_]:
+        """True for pixels that show what may be rain, bool (H · W,)."""
+        if self.candidate is None:
+            return self.winner >= 0
+        # The last value is what row -1 has: where nothing returned.
+        return np.append(self.candidate, False)[self.winner]
 
 
 def _to_rows(
     way_back: str,
     points: ProjectedPoints,
-    judged: NDArray[np.int64],
-    rows: int,
+    rows: NDArray[np.int64],
+    count: int,
+    asked: NDArray[np.bool_] | None,
     score: NDArray[np.float32],
 ) -> NDArray[np.float32]:
-    result = np.zeros(rows, np.float32)
-    result[judged] = BACK_PROJECTIONS[way_back](points, score)
+    """Scores of all rows of a scan, float32 (count,): of some from pixels, of the others 0."""
+    if asked is not None:
+        score = np.where(asked, score, np.float32(0))
+    result = np.zeros(count, np.float32)
+    result[rows] = BACK_PROJECTIONS[way_back](points, score)
     return result
 
 
@@ -128,6 +147,7 @@ class RangeView(View):
             ``nearest range``, ``copy`` or ``vote``. It is called so in options and in Specs, which
             users type and files hold.
         stand_in: What stands in for a value that a scan lacks, by channel; 0 if not named.
+        candidates: Which points are scored; None for all. The image shows the others all the same.
 
     Raises:
         InputError: An unknown back-projection.
@@ -137,6 +157,7 @@ class RangeView(View):
     channels: tuple[str, ...] = ("range", "x", "y", "z", "intensity")
     way_back: str = "nearest range"
     stand_in: Mapping[str, float] = field(default_factory=dict)
+    candidates: Candidates | None = None
 
     def __post_init__(self) -> None:
         if self.way_back not in BACK_PROJECTIONS:
@@ -172,37 +193,53 @@ class RangeView(View):
         """What it sees: the grid's right and left bound, degrees counter-clockwise from x."""
         return self.grid.azimuth
 
+    def judging(self, candidates: Candidates) -> Self:
+        """The same view, that gives scores to candidates alone."""
+        return replace(self, candidates=candidates)
+
     def __call__(self, scan: Scan) -> RangeImage:
         """Views a scan."""
-        grid, distance = self.grid, scan.range
-        valid = np.flatnonzero(scan.valid)
-        pixel = np.full(len(scan), -1)
-        # take is four times faster than indexing for rows of three numbers.
-        pixel[valid] = grid.pixel(scan.xyz.take(valid, axis=0))
-        winner = _winners(pixel, distance, grid.rows * grid.columns)
-        shown = np.flatnonzero(winner >= 0)
-        image = np.zeros((len(self.channels), len(winner)), np.float32)
-        image[:, shown] = filled_values(scan, winner[shown], self.channels, self.stand_in)
+        shape = self.grid.rows, self.grid.columns
+        pixel = self._pixel(scan)
+        shown = _shown(pixel, scan.range, math.prod(shape))
+        winner = shown["row"].astype(np.int64)
         return RangeImage(
-            image.reshape(len(self.channels), grid.rows, grid.columns),
-            (winner >= 0).reshape(grid.rows, grid.columns),
+            channel_image(scan, winner, self.channels, self.stand_in).reshape(-1, *shape),
+            (winner >= 0).reshape(shape),
             pixel,
             winner,
-            distance,
-            grid.is_full_circle,
+            np.ascontiguousarray(shown["range"]).reshape(shape),
+            scan.range,
+            self.grid.is_full_circle,
             self.way_back,
+            None if self.candidates is None else self.candidates.among(scan),
         )
 
+    def _pixel(self, scan: Scan) -> NDArray[np.int64]:
+        """Pixel of each row, int64 (N,); -1 for invalid rows and outside the grid."""
+        valid = scan.valid
+        if valid.all():
+            return self.grid.pixel(scan.xyz)
+        pixel = np.full(len(scan), -1)
+        # take is four times faster than indexing for rows of three numbers.
+        pixel[valid] = self.grid.pixel(scan.xyz.take(np.flatnonzero(valid), axis=0))
+        return pixel
 
-def _winners(
-    pixel: NDArray[np.int64], distance: NDArray[np.float32], size: int
-) -> NDArray[np.int64]:
-    """Row of the nearest point in each pixel, the lowest of equally near ones, int64 (size,)."""
-    rows = np.flatnonzero(pixel >= 0)
-    nearest = np.full(size, np.inf, np.float32)
-    np.minimum.at(nearest, pixel[rows], distance[rows])
-    rows = rows[distance[rows] == nearest[pixel[rows]]]
-    winner = np.full(size, -1)
-    # Where a pixel is written several times the last stays, which backwards is the lowest row.
-    winner[pixel[rows[::-1]]] = rows[::-1]
-    return winner
+
+def _shown(pixel: NDArray[np.int64], distance: NDArray[np.float32], size: int) -> NDArray[np.void]:
+    """What each pixel shows: the nearest point, the lowest row of equally near ones.
+
+    Args:
+        pixel: Pixel of each point, int64 (N,); -1 for those in none.
+        distance: Its range, float32 (N,), metres.
+        size: M, the number of pixels.
+
+    Returns:
+        SHOWN_POINT (M,); NOTHING_SHOWN in empty pixels.
+    """
+    points = np.empty(len(pixel), SHOWN_POINT)
+    points["row"], points["range"] = np.arange(len(pixel)), distance
+    # One pixel more: the last takes the points that are in none, whose pixel is -1.
+    shown = np.full(size + 1, NOTHING_SHOWN, "<i8")
+    np.minimum.at(shown, pixel, points.view("<i8"))
+    return shown[:-1].view(SHOWN_POINT)

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
+from derain.views.direction_table import OUTSIDE, UNSURE_BELOW, DirectionTable
 from derain.views.directions import directions
 from derain.views.published_grids import PUBLISHED_GRIDS
 
@@ -137,25 +139,38 @@ class SphericalGrid:
         Source: Milioto et al. 2019, RangeNet++, eq. 1; github.com/TiagoCortinhal/SalsaNext,
             train/common/laserscan.py.
         """
-        azimuth, inclination = directions(xyz)
-        row, in_height = self._row(inclination)
-        column, in_width = self._column(azimuth)
-        return np.where(in_height & in_width, row * self.columns + column, -1)
+        pixel = self.table(xyz)
+        unsure = np.flatnonzero(pixel < UNSURE_BELOW)
+        azimuth, inclination = directions(xyz.take(unsure, axis=0))
+        pixel[unsure] = self._first_pixel(inclination) + self._column(azimuth)
+        return np.maximum(pixel, -1, out=pixel)
 
-    def _row(self, inclination: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Row, int64 (N,), and whether it is one of the grid's."""
+    def _first_pixel(self, inclination: NDArray[np.float64]) -> NDArray[np.int64]:
+        """First pixel of the row, int64 (N,); OUTSIDE where it is none of the grid's."""
         ascending = np.array(self.edges[::-1])
         row = self.rows - np.searchsorted(ascending, inclination, side="left")
         inside = (inclination >= ascending[0]) & (inclination <= ascending[-1])
-        return np.minimum(row, self.rows - 1), inside
+        return np.where(inside, np.minimum(row, self.rows - 1) * self.columns, OUTSIDE)
 
-    def _column(self, azimuth: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Column, int64 (N,), and whether it is one of the grid's."""
+    def _column(self, azimuth: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Column, int64 (N,); OUTSIDE where it is none of the grid's."""
         right, left = self.azimuth
         from_left = (left - azimuth) % FULL_CIRCLE
         # Multiplied before it is divided: that is exact for the usual bounds and round azimuths.
         column = (from_left * self.columns / (left - right)).astype(np.int64)
-        return np.minimum(column, self.columns - 1), from_left <= left - right
+        inside = from_left <= left - right
+        return np.where(inside, np.minimum(column, self.columns - 1), OUTSIDE)
+
+    @cached_property
+    def table(self) -> DirectionTable:
+        """What finds the pixels of nearly all points without trigonometry."""
+        right, left = self.azimuth
+        return DirectionTable(
+            np.array(self.edges),
+            self._first_pixel,
+            np.linspace(left, right, self.columns + 1),
+            self._column,
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """The grid as JSON-able primitives, which :func:`grid_of` reads back."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from derain.views.back_projection import (
     BACK_PROJECTIONS,
     CHUNK,
+    PixelsToPoints,
     ProjectedPoints,
     copy,
     nearest_range,
@@ -163,16 +164,17 @@ def test_a_tied_vote_is_not_rain_and_a_lone_return_decides_for_itself() -> None:
     assert vote(far, np.array([1, 0, 0, 0, 0, 0, 0, 0], np.float32)).tolist() == [1, 0]
 
 
-def test_the_vote_does_not_depend_on_how_many_vote_at_a_time(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("way_back", [nearest_range, vote])
+def test_answers_do_not_depend_on_how_many_points_look_around_at_a_time(
+    way_back: PixelsToPoints, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rng = np.random.default_rng(1)
     points = project(rng.integers(0, 600, 900), rng.uniform(1, 9, 900), (20, 30), True)
     score = rng.random(600, np.float32)
     assert CHUNK > 900
-    whole = vote(points, score)
+    whole = way_back(points, score)
     monkeypatch.setattr("derain.views.back_projection.CHUNK", 7)
-    np.testing.assert_array_equal(vote(points, score), whole)
+    np.testing.assert_array_equal(way_back(points, score), whole)
 
 
 def test_away_from_the_borders_the_vote_is_the_published_one() -> None:

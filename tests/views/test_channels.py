@@ -11,6 +11,7 @@ from derain.evaluation.hard_cases import hard_cases
 from derain.scan import Scan
 from derain.views.channels import (
     USUAL_CHANNELS,
+    channel_image,
     channel_values,
     extra_channels,
     filled_values,
@@ -77,3 +78,21 @@ def test_columns_are_kept_by_name_and_all_others_left_behind() -> None:
         np.testing.assert_equal(kept.channel(name), scan.channel(name))
     assert {column.dtype for column in kept.fields.values()} == {np.dtype(np.float32)}
     assert with_columns(scan, ()).fields == {}
+
+
+def test_an_image_holds_the_values_of_its_winners_and_zero_where_there_is_none() -> None:
+    columns = {"doppler": np.array([1.0, np.nan, 3.0])}
+    scan = Scan(np.arange(9, dtype=np.float32).reshape(3, 3), fields=columns)
+    winner = np.array([2, -1, 1, 0, 2, -1])
+    image = channel_image(scan, winner, ["y", "doppler", "rcs"], {"doppler": -0.5, "rcs": 4.0})
+    assert image.dtype == np.float32
+    assert image.tolist() == [[7, 0, 4, 1, 7, 0], [3, 0, -0.5, 1, 3, 0], [4, 0, 4, 4, 4, 0]]
+
+
+@pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
+def test_an_image_of_all_valid_points_holds_what_they_measure(scan: Scan) -> None:
+    winner = np.where(scan.valid, np.arange(len(scan)), -1)
+    image = channel_image(scan, winner, EVERYTHING, {"intensity": 9.0})
+    filled = filled_values(scan, np.flatnonzero(scan.valid), EVERYTHING, {"intensity": 9.0})
+    np.testing.assert_array_equal(image[:, scan.valid], filled)
+    assert not image[:, ~scan.valid].any()

@@ -15,7 +15,8 @@ from derain.evaluation.hard_cases import hard_cases
 from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.files.labels import label_beside, read_labels, semantic
 from derain.scan import Scan
-from derain.views.back_projection import BACK_PROJECTIONS
+from derain.views.back_projection import BACK_PROJECTIONS, REACH
+from derain.views.candidates import Bound, Candidates
 from derain.views.grid_fit import fit_grid
 from derain.views.range_image import RangeImage, RangeView
 from derain.views.spherical_grid import SphericalGrid, grid_of
@@ -60,6 +61,8 @@ def test_every_pixel_shows_the_nearest_of_its_points(
         held = np.zeros(5) if row < 0 else [scan.range[row], *points[row]]
         np.testing.assert_array_equal(content, np.float32(held))
     np.testing.assert_array_equal(image.valid.ravel(), np.array(winner) >= 0)
+    nearest = [np.inf if row < 0 else scan.range[row] for row in winner]
+    np.testing.assert_array_equal(image.nearest.ravel(), np.float32(nearest))
 
 
 @settings(deadline=None)
@@ -135,6 +138,69 @@ def test_invalid_rows_and_points_outside_get_zero() -> None:
     scan = Scan.of([[3, 0, 0, 1], [np.nan, 0, 0, 1], [-3, 0, 0, 1], [0, 0, 3, 1]])
     image = RangeView(FRONT)(scan)
     assert image.back(np.ones(image.size, np.float32)).tolist() == [1, 0, 0, 0]
+
+
+BOUNDS = st.builds(
+    Candidates,
+    st.tuples(
+        st.builds(Bound, st.just("intensity"), least=st.sampled_from([-1.0, 0.0, 1.0])),
+        st.builds(Bound, st.just("range"), most=st.sampled_from([2.0, 3.5, 9.0])),
+    ),
+)
+
+
+@pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
+@pytest.mark.parametrize("grid", [FULL, FRONT], ids=["full circle", "front"])
+@settings(deadline=None)
+@given(points=clouds, candidates=BOUNDS, seed=st.integers(0, 2**32 - 1))
+def test_candidates_are_given_scores_of_candidates_alone(
+    grid: SphericalGrid,
+    way_back: str,
+    points: NDArray[np.float32],
+    candidates: Candidates,
+    seed: int,
+) -> None:
+    rng, scan = np.random.default_rng(seed), Scan.of(points)
+    score = rng.random(grid.rows * grid.columns, np.float32)
+    view = RangeView(grid, way_back=way_back)
+    whole, image = view(scan), view.judging(candidates)(scan)
+    candidate = candidates.among(scan)
+    asked = np.array([row >= 0 and candidate[row] for row in whole.winner])
+
+    # The network sees the same, and the same rows are judged.
+    for name, array in whole.inputs().items():
+        np.testing.assert_array_equal(image.inputs()[name], array)
+    np.testing.assert_array_equal(image.judged, whole.judged)
+    rain = rng.random(len(scan)) < 0.5
+    np.testing.assert_array_equal(image.target(rain), np.where(asked, whole.target(rain), IGNORED))
+
+    back = image.back(score)
+    assert not back[~(candidate & whole.judged)].any()
+    expected = whole.back(np.where(asked, score, np.float32(0)))
+    np.testing.assert_array_equal(back[candidate], expected[candidate])
+    # Where all pixels around show candidates, or nothing, the others change nothing.
+    among_candidates = candidate & whole.judged
+    for row in np.flatnonzero(among_candidates):
+        around = pixels_around(grid, int(whole.pixel[row]))
+        among_candidates[row] = (asked | (whole.winner < 0))[around].all()
+    np.testing.assert_array_equal(back[among_candidates], whole.back(score)[among_candidates])
+
+
+def pixels_around(grid: SphericalGrid, pixel: int) -> list[int]:
+    """The pixels of the window around a pixel."""
+    row, column = divmod(pixel, grid.columns)
+    rows = range(max(row - REACH, 0), min(row + REACH + 1, grid.rows))
+    columns = range(column - REACH, column + REACH + 1)
+    if not grid.is_full_circle:
+        columns = [number for number in columns if 0 <= number < grid.columns]
+    return [above * grid.columns + beside % grid.columns for above in rows for beside in columns]
+
+
+def test_a_view_judging_candidates_is_the_same_otherwise() -> None:
+    candidates = Candidates((Bound("range", most=10.0),))
+    view = RangeView(FRONT, ("z", "range"), "vote", {"z": 1.0})
+    assert view.judging(candidates) == replace(view, candidates=candidates)
+    assert view.judging(candidates).as_dict() == view.as_dict()
 
 
 def test_packing_keeps_every_scan_to_its_own_image() -> None:

@@ -1,0 +1,128 @@
+"""Pixels of a spherical grid by look-up: no trigonometry, and exact wherever there is an answer.
+
+Two numbers say where a direction points, for one division each: its *height*, which ascends with
+the inclination, and its *turn*, which ascends with the azimuth. Each is cut into many more bins
+than a grid has rows or columns, and a table says of each bin in which row or column it lies. Bins
+with a border in them are unsure; so are those so near to one that rounding may mistake the bin.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Bins of each table. A grid of 2048 columns leaves 32 of them to a column, one of which is unsure.
+BINS = 2**16
+
+# Bins nearer than this to a border are unsure, in bins. Height and turn are computed in float32,
+# from coordinates that may have been rounded to it: that moves them by less than 4 units of 2⁻²⁴
+# of their whole extent, which is 1/64 of a bin.
+BORDER_MARGIN = 1 / 16
+
+# What stands in a table besides numbers of pixels. Entries of both tables are added: the sum is
+# below UNSURE_BELOW where one is unsure, or else negative where one is outside the grid.
+OUTSIDE = -(2**24)
+UNSURE_BELOW = 2 * OUTSIDE
+UNSURE = 2 * UNSURE_BELOW
+
+# Squared ranges, in square metres, of points whose height float32 tells as precisely as that.
+SQUARED_RANGES = (1e-20, 1e20)
+
+# Points that are looked up at a time: what is computed on the way stays in the cache.
+POINTS_AT_A_TIME = 2**14
+
+# Says of some angles, float64 (M,), degrees, in which row or column of a grid they lie, int64 (M,).
+OfAngles = Callable[[NDArray[np.float64]], NDArray[np.int64]]
+
+
+class DirectionTable:
+    """The pixel of a grid that each direction falls into.
+
+    Args:
+        inclinations: Borders between rows, and the grid's bounds, float64, degrees.
+        first_pixel: First pixel of an inclination's row; OUTSIDE where there is none.
+        azimuths: Borders between columns, and the grid's bounds, float64, degrees.
+        column: Column of an azimuth; OUTSIDE where there is none.
+    """
+
+    def __init__(
+        self,
+        inclinations: NDArray[np.float64],
+        first_pixel: OfAngles,
+        azimuths: NDArray[np.float64],
+        column: OfAngles,
+    ) -> None:
+        middles = np.arange(BINS) + 0.5
+        inclinations, azimuths = np.radians(inclinations), np.radians(azimuths)
+        heights = height_of(np.sin(inclinations), 1.0)
+        turns = turn_of(np.cos(azimuths), np.sin(azimuths))
+        self._first_pixels = _table(first_pixel(_inclination(middles)), heights)
+        self._columns = _table(column(_azimuth(middles)), turns)
+
+    def __call__(self, xyz: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Looks up points.
+
+        Args:
+            xyz: Finite coordinates, float32 (N, 3), metres in the sensor frame.
+
+        Returns:
+            Pixels, int64 (N,); negative outside the grid, and less than UNSURE_BELOW where the
+            table does not know.
+        """
+        pixel = np.empty(len(xyz), np.int64)
+        for start in range(0, len(xyz), POINTS_AT_A_TIME):
+            part = slice(start, start + POINTS_AT_A_TIME)
+            pixel[part] = self._look_up(xyz[part])
+        return pixel
+
+    def _look_up(self, xyz: NDArray[np.float32]) -> NDArray[np.int32]:
+        # What overflows on the way, or divides by zero, is unsure in the end.
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            x, y, z = np.ascontiguousarray(xyz.T, dtype=np.float32)
+            squared = x * x + y * y + z * z
+            height = height_of(z, np.sqrt(squared)).astype(np.int64)
+            turn = turn_of(x, y).astype(np.int64)
+        # Clipping bounds what is not a number; all else is within.
+        pixel = self._first_pixels.take(height, mode="clip") + self._columns.take(turn, mode="clip")
+        least, most = SQUARED_RANGES
+        pixel[~((squared > least) & (squared < most))] = UNSURE
+        return pixel
+
+
+def _table(of_bins: NDArray[np.int64], borders: NDArray[np.float64]) -> NDArray[np.int32]:
+    """What each bin holds, int32 (BINS + 1,): the last is for what is BINS itself."""
+    table = np.append(of_bins, UNSURE).astype(np.int32)
+    for near in (borders - BORDER_MARGIN, borders + BORDER_MARGIN):
+        table[np.clip(near, 0, BINS).astype(np.int64)] = UNSURE
+    # Both ends of the turns are straight behind; at both of the heights is a pole, without a turn.
+    table[[0, BINS - 1]] = UNSURE
+    return table
+
+
+def height_of(z: NDArray[Any], distance: NDArray[Any] | float) -> NDArray[Any]:
+    """The sine of the inclination, in bins from 0 to BINS."""
+    return (z / distance + 1) * (BINS // 2)
+
+
+def _inclination(height: NDArray[Any]) -> NDArray[np.float64]:
+    """Inclination of a height, degrees."""
+    inclination: NDArray[np.float64] = np.degrees(np.arcsin(height / (BINS // 2) - 1))
+    return inclination
+
+
+def turn_of(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
+    """The way from straight behind, counter-clockwise, in bins from 0 to BINS.
+
+    It is measured along the square |x| + |y| = 1, each side of which is as good as an arc.
+    """
+    way: NDArray[Any] = 2 + np.copysign(1 - x / (np.abs(x) + np.abs(y)), y)
+    return way * (BINS // 4)
+
+
+def _azimuth(turn: NDArray[Any]) -> NDArray[np.float64]:
+    """Azimuth of a turn, degrees."""
+    way = turn / (BINS // 4) - 2
+    x = 1 - np.abs(way)
+    azimuth: NDArray[np.float64] = np.degrees(np.arctan2(np.copysign(1 - np.abs(x), way), x))
+    return azimuth
