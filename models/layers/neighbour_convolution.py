@@ -23,7 +23,7 @@ def convolve(features: Tensor, neighbours: Tensor, weight: Tensor) -> Tensor:
         Features of those points, float (K, outputs).
     """
     matrix = weight.permute(2, 0, 1).flatten(0, 1)
-    result: Tensor = _Convolution.apply(features, neighbours, matrix)  # type: ignore[no-untyped-call]
+    result: Tensor = _Convolution.apply(features, neighbours, matrix)
     return result
 
 
@@ -40,7 +40,7 @@ class _Convolution(torch.autograd.Function):
         return result
 
     @staticmethod
-    @once_differentiable  # type: ignore[untyped-decorator]
+    @once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, None, Tensor]:
         features, neighbours, matrix = ctx.saved_tensors
         of_features = torch.zeros_like(features) if ctx.needs_input_grad[0] else None

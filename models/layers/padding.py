@@ -28,7 +28,7 @@ def pad_around(image: Tensor, margin: int) -> Tensor:
         (..., H + 2 margin, W + 2 margin).
     """
     if image.requires_grad and not torch.compiler.is_compiling():  # which an export is, too
-        padded: Tensor = _Padding.apply(image, margin)  # type: ignore[no-untyped-call]
+        padded: Tensor = _Padding.apply(image, margin)
         return padded
     return _padded(image, margin)
 
@@ -55,7 +55,7 @@ class _Padding(torch.autograd.Function):
         return padded
 
     @staticmethod
-    @once_differentiable  # type: ignore[untyped-decorator]
+    @once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
         height, width = (side - 2 * ctx.margin for side in gradient.shape[-2:])
         gradient = _folded(gradient, -2, ctx.margin, lambda row: _mirrored(row, height))

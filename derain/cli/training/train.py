@@ -157,7 +157,7 @@ def train(arguments: list[str]) -> None:
     torch.set_num_threads(min(torch.get_num_threads(), usable_cores()))
     keep_freed_memory(KEPT_IN_TRAINING)
     # Deterministic training would write to every new array before anything computes it.
-    torch.utils.deterministic.fill_uninitialized_memory = False
+    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
     of_parsers = {
         "formatter_class": ExamplesFormatter,
         "allow_abbrev": False,  # a misspelling is no abbreviation
