@@ -42,6 +42,11 @@ class Augmentation:
     dropping: float = 0.5
 
     @property
+    def changes_anything(self) -> bool:
+        """Whether any scan is changed."""
+        return max(self.jitter_probability, self.dropping_probability) > 0 or self.moves_the_sensor
+
+    @property
     def moves_the_sensor(self) -> bool:
         """Whether it turns or mirrors whole scans, each in its own way."""
         return max(self.rotation_probability, self.mirror_probability) > 0

@@ -2,6 +2,7 @@
 
 from torch.utils.data import DataLoader
 
+from derain.datamodules.kept import MEGABYTE
 from derain.datamodules.loading import Loading, Part
 from derain.datamodules.order import MeasuringOrder, TrainingOrder
 from derain.datamodules.scan_dataset import LateLoader, ScanDataset, packed
@@ -61,6 +62,9 @@ def scan_loader(
         )
     reader = FrameReader(task.card, loading.intensity_scale, task.columns)
     once = loading.counts_once(task.card)
+    augmented = part == "train" and loading.augmentation.changes_anything
+    # Tests and predictions ask for each scan once.
+    room = loading.kept_megabytes * MEGABYTE if part in ("train", "validation") else 0
     dataset = ScanDataset(
         # Of frames to predict, whoever writes beside them has to know where their labels are.
         source if part == "predict" else with_needed_labels(source, part, task.reads_labels),
@@ -71,8 +75,9 @@ def scan_loader(
         }.get(part, reader.read_distinct if once else reader.read),
         view,
         reader,
-        loading.augmentation if part == "train" else None,
+        loading.augmentation if augmented else None,
         run_seed(),
+        room // max(loading.workers, 1),
     )
     order = (
         TrainingOrder(dataset, dataset.seed, processes, process)

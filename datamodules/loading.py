@@ -22,6 +22,8 @@ class Loading:
         deduplicate: Whether points at one position are measured once; None does as the data card
             says. Predictions are for every row in any case.
         augmentation: What training changes about its scans.
+        kept_megabytes: Memory for what no epoch changes of the training scans, and as much for the
+            validation scans, so that it is not read and viewed again. Workers share it out.
     """
 
     batch_size: int = 1
@@ -30,6 +32,7 @@ class Loading:
     intensity_scale: float = 1.0
     deduplicate: bool | None = None
     augmentation: Augmentation = field(default_factory=Augmentation)
+    kept_megabytes: int = 512
 
     def counts_once(self, card: DataCard) -> bool:
         """Whether points at one position are measured once."""

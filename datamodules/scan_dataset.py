@@ -1,12 +1,14 @@
 """Scans of a data set one by one: read, augmented and viewed."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from torch.utils.data import DataLoader, Dataset
 
 from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
+from derain.datamodules.kept import Kept
 from derain.datamodules.order import Pick
 from derain.datamodules.windows import seen
 from derain.errors import InputError
@@ -22,6 +24,9 @@ from derain.views.view import View
 class ScanDataset(Dataset[Sample | InputError]):
     """Reads the scans of frames and views them.
 
+    What no epoch changes is kept from one to the next: of scans that are augmented what was read,
+    of others their views, too. A file that changes meanwhile is not read again.
+
     Args:
         frames: The frames.
         read: Reads the scan of one of them, as the network is to see it.
@@ -29,6 +34,7 @@ class ScanDataset(Dataset[Sample | InputError]):
         reader: Reads scans as they are, and has the data card that says which labels are rain.
         augmentation: Changes each scan anew every epoch; None leaves them as they are.
         seed: Seed of the run; with the epoch and the scan it says how that scan is changed.
+        room: Bytes that may be kept; each worker, which has a copy of the data set, keeps as many.
     """
 
     def __init__(
@@ -39,6 +45,7 @@ class ScanDataset(Dataset[Sample | InputError]):
         reader: FrameReader,
         augmentation: Augmentation | None = None,
         seed: int = 0,
+        room: int = 0,
     ) -> None:
         self.frames = frames
         self.read = read
@@ -46,6 +53,8 @@ class ScanDataset(Dataset[Sample | InputError]):
         self.reader = reader
         self.augmentation = augmentation
         self.seed = seed
+        self._scans = Kept[Scan](room)
+        self._samples = Kept[Sample](room)
 
     @property
     def card(self) -> DataCard:
@@ -76,17 +85,18 @@ class ScanDataset(Dataset[Sample | InputError]):
         return map(self.reader.read, evenly_spaced(self.frames, most))
 
     def _sample(self, pick: Pick) -> Sample:
-        frame = self.frames[pick.number]
-        scan = self._changed(self.read(frame), pick)
-        view = seen(self.view, scan, self.frames, pick.number, self.reader.read_unlabelled)
-        return Sample.of(scan, view, self.card, pick.measured, frame.key)
-
-    def _changed(self, scan: Scan, pick: Pick) -> Scan:
-        """The scan as training changes it in this epoch."""
+        number, frame = pick.number, self.frames[pick.number]
         if self.augmentation is None:
-            return scan
-        generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, pick.number)
-        return self.augmentation(scan, generator, self.view.azimuth)
+            sample = self._samples.get(number, lambda: self._viewed(self.read(frame), number))
+        else:
+            scan = self._scans.get(number, lambda: self.read(frame))
+            generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, number)
+            sample = self._viewed(self.augmentation(scan, generator, self.view.azimuth), number)
+        return replace(sample, measured=pick.measured)
+
+    def _viewed(self, scan: Scan, number: int) -> Sample:
+        view = seen(self.view, scan, self.frames, number, self.reader.read_unlabelled)
+        return Sample.of(scan, view, self.card, key=self.frames[number].key)
 
 
 class LateLoader(DataLoader[Sample | InputError]):

@@ -16,6 +16,7 @@ from torch.nn import functional
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.models.layers.batch_norm import PointBatchNorm
+from derain.models.layers.neighbour_convolution import convolve
 from derain.models.published import Published, network_of, published_tensors
 from derain.models.registry import NETWORKS
 from derain.models.supervised import SupervisedModule
@@ -116,28 +117,16 @@ class OutDetNetwork(nn.Module):
         Returns:
             Logits of "not rain" and "rain", float (J, 2).
         """
-        weighted = self.distance_weight * (distances + DISTANCE_OFFSET)
-        seen = torch.cat([points[neighbours], weighted[..., None]], dim=-1)
-        features = convolve(seen, self.weight1) + self.bias1
+        # Points and distances are convolved apart, so that no copy joins them before.
+        on_distances = (self.weight1[-1] * self.distance_weight).T
+        features = convolve(points, neighbours, self.weight1[:-1])
+        features = features + (distances + DISTANCE_OFFSET) @ on_distances + self.bias1
         features = functional.leaky_relu(self.norm1(features), 0.2)
         own, around = _judged(points, neighbours, candidates)
-        features = self.norm2(convolve(features[around], self.weight2))
+        features = self.norm2(convolve(features, around, self.weight2))
         features = features + own @ self.shortcut[..., 0].T
         features = functional.leaky_relu(features, 0.2)
         return self.head(self.dropout(features))
-
-
-def convolve(seen: Tensor, weight: Tensor) -> Tensor:
-    """Convolution over a neighbourhood, as one matrix product.
-
-    Args:
-        seen: Features of every point's neighbours, float (M, k, inputs).
-        weight: Published layout, float (inputs, outputs, k).
-
-    Returns:
-        Features, float (M, outputs).
-    """
-    return seen.flatten(1) @ weight.permute(2, 0, 1).flatten(0, 1)
 
 
 def _judged(points: Tensor, neighbours: Tensor, candidates: Tensor | None) -> tuple[Tensor, Tensor]:

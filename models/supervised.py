@@ -90,4 +90,6 @@ class SupervisedModule(DerainingModule):
                 judge, int64 (M,).
         """
         judged = target != IGNORED
+        if judged.all():  # as of points, which are not to be copied for nothing
+            return segmentation_loss(logits, target, self.class_weight)
         return segmentation_loss(logits[judged], target[judged], self.class_weight)

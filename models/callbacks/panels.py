@@ -1,9 +1,11 @@
-"""Pictures of a few validation scans in TensorBoard, the same ones after every epoch."""
+"""Pictures of a few validation scans in TensorBoard, the same ones throughout a training."""
 
 from typing import Any
 
 import lightning
+import numpy as np
 from lightning.pytorch.loggers import TensorBoardLogger
+from lightning.pytorch.trainer.states import TrainerFn
 
 from derain.learning.batch import Batch
 from derain.models.base import DerainingModule
@@ -15,18 +17,24 @@ class ScanPanels(lightning.Callback):
 
     Of several processes the first draws, of the scans that it measures.
 
+    A picture costs as much as a step of training and more, and of each scan TensorBoard shows ten
+    pictures. So ten epochs are drawn, spread from the first to the last of those to come; all
+    where nobody says how many those are.
+
     Args:
         scans: How many scans to show; 0 shows none.
+        pictures: How many pictures of each to draw in a training.
     """
 
-    def __init__(self, scans: int = 2) -> None:
+    def __init__(self, scans: int = 2, pictures: int = 10) -> None:
         self.scans = scans
+        self.pictures = pictures
         self.left = 0
 
     def on_validation_epoch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
         """Starts counting anew; the order of validation scans is fixed."""
         draws = trainer.is_global_zero and not trainer.sanity_checking
-        self.left = self.scans if draws else 0
+        self.left = self.scans if draws and self._shows(trainer) else 0
 
     def on_validation_batch_end(
         self,
@@ -50,3 +58,10 @@ class ScanPanels(lightning.Callback):
             name = f"validation scan {self.scans - self.left}"
             trainer.logger.experiment.add_figure(name, figure, trainer.global_step)
             self.left -= 1
+
+    def _shows(self, trainer: lightning.Trainer) -> bool:
+        """Whether the epoch is one that is drawn."""
+        epochs = trainer.max_epochs
+        if trainer.state.fn != TrainerFn.FITTING or epochs is None or epochs < 1:
+            return True
+        return trainer.current_epoch in np.linspace(0, epochs - 1, self.pictures).round()

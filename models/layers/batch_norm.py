@@ -1,5 +1,6 @@
 """BatchNorm that also takes the smallest of scans."""
 
+import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -26,3 +27,22 @@ class PointBatchNorm(_Lenient, nn.BatchNorm1d):
 
 class PixelBatchNorm(_Lenient, nn.BatchNorm2d):
     """For pixels, (B, channels, H, W); a single one included, as a small image ends in."""
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Normalises float (B, channels, H, W)."""
+        normalised = super().forward(features)
+        if normalised.requires_grad and _is_channels_last(normalised):
+            normalised.register_hook(_dense)
+        return normalised
+
+
+def _is_channels_last(features: Tensor) -> bool:
+    return features.is_contiguous(memory_format=torch.channels_last)
+
+
+def _dense(gradient: Tensor) -> Tensor:
+    """A gradient without gaps, such as one of several that came out of a concatenation has.
+
+    PyTorch's BatchNorm takes five times as long where there are any.
+    """
+    return gradient.contiguous(memory_format=torch.channels_last)

@@ -1,9 +1,11 @@
 """How LiSnowNet sees past the edges of a range image."""
 
 from collections.abc import Callable
+from typing import Any
 
 import torch
 from torch import Tensor
+from torch.autograd.function import once_differentiable
 
 
 def pad_around(image: Tensor, margin: int) -> Tensor:
@@ -25,6 +27,42 @@ def pad_around(image: Tensor, margin: int) -> Tensor:
     Returns:
         (..., H + 2 margin, W + 2 margin).
     """
+    if image.requires_grad and not torch.compiler.is_compiling():  # which an export is, too
+        padded: Tensor = _Padding.apply(image, margin)
+        return padded
+    return _padded(image, margin)
+
+
+class _Padding(torch.autograd.Function):
+    """Adds the gradients of what continues an image to those of where it was taken from.
+
+    PyTorch's own gradient of a slice is an image of zeros that holds it, one for each slice.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, image: Tensor, margin: int) -> Tensor:
+        ctx.margin = margin
+        height, width = image.shape[-2:]
+        padded = image.new_empty(*image.shape[:-2], height + 2 * margin, width + 2 * margin)
+        if image.ndim == 4 and image.is_contiguous(memory_format=torch.channels_last):
+            padded = padded.contiguous(memory_format=torch.channels_last)
+        padded[..., margin:-margin, margin:-margin] = image
+        rows = padded[..., margin:-margin, :]
+        for place in (*range(-margin, 0), *range(width, width + margin)):
+            rows[..., margin + place] = image[..., place % width]
+        for place in (*range(-margin, 0), *range(height, height + margin)):
+            padded[..., margin + place, :] = rows[..., _mirrored(place, height), :]
+        return padded
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        height, width = (side - 2 * ctx.margin for side in gradient.shape[-2:])
+        gradient = _folded(gradient, -2, ctx.margin, lambda row: _mirrored(row, height))
+        return _folded(gradient, -1, ctx.margin, lambda column: column % width), None
+
+
+def _padded(image: Tensor, margin: int) -> Tensor:
     height, width = image.shape[-2:]
     image = _continued(image, -1, margin, lambda column: column % width)
     return _continued(image, -2, margin, lambda row: _mirrored(row, height))
@@ -36,6 +74,15 @@ def _continued(image: Tensor, dim: int, margin: int, source: Callable[[int], int
     before = [image.narrow(dim, source(place), 1) for place in range(-margin, 0)]
     after = [image.narrow(dim, source(place), 1) for place in range(size, size + margin)]
     return torch.cat([*before, image, *after], dim)
+
+
+def _folded(gradient: Tensor, dim: int, margin: int, source: Callable[[int], int]) -> Tensor:
+    """Undoes :func:`_continued`: adds every added slice to the one that it is a copy of."""
+    size = gradient.shape[dim] - 2 * margin
+    inner = gradient.narrow(dim, margin, size).clone()
+    for place in (*range(-margin, 0), *range(size, size + margin)):
+        inner.narrow(dim, source(place), 1).add_(gradient.narrow(dim, margin + place, 1))
+    return inner
 
 
 def _mirrored(row: int, height: int) -> int:

@@ -168,6 +168,8 @@ class LiSnowNet(DerainingModule, Published):
         self.save_hyperparameters()
         self.network = LiSnowNetwork(width=width, dropout=dropout)
         self.selection = SelectionRule.fitted(rule, [])
+        # Images that the rule's residual is fitted to, the same after every epoch of a training.
+        self._examples: list[tuple[Tensor, Tensor]] | None = None
         self.adopt(spec)
 
     @classmethod
@@ -232,7 +234,7 @@ class LiSnowNet(DerainingModule, Published):
             "wavelet": loss.wavelet,
             "fourier": loss.fourier,
             "residual": loss.residual,
-        }, select(image, valid, seen, denoised, self.selection)
+        }, select(image, valid, seen, denoised.detach(), self.selection)
 
     def on_validation_epoch_start(self) -> None:
         """Fits the rule's residual, where it is not stated, to what the network changes by now.
@@ -243,27 +245,38 @@ class LiSnowNet(DerainingModule, Published):
         training = self.trainer.state.fn == "fit" and not self.trainer.sanity_checking
         if not training or "residual" in self.hparams["rule"]:
             return
-        changes = [self._changes(scan) for scan in self.validation_scans(EXAMPLE_SCANS)]
-        if not changes:  # batches that were made elsewhere
+        if self._examples is None:
+            self._examples = [self._seen(scan) for scan in self.validation_scans(EXAMPLE_SCANS)]
+        if not self._examples:  # batches that were made elsewhere
             return
+        changes = [self._changes(*example) for example in self._examples]
         rule = self.selection.with_residual_of(np.concatenate(changes))
         # Several processes go on with one rule, however each has rounded.
         rule = replace(rule, residual=self.trainer.strategy.broadcast(rule.residual))
         self._log_alike({"val/rule_residual": torch.tensor(rule.residual)})
         self.adopt(replace(self.spec, rule=rule.as_dict()))
 
-    def _changes(self, scan: Scan) -> NDArray[np.float32]:
-        """What the network changes of the returns that the rule's limits leave, float32 (M,)."""
+    def on_fit_end(self) -> None:
+        """Lets go of what the rule was fitted to."""
+        self._examples = None
+
+    def _seen(self, scan: Scan) -> tuple[Tensor, Tensor]:
         inputs = self.spec.make_view()(scan).inputs()
-        image, valid = (
-            torch.from_numpy(inputs[name]).to(self.device) for name in ("image", "valid")
-        )
+        return torch.from_numpy(inputs["image"]), torch.from_numpy(inputs["valid"])
+
+    def _changes(self, image: Tensor, valid: Tensor) -> NDArray[np.float32]:
+        """What the network changes of the returns that the rule's limits leave, float32 (M,)."""
+        image, valid = image.to(self.device), valid.to(self.device)
         seen = cube_roots(image, self.selection)
         changes = change(seen, self.network(seen, valid))
         return changes[valid & possible(image, self.selection)].cpu().numpy()
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
         """Adam with a learning rate that falls after every epoch."""
-        optimizer = torch.optim.Adam(self.parameters(), lr=self.hparams["learning_rate"])
+        optimizer = torch.optim.Adam(
+            self.parameters(),
+            lr=self.hparams["learning_rate"],
+            fused=True,  # many small tensors
+        )
         schedule = torch.optim.lr_scheduler.ExponentialLR(optimizer, self.hparams["decay"])
         return {"optimizer": optimizer, "lr_scheduler": schedule}

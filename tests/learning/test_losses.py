@@ -176,6 +176,21 @@ def test_the_total_is_the_sum_of_its_named_parts() -> None:
     torch.testing.assert_close(loss.lovasz, lovasz_softmax(logits.softmax(dim=1), target))
 
 
+@given(seeds, st.integers(0, 40), st.integers(1, 2))
+def test_the_short_way_of_two_classes_is_the_sum_of_the_general_losses(
+    seed: int, points: int, present: int
+) -> None:
+    logits, target = random_case(seed, points, classes=2, present=present)
+    weight = torch.tensor([1.07, 14.84])
+    short = segmentation_loss(logits.requires_grad_(), target, weight)
+    cross_entropy = weighted_cross_entropy(logits, target, weight)
+    lovasz = lovasz_softmax(logits.softmax(dim=1), target)
+    torch.testing.assert_close(short.cross_entropy, cross_entropy)
+    torch.testing.assert_close(short.lovasz, lovasz)
+    expected = torch.autograd.grad(cross_entropy + lovasz, logits)
+    torch.testing.assert_close(torch.autograd.grad(short.total, logits), expected)
+
+
 def test_descending_the_loss_finds_the_rare_class() -> None:
     _, target = random_case(seed=11, points=200, present=2)
     target[:190] = 0

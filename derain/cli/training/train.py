@@ -39,6 +39,7 @@ from derain.models.checkpoint import check_resumable, load_model
 from derain.models.measured import MONITOR
 from derain.models.registry import NETWORKS
 from derain.system.cores import usable_cores
+from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
 from derain.system.open3d_import import make_open3d_loadable
 from derain.system.workers import end_with_launcher
 
@@ -154,6 +155,9 @@ def train(arguments: list[str]) -> None:
     warnings.filterwarnings("ignore", message="The dirpath has changed")
     end_with_launcher()
     torch.set_num_threads(min(torch.get_num_threads(), usable_cores()))
+    keep_freed_memory(KEPT_IN_TRAINING)
+    # Deterministic training would write to every new array before anything computes it.
+    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
     of_parsers = {
         "formatter_class": ExamplesFormatter,
         "allow_abbrev": False,  # a misspelling is no abbreviation

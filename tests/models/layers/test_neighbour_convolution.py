@@ -1,0 +1,54 @@
+"""The convolution over neighbourhoods is its formula, and so is its gradient, block by block."""
+
+import pytest
+import torch
+from torch import Tensor
+
+from derain.models.layers import neighbour_convolution
+from derain.models.layers.neighbour_convolution import convolve
+
+INPUTS, OUTPUTS, K, POINTS = 3, 4, 5, 11
+
+
+@pytest.fixture(autouse=True)
+def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(neighbour_convolution, "BLOCK", 4)  # 11 points: two blocks and a part
+
+
+def case(rows: int = POINTS) -> tuple[Tensor, Tensor, Tensor]:
+    generator = torch.Generator().manual_seed(rows)
+    features = torch.randn(POINTS, INPUTS, dtype=torch.double, generator=generator)
+    neighbours = torch.randint(POINTS, (rows, K), generator=generator)
+    weight = torch.randn(INPUTS, OUTPUTS, K, dtype=torch.double, generator=generator)
+    return features, neighbours, weight
+
+
+@pytest.mark.parametrize("rows", [0, 1, 4, 8, POINTS], ids=str)
+def test_it_is_a_sum_over_neighbours_and_channels(rows: int) -> None:
+    features, neighbours, weight = case(rows)
+    expected = torch.einsum("pji,ioj->po", features[neighbours], weight)
+    torch.testing.assert_close(convolve(features, neighbours, weight), expected)
+
+
+@pytest.mark.parametrize("rows", [0, 3, POINTS], ids=str)
+def test_its_gradient_is_that_of_the_sum(rows: int) -> None:
+    features, neighbours, weight = case(rows)
+    features.requires_grad_(), weight.requires_grad_()
+    assert torch.autograd.gradcheck(lambda f, w: convolve(f, neighbours, w), (features, weight))
+
+
+def test_points_that_need_no_gradient_get_none() -> None:
+    features, neighbours, weight = case()
+    convolve(features, neighbours, weight.requires_grad_()).sum().backward()
+    assert features.grad is None
+    assert weight.grad is not None
+
+
+def test_two_runs_are_the_same_to_the_bit() -> None:
+    features, neighbours, weight = (t.float() if t.is_floating_point() else t for t in case())
+    features.requires_grad_()
+    first, second = (
+        torch.autograd.grad(convolve(features, neighbours, weight).square().sum(), features)[0]
+        for _ in range(2)
+    )
+    assert torch.equal(first, second)
