@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from derain.cli.arguments import count, threads
 from derain.cli.outputs import say
+from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.system.notices import Notices
 
@@ -22,10 +23,12 @@ Exports a checkpoint as one ONNX file, proves it against PyTorch, and times it.
   derain export outdet.ckpt --out outdet.onnx
   derain export outdet.ckpt --out outdet.onnx --scan scans/000000.bin --threads 2
   derain export salsanext.ckpt --out salsanext.onnx --int8 --calibration scans/
+  derain export salsanext.ckpt --out salsanext.onnx --runtime openvino --precision bf16
 
 Where the proof fails, no file is left. With --int8, convolutions compute in eight bits, scaled by
 what they see in scans of the calibration folder. They must find the rain there that the network
 finds: so the scans have to hold some, and their intensities the unit of the training data.
+The file is the same for every runtime: another that is named has to pass the proof too.
 """
 
 
@@ -47,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--threads", type=threads, default=0, help="threads to time with (default all)"
     )
+    add_runtime(parser, help="prove and time the file by this runtime too")
     parser.add_argument("--repeats", type=count, default=30, help="timed runs (default 30)")
 
 
@@ -60,10 +64,11 @@ def main(arguments: argparse.Namespace) -> int:
 
     if arguments.scan is not None and not is_file(arguments.scan):
         raise InputError(arguments.scan, "there is no such file", "Check --scan.")
+    runtime = runtime_of(arguments)
     model = load_model(arguments.checkpoint)
     calibration = _calibration(arguments)
     _warn_of_odd(calibration, model.spec)
-    proof = export(model, arguments.out, calibration)
+    proof = export(model, arguments.out, calibration, runtime)
     print(proof)
     say(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
     print(
@@ -73,6 +78,7 @@ def main(arguments: argparse.Namespace) -> int:
             arguments.columns,
             arguments.threads,
             arguments.repeats,
+            runtime,
         )
     )
     return 0

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.export.bench.other_runtime import OtherRuntime
 from derain.filters import PointFilter
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
@@ -29,6 +30,7 @@ class Contestant:
         facts: What the method is, for whoever repeats the bench: file or parameters.
         filter: The filter, where it is one: filters share one search for neighbours.
         judges_by: What it judges by, as far as a scan may not suit it.
+        by_other: What runs it, where it is a model and that is not onnxruntime in float32.
     """
 
     title: str
@@ -37,6 +39,7 @@ class Contestant:
     facts: dict[str, Any] = field(default_factory=dict)
     filter: PointFilter | None = None
     judges_by: Examiner | None = None
+    by_other: OtherRuntime | None = None
 
     @cached_property
     def can_be_sent(self) -> bool:
