@@ -196,7 +196,7 @@ def prove(
     def expect(view: SeenScan) -> NDArray[np.float32]:
         tensors = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
         with torch.inference_mode():
-            return forward(**tensors).numpy()  # type: ignore[no-any-return]
+            return forward(**tensors).numpy()
 
     derainers = [Derainer(model, count, runtime.name, runtime.precision) for count in THREADS]
     return _proof(expect, derainers, scans, bounds)

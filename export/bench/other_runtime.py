@@ -12,7 +12,7 @@ from derain.scan import Scan
 from derain.spec import Spec
 
 if TYPE_CHECKING:
-    from derain.export.bench.contestant import Contestant
+    from derain.export.bench.contestant import Contestant, TimedMethod
     from derain.export.bench.cost import Timing
     from derain.sources.frame import Frame
 
@@ -67,7 +67,8 @@ def run_by(row: "Contestant", runtime: Runtime) -> "Contestant":
     Raises:
         InputError: It cannot run the model.
     """
-    ready = partial(row.ready, runtime=runtime)
+    make: Callable[..., TimedMethod] = row.ready  # that of a model, which takes a runtime
+    ready = partial(make, runtime=runtime)
     ready(1)  # refused before any work
     other = OtherRuntime(runtime, row.ready)
     return replace(row, ready=ready, facts={**row.facts, **other.facts}, by_other=other)

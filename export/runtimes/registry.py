@@ -1,5 +1,6 @@
 """Runtimes by name: those of this folder, and those that other packages bring."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from derain.errors import InputError
@@ -64,5 +65,5 @@ class Runtime:
         return self.name if self.precision == FLOAT32_PRECISION else f"{self.name} {self.precision}"
 
 
-def _listed(names: object) -> str:
-    return " or ".join(names)  # type: ignore[call-overload,no-any-return]
+def _listed(names: Iterable[str]) -> str:
+    return " or ".join(names)
