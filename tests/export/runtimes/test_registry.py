@@ -100,8 +100,10 @@ def test_a_method_is_run_by_the_runtime_that_is_named_and_a_filter_by_none() -> 
         load_method("dror", {}, 1, Runtime("rainy"))
 
 
-def test_the_versions_name_each_package_that_ran_once(rainy: type[Session]) -> None:
+def test_the_versions_name_each_package_that_ran_once(
+    rainy: type[Session], monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert versions(["onnxruntime", "rainy"]) == versions()
-    rainy.PACKAGE = "numpy"
+    monkeypatch.setattr(rainy, "PACKAGE", "numpy")
     assert versions(["rainy"]).count(np.__version__) == 2
     assert "onnxruntime" not in versions(["rainy"])
