@@ -3,7 +3,7 @@ VENV := .venv
 PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint types clean
+.PHONY: demo test test-openvino lint types clean
 
 demo: $(READY)
 	$(VENV)/bin/derain demo
@@ -11,6 +11,11 @@ demo: $(READY)
 # Two processes, a file of tests to each in turn: what a file's tests share is made once.
 test: $(READY)
 	$(PYTHON) -m pytest --numprocesses 2 --dist loadfile
+
+# Not among `make test`: a runtime of 180 MB, which nobody has to have.
+test-openvino: $(READY)
+	$(PYTHON) -m pip install --quiet -c constraints.txt -e ".[openvino]"
+	$(PYTHON) -m pytest tests/export/runtimes
 
 lint: $(READY)
 	$(VENV)/bin/ruff check .

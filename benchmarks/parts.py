@@ -83,7 +83,7 @@ def _searches(xyz: NDArray[np.float32], threads: int) -> dict[str, Callable[[], 
 
 def _network(derainer: Derainer, scan: object) -> Callable[[], object]:
     inputs = derainer.view(scan).inputs()
-    return lambda: derainer.session.run(None, inputs)
+    return lambda: derainer.session.run(inputs)
 
 
 def _report(title: str, candidates: Mapping[str, Callable[[], object]]) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from derain.evaluation.hard_cases import scene
 from derain.export.machine import versions
 from derain.export.runtime import Derainer
+from derain.export.runtimes.registry import Runtime
 from derain.export.timing import RunTimes, timed_runs
 from derain.files import DEFAULT_COLUMNS
 from derain.sources.file_frame import FileFrame
@@ -49,6 +50,7 @@ def measure_latency(
     columns: Sequence[str] = DEFAULT_COLUMNS,
     threads: int = 0,
     repeats: int = 30,
+    runtime: Runtime = Runtime(),
 ) -> Latency:
     """Times an exported model from file to mask.
 
@@ -58,6 +60,7 @@ def measure_latency(
         columns: Names of the columns of a scan that does not name them.
         threads: Threads; 0 takes every core this process may use.
         repeats: Timed runs.
+        runtime: What runs the network.
 
     Raises:
         InputError: A model or scan that cannot be read.
@@ -66,7 +69,8 @@ def measure_latency(
         if scan is None:
             scan, columns = Path(folder) / "scene.bin", DEFAULT_COLUMNS
             scene(100_000).tofile(scan)
-        derainer = Derainer(model, threads)
+        derainer = Derainer(model, threads, runtime.name, runtime.precision)
         frame = FileFrame(key=scan.stem, path=scan, columns=tuple(columns))
         times = timed_runs(derainer.probability, [frame], repeats)
-        return Latency(times, frame.count_points(), derainer.threads, versions())
+        software = versions([runtime.name])
+        return Latency(times, frame.count_points(), derainer.threads, software)

@@ -1,18 +1,26 @@
 """The machine and the software that times are taken on."""
 
 import platform
+from collections.abc import Iterable
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-import onnxruntime
 
 import derain
+from derain.export.runtimes.registry import DEFAULT_RUNTIME, RUNTIMES
 
 
-def versions() -> str:
-    """The processor, and the versions that a time depends on."""
+def versions(runtimes: Iterable[str] = (DEFAULT_RUNTIME,)) -> str:
+    """The processor, and the versions that a time depends on.
+
+    Args:
+        runtimes: Names of what ran networks.
+    """
+    packages = dict.fromkeys(RUNTIMES[name].PACKAGE for name in runtimes)
+    ran = "".join(f"{package} {version(package)}, " for package in packages)
     return (
-        f"{processor()}; derain {derain.__version__}, onnxruntime {onnxruntime.__version__}, "
+        f"{processor()}; derain {derain.__version__}, {ran}"
         f"NumPy {np.__version__}, Python {platform.python_version()}"
     )
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from derain.errors import InputError
 from derain.export.runtime import Derainer
+from derain.export.runtimes.registry import Runtime
 from derain.files.reading import is_file
 from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
 from derain.filters.parameters import CANDIDATES
@@ -28,7 +29,7 @@ def named_method(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def load_method(
-    name: str, parameters: Mapping[str, Any], threads: int = 0
+    name: str, parameters: Mapping[str, Any], threads: int = 0, runtime: Runtime = Runtime()
 ) -> Derainer | FilterDerainer:
     """Makes a method ready to judge scans.
 
@@ -37,13 +38,18 @@ def load_method(
         parameters: Parameters by name: those of the filter and its ``candidates``, or the
             ``threshold`` of the model.
         threads: Threads to use; 0 takes every core this process may use.
+        runtime: What runs the model's network.
 
     Raises:
         InputError: Neither a filter nor an exported model, a parameter that it does not have, or
-            one out of its bounds.
+            one out of its bounds; a runtime that cannot run it, or any but the usual for a filter.
     """
     # What has a suffix is a file, for which other packages need not be asked.
     if not Path(name).suffix and name in FILTERS:
+        if not runtime.is_default:
+            raise InputError(
+                name, f"a filter, which has no network that {runtime} could run", "Leave it out."
+            )
         of_filter = {key: value for key, value in parameters.items() if key != CANDIDATES}
         return FilterDerainer(filter_from(name, of_filter), threads, parameters.get(CANDIDATES))
     if not is_file(Path(name)):
@@ -58,7 +64,8 @@ def load_method(
             "a checkpoint, which only torch can run",
             f"Export it first: `derain export {name} --out {Path(name).with_suffix('.onnx')}`.",
         )
-    return _with_threshold(Derainer(name, threads), name, parameters)
+    derainer = Derainer(name, threads, runtime.name, runtime.precision)
+    return _with_threshold(derainer, name, parameters)
 
 
 def require_one_scan(derainer: Derainer) -> None:

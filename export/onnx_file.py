@@ -17,8 +17,10 @@ import derain
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.model_file import CHECKSUM_KEY, METADATA_KEY, NO_CHECKSUM, sealed
-from derain.export.proof import FINITE, FLOAT32, INT8, Proof, prove
+from derain.export.proof import BF16, FINITE, FLOAT32, INT8, Proof, prove
 from derain.export.quantisation import quantised
+from derain.export.runtimes.registry import Runtime
+from derain.export.runtimes.session import FLOAT32_PRECISION
 from derain.files.atomic import replacing
 from derain.models.base import DerainingModule
 from derain.scan import Scan
@@ -36,7 +38,12 @@ OPSET = 18
 NEGLIGIBLE = 1e-20
 
 
-def export(model: DerainingModule, path: Path, calibration: Collection[Scan] = ()) -> Proof:
+def export(
+    model: DerainingModule,
+    path: Path,
+    calibration: Collection[Scan] = (),
+    runtime: Runtime = Runtime(),
+) -> Proof:
     """Exports a model, proves it, and only then puts the file in its place.
 
     Args:
@@ -44,13 +51,14 @@ def export(model: DerainingModule, path: Path, calibration: Collection[Scan] = (
         path: The ONNX file to write.
         calibration: Scans like those that the model will see, to export it in eight bits; none
             exports it in float32. They are gone through twice, one at a time.
+        runtime: What is to run the file, which is proved by that too where it is not onnxruntime.
 
     Returns:
         The proof, which the file's metadata holds as well.
 
     Raises:
-        InputError: A model without a Spec, an output that cannot be written, or a proof that
-            fails; no file is left then.
+        InputError: A model without a Spec, an output that cannot be written, a runtime that cannot
+            run it, or a proof that fails; no file is left then.
     """
     model = model.eval().cpu()
     with replacing(path) as temporary:
@@ -60,7 +68,9 @@ def export(model: DerainingModule, path: Path, calibration: Collection[Scan] = (
             proto = quantised(proto, model.spec.make_view(), calibration, model.INTEGER_OPERATORS)
         _describe(proto, model.spec, {})
         onnx.save(proto, temporary)
-        proof = _proof(model, temporary, calibration)
+        proof = _proof(model, temporary, calibration, Runtime())
+        if not runtime.is_default:
+            proof = replace(proof, by_other=_proof(model, temporary, calibration, runtime))
         if not proof.holds:
             raise InputError(path, f"the exported model differs:\n{proof}", "No file was left.")
         known = {"proof": proof.as_dict(), "flushed": flushed, CHECKSUM_KEY: NO_CHECKSUM}
@@ -89,14 +99,18 @@ def flush(proto: onnx.ModelProto) -> int:
     return flushed
 
 
-def _proof(model: DerainingModule, path: Path, calibration: Collection[Scan]) -> Proof:
+def _proof(
+    model: DerainingModule, path: Path, calibration: Collection[Scan], runtime: Runtime
+) -> Proof:
     if not calibration:
-        assert FLOAT32.difference is not None
-        bounds = replace(FLOAT32, difference=FLOAT32.difference * model.AMPLIFIES)
-        return prove(model, path, _hard_cases(model.spec), bounds)
+        bounds = FLOAT32 if runtime.precision == FLOAT32_PRECISION else BF16
+        assert bounds.difference is not None
+        bounds = replace(bounds, difference=bounds.difference * model.AMPLIFIES)
+        return prove(model, path, _hard_cases(model.spec), bounds, runtime)
     # Mapped, for a loop would hold on to one scan while the next is read.
-    seen = prove(model, path, map(_named, calibration), INT8)
-    return Proof(seen.cases + prove(model, path, _hard_cases(model.spec), FINITE).cases)
+    seen = prove(model, path, map(_named, calibration), INT8, runtime)
+    hard = prove(model, path, _hard_cases(model.spec), FINITE, runtime)
+    return Proof(seen.cases + hard.cases)
 
 
 def _named(scan: Scan) -> tuple[str, Scan]:

@@ -1,4 +1,4 @@
-"""Runs an exported model on a CPU: NumPy, onnxruntime and the kNN library, nothing else."""
+"""Runs an exported model on a CPU: NumPy, one runtime and the kNN library, nothing else."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.export.model_file import METADATA_KEY, ModelFile
+from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
+from derain.export.runtimes.session import FLOAT32_PRECISION, Session, TensorType
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.judgement import Judgement
@@ -20,10 +21,7 @@ from derain.system.stopwatch import Stopwatch
 from derain.views.probability import probability_of_rain
 from derain.views.view import SeenScan, View
 
-__all__ = ["METADATA_KEY", "Derainer", "Judgement", "open_session"]
-
-# What onnxruntime calls the types of a view's inputs.
-ONNX_TYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
+__all__ = ["METADATA_KEY", "Derainer", "Judgement"]
 
 
 class Derainer:
@@ -39,26 +37,40 @@ class Derainer:
     Args:
         model: ONNX file written by ``derain export``.
         threads: Threads for view and network; 0 takes every core this process may use.
+        runtime: What runs the network: ``onnxruntime``, or ``openvino``, which has to be installed
+            (``pip install 'derain[openvino]'``).
+        precision: What it computes in: ``float32``, or ``bf16`` with OpenVINO on a processor that
+            has it. Some scores near the threshold then come out on its other side.
 
     Attributes:
         path: Its file.
+        threads: How many it uses.
+        runtime: What runs the network, and its precision.
         spec: How the model sees a scan and what it was trained on.
         metadata: Everything else the file says of itself: proof, versions, licence.
 
     Raises:
         InputError: A missing file, one that is not ONNX, one that derain did not export or that
-            has changed since; a negative number of threads.
+            has changed since; a negative number of threads; a runtime that there is not or that
+            is not installed, or a precision that it or the processor has not.
     """
 
-    def __init__(self, model: str | Path, threads: int = 0) -> None:
+    def __init__(
+        self,
+        model: str | Path,
+        threads: int = 0,
+        runtime: str = DEFAULT_RUNTIME,
+        precision: str = FLOAT32_PRECISION,
+    ) -> None:
         if threads < 0:
             raise InputError("threads", f"{threads} is negative", "Give 0 for every core.")
+        self.runtime = Runtime(runtime, precision)
         file = ModelFile.read(Path(model))
         self.path = file.path
         self.threads = threads or usable_cores()
         self.metadata, self.spec = file.metadata, file.spec
         self.view = self.spec.make_view(self.threads)
-        self.session = open_session(file, self.threads)
+        self.session = self.runtime.open(file, self.threads)
         _refuse_other_network(self.session, self.view, self.path)
         self._recent = RecentFrames(self.view.window)
 
@@ -184,8 +196,8 @@ class Derainer:
             InputError: A network that fails.
         """
         try:
-            return self.session.run(None, view.inputs())[0]  # type: ignore[no-any-return]
-        except Exception as error:  # onnxruntime's exceptions share no base of their own
+            return self.session.run(view.inputs())
+        except Exception as error:  # the runtimes' exceptions share no base of their own
             raise InputError(
                 self.path, f"its network fails ({error})", "Export it with `derain export`."
             ) from error
@@ -217,32 +229,7 @@ class Derainer:
             )
 
 
-def open_session(file: ModelFile, threads: int) -> onnxruntime.InferenceSession:
-    """Opens a model for the CPU.
-
-    Raises:
-        InputError: A graph that onnxruntime cannot run.
-    """
-    options = onnxruntime.SessionOptions()
-    # Always stated: the default counts the host's cores, not those a container may use.
-    options.intra_op_num_threads = threads
-    options.inter_op_num_threads = 1
-    options.log_severity_level = 3
-    # Threads may spin while the network runs; after it, the cores are for the next scan's view.
-    options.add_session_config_entry("session.force_spinning_stop", "1")
-    try:
-        return onnxruntime.InferenceSession(
-            file.content, options, providers=["CPUExecutionProvider"]
-        )
-    except Exception as error:  # onnxruntime's exceptions share no base of their own
-        raise InputError(
-            file.path,
-            f"not an ONNX model that onnxruntime can run ({str(error).splitlines()[0]})",
-            "Give a model written by `derain export`.",
-        ) from error
-
-
-def _refuse_other_network(session: onnxruntime.InferenceSession, view: View, path: Path) -> None:
+def _refuse_other_network(session: Session, view: View, path: Path) -> None:
     """Refuses a graph that takes or gives anything but what its Spec's view does.
 
     Raises:
@@ -251,18 +238,20 @@ def _refuse_other_network(session: onnxruntime.InferenceSession, view: View, pat
     empty = view(Scan.of(np.zeros((0, 4))))
     varying = empty.varying
     wanted = {
-        name: (ONNX_TYPES[array.dtype.name], array.shape[name in varying :])
+        name: (array.dtype.name, array.shape[name in varying :])
         for name, array in empty.inputs().items()
     }
-    found = {
-        value.name: (value.type, tuple(value.shape[value.name in varying :]))
-        for value in session.get_inputs()
-    }
-    scores = [(value.type, tuple(value.shape[1:])) for value in session.get_outputs()]
-    if found != wanted or scores != [("tensor(float)", (2,))]:
+    found = {name: _beyond(value, name in varying) for name, value in session.inputs.items()}
+    scores = [_beyond(value, 1) for value in session.outputs]
+    if found != wanted or scores != [("float32", (2,))]:
         raise InputError(
             path,
             f"its network takes {found} and gives {scores}, not as its Spec says {wanted} and "
             "two scores",
             "Export it with `derain export`.",
         )
+
+
+def _beyond(value: TensorType, axes: int) -> tuple[str, tuple[int | None, ...]]:
+    """Type and sizes of what a network takes or gives, without its first axes."""
+    return value.dtype, value.shape[axes:]

@@ -25,6 +25,7 @@ LIBRARIES = {
     "matplotlib": "matplotlib",
     "onnx": "ONNX",
     "onnxscript": "ONNX",
+    "openvino": "OpenVINO",
     "optuna": "Optuna",
     "sqlalchemy": "Optuna",
 }

@@ -11,6 +11,7 @@ from derain.cli.arguments import add_threads, command_line, count
 from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
+from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.errors import InputError
 from derain.evaluation.published_tables import (
     TABLES,
@@ -39,6 +40,8 @@ and one picture of error against time (speed_error.png).
   derain bench --data scans/ --card wads --methods outdet.onnx dror dsor all none --out bench
   derain bench --data DATASET --methods outdet.onnx int8=outdet_int8.onnx tuned=dsor.yaml \\
       position intensity all none --out bench
+  derain bench --data scans/ --card wads --methods outdet.onnx --runtime openvino \\
+      --precision bf16 --out bench
   derain bench --data test/ --train train/ --card wads --methods position intensity --out bench
   derain bench --paper table2 --data REHEARSE3D_PUBLIC --methods outdet.onnx salsanext.onnx \\
       lisnownet.onnx dsor.yaml dror.yaml position all none --out table2
@@ -47,6 +50,8 @@ and one picture of error against time (speed_error.png).
 
 A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), a filter (below), or a
 baseline: position and intensity, learnt from the training scans, all and none.
+With --runtime, every model is run by that one too, in a row of its own,
+and what it changes beside onnxruntime is printed.
 Scoring runs all methods in this process, where filters share one search for neighbours; then each
 is timed alone, in a process of its own.
 """
@@ -80,6 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--paper", choices=TABLES, help="print beside this table")
     add_threads(parser)
+    add_runtime(parser, help="another runtime to run models by")
     parser.add_argument(
         "--timed", type=count, default=10, help="scans to time on (default: %(default)s)"
     )
@@ -96,7 +102,7 @@ def main(arguments: argparse.Namespace) -> int:
 
     data = labelled(arguments, arguments.data)
     rates = rain_rates(arguments.data, arguments.rain_rates)
-    methods = contestants(arguments.methods, _learn_from(arguments, data))
+    methods = contestants(arguments.methods, _learn_from(arguments, data), runtime_of(arguments))
     refuse_unwritable(arguments.out / "bench.json")
     if arguments.paper is None:
         scans = _labelled_frames(data, _frames(data, arguments.part), rates)

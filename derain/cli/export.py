@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from derain.cli.arguments import count, share, threads
 from derain.cli.outputs import say
+from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.system.notices import Notices
 from derain.views.candidate_fit import RAIN_INSIDE
@@ -36,6 +37,7 @@ without.
 Where the proof fails, no file is left. With --int8, convolutions compute in eight bits, scaled by
 what they see in scans of the calibration folder. They must find the rain there that the network
 finds: so the scans have to hold some, and their intensities the unit of the training data.
+The file is the same for every runtime: another that is named has to pass the proof too.
 """
 
 
@@ -71,6 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--threads", type=threads, default=0, help="threads to time with (default all)"
     )
+    add_runtime(parser, help="prove and time the file by this runtime too")
     parser.add_argument("--repeats", type=count, default=30, help="timed runs (default 30)")
 
 
@@ -84,12 +87,13 @@ def main(arguments: argparse.Namespace) -> int:
 
     if arguments.scan is not None and not is_file(arguments.scan):
         raise InputError(arguments.scan, "there is no such file", "Check --scan.")
+    runtime = runtime_of(arguments)
     model = load_model(arguments.checkpoint)
     calibration = _calibration(arguments)
     _warn_of_odd(calibration, model.spec)
     if arguments.candidates:
         _fit_candidates(model, arguments)
-    proof = export(model, arguments.out, calibration)
+    proof = export(model, arguments.out, calibration, runtime)
     print(proof)
     say(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
     print(
@@ -99,6 +103,7 @@ def main(arguments: argparse.Namespace) -> int:
             arguments.columns,
             arguments.threads,
             arguments.repeats,
+            runtime,
         )
     )
     return 0

@@ -10,6 +10,7 @@ from typing import Any
 from derain.cli.arguments import add_threads, share
 from derain.cli.filter_help import list_filters
 from derain.cli.outputs import folder_sink, tell
+from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError, printable
@@ -34,6 +35,7 @@ rain, in the input's format with every field kept.
   derain run model.onnx scan.bin --out cleaned
   derain run model.onnx scans/ more/scan.pcd --out cleaned --threads 2 --json
   derain run model.onnx nuscenes/ --out cleaned --columns x,y,z,intensity,ring
+  derain run model.onnx scans/ --out cleaned --runtime openvino --precision bf16
   derain run dror scans/ --out cleaned
   derain run dror WADS/ --out cleaned
   derain run best.yaml scans/ --out cleaned
@@ -88,6 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     add_threads(parser)
+    add_runtime(parser, help="what runs the model")
     parser.add_argument("--json", action="store_true", help="print one JSON object a scan")
     add_columns(parser)
     add_intensity_scale(parser)
@@ -114,7 +117,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
-    method = load_method(*_named_method(arguments), arguments.threads)
+    runtime = runtime_of(arguments)
+    method = load_method(*_named_method(arguments), arguments.threads, runtime)
     source = named_frames(arguments.scans, arguments.columns)
     cleaning = _Cleaning(method, folder_sink(arguments.out, source), arguments)
     scans = ScanByScan(source)

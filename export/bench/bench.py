@@ -16,10 +16,13 @@ from derain.export.bench.contestant import Contestant
 from derain.export.bench.contestants import GivenMethod, contestants
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
-from derain.export.bench.report import main_table, write_report
+from derain.export.bench.other_runtime import changes
+from derain.export.bench.report import main_table, runtimes_table, write_report
 from derain.export.bench.rows import Row, joined
 from derain.export.bench.shared_search import scored_methods
 from derain.export.machine import processor, versions
+from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
+from derain.export.runtimes.session import FLOAT32_PRECISION
 from derain.files import DEFAULT_COLUMNS
 from derain.scan import Scan
 from derain.sources.given import GivenScans, source_of
@@ -31,7 +34,7 @@ from derain.system.notices import Notices
 
 @dataclass(frozen=True)
 class Bench:
-    """What a bench found; as text, its main table.
+    """What a bench found; as text, its main table, and what other runtimes change.
 
     Attributes:
         rows: How each method did, in the order of the methods.
@@ -43,7 +46,9 @@ class Bench:
     facts: Mapping[str, Any]
 
     def __str__(self) -> str:
-        return main_table(self.rows)
+        changed = self.facts["runtimes"]
+        table = main_table(self.rows)
+        return f"{table}\n\n{runtimes_table(changed)}" if changed else table
 
     def __getitem__(self, title: str) -> Row:
         """The row of a method, by its title.
@@ -100,6 +105,8 @@ def bench(
     timed: int = 10,
     repeats: int = 3,
     seed: int = 0,
+    runtime: str = DEFAULT_RUNTIME,
+    precision: str = FLOAT32_PRECISION,
 ) -> Bench:
     """Compares methods on the same labelled scans: error, time and memory.
 
@@ -132,6 +139,10 @@ def bench(
         timed: Scans that each method is timed on, spread over all.
         repeats: Timed runs on each of them.
         seed: Of the draws behind the intervals.
+        runtime: Another runtime that every model is run by besides onnxruntime, such as
+            ``openvino``; what it changes is told.
+        precision: What that computes in: ``float32``, or ``bf16`` where it and the processor have
+            it.
 
     Returns:
         A row for each method, which can be printed and written.
@@ -148,7 +159,7 @@ def bench(
         return LabelledFrames(card, frames, intensity_scale, asked, rain_rates or {})
 
     learn_from = None if train is None else labelled(train).truths
-    rows = contestants(methods, learn_from)
+    rows = contestants(methods, learn_from, Runtime(runtime, precision))
     titles = ", ".join(repr(row.title) for row in rows)
     effort = Effort(threads, timed, repeats, seed)
     return run_bench(rows, labelled(scans), effort, command=f"derain.bench([{titles}], ...)")
@@ -184,7 +195,9 @@ def run_bench(
     ]
     notices.tell_how_many_more()
     rows = joined(methods, scores, costs, np.random.default_rng(effort.seed))
-    return Bench(rows, {**_facts(command, data, timing, effort.seed), "notes": notes})
+    changed = changes(methods, timing, data.read)
+    facts = _facts(command, data, timing, effort.seed, methods)
+    return Bench(rows, {**facts, "notes": notes, "runtimes": changed})
 
 
 def _notes(methods: Sequence[Contestant], data: LabelledFrames) -> list[str]:
@@ -210,9 +223,12 @@ def _scans(methods: Sequence[Contestant], data: LabelledFrames, notices: Notices
         yield scan
 
 
-def _facts(command: str, data: LabelledFrames, timing: Timing, seed: int) -> dict[str, Any]:
+def _facts(
+    command: str, data: LabelledFrames, timing: Timing, seed: int, methods: Sequence[Contestant]
+) -> dict[str, Any]:
     """Everything that a bench depends on besides its methods, as JSON-able primitives."""
     card, frames = data.card, data.frames
+    others = [method.by_other.runtime.name for method in methods if method.by_other]
     scans = "1 scan" if len(frames) == 1 else f"{len(frames):,} scans"
     files = []
     for frame in frames:
@@ -231,6 +247,6 @@ def _facts(command: str, data: LabelledFrames, timing: Timing, seed: int) -> dic
         "timed_on": [frame.name for frame in timing.frames],
         "processor": processor(),
         "system": platform.platform(),
-        "versions": versions(),
+        "versions": versions([DEFAULT_RUNTIME, *others]),
         "files": files,
     }

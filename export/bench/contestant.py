@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.export.bench.other_runtime import OtherRuntime
 from derain.filters import PointFilter
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
@@ -31,6 +32,7 @@ class Contestant:
         filter: The filter, where it is one: filters share one search for neighbours.
         candidates: Bounds outside which that filter calls nothing rain, if it has any.
         judges_by: What it judges by, as far as a scan may not suit it.
+        by_other: What runs it, where it is a model and that is not onnxruntime in float32.
     """
 
     title: str
@@ -40,6 +42,7 @@ class Contestant:
     filter: PointFilter | None = None
     candidates: Candidates | None = None
     judges_by: Examiner | None = None
+    by_other: OtherRuntime | None = None
 
     @cached_property
     def can_be_sent(self) -> bool:

@@ -20,8 +20,10 @@ from derain.evaluation.baselines import PositionPrior, all_points, no_points
 from derain.evaluation.intensity_rule import IntensityRule
 from derain.export.bench.contestant import Contestant
 from derain.export.bench.functions import TimedFunction
+from derain.export.bench.other_runtime import beside_themselves, run_by
 from derain.export.methods import load_method, named_method, require_one_scan
 from derain.export.runtime import Derainer
+from derain.export.runtimes.registry import Runtime
 from derain.filters import FilterDerainer, PointFilter
 from derain.filters.parameters import CANDIDATES
 from derain.scan import Scan
@@ -40,7 +42,9 @@ LEARNT = ("position", "intensity")
 
 
 def contestants(
-    methods: Sequence[GivenMethod] | Mapping[str, GivenMethod], learn_from: LearnFrom | None = None
+    methods: Sequence[GivenMethod] | Mapping[str, GivenMethod],
+    learn_from: LearnFrom | None = None,
+    runtime: Runtime = Runtime(),
 ) -> list[Contestant]:
     """The methods of a bench.
 
@@ -49,10 +53,11 @@ def contestants(
             model, a YAML file of parameters, a filter or a baseline (position, intensity, all,
             none), and without a mapping may have ``title=`` before it.
         learn_from: Scans for position and intensity; None where there are none to learn from.
+        runtime: What every model is run by besides onnxruntime, where it is another.
 
     Raises:
         InputError: No method; one that is not known or cannot be read, or has nothing to learn
-            from; or two of one title.
+            from; two of one title; or a runtime that cannot run the models, or has none to run.
     """
     if not methods:
         raise InputError("methods", "there are none", "Give one or more.")
@@ -63,6 +68,7 @@ def contestants(
         ]
     else:
         rows = [_contestant(method, learn_from) for method in methods]
+    rows = beside_themselves(rows, runtime)
     titles = [row.title for row in rows]
     for title in titles:
         if titles.count(title) > 1:
@@ -84,7 +90,8 @@ def _contestant(method: GivenMethod, learn_from: LearnFrom | None) -> Contestant
             return _filter(method.filter.name, method)
         case Derainer(path=path, spec=spec):
             ready = partial(load_method, str(path), {"threshold": spec.threshold})
-            return _model(printable(path.stem), str(path), method, ready)
+            row = _model(printable(path.stem), str(path), method, ready)
+            return row if method.runtime.is_default else run_by(row, method.runtime)
         case _ if callable(method) and not isinstance(method, type):
             return _function(method)
     kind = f"the class {method.__name__}" if isinstance(method, type) else type(method).__name__

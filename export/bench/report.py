@@ -31,6 +31,12 @@ READING = """\
   near; `all` and `none` look at nothing. A method that does not beat them has learnt nothing."""
 
 
+OTHER_RUNTIMES = """\
+Each model by another runtime beside itself by onnxruntime in float32, on the scans that were timed:
+the largest difference of a logit, as a share of the scan's largest where that is above 1; points or
+pixels on the other side of the threshold; what both call rain, as a share of what either does."""
+
+
 def write_report(rows: Sequence[Row], facts: Mapping[str, Any], out: Path) -> None:
     """Writes ``bench.json``, ``bench.csv`` and ``bench.md`` into a folder.
 
@@ -84,6 +90,8 @@ def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
     if rows[0].scores.by_sensor:
         parts += ["## IoU by sensor", _groups(rows, lambda row: row.scores.by_sensor)]
     parts += ["## Milliseconds by stage, median and 95th percentile", _by_stage(rows)]
+    if changed := facts.get("runtimes"):
+        parts += ["## What another runtime changes", runtimes_table(changed), OTHER_RUNTIMES]
     if failures := _failures(rows):
         parts += ["## What failed", failures]
     return "\n\n".join([*parts, facts["versions"]])
@@ -94,6 +102,29 @@ def main_table(rows: Sequence[Row]) -> str:
     head = ["method", "P", "R", "F1", "IoU", "IoU 95 %", "behind best"]
     head += ["F1 per scan", "IoU per scan", "ms", "p95", "weights", "MiB"]
     return markdown_table(head, [_main_cells(row) for row in rows])
+
+
+def runtimes_table(changed: Sequence[Mapping[str, Any]]) -> str:
+    """What each model by another runtime changes, beside itself by onnxruntime.
+
+    Args:
+        changed: As :func:`.other_runtime.changes` has it, one or more.
+    """
+    head = ["method", "beside onnxruntime", "largest logit difference", "labels flipped"]
+    return markdown_table([*head, "IoU of the rain"], [_changed_cells(row) for row in changed])
+
+
+def _changed_cells(row: Mapping[str, Any]) -> list[str]:
+    if "failure" in row:
+        return [row["method"], row["failure"], "-", "-", "-"]
+    scans = "1 scan" if row["scans"] == 1 else f"{row['scans']:,} scans"
+    return [
+        row["method"],
+        f"{scans}, {row['points']:,} points or pixels",
+        f"{row['largest_difference']:.1e}",
+        f"{row['flipped']:,}",
+        f"{row['rain_iou']:.4f}",
+    ]
 
 
 def _main_cells(row: Row) -> list[str]:

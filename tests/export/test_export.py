@@ -80,7 +80,8 @@ def test_the_metadata_says_how_the_model_is_used(onnx_model: Path, random_outdet
     assert derainer.metadata["spec"] == random_outdet.spec.as_dict()
     assert derainer.metadata["versions"]["derain"] == derain.__version__
     assert derainer.metadata["versions"]["torch"] == torch.__version__
-    properties = derainer.session.get_modelmeta().custom_metadata_map
+    proto = onnx.load(onnx_model)
+    properties = {entry.key: entry.value for entry in proto.metadata_props}
     assert properties["license"] == "network: MIT; training data: CC BY-NC-SA 4.0"
     assert properties["version"] == derain.__version__
     assert "outdet" in properties["description"]

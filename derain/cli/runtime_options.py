@@ -1,0 +1,35 @@
+"""Arguments that say what runs a model's network."""
+
+import argparse
+
+from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
+from derain.export.runtimes.session import FLOAT32_PRECISION
+
+
+def add_runtime(parser: argparse.ArgumentParser, help: str) -> None:
+    """Declares what runs a model's network.
+
+    Args:
+        parser: The command's parser.
+        help: What the command does with it.
+    """
+    parser.add_argument(
+        "--runtime",
+        metavar="NAME",
+        help=f"{help}: {DEFAULT_RUNTIME} (default), or openvino: pip install 'derain[openvino]'",
+    )
+    parser.add_argument(
+        "--precision",
+        metavar="NAME",
+        help=f"what it computes in: {FLOAT32_PRECISION} (default), or bf16, where the runtime and "
+        "the processor have it",
+    )
+
+
+def runtime_of(arguments: argparse.Namespace) -> Runtime:
+    """What is to run a model's network.
+
+    Raises:
+        InputError: No such runtime, or a precision that it has not.
+    """
+    return Runtime(arguments.runtime or DEFAULT_RUNTIME, arguments.precision or FLOAT32_PRECISION)

@@ -1,0 +1,118 @@
+"""A model by another runtime, beside itself by onnxruntime."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from derain.errors import InputError, reason_of
+from derain.export.runtime import Derainer
+from derain.export.runtimes.registry import Runtime
+from derain.scan import Scan
+from derain.spec import Spec
+
+if TYPE_CHECKING:
+    from derain.export.bench.contestant import Contestant, TimedMethod
+    from derain.export.bench.cost import Timing
+    from derain.sources.frame import Frame
+
+
+@dataclass(frozen=True)
+class OtherRuntime:
+    """What runs a model in place of onnxruntime.
+
+    Attributes:
+        runtime: What runs it.
+        usual: Makes the same model by onnxruntime in float32, with a number of threads.
+    """
+
+    runtime: Runtime
+    usual: Callable[[int], object]
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What it is, for whoever repeats the bench."""
+        return {"runtime": str(self.runtime)}  # in one, for precision is a score as well
+
+
+def beside_themselves(rows: Sequence["Contestant"], runtime: Runtime) -> list["Contestant"]:
+    """The methods, each model followed by itself by another runtime.
+
+    Args:
+        rows: The methods.
+        runtime: The other runtime; the usual one adds nothing.
+
+    Raises:
+        InputError: A runtime that cannot run one of the models, or no model.
+    """
+    if runtime.is_default:
+        return list(rows)
+    beside = []
+    for row in rows:
+        beside.append(row)
+        if isinstance(row.judges_by, Spec) and row.by_other is None:
+            beside.append(replace(run_by(row, runtime), title=f"{row.title} ({runtime})"))
+    if len(beside) == len(rows):
+        raise InputError(f"runtime {runtime}", "none of the methods is a model", "Leave it out.")
+    return beside
+
+
+def run_by(row: "Contestant", runtime: Runtime) -> "Contestant":
+    """A model by another runtime.
+
+    Args:
+        row: The model by the usual one.
+        runtime: The other runtime.
+
+    Raises:
+        InputError: It cannot run the model.
+    """
+    make: Callable[..., TimedMethod] = row.ready  # that of a model, which takes a runtime
+    ready = partial(make, runtime=runtime)
+    ready(1)  # refused before any work
+    other = OtherRuntime(runtime, row.ready)
+    return replace(row, ready=ready, facts={**row.facts, **other.facts}, by_other=other)
+
+
+def changes(
+    methods: Sequence["Contestant"], timing: "Timing", read: Callable[["Frame"], Scan]
+) -> list[dict[str, Any]]:
+    """What each model by another runtime changes beside itself by onnxruntime.
+
+    Args:
+        methods: The methods.
+        timing: What they are timed on, which is what is compared as well.
+        read: Reads a frame, in the unit of the methods.
+
+    Returns:
+        For each such model, by the title ``method``, the numbers of a
+        :class:`derain.export.proof.Proof` as JSON-able primitives; or its ``failure``.
+    """
+    return [
+        {"method": method.title, **method.by_other.facts, **_change(method, timing, read)}
+        for method in methods
+        if method.by_other is not None
+    ]
+
+
+def _change(
+    method: "Contestant", timing: "Timing", read: Callable[["Frame"], Scan]
+) -> dict[str, Any]:
+    from derain.export.proof import beside  # here: it brings torch, which is not to be measured
+
+    assert method.by_other is not None
+    try:
+        usual, other = method.by_other.usual(timing.threads), method.ready(timing.threads)
+        assert isinstance(usual, Derainer)
+        assert isinstance(other, Derainer)
+        # Mapped, for a loop would hold on to one scan while the next is read.
+        proof = beside(usual, other, map(_named(read), timing.frames))
+    except Exception as error:  # whatever a runtime raises is told in the method's row
+        return {"failure": reason_of(error)}
+    numbers = proof.as_dict()
+    del numbers["cases"]
+    return {**numbers, "scans": len(proof.cases)}
+
+
+def _named(read: Callable[["Frame"], Scan]) -> Callable[["Frame"], tuple[str, Scan]]:
+    return lambda frame: (frame.name, read(frame))

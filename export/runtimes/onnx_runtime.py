@@ -1,0 +1,57 @@
+"""onnxruntime, which comes with derain and runs a model unless another runtime is named."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.export.model_file import ModelFile
+from derain.export.runtimes.registry import DEFAULT_RUNTIME, RUNTIMES
+from derain.export.runtimes.session import Session, TensorType
+
+# NumPy's names of what onnxruntime calls the types of a view's inputs and of scores.
+NUMPY_NAMES = {"tensor(float)": "float32", "tensor(int64)": "int64", "tensor(bool)": "bool"}
+
+
+@RUNTIMES.add(DEFAULT_RUNTIME)
+class OnnxRuntimeSession(Session):
+    """A network on the CPU by onnxruntime."""
+
+    PACKAGE = "onnxruntime"
+
+    def __init__(self, file: ModelFile, threads: int, precision: str) -> None:
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        # Always stated: the default counts the host's cores, not those a container may use.
+        options.intra_op_num_threads = threads
+        options.inter_op_num_threads = 1
+        options.log_severity_level = 3
+        # Threads may spin while the network runs; after it, the cores are for the next scan's view.
+        options.add_session_config_entry("session.force_spinning_stop", "1")
+        try:
+            self.session = onnxruntime.InferenceSession(
+                file.content, options, providers=["CPUExecutionProvider"]
+            )
+        except Exception as error:  # onnxruntime's exceptions share no base of their own
+            raise self.cannot_run(file, error) from error
+
+    @property
+    def inputs(self) -> dict[str, TensorType]:
+        """What the network takes, by name."""
+        return {value.name: _type_of(value) for value in self.session.get_inputs()}
+
+    @property
+    def outputs(self) -> list[TensorType]:
+        """What the network gives, in order."""
+        return [_type_of(value) for value in self.session.get_outputs()]
+
+    def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+        """The network's first output."""
+        return self.session.run(None, inputs)[0]  # type: ignore[no-any-return]
+
+
+def _type_of(value: Any) -> TensorType:
+    sizes = tuple(size if isinstance(size, int) else None for size in value.shape)
+    return TensorType(NUMPY_NAMES.get(value.type, value.type), sizes)

@@ -1,0 +1,45 @@
+"""A runtime that a test brings itself."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from derain.export.model_file import ModelFile
+from derain.export.runtimes.onnx_runtime import OnnxRuntimeSession
+from derain.export.runtimes.registry import RUNTIMES
+from derain.export.runtimes.session import Session, TensorType
+
+# What the runtime "rainy" adds to the score of rain, by its precisions.
+RAINY = {"float32": 0.0, "bf16": 0.01, "int2": 1000.0}
+
+
+class RainySession(Session):
+    """onnxruntime, which takes everything for rain the more, the less precise it is."""
+
+    PACKAGE = "onnxruntime"
+    PRECISIONS = tuple(RAINY)
+
+    def __init__(self, file: ModelFile, threads: int, precision: str) -> None:
+        self.usual = OnnxRuntimeSession(file, threads, "float32")
+        self.asked = (threads, precision)
+
+    @property
+    def inputs(self) -> dict[str, TensorType]:
+        return self.usual.inputs
+
+    @property
+    def outputs(self) -> list[TensorType]:
+        return self.usual.outputs
+
+    def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+        return self.usual.run(inputs) + np.float32([0, RAINY[self.asked[1]]])
+
+
+@pytest.fixture
+def rainy(monkeypatch: pytest.MonkeyPatch) -> type[Session]:
+    """A runtime of that name for the length of a test."""
+    monkeypatch.setattr(RUNTIMES, "_members", dict(RUNTIMES))
+    return RUNTIMES.add("rainy")(RainySession)

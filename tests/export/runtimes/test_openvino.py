@@ -1,0 +1,197 @@
+"""OpenVINO gives onnxruntime's answers in float32, and nearly so in bfloat16; it stays at home.
+
+`make test-openvino` installs it and runs these tests.
+"""
+
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.export import onnx_file, proof
+from derain.export.model_file import METADATA_KEY
+from derain.export.onnx_file import export
+from derain.export.proof import BF16, FLOAT32, beside, prove
+from derain.export.runtime import Derainer
+from derain.export.runtimes.registry import Runtime
+from derain.models.base import DerainingModule
+from derain.models.checkpoint import load_model
+from derain.scan import Scan
+from derain.system.cores import usable_cores
+
+KEPT = Path(__file__).parent.parent / "kept"
+HARD_CASES = dict(hard_cases(largest=3000))
+OPENVINO, BFLOAT16 = Runtime("openvino"), Runtime("openvino", "bf16")
+
+pytestmark = pytest.mark.skipif(
+    find_spec("openvino") is None, reason="OpenVINO is not installed: make test-openvino"
+)
+
+
+@pytest.fixture(scope="module")
+def model() -> Derainer:
+    return Derainer(KEPT / "outdet.onnx", 2, "openvino")
+
+
+@pytest.fixture(scope="module")
+def model_in_bfloat16() -> Derainer:
+    try:
+        return Derainer(KEPT / "outdet.onnx", 2, "openvino", "bf16")
+    except InputError as error:
+        pytest.skip(str(error))
+
+
+def test_float32_is_onnxruntimes_on_every_hard_case() -> None:
+    network = load_model(KEPT / "outdet.ckpt")
+    found = prove(network, KEPT / "outdet.onnx", HARD_CASES.items(), FLOAT32, OPENVINO)
+    assert found.holds, str(found)
+    assert {case.runtime for case in found.cases} == {"openvino"}
+    assert found.flipped == 0
+
+
+@pytest.mark.usefixtures("model_in_bfloat16")
+def test_bfloat16_is_near_on_every_hard_case() -> None:
+    network = load_model(KEPT / "outdet.ckpt")
+    found = prove(network, KEPT / "outdet.onnx", HARD_CASES.items(), BF16, BFLOAT16)
+    assert found.holds, str(found)
+    assert found.worst.difference > 1e-4  # it does compute in bfloat16
+    assert str(found).startswith("openvino bf16: ")
+
+
+@pytest.mark.parametrize(("precision", "bounds"), [("float32", FLOAT32), ("bf16", BF16)])
+def test_networks_on_images_come_out_alike(
+    image_model: DerainingModule,
+    image_onnx: Path,
+    model_in_bfloat16: Derainer,
+    precision: str,
+    bounds: proof.Bounds,
+) -> None:
+    usual, other = Derainer(image_onnx, 1), Derainer(image_onnx, 1, "openvino", precision)
+    found = beside(usual, other, HARD_CASES.items())
+    assert bounds.difference is not None
+    assert found.worst.difference < bounds.difference * image_model.AMPLIFIES
+    assert found.flipped <= len(found.cases) + (bounds.flipped or 0) * found.points
+    assert found.rain_iou > 0.95
+
+
+def test_scans_of_any_size_follow_each_other(model: Derainer, model_in_bfloat16: Derainer) -> None:
+    sizes = [500, 0, 1, 2, 499, 1000, 500, 3, 0, 500]
+    for derainer in (model, model_in_bfloat16):
+        answers = [derainer.probability(scene(size)) for size in sizes]
+        for size, answer in zip(sizes, answers, strict=True):
+            alone = Derainer(derainer.path, 2, "openvino", derainer.runtime.precision)
+            np.testing.assert_array_equal(alone.probability(scene(size)), answer)
+
+
+def test_scores_stay_as_they_were_when_the_next_scan_is_judged(model: Derainer) -> None:
+    view = model.view(Scan.of(scene(300)))
+    first = model.logits(view)
+    kept = first.copy()
+    model.logits(model.view(Scan.of(scene(300, seed=1))))
+    np.testing.assert_array_equal(first, kept)
+
+
+def test_one_model_serves_several_threads_of_a_program(model: Derainer) -> None:
+    views = [model.view(Scan.of(scene(2000, seed))) for seed in range(8)]
+    expected = [model.logits(view) for view in views]
+    with ThreadPoolExecutor(4) as pool:
+        for logits, alone in zip(pool.map(model.logits, views * 5), expected * 5, strict=True):
+            np.testing.assert_array_equal(logits, alone)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_threads_and_precision_are_those_that_are_asked_for(threads: int) -> None:
+    network = Derainer(KEPT / "outdet.onnx", threads, "openvino").session.model
+    assert network.get_property("INFERENCE_NUM_THREADS") == min(threads, usable_cores())
+    assert network.get_property("NUM_STREAMS") == 1
+    # The default would be bfloat16 where the processor has it.
+    assert network.get_property("INFERENCE_PRECISION_HINT").to_dtype() == np.float32
+
+
+def test_a_graph_that_it_cannot_run_is_one_line(tmp_path: Path) -> None:
+    proto = onnx.load(KEPT / "outdet.onnx")
+    proto.graph.node[0].op_type = "Unheard"
+    onnx.save(proto, tmp_path / "odd.onnx")
+    with pytest.raises(InputError, match=r"odd\.onnx: not an ONNX model that openvino") as refusal:
+        Derainer(tmp_path / "odd.onnx", 1, "openvino")
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_network_of_another_view_is_refused(tmp_path: Path) -> None:
+    kept = onnx.load(KEPT / "outdet.onnx")
+    value = helper.make_tensor_value_info("points", TensorProto.FLOAT, ["points", 2])
+    logits = helper.make_tensor_value_info("logits", TensorProto.FLOAT, ["points", 2])
+    node = helper.make_node("Identity", ["points"], ["logits"])
+    graph = helper.make_graph([node], "other", [value], [logits])
+    proto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
+    metadata = {entry.key: entry.value for entry in kept.metadata_props}
+    helper.set_model_props(proto, {METADATA_KEY: metadata[METADATA_KEY]})
+    onnx.save(proto, tmp_path / "other.onnx")
+    with pytest.raises(InputError, match=r"other\.onnx: its network takes"):
+        Derainer(tmp_path / "other.onnx", 1, "openvino")
+
+
+def test_a_processor_without_bfloat16_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    # OpenVINO's own way to make little of a processor; read when it is loaded.
+    monkeypatch.setenv("OV_CPU_MAX_ISA", "AVX2")
+    code = "import sys; from derain.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    options = ["--out", "none", "--runtime", "openvino", "--precision", "bf16"]
+    finished = subprocess.run(
+        [sys.executable, "-c", code, "run", KEPT / "outdet.onnx", "none.bin", *options],
+        capture_output=True,
+        text=True,
+    )
+    assert finished.returncode == 2
+    assert finished.stderr.startswith("derain: precision bf16: this processor has none")
+
+
+def test_it_asks_nothing_of_the_network_writes_nothing_and_needs_no_onnxruntime(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    script = """
+import sys
+events = []
+def heard(event, arguments):
+    if event in ("socket.connect", "socket.getaddrinfo", "socket.sendto"):
+        events.append((event, arguments))
+sys.addaudithook(heard)
+sys.modules["onnxruntime"] = sys.modules["torch"] = None  # importing them is an error
+from derain.export.runtime import Derainer
+from derain.evaluation.hard_cases import scene
+print(Derainer(sys.argv[1], 1, "openvino")(scene(300)).sum())
+assert not events, events
+assert "openvino_telemetry" not in sys.modules
+"""
+    finished = subprocess.run(
+        [sys.executable, "-c", script, KEPT / "outdet.onnx"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+    )
+    assert finished.returncode == 0, finished.stderr
+    assert int(finished.stdout) == Derainer(KEPT / "outdet.onnx", 1)(scene(300)).sum()
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_export_for_it_is_proved_by_both(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(1000)))])
+    # The graph need not be traced anew.
+    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(KEPT / "outdet.onnx"))
+    made = export(load_model(KEPT / "outdet.ckpt"), tmp_path / "made.onnx", runtime=OPENVINO)
+    assert made.holds
+    assert made.by_other is not None
+    assert [case.runtime for case in made.by_other.cases] == ["openvino"] * 2
+    assert "\nopenvino: 2 cases" in str(made)
+    written = Derainer(tmp_path / "made.onnx", 1, "openvino").metadata["proof"]
+    assert written["by_other"]["flipped"] == 0

@@ -1,0 +1,109 @@
+"""A runtime is found by its name, opens what has been looked at, and is refused in one line."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.export.machine import versions
+from derain.export.methods import load_method
+from derain.export.model_file import ModelFile
+from derain.export.runtime import Derainer
+from derain.export.runtimes.registry import RUNTIMES, Runtime
+from derain.export.runtimes.session import Session, TensorType
+
+KEPT = Path(__file__).parent.parent / "kept/outdet.onnx"
+SCORES = [TensorType("float32", (None, 2))]
+
+
+def test_onnxruntime_in_float32_is_what_runs_a_model_unless_another_is_named() -> None:
+    assert Derainer(KEPT, 1).runtime == Runtime("onnxruntime", "float32")
+    assert Runtime().is_default
+    assert {"onnxruntime", "openvino"} <= set(RUNTIMES)
+    assert all(name == RUNTIMES[name].NAME for name in RUNTIMES)
+
+
+def test_a_network_says_what_it_takes_and_gives() -> None:
+    session = Runtime().open(ModelFile.read(KEPT), 1)
+    assert session.inputs == {
+        "points": TensorType("float32", (None, 4)),
+        "distances": TensorType("float32", (None, 3)),
+        "neighbours": TensorType("int64", (None, 3)),
+    }
+    assert session.outputs == SCORES
+
+
+@pytest.mark.parametrize(
+    ("runtime", "precision", "line"),
+    [
+        ("abacus", "float32", "abacus: no such runtime. Give onnxruntime or openvino."),
+        ("onnxruntime", "bf16", "computes in float32. Leave it out, or take the runtime openvino."),
+        ("openvino", "int4", "precision int4: openvino computes in float32 or bf16. Leave it out."),
+    ],
+)
+def test_what_no_runtime_has_is_refused_with_what_there_is(
+    runtime: str, precision: str, line: str
+) -> None:
+    with pytest.raises(InputError) as refusal:
+        Derainer(KEPT, 1, runtime, precision)
+    assert str(refusal.value).endswith(line)
+
+
+def test_openvino_is_asked_for_by_the_extra_that_installs_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "openvino", None)  # importing it is an ImportError
+    with pytest.raises(InputError) as refusal:
+        Derainer(KEPT, 1, "openvino")
+    assert str(refusal.value) == (
+        "openvino: this runtime is not installed. pip install 'derain[openvino]'"
+    )
+
+
+def test_a_runtime_of_another_package_is_given_threads_and_precision(rainy: type[Session]) -> None:
+    derainer = Derainer(KEPT, 2, "rainy", "int2")
+    assert isinstance(derainer.session, rainy)
+    assert derainer.session.asked == (2, "int2")
+    assert str(derainer.runtime) == "rainy int2"
+    assert derainer(scene(300)).all()
+    same = Derainer(KEPT, 2, "rainy").probability(scene(300))
+    np.testing.assert_array_equal(same, Derainer(KEPT, 2).probability(scene(300)))
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        lambda session: ("inputs", {**session.inputs, "more": SCORES[0]}),
+        lambda session: ("inputs", {**session.inputs, "points": TensorType("float64", (None, 4))}),
+        lambda session: ("inputs", {**session.inputs, "points": TensorType("float32", (None, 5))}),
+        lambda session: ("outputs", [TensorType("float16", (None, 2))]),
+        lambda session: ("outputs", SCORES * 2),
+    ],
+)
+def test_what_a_network_takes_and_gives_is_checked_whatever_runs_it(
+    rainy: type[Session], monkeypatch: pytest.MonkeyPatch, changed: Callable[[Session], object]
+) -> None:
+    name, value = changed(Runtime().open(ModelFile.read(KEPT), 1))
+    monkeypatch.setattr(rainy, name, value)
+    with pytest.raises(InputError, match=r"outdet\.onnx: its network takes"):
+        Derainer(KEPT, 1, "rainy")
+
+
+@pytest.mark.usefixtures("rainy")
+def test_a_method_is_run_by_the_runtime_that_is_named_and_a_filter_by_none() -> None:
+    assert load_method(str(KEPT), {}, 1, Runtime("rainy", "bf16")).runtime.name == "rainy"
+    with pytest.raises(InputError, match=r"dror: a filter, .* rainy could run\. Leave it out"):
+        load_method("dror", {}, 1, Runtime("rainy"))
+
+
+def test_the_versions_name_each_package_that_ran_once(
+    rainy: type[Session], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert versions(["onnxruntime", "rainy"]) == versions()
+    monkeypatch.setattr(rainy, "PACKAGE", "numpy")
+    assert versions(["rainy"]).count(np.__version__) == 2
+    assert "onnxruntime" not in versions(["rainy"])
