@@ -103,7 +103,7 @@ def plain_view(view: RangeView, scan: Scan) -> dict[str, NDArray[np.generic]]:
     winner[pixel[rows[::-1]]] = rows[::-1]  # of equally near ones the lowest row is written last
     shown = np.flatnonzero(winner >= 0)
     image = np.zeros((len(view.channels), len(winner)), np.float32)
-    image[:, shown] = filled_values(scan, winner[shown], view.channels, view.stand_in)
+    image[:, shown] = filled_values(scan, winner[shown], view.channels, view.stand_in).T
     return {"image": image, "pixel": pixel, "winner": winner, "range": scan.range}
 
 

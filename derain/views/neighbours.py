@@ -182,8 +182,7 @@ class NeighbourView(View):
         """Views a scan."""
         first, inverse = distinct_rows(scan)
         search = NeighbourSearch(scan.xyz.take(first, axis=0), rank=first, threads=self.threads)
-        values = filled_values(scan, first, self.channels, self.stand_in)
-        points = np.ascontiguousarray(values.T)
+        points = filled_values(scan, first, self.channels, self.stand_in)
         if self.candidates is None:
             neighbours, distances = search(self.neighbours)
             return Neighbourhoods(points, neighbours, distances, first, inverse)

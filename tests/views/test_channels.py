@@ -37,7 +37,7 @@ def test_each_value_is_the_scans_or_else_the_stand_in(
 ) -> None:
     scan = Scan(np.ones((len(column), 3), np.float32), fields={"doppler": column})
     rows = np.arange(len(column))[::-1]
-    (filled,) = filled_values(scan, rows, ["doppler"], {"doppler": mean})
+    filled = filled_values(scan, rows, ["doppler"], {"doppler": mean})[:, 0]
     expected = [value if abs(value) <= 1e7 else mean for value in column[rows].tolist()]
     np.testing.assert_array_equal(filled, np.float32(expected))
 
@@ -45,14 +45,14 @@ def test_each_value_is_the_scans_or_else_the_stand_in(
 def test_a_channel_without_a_stand_in_is_zero_where_it_is_missing() -> None:
     scan = Scan(np.full((2, 3), 4, np.float32))
     filled = filled_values(scan, np.array([1]), ["rcs", "y"], {"y": 7.0})
-    assert filled.tolist() == [[0], [4]]
+    assert filled.tolist() == [[0, 4]]
 
 
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
 def test_valid_points_of_a_hard_scan_have_finite_values(scan: Scan) -> None:
     rows = np.flatnonzero(scan.valid)
     filled = filled_values(scan, rows, EVERYTHING, {"intensity": 9.0})
-    assert filled.shape == (len(EVERYTHING), len(rows))
+    assert filled.shape == (len(rows), len(EVERYTHING))
     assert filled.dtype == np.float32
     assert np.isfinite(filled).all()
     # It is the scan's columns that are NaN, not what was made of them.
@@ -93,6 +93,6 @@ def test_an_image_holds_the_values_of_its_winners_and_zero_where_there_is_none()
 def test_an_image_of_all_valid_points_holds_what_they_measure(scan: Scan) -> None:
     winner = np.where(scan.valid, np.arange(len(scan)), -1)
     image = channel_image(scan, winner, EVERYTHING, {"intensity": 9.0})
-    filled = filled_values(scan, np.flatnonzero(scan.valid), EVERYTHING, {"intensity": 9.0})
+    filled = filled_values(scan, np.flatnonzero(scan.valid), EVERYTHING, {"intensity": 9.0}).T
     np.testing.assert_array_equal(image[:, scan.valid], filled)
     assert not image[:, ~scan.valid].any()
