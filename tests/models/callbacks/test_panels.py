@@ -107,7 +107,7 @@ def test_the_epochs_that_are_drawn_are_spread_over_the_training(
     trainer.state.fn = TrainerFn.FITTING
     begun = []
     for epoch in range(epochs if epochs > 0 else 7):
-        trainer.fit_loop.epoch_progress.current.processed = epoch
+        trainer.fit_loop.epoch_progress.current.completed = epoch
         panel.on_validation_epoch_start(trainer)
         if panel.left:
             begun.append(epoch)
