@@ -5,11 +5,10 @@ is halved four times and doubled again. What differs is what costs time and find
 
 - Convolution, BatchNorm, ReLU, in this order. So every BatchNorm folds into its convolution, and
   in eight bits the ReLU is no more than where its numbers end.
-- The layers of a block are as wide as what comes into it, which at the larger sizes is half of what
-  they are joined into; the join sees what the block sees, which stands in for the shortcut.
-- Features are doubled by repeating them behind a 1×1 convolution, which onnxruntime does in the
-  layout that it keeps features in; shuffled pixels it has to move.
-- What the encoder found is narrowed and added, where SalsaNext looks at all of it by 3×3.
+- The layers of a block are half as wide as what they are joined into; the join sees what the block
+  sees, which stands in for the shortcut.
+- Features are halved by their maximum, and doubled by repeating them behind a 1×1 convolution,
+  which onnxruntime does in the layout that it keeps features in; shuffled pixels it has to move.
 
 Source: T. Cortinhal, G. Tzelepis, E. E. Aksoy, "SalsaNext: Fast, Uncertainty-aware Semantic
 Segmentation of LiDAR Point Clouds for Autonomous Driving", ISVC 2020, for the plan; Y. Lee et al.,
@@ -83,16 +82,16 @@ class ResidualContext(nn.Module):
 class JoinedLayers(nn.Module):
     """Three layers of growing reach, one after the other, joined once with what they began with."""
 
-    def __init__(self, inputs: int, outputs: int) -> None:
+    def __init__(self, inputs: int, layers: int, outputs: int) -> None:
         super().__init__()
         self.layers = nn.ModuleList(
             [
-                FoldingLayer(inputs, inputs, kernel=3),
-                FoldingLayer(inputs, inputs, kernel=3, dilation=2),
-                FoldingLayer(inputs, inputs, kernel=2, dilation=2),
+                FoldingLayer(inputs, layers, kernel=3),
+                FoldingLayer(layers, layers, kernel=3, dilation=2),
+                FoldingLayer(layers, layers, kernel=2, dilation=2),
             ]
         )
-        self.join = FoldingLayer(4 * inputs, outputs, kernel=1)
+        self.join = FoldingLayer(inputs + 3 * layers, outputs, kernel=1)
 
     def forward(self, features: Tensor) -> Tensor:
         """Features, float (B, outputs, H, W), of float (B, inputs, H, W)."""
@@ -100,26 +99,6 @@ class JoinedLayers(nn.Module):
         for layer in self.layers:
             found.append(functional.relu(layer(found[-1])))
         return functional.relu(self.join(torch.cat(found, dim=1)))
-
-
-class HalvingMean(nn.Module):
-    """Halves an image: the mean of 3×3 pixels around every second one, beyond the edges 0.
-
-    It is a depthwise convolution, since onnxruntime is several times as slow with other means of
-    eight-bit numbers.
-    """
-
-    kernel: Tensor
-
-    def __init__(self, channels: int) -> None:
-        super().__init__()
-        # Not in the state_dict: nothing learns it.
-        self.register_buffer("kernel", torch.full((channels, 1, 3, 3), 1 / 9), persistent=False)
-
-    def forward(self, features: Tensor) -> Tensor:
-        """Features, float (B, C, H / 2, W / 2), of float (B, C, H, W)."""
-        channels = len(self.kernel)
-        return functional.conv2d(features, self.kernel, stride=2, padding=1, groups=channels)
 
 
 class DoublingBlock(nn.Module):
@@ -130,7 +109,7 @@ class DoublingBlock(nn.Module):
         self.narrow = FoldingLayer(inputs, outputs, kernel=1)
         self.skip = FoldingLayer(skipped, outputs, kernel=1)
         self.dropout = nn.Dropout2d(dropout)
-        self.layers = JoinedLayers(outputs, outputs)
+        self.layers = JoinedLayers(outputs, outputs, outputs)
 
     def forward(self, features: Tensor, skip: Tensor) -> Tensor:
         """Features of the doubled image.
@@ -144,7 +123,7 @@ class DoublingBlock(nn.Module):
         """
         # Narrowed first: a 1×1 convolution of repeated pixels is the repeated 1×1 convolution.
         doubled = functional.interpolate(self.narrow(features), scale_factor=2, mode="nearest")
-        joined = functional.relu(self.dropout(doubled) + self.skip(self.dropout(skip)))
+        joined = self.dropout(functional.relu(doubled + self.skip(skip)))
         return self.dropout(self.layers(joined))
 
 
@@ -180,20 +159,21 @@ class SalsaNextLiteNetwork(nn.Module):
             raise InputError("width", f"{width} is not positive", "Give 16, or a multiple of it.")
         self.channels, self.width, self.classes = channels, width, classes
         encoder = [width * factor for factor in (1, 2, 4, 8, 8)]
-        decoder = list(reversed(encoder))
+        decoder = [width * factor for factor in (8, 4, 4, 2, 1)]
         rates = (0.0, dropout, dropout, dropout)  # from full resolution downwards
         self.context = nn.Sequential(
             ResidualContext(channels, width),
             ResidualContext(width, width),
             ResidualContext(width, width),
         )
-        self.encoder = nn.ModuleList(JoinedLayers(*pair) for pair in pairwise(encoder))
+        self.encoder = nn.ModuleList(
+            JoinedLayers(inputs, outputs // 2, outputs) for inputs, outputs in pairwise(encoder)
+        )
         self.halve = nn.ModuleList(
-            nn.Sequential(nn.Dropout2d(rate), HalvingMean(outputs))
-            for rate, outputs in zip(rates, encoder[1:], strict=True)
+            nn.Sequential(nn.Dropout2d(rate), nn.MaxPool2d(2)) for rate in rates
         )
         self.bottleneck = nn.Sequential(
-            JoinedLayers(encoder[-1], decoder[0]), nn.Dropout2d(dropout)
+            JoinedLayers(encoder[-1], decoder[0] // 2, decoder[0]), nn.Dropout2d(dropout)
         )
         self.decoder = nn.ModuleList(
             DoublingBlock(inputs, skipped, outputs, rate)
@@ -245,7 +225,9 @@ class SalsaNextLite(SalsaNextModule):
     """
 
     # All that it is made of: from the image to the scores nothing leaves the integers.
-    INTEGER_OPERATORS: ClassVar[tuple[str, ...]] = (*("Conv", "Relu", "Add", "Concat", "Resize"),)
+    INTEGER_OPERATORS: ClassVar[tuple[str, ...]] = (
+        *("Conv", "Relu", "Add", "Concat", "MaxPool", "Resize"),
+    )
     network: SalsaNextLiteNetwork
 
     def network_for(self, channels: int, width: int, dropout: float) -> SalsaNextLiteNetwork:
