@@ -121,3 +121,5 @@ def test_the_versions_name_each_package_that_ran_once(
     monkeypatch.setattr(rainy, "PACKAGE", "numpy")
     assert versions(["rainy"]).count(np.__version__) == 2
     assert "onnxruntime" not in versions(["rainy"])
+    monkeypatch.setattr(rainy, "PACKAGE", "rain-under-another-name")
+    assert "rain-under-another-name, NumPy" in versions(["rainy"])
