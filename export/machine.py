@@ -2,7 +2,7 @@
 
 import platform
 from collections.abc import Iterable
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +18,19 @@ def versions(runtimes: Iterable[str] = (DEFAULT_RUNTIME,)) -> str:
         runtimes: Names of what ran networks.
     """
     packages = dict.fromkeys(RUNTIMES[name].PACKAGE for name in runtimes)
-    ran = "".join(f"{package} {version(package)}, " for package in packages)
+    ran = "".join(f"{_with_version(package)}, " for package in packages)
     return (
         f"{processor()}; derain {derain.__version__}, {ran}"
         f"NumPy {np.__version__}, Python {platform.python_version()}"
     )
+
+
+def _with_version(package: str) -> str:
+    """A package with its version, as far as it is installed under that name."""
+    try:
+        return f"{package} {version(package)}"
+    except PackageNotFoundError:  # another brings the same modules, as onnxruntime-gpu does
+        return package
 
 
 def processor() -> str:

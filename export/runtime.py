@@ -242,6 +242,8 @@ def _refuse_other_network(session: Session, view: View, path: Path) -> None:
         for name, array in empty.inputs().items()
     }
     found = {name: _beyond(value, name in varying) for name, value in session.inputs.items()}
+    if session.DROPS_UNUSED_INPUTS:
+        wanted = {name: kind for name, kind in wanted.items() if name in found}
     scores = [_beyond(value, 1) for value in session.outputs]
     if found != wanted or scores != [("float32", (2,))]:
         raise InputError(

@@ -31,6 +31,7 @@ class OpenVinoSession(Session):
 
     PACKAGE = "openvino"
     PRECISIONS = tuple(PRECISIONS)
+    DROPS_UNUSED_INPUTS = True
 
     def __init__(self, file: ModelFile, threads: int, precision: str) -> None:
         openvino = import_openvino()
@@ -60,6 +61,7 @@ class OpenVinoSession(Session):
         except Exception as error:  # OpenVINO raises RuntimeError, its bindings more
             raise self.cannot_run(file, error) from error
         self._request = self.model.create_infer_request()
+        self._taken = tuple(self.inputs)
         self._one_at_a_time = Lock()
 
     @property
@@ -75,7 +77,7 @@ class OpenVinoSession(Session):
     def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
         """The network's first output."""
         with self._one_at_a_time:  # a second call would be refused while the request is busy
-            self._request.infer(dict(inputs), share_inputs=True)
+            self._request.infer({name: inputs[name] for name in self._taken}, share_inputs=True)
             # Copied: the memory is the request's, which writes the next scan's scores to it.
             return np.array(self._request.get_output_tensor(0).data)
 

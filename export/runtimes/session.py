@@ -45,6 +45,7 @@ class Session(ABC):
         NAME: The runtime's name; the decorator sets it.
         PACKAGE: What is installed to have it, whose version a report of times says.
         PRECISIONS: What it can compute in, on some processors at least.
+        DROPS_UNUSED_INPUTS: Whether ``inputs`` leaves out what the network has no use for.
 
     Raises:
         InputError: A runtime that is not installed, a graph that it cannot run, or a precision that
@@ -54,6 +55,7 @@ class Session(ABC):
     NAME: ClassVar[str]
     PACKAGE: ClassVar[str]
     PRECISIONS: ClassVar[tuple[str, ...]] = (FLOAT32_PRECISION,)
+    DROPS_UNUSED_INPUTS: ClassVar[bool] = False
 
     @abstractmethod
     def __init__(self, file: ModelFile, threads: int, precision: str) -> None: ...
@@ -73,7 +75,7 @@ class Session(ABC):
         """The network's first output, an array of its own.
 
         Args:
-            inputs: Arrays by name, of the types that ``inputs`` says.
+            inputs: Arrays by name, of the types that ``inputs`` says, and any that were dropped.
 
         Raises:
             Exception: Whatever the runtime raises where the network fails.

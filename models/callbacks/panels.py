@@ -18,8 +18,8 @@ class ScanPanels(lightning.Callback):
     Of several processes the first draws, of the scans that it measures.
 
     A picture costs as much as a step of training and more, and of each scan TensorBoard shows ten
-    pictures. So ten epochs are drawn, spread from the first to the last of those to come; all
-    where nobody says how many those are.
+    pictures. So ten of the epochs that end in a validation are drawn, spread from the first to the
+    last; all where nobody says how many epochs there are.
 
     Args:
         scans: How many scans to show; 0 shows none.
@@ -64,4 +64,6 @@ class ScanPanels(lightning.Callback):
         epochs = trainer.max_epochs
         if trainer.state.fn != TrainerFn.FITTING or epochs is None or epochs < 1:
             return True
-        return trainer.current_epoch in np.linspace(0, epochs - 1, self.pictures).round()
+        every = trainer.check_val_every_n_epoch or 1
+        validation = (trainer.current_epoch + 1) // every - 1
+        return validation in np.linspace(0, epochs // every - 1, self.pictures).round()

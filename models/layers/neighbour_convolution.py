@@ -47,11 +47,13 @@ class _Convolution(torch.autograd.Function):
         of_matrix = torch.zeros_like(matrix)
         turned = matrix.T.contiguous()
         blocks = zip(gradient.split(BLOCK), neighbours.split(BLOCK), strict=True)
-        for of_block, rows in blocks:
-            of_matrix.addmm_(_gathered(features, rows).T, of_block)
-            if of_features is not None:
-                of_gathered = (of_block @ turned).view(rows.numel(), features.shape[1])
-                of_features.index_add_(0, rows.flatten(), of_gathered)
+        # Whoever asks for the gradient inside of autocast would have products of another type.
+        with torch.autocast(gradient.device.type, enabled=False):
+            for of_block, rows in blocks:
+                of_matrix.addmm_(_gathered(features, rows).T, of_block)
+                if of_features is not None:
+                    of_gathered = (of_block @ turned).view(rows.numel(), features.shape[1])
+                    of_features.index_add_(0, rows.flatten(), of_gathered)
         return of_features, None, of_matrix
 
 

@@ -256,6 +256,10 @@ class LiSnowNet(DerainingModule, Published):
         self._log_alike({"val/rule_residual": torch.tensor(rule.residual)})
         self.adopt(replace(self.spec, rule=rule.as_dict()))
 
+    def on_fit_start(self) -> None:
+        """Forgets what the rule was fitted to in a training that did not come to its end."""
+        self._examples = None
+
     def on_fit_end(self) -> None:
         """Lets go of what the rule was fitted to."""
         self._examples = None

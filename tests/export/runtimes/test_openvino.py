@@ -3,6 +3,7 @@
 `make test-openvino` installs it and runs these tests.
 """
 
+import json
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -137,6 +138,25 @@ def test_a_network_of_another_view_is_refused(tmp_path: Path) -> None:
     onnx.save(proto, tmp_path / "other.onnx")
     with pytest.raises(InputError, match=r"other\.onnx: its network takes"):
         Derainer(tmp_path / "other.onnx", 1, "openvino")
+
+
+def test_inputs_that_a_network_has_no_use_for_may_be_among_those_of_its_view(
+    tmp_path: Path,
+) -> None:
+    proto = onnx.load(KEPT / "outdet.onnx")
+    weight = np.random.default_rng(0).normal(size=(4, 2)).astype(np.float32)
+    del proto.graph.node[:], proto.graph.initializer[:]
+    proto.graph.node.append(helper.make_node("MatMul", ["points", "weight"], ["logits"]))
+    proto.graph.initializer.append(onnx.numpy_helper.from_array(weight, "weight"))
+    metadata = {entry.key: entry.value for entry in proto.metadata_props}
+    known = json.loads(metadata[METADATA_KEY])
+    helper.set_model_props(proto, {METADATA_KEY: json.dumps({"spec": known["spec"]})})
+    onnx.save(proto, tmp_path / "points.onnx")
+    usual, other = (
+        Derainer(tmp_path / "points.onnx", 1, name) for name in ("onnxruntime", "openvino")
+    )
+    view = usual.view(Scan.of(scene(100)))
+    np.testing.assert_allclose(other.logits(view), usual.logits(view), rtol=1e-5, atol=1e-4)
 
 
 def test_a_processor_without_bfloat16_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

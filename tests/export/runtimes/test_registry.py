@@ -93,6 +93,20 @@ def test_what_a_network_takes_and_gives_is_checked_whatever_runs_it(
         Derainer(KEPT, 1, "rainy")
 
 
+def test_only_a_runtime_that_drops_inputs_may_show_fewer(
+    rainy: type[Session], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inputs = Runtime().open(ModelFile.read(KEPT), 1).inputs
+    monkeypatch.setattr(rainy, "inputs", {"points": inputs["points"]})
+    with pytest.raises(InputError, match=r"outdet\.onnx: its network takes"):
+        Derainer(KEPT, 1, "rainy")
+    monkeypatch.setattr(rainy, "DROPS_UNUSED_INPUTS", True)
+    Derainer(KEPT, 1, "rainy")
+    monkeypatch.setattr(rainy, "inputs", {"points": inputs["neighbours"]})
+    with pytest.raises(InputError, match=r"outdet\.onnx: its network takes"):
+        Derainer(KEPT, 1, "rainy")
+
+
 @pytest.mark.usefixtures("rainy")
 def test_a_method_is_run_by_the_runtime_that_is_named_and_a_filter_by_none() -> None:
     assert load_method(str(KEPT), {}, 1, Runtime("rainy", "bf16")).runtime.name == "rainy"
@@ -107,3 +121,5 @@ def test_the_versions_name_each_package_that_ran_once(
     monkeypatch.setattr(rainy, "PACKAGE", "numpy")
     assert versions(["rainy"]).count(np.__version__) == 2
     assert "onnxruntime" not in versions(["rainy"])
+    monkeypatch.setattr(rainy, "PACKAGE", "rain-under-another-name")
+    assert "rain-under-another-name, NumPy" in versions(["rainy"])

@@ -52,3 +52,15 @@ def test_two_runs_are_the_same_to_the_bit() -> None:
         for _ in range(2)
     )
     assert torch.equal(first, second)
+
+
+def test_a_gradient_inside_of_autocast_is_that_outside() -> None:
+    features, neighbours, weight = (t.float() if t.is_floating_point() else t for t in case())
+    features.requires_grad_(), weight.requires_grad_()
+    with torch.autocast("cpu", torch.bfloat16):
+        inside = torch.autograd.grad(
+            convolve(features, neighbours, weight).sum(), [features, weight]
+        )
+    outside = torch.autograd.grad(convolve(features, neighbours, weight).sum(), [features, weight])
+    for one, other in zip(inside, outside, strict=True):
+        torch.testing.assert_close(one, other)

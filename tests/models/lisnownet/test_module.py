@@ -400,6 +400,30 @@ def test_the_residual_is_fitted_to_what_the_network_changes_in_the_validation_sc
     assert again.best["hyper_parameters"]["spec"] == run.best["hyper_parameters"]["spec"]
 
 
+def test_a_training_that_broke_off_leaves_nothing_to_the_next(
+    make_trainer: MakeTrainer, small_grid: dict[str, Any], tmp_path: Path
+) -> None:
+    class Breaking(lightning.Callback):
+        def on_validation_epoch_end(self, trainer: lightning.Trainer, *_: Any) -> None:
+            if not trainer.sanity_checking:
+                raise ArithmeticError
+
+    for number in range(2):
+        scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
+    model = LiSnowNet(small_grid, width=2)
+    first, second = (
+        Folder(str(tmp_path), "wads", train=[f"{number}.bin"], validation=[f"{number}.bin"])
+        for number in range(2)
+    )
+    with pytest.raises(ArithmeticError):
+        make_trainer(epochs=1, callbacks=[Breaking()]).fit(model, first)
+    seen: list[str] = []
+    look = model._seen
+    model._seen = lambda scan: seen.append(Path(scan.name).name) or look(scan)
+    make_trainer(epochs=2).fit(model, second)
+    assert seen == ["1.bin"]
+
+
 @pytest.mark.usefixtures("dense")
 def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(
     train: Callable[..., Run], tmp_path: Path
