@@ -226,7 +226,12 @@ class SalsaNextLite(SalsaNextModule):
 
     # All that it is made of: from the image to the scores nothing leaves the integers.
     INTEGER_OPERATORS: ClassVar[tuple[str, ...]] = (
-        *("Conv", "Relu", "Add", "Concat", "MaxPool", "Resize"),
+        "Conv",
+        "Relu",
+        "Add",
+        "Concat",
+        "MaxPool",
+        "Resize",
     )
     network: SalsaNextLiteNetwork
 
