@@ -56,8 +56,8 @@ def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_said(
     derainer, of_all = Derainer(out, 1), Derainer(onnx_model, 1)
     candidates = derainer.spec.candidates
     assert candidates is not None
-    assert f"Candidates: {candidates} that the network finds\n" in outcome.out
-    assert "IoU on these 2 scans 0." in outcome.out
+    assert f"Candidates: {candidates}, " in outcome.out
+    assert "% of that which the network finds\nIoU on these 2 scans 0." in outcome.out
     for path in sorted((tmp_path / "scans").glob("*.bin")):
         scan = read_scan(path)
         expected = of_all(scan) & candidates.among(scan)
