@@ -63,8 +63,6 @@ def test_little_rain_makes_the_bounds_wider_than_its_outermost_drops(points: int
         candidates = fit_candidates([street(points, seed)], CHANNELS, 0.999)
         if candidates is not None:
             outside.append(1 - candidates.among(other)[rain].mean())
-    # Fifty drops and more stand for what a thousandth of the rain is; their largest alone would
-    # leave out one in fifty of each channel's side.
     assert len(outside) == 20
     assert np.mean(outside) < 0.002
 
