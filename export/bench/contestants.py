@@ -126,7 +126,7 @@ def _deployable(title: str, name: str, parameters: dict[str, Any]) -> Contestant
 
 def _filter(title: str, derainer: FilterDerainer) -> Contestant:
     filter, candidates = derainer.filter, derainer.candidates
-    facts = {"parameters": filter.as_dict()}
+    facts: dict[str, Any] = {"parameters": filter.as_dict()}
     if candidates is not None:
         facts[CANDIDATES] = str(candidates)
     ready = partial(FilterDerainer, filter, candidates=candidates)
