@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from inspect import signature
 
 import numpy as np
 import torch
@@ -13,7 +14,8 @@ from derain.evaluation.counts import Counts
 from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.views.candidate_fit import RAIN_INSIDE, fit_candidates
-from derain.views.candidates import Candidates
+from derain.views.candidates import Bound, Candidates
+from derain.views.morton import first_rows
 from derain.views.probability import probability_of_rain
 
 
@@ -22,7 +24,7 @@ class FittedCandidates:
     """Candidates, and what a network gains or loses by them on the scans they were fitted to.
 
     Attributes:
-        candidates: The candidates; their share of the rain is of that which the network finds.
+        candidates: The candidates. Their shares are of all the rain, found or not.
         scans: Number of scans.
         before: Points as the network judges them all.
         after: The same points, where nothing but candidates is rain.
@@ -34,8 +36,9 @@ class FittedCandidates:
     after: Counts
 
     def __str__(self) -> str:
+        found = self.after.true_positive / self.before.true_positive
         return (
-            f"Candidates: {self.candidates} that the network finds\n"
+            f"Candidates: {self.candidates}, {found:.2%} of that which the network finds\n"
             f"IoU on these {self.scans} scans {self.before.iou:.4f} where all points are judged, "
             f"{self.after.iou:.4f} where candidates are"
         )
@@ -53,15 +56,16 @@ def candidates_of_findings(
     all rain, of which a label's last thousandth may lie anywhere.
 
     Args:
-        model: A trained model. What candidates it has are not looked at.
+        model: A trained model.
         scans: Scans with labels, their intensities in the unit of the model's training data.
         card: Their data card.
         inside: Share of the rain it finds that is to be within the bounds.
 
     Raises:
         InputError: Scans in which it finds no rain, or none that bounds would tell from the rest;
-            a model that sees several scans at a time.
+            a model that sees several scans at a time, takes no candidates, or has some already.
     """
+    _refuse_unable(model)
     model = model.eval().cpu()
     judged = [_judged(model, scan, card) for scan in scans]
     candidates = fit_candidates(
@@ -73,26 +77,43 @@ def candidates_of_findings(
             "no bounds tell rain that the network finds in these scans from the rest",
             "Give scans with rain, or leave it out.",
         )
-    before, after = Counts(), Counts()
+    before, after, inside_bounds = Counts(), Counts(), Counts()
     for scan, called, rain in judged:
+        among, rows = candidates.among(scan), first_rows(scan)
         before += Counts.of(called, rain)
-        after += Counts.of(called & candidates.among(scan), rain)
-    return FittedCandidates(candidates, len(judged), before, after)
+        after += Counts.of(called & among, rain)
+        inside_bounds += Counts.of(among[rows], rain[rows])
+    # So far they are of the rain that the network finds, which nobody who reads them knows.
+    of_all_rain = replace(candidates, rain=inside_bounds.recall, rain_share=inside_bounds.precision)
+    return FittedCandidates(of_all_rain, len(judged), before, after)
+
+
+def _refuse_unable(model: DerainingModule) -> None:
+    """Refuses a model that cannot be given candidates, before any scan is judged."""
+
+    def refusal(reason: str) -> InputError:
+        return InputError("--candidates", reason, "Leave the option out.")
+
+    if model.spec.candidates is not None:
+        # What it says outside them, it was never taught.
+        raise refusal(f"the model was trained with its own ({model.spec.candidates})")
+    view = model.spec.make_view()
+    if not view.window.is_one_scan:
+        raise refusal("the network sees several scans at a time")
+    seen = view.judging(Candidates((Bound("range", most=1.0),)))(Scan.of(np.zeros((0, 4))))
+    try:
+        signature(model.forward).bind(**seen.inputs())
+    except TypeError as error:
+        raise refusal(f"{model.NAME} judges every point alike ({error})") from error
 
 
 def _judged(
     model: DerainingModule, scan: Scan, card: DataCard
 ) -> tuple[Scan, NDArray[np.bool_], NDArray[np.bool_]]:
     """The points of which it is known what they are, which the network calls rain, which are."""
-    spec = replace(model.spec, candidates=None)
-    view = spec.make_view()
-    if not view.window.is_one_scan:
-        raise InputError(
-            "--candidates", "the network sees several scans at a time", "Leave the option out."
-        )
-    seen = view(scan)
+    seen = model.spec.make_view()(scan)
     with torch.inference_mode():
         logits = model(**{name: torch.from_numpy(each) for name, each in seen.inputs().items()})
-    called = seen.back(probability_of_rain(logits.numpy())) > spec.threshold
+    called = seen.back(probability_of_rain(logits.numpy())) > model.spec.threshold
     known = ~card.unknown_of(scan)
     return scan.take(known), called[known], card.rain_of(scan)[known]

@@ -246,7 +246,7 @@ class DerainingModule(MeasuredModule):
         data = getattr(self._trainer, "datamodule", None)
         if isinstance(data, TrainingData):
             agree(self, data, training=False)  # again: the checkpoint has the last word
-        elif agreed is not None and self.spec.view != agreed.view and self._trainer is not None:
+        elif agreed is not None and self._trainer is not None and not _alike(self.spec, agreed):
             raise InputError(
                 "checkpoint",
                 "it sees another view than the loader makes",
@@ -276,3 +276,8 @@ class DerainingModule(MeasuredModule):
         scans = len(batch.cells)
         self.log_dict(values, on_step=False, on_epoch=True, sync_dist=True, batch_size=scans)
         return losses["loss"]
+
+
+def _alike(first: Spec, second: Spec) -> bool:
+    """Whether networks of two Specs see the same cells of a scan."""
+    return (first.view, first.candidates) == (second.view, second.candidates)

@@ -12,11 +12,12 @@ from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.system.notices import Notices
 from derain.views.candidate_fit import RAIN_INSIDE
-from derain.views.channels import extra_channels
+from derain.views.channels import extra_channels, with_columns
 
 if TYPE_CHECKING:
     from derain.models.base import DerainingModule
     from derain.scan import Scan
+    from derain.sources.frame import Frame
     from derain.spec import Spec
 
 SUMMARY = "make an ONNX file that runs on a CPU without torch"
@@ -131,10 +132,18 @@ def _fit_candidates(model: "DerainingModule", arguments: argparse.Namespace) -> 
     from derain.cli.labelled_data import labelled
     from derain.export.candidates import candidates_of_findings
     from derain.learning.task import EXAMPLE_SCANS
+    from derain.sources.spread import evenly_spaced
 
-    data = labelled(arguments, arguments.candidates)
-    scans = data.training_scans(EXAMPLE_SCANS, extra_channels(model.channels))
+    data, notices = labelled(arguments, arguments.candidates), Notices()
+
+    def read(frame: "Frame") -> "Scan":
+        scan = data.read_measured(frame)
+        notices.tell(frame.name, model.spec.oddities(scan))
+        return with_columns(scan, extra_channels(model.channels))
+
+    scans = map(read, evenly_spaced(data.frames("train"), EXAMPLE_SCANS))
     fitted = candidates_of_findings(model, scans, data.card, arguments.inside)
+    notices.tell_how_many_more()
     model.adopt(replace(model.spec, candidates=fitted.candidates))
     print(fitted)
 

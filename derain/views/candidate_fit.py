@@ -20,6 +20,9 @@ LEAST_INSIDE = 0.5
 # A bound has to leave out at least this share of the points; others are not worth a comparison.
 WORTH = 0.05
 
+# The tail of the rain is read from the ten outermost points: of fewer it has none.
+FEWEST = 10
+
 # Bounds are rounded outwards to so many digits, so that they can be read.
 DIGITS = 3
 
@@ -34,7 +37,9 @@ def fit_candidates(
     Each side of each channel is allowed an equal part of the rain that may be left out, and the
     bound found so is moved outwards by a margin that the rain's own tail says: as far again as
     from ten times that part to the part itself. Of a tail that falls exponentially, a tenth of the
-    part is left out then, in scans alike. Sides that leave out hardly a point are not bounded.
+    part is left out then, in scans alike. Where the part is less than one point of the rain, the
+    bound starts from the outermost one, and the tail behind the ten outermost is followed further
+    for each power of ten. Sides that leave out hardly a point are not bounded.
 
     Args:
         scans: Scans, and for each which of its rows are rain, bool (N,).
@@ -42,7 +47,7 @@ def fit_candidates(
         inside: Share of the rain that is to be within all bounds, from 0.5 to below 1.
 
     Returns:
-        The candidates; None where there is no rain, or where it is as the rest is.
+        The candidates; None where there is no rain or too little, or where it is as the rest is.
 
     Raises:
         InputError: Another share.
@@ -96,19 +101,20 @@ class _Side:
     rain: NDArray[np.bool_]
 
     def limit(self, outside: float) -> float:
-        """What is above this is no rain; infinite where no rain has a value.
+        """What is above this is no rain; infinite where too little rain has a value to say.
 
         Args:
             outside: Share of the rain that may be above it, were there no margin.
         """
         rain = self.values[self.rain]
         rain = rain[~np.isnan(rain)]
-        if not len(rain):
+        if len(rain) < FEWEST:
             return math.inf
+        tail = max(outside, 1 / len(rain))
         before, edge = np.quantile(
-            rain, [max(1 - 10 * outside, 0.5), 1 - outside], method="higher"
+            rain, [max(1 - 10 * tail, 0.5), 1 - tail], method="higher"
         ).astype(float)
-        return _rounded_up(edge + (edge - before))
+        return _rounded_up(edge + (edge - before) * (1 + math.log10(tail / outside)))
 
     def leaves_out(self, limit: float) -> NDArray[np.bool_]:
         """True for points above a limit, bool (M,)."""

@@ -11,6 +11,9 @@ from derain.files.documents import Entry
 from derain.scan import Scan
 from derain.views.channels import MOST_CHANNELS
 
+# Bounds are compared as float32, as which a larger number would be infinite.
+LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -125,11 +128,13 @@ def _bound(entry: Entry) -> Bound:
     bound = Bound(**entry.record(_BOUND_PARSERS, required=("channel",)))
     if bound.least is None is bound.most:
         raise entry.fault("it has neither least nor most", "Write one of them.")
+    if bound.least is not None and bound.most is not None and bound.least > bound.most:
+        raise entry.fault("its least is more than its most", "Write the smaller one as least.")
     return bound
 
 
 def _number_or_none(entry: Entry) -> float | None:
-    return None if entry.value is None else entry.number()
+    return None if entry.value is None else entry.within(-LARGEST_FLOAT32, LARGEST_FLOAT32)
 
 
 _BOUND_PARSERS: dict[str, Callable[[Entry], Any]] = {

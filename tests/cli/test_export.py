@@ -56,8 +56,8 @@ def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_said(
     derainer, of_all = Derainer(out, 1), Derainer(onnx_model, 1)
     candidates = derainer.spec.candidates
     assert candidates is not None
-    assert f"Candidates: {candidates} that the network finds\n" in outcome.out
-    assert "IoU on these 2 scans 0." in outcome.out
+    assert f"Candidates: {candidates}, " in outcome.out
+    assert "% of that which the network finds\nIoU on these 2 scans 0." in outcome.out
     for path in sorted((tmp_path / "scans").glob("*.bin")):
         scan = read_scan(path)
         expected = of_all(scan) & candidates.among(scan)
@@ -65,6 +65,34 @@ def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_said(
     told = run_derain("info", out)
     assert f"candidates: {candidates}" in told.out
     assert "candidates: every point" in run_derain("info", onnx_model).out
+
+
+def test_scans_that_candidates_are_fitted_to_count_once_and_are_warned_of(
+    run_derain,
+    checkpoint: Path,
+    write_labelled,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(onnx_file, "export", lambda _, path, *__: path.touch())
+    monkeypatch.setattr("derain.export.latency.measure_latency", lambda *_: "times")
+    scan, label = tmp_path / "scans/0.bin", tmp_path / "scans/0.label"
+    write_labelled(scan, label, rain=110)
+    options = ["--candidates", scan, "--card", "wads", "--inside", "0.9"]
+    command = ["export", checkpoint, "--out", tmp_path / "outdet.onnx", *options]
+    once = run_derain(*command)
+    assert once.said == []
+    # As a sensor writes them that tells two returns of every beam; WADS counts them once.
+    points, labels = np.fromfile(scan, np.float32), np.fromfile(label, np.uint32)
+    twice = np.concatenate([points.reshape(-1, 4), points.reshape(-1, 4)[:200]])
+    twice.tofile(scan)
+    np.concatenate([labels, labels[:200]]).tofile(label)
+    assert run_derain(*command).out == once.out
+    (twice / np.array([1, 1, 1, 256], np.float32)).tofile(scan)
+    (warning,) = run_derain(*command).said
+    assert warning.startswith(f"derain: warning: {scan}: mean intensity 0.")
+    scaled = run_derain(*command, "--intensity-scale", "256")
+    assert (scaled.said, scaled.out) == ([], once.out)
 
 
 @pytest.mark.parametrize(

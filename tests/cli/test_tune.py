@@ -191,7 +191,10 @@ def test_a_second_call_goes_on_and_comes_to_the_same(
         assert run_derain("tune", "ror", *options, "--trials", trials, "--out", out).code == 0
     other = run_derain("tune", "ror", *options, "--scans", "1", "--out", tmp_path / "no.yaml")
     assert other.code == 2
-    assert "holds a study of ror on other scans or labels. Name another --storage." in other.err
+    assert (
+        "holds a study of ror on other scans, labels or candidates. Name another --storage."
+        in other.err
+    )
     assert not (tmp_path / "no.yaml").exists()
 
 

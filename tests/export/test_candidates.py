@@ -85,7 +85,7 @@ def test_they_are_fitted_to_the_rain_that_the_network_finds(
     card = replace(WADS, unknown=(0,))
     fitted = candidates_of_findings(random_outdet, labelled, card, inside=0.9)
     derainer = Derainer(onnx_model, 1)
-    before, after = Counts(), Counts()
+    before, after, bounded = Counts(), Counts(), Counts()
     inside = found = 0
     for scan in labelled:
         known = scan.label != 0
@@ -93,15 +93,29 @@ def test_they_are_fitted_to_the_rain_that_the_network_finds(
         among = fitted.candidates.among(scan)[known]
         before += Counts.of(called, rain)
         after += Counts.of(called & among, rain)
+        bounded += Counts.of(among, rain)
         inside += int((called & rain & among).sum())
         found += int((called & rain).sum())
     assert (fitted.before, fitted.after, fitted.scans) == (before, after, 2)
     assert before != after
     assert inside >= 0.9 * found > 0
     assert fitted.candidates.points < 0.9
+    # Whoever reads the model's Spec is told of all the rain, found or not.
+    assert fitted.candidates.rain == bounded.recall < inside / found
+    assert fitted.candidates.rain_share == bounded.precision
+    assert f"{inside / found:.2%} of that which the network finds" in str(fitted)
 
 
 def test_bounds_of_nothing_are_refused(random_outdet: OutDet, labelled: list[Scan]) -> None:
     dry = [scan.with_label(np.full(len(scan), 40)) for scan in labelled]
     with pytest.raises(InputError, match=r"--candidates: no bounds tell rain .* leave it out"):
         candidates_of_findings(random_outdet, dry, WADS)
+
+
+def test_a_model_that_was_trained_with_candidates_keeps_them(
+    random_outdet: OutDet, labelled: list[Scan]
+) -> None:
+    model = deepcopy(random_outdet)
+    model.adopt(replace(model.spec, candidates=NEAR_AND_DIM))
+    with pytest.raises(InputError, match=r"trained with its own \(range of at most 25.*\)\. Leave"):
+        candidates_of_findings(model, labelled, WADS)

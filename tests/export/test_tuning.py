@@ -18,8 +18,8 @@ from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import tuning
+from derain.export.labelled_neighbourhoods import LabelledNeighbourhoods
 from derain.export.tuning import (
-    LabelledNeighbourhoods,
     Search,
     neighbours_to_find,
     pooled_iou,
@@ -194,7 +194,7 @@ def test_a_study_goes_on_only_with_the_same_labels(
     tune_filter("dsor", seen, search(1, storage)[0])
     other = DataCard("made up", {0: "solid", 3: "rain", 9: "also rain"}, rain=(3, 9))
     relabelled = [neighbourhoods(labelled(seed), other) for seed in (1, 2)]
-    with pytest.raises(InputError, match="other scans or labels"):
+    with pytest.raises(InputError, match="other scans, labels or candidates"):
         tune_filter("dsor", relabelled, search(2, storage)[0])
 
 

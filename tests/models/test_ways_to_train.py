@@ -227,3 +227,26 @@ def test_a_run_of_loaders_goes_on_from_its_checkpoint(
     assert_same(fit(3, tmp_path / "1.ckpt").state_dict(), straight.state_dict())
     with pytest.raises(InputError, match="another view than the loader makes"):
         fit(3, tmp_path / "1.ckpt", rows=32)
+
+
+def test_a_run_of_loaders_does_not_go_on_with_other_candidates(
+    make_trainer: MakeTrainer, scans: list[Scan], tmp_path: Path
+) -> None:
+    near = [scan.with_label(np.where(scan.range < 8, SNOW, 0)) for scan in scans]
+    memory = InMemory(near, near, near, card="wads", loading=LOADING)
+
+    def fit(candidates: float | None, checkpoint: Path | None = None) -> OutDet:
+        model = OutDet(neighbours=5, candidates=candidates)
+        loader = scan_loader(memory.source("train"), "train", agree(model, memory), LOADING)
+        trainer = make_trainer(epochs=1 if checkpoint is None else 2)
+        trainer.fit(model, loader, ckpt_path=checkpoint)
+        trainer.save_checkpoint(tmp_path / "1.ckpt")
+        return model
+
+    assert fit(None).spec.candidates is None
+    with pytest.raises(InputError, match="another view than the loader makes"):
+        fit(0.9, tmp_path / "1.ckpt")
+    assert fit(0.9).spec.candidates is not None
+    with pytest.raises(InputError, match="another view than the loader makes"):
+        fit(None, tmp_path / "1.ckpt")
+    assert fit(0.9, tmp_path / "1.ckpt").trainer.current_epoch == 2

@@ -55,6 +55,24 @@ def test_a_margin_keeps_rain_of_other_scans_inside() -> None:
     assert 1 - candidates.among(scan)[rain].mean() == pytest.approx(0.001, abs=0.0005)
 
 
+@pytest.mark.parametrize("points", [250, 1000, 4000])
+def test_little_rain_makes_the_bounds_wider_than_its_outermost_drops(points: int) -> None:
+    other, rain = street(50_000, 0)
+    outside = []
+    for seed in range(1, 21):
+        candidates = fit_candidates([street(points, seed)], CHANNELS, 0.999)
+        if candidates is not None:
+            outside.append(1 - candidates.among(other)[rain].mean())
+    assert len(outside) == 20
+    assert np.mean(outside) < 0.002
+
+
+def test_of_fewer_drops_than_tell_a_tail_nothing_follows() -> None:
+    scan, _ = street(5000, 9)
+    nine = np.arange(5000) < 9
+    assert fit_candidates([(scan, nine)], CHANNELS) is None
+
+
 def test_the_bounds_follow_the_unit_of_the_data() -> None:
     (scan, rain) = street(20_000, 3)
     of_bytes = fit_candidates([(scan, rain)], CHANNELS)

@@ -15,9 +15,16 @@ from derain.spec import Spec
 from derain.views.candidates import Bound, Candidates, bounded_channels, candidates_at
 
 numbers = st.none() | st.floats(-50, 50, width=32)
+sides = (
+    st.tuples(numbers, numbers)
+    .filter(lambda pair: pair != (None, None))
+    .map(lambda pair: pair if None in pair else tuple(sorted(pair)))
+)
 bounds = st.builds(
-    Bound, st.sampled_from(["range", "z", "intensity", "doppler"]), numbers, numbers
-).filter(lambda bound: (bound.least, bound.most) != (None, None))
+    lambda channel, pair: Bound(channel, *pair),
+    st.sampled_from(["range", "z", "intensity", "doppler"]),
+    sides,
+)
 rules = st.lists(bounds, min_size=1, unique_by=lambda bound: bound.channel).map(
     lambda several: Candidates(tuple(several), 0.25, 0.5, 0.75)
 )
@@ -76,6 +83,9 @@ NEAR = {"channel": "range", "most": 30.0}
         ({"bounds": [{"most": 1.0}]}, r"c\.bounds\[0\]: channel is missing"),
         ({"bounds": [{**NEAR, "most": "far"}]}, r"c\.bounds\[0\]\.most: 'far' is not a finite"),
         ({"bounds": [{**NEAR, "most": float("nan")}]}, r"most: nan is not a finite number"),
+        ({"bounds": [{**NEAR, "most": 1e300}]}, r"most: 1e\+300 is not within"),
+        ({"bounds": [{**NEAR, "least": -(10**400)}]}, r"least: the number is too large"),
+        ({"bounds": [{**NEAR, "least": 31}]}, r"c\.bounds\[0\]: its least is more than its most"),
         ({"bounds": [NEAR], "rain": 1.5}, r"c\.rain: 1\.5 is not within 0 and 1"),
         ({"bounds": [NEAR], "sky": 0}, r"c\.sky: there is no such key"),
     ],
