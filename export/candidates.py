@@ -1,7 +1,7 @@
 """Candidates for a network that is trained: bounds of the rain that it finds."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from inspect import signature
 
 import numpy as np
@@ -14,7 +14,7 @@ from derain.evaluation.counts import Counts
 from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.views.candidate_fit import RAIN_INSIDE, fit_candidates
-from derain.views.candidates import Bound, Candidates
+from derain.views.candidates import Bound, Candidates, narrower
 from derain.views.morton import first_rows
 from derain.views.probability import probability_of_rain
 
@@ -26,7 +26,7 @@ class FittedCandidates:
     Attributes:
         candidates: The candidates. Their shares are of all the rain, found or not.
         scans: Number of scans.
-        before: Points as the network judges them all.
+        before: Points as the network judges them without these bounds.
         after: The same points, where nothing but candidates is rain.
     """
 
@@ -39,8 +39,8 @@ class FittedCandidates:
         found = self.after.true_positive / self.before.true_positive
         return (
             f"Candidates: {self.candidates}, {found:.2%} of that which the network finds\n"
-            f"IoU on these {self.scans} scans {self.before.iou:.4f} where all points are judged, "
-            f"{self.after.iou:.4f} where candidates are"
+            f"IoU on these {self.scans} scans {self.before.iou:.4f} without them, "
+            f"{self.after.iou:.4f} with them"
         )
 
 
@@ -53,7 +53,8 @@ def candidates_of_findings(
     """Fits candidates to what a trained network calls rain and is rain.
 
     Rain that it does not find is not lost to it by bounds: so they may be narrower than those of
-    all rain, of which a label's last thousandth may lie anywhere.
+    all rain, of which a label's last thousandth may lie anywhere. Where a network was trained with
+    candidates, they stay within those: what it says outside them, it was never taught.
 
     Args:
         model: A trained model.
@@ -63,7 +64,7 @@ def candidates_of_findings(
 
     Raises:
         InputError: Scans in which it finds no rain, or none that bounds would tell from the rest;
-            a model that sees several scans at a time, takes no candidates, or has some already.
+            a model that sees several scans at a time, or takes no candidates.
     """
     _refuse_unable(model)
     model = model.eval().cpu()
@@ -77,14 +78,21 @@ def candidates_of_findings(
             "no bounds tell rain that the network finds in these scans from the rest",
             "Give scans with rain, or leave it out.",
         )
-    before, after, inside_bounds = Counts(), Counts(), Counts()
+    if (own := model.spec.candidates) is not None:
+        candidates = replace(candidates, bounds=narrower(candidates.bounds, own.bounds))
+    before, after, bounded = Counts(), Counts(), Counts()
     for scan, called, rain in judged:
         among, rows = candidates.among(scan), first_rows(scan)
         before += Counts.of(called, rain)
         after += Counts.of(called & among, rain)
-        inside_bounds += Counts.of(among[rows], rain[rows])
-    # So far they are of the rain that the network finds, which nobody who reads them knows.
-    of_all_rain = replace(candidates, rain=inside_bounds.recall, rain_share=inside_bounds.precision)
+        bounded += Counts.of(among[rows], rain[rows])
+    # So far their shares are of the rain that it finds, which nobody who reads them knows.
+    of_all_rain = replace(
+        candidates,
+        points=(bounded.true_positive + bounded.false_positive) / sum(astuple(bounded)),
+        rain=bounded.recall,
+        rain_share=bounded.precision,
+    )
     return FittedCandidates(of_all_rain, len(judged), before, after)
 
 
@@ -94,9 +102,6 @@ def _refuse_unable(model: DerainingModule) -> None:
     def refusal(reason: str) -> InputError:
         return InputError("--candidates", reason, "Leave the option out.")
 
-    if model.spec.candidates is not None:
-        # What it says outside them, it was never taught.
-        raise refusal(f"the model was trained with its own ({model.spec.candidates})")
     view = model.spec.make_view()
     if not view.window.is_one_scan:
         raise refusal("the network sees several scans at a time")

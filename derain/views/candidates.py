@@ -1,6 +1,6 @@
 """Candidates: the few bounds outside which no point is rain, so that nobody need look there."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -90,6 +90,23 @@ class Candidates:
     def __str__(self) -> str:
         bounds = ", ".join(map(str, self.bounds))
         return f"{bounds}: {self.points:.1%} of the points, {self.rain:.2%} of the rain"
+
+
+def narrower(some: Iterable[Bound], others: Iterable[Bound]) -> tuple[Bound, ...]:
+    """The bounds that hold what both hold, one a channel."""
+    by_channel = {bound.channel: bound for bound in some}
+    for other in others:
+        bound = by_channel.get(other.channel, other)
+        limits = {
+            "least": [limit for limit in (bound.least, other.least) if limit is not None],
+            "most": [limit for limit in (bound.most, other.most) if limit is not None],
+        }
+        by_channel[other.channel] = Bound(
+            other.channel,
+            max(limits["least"], default=None),
+            min(limits["most"], default=None),
+        )
+    return tuple(by_channel.values())
 
 
 def candidates_at(entry: Entry) -> Candidates | None:

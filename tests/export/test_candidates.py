@@ -112,10 +112,16 @@ def test_bounds_of_nothing_are_refused(random_outdet: OutDet, labelled: list[Sca
         candidates_of_findings(random_outdet, dry, WADS)
 
 
-def test_a_model_that_was_trained_with_candidates_keeps_them(
+def test_a_model_that_was_trained_with_candidates_stays_within_them(
     random_outdet: OutDet, labelled: list[Scan]
 ) -> None:
     model = deepcopy(random_outdet)
-    model.adopt(replace(model.spec, candidates=NEAR_AND_DIM))
-    with pytest.raises(InputError, match=r"trained with its own \(range of at most 25.*\)\. Leave"):
-        candidates_of_findings(model, labelled, WADS)
+    model.adopt(replace(model.spec, candidates=Candidates((Bound("range", most=8.0),))))
+    fitted = candidates_of_findings(model, labelled, WADS, inside=0.9)
+    bounds = {bound.channel: bound for bound in fitted.candidates.bounds}
+    assert bounds["range"].most <= 8.0
+    assert "intensity" in bounds
+    among = np.concatenate([fitted.candidates.among(scan) for scan in labelled])
+    assert fitted.candidates.points == among.mean()
+    rain = np.concatenate([scan.label == 110 for scan in labelled])
+    assert fitted.candidates.rain == among[rain].mean()

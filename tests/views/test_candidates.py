@@ -12,7 +12,7 @@ from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.scan import Scan
 from derain.spec import Spec
-from derain.views.candidates import Bound, Candidates, bounded_channels, candidates_at
+from derain.views.candidates import Bound, Candidates, bounded_channels, candidates_at, narrower
 
 numbers = st.none() | st.floats(-50, 50, width=32)
 sides = (
@@ -67,6 +67,16 @@ def test_candidates_survive_json_and_say_each_of_their_numbers(candidates: Candi
     assert "25.0% of the points" in text
     for bound in candidates.bounds:
         assert all(f"{limit:g}" in text for limit in (bound.least, bound.most) if limit is not None)
+
+
+@given(rules, rules, st.integers(0, 1000))
+def test_the_narrower_bounds_hold_what_both_hold(
+    some: Candidates, others: Candidates, seed: int
+) -> None:
+    scan = a_scan(seed, intensity=True)
+    both = Candidates(narrower(some.bounds, others.bounds))
+    np.testing.assert_array_equal(both.among(scan), some.among(scan) & others.among(scan))
+    assert len({bound.channel for bound in both.bounds}) == len(both.bounds)
 
 
 NEAR = {"channel": "range", "most": 30.0}
