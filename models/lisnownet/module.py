@@ -251,10 +251,11 @@ class LiSnowNet(DerainingModule, Published):
             self._examples = [self._seen(scan) for scan in self.validation_scans(EXAMPLE_SCANS)]
         if not self._examples:  # batches that were made elsewhere
             return
-        self._denoised = [
-            (image, valid, self.network(cube_roots(image, self.selection), valid))
-            for image, valid in self._examples
-        ]
+        with self.trainer.precision_plugin.val_step_context():  # as the batches are scored
+            self._denoised = [
+                (image, valid, self.network(cube_roots(image, self.selection), valid))
+                for image, valid in self._examples
+            ]
         changes = np.concatenate([self._changes(*example) for example in self._denoised])
         rule = self.selection.with_residual_of(changes)
         # Several processes go on with one rule, however each has rounded.
@@ -277,11 +278,10 @@ class LiSnowNet(DerainingModule, Published):
         return image.to(self.device), valid.to(self.device)
 
     def _denoise(self, image: Tensor, valid: Tensor, seen: Tensor) -> Tensor:
-        """What the network makes of images; known, but for autocast, where the rule saw them."""
-        if not torch.is_autocast_enabled(image.device.type):
-            for known_image, known_valid, denoised in self._denoised:
-                if torch.equal(known_image, image) and torch.equal(known_valid, valid):
-                    return denoised
+        """What the network makes of images; known of those that the rule was just fitted to."""
+        for known_image, known_valid, denoised in self._denoised:
+            if torch.equal(known_image, image) and torch.equal(known_valid, valid):
+                return denoised
         return self.network(seen, valid)
 
     def _changes(self, image: Tensor, valid: Tensor, denoised: Tensor) -> NDArray[np.float32]:
