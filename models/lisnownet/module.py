@@ -170,6 +170,8 @@ class LiSnowNet(DerainingModule, Published):
         self.selection = SelectionRule.fitted(rule, [])
         # Images that the rule's residual is fitted to, the same after every epoch of a training.
         self._examples: list[tuple[Tensor, Tensor]] | None = None
+        # What the network makes of them by now, while it is validated.
+        self._denoised: list[tuple[Tensor, Tensor, Tensor]] = []
         self.adopt(spec)
 
     @classmethod
@@ -227,7 +229,7 @@ class LiSnowNet(DerainingModule, Published):
         """Loss with its parts, from the images alone, and logits."""
         image, valid = batch.inputs["image"], batch.inputs["valid"]
         seen = cube_roots(image, self.selection)
-        denoised = self.network(seen, valid)
+        denoised = self._denoise(image, valid, seen)
         loss = sparsity_loss(denoised, seen, valid, self.hparams["alpha"], self.hparams["beta"])
         return {
             "loss": loss.total,
@@ -249,8 +251,13 @@ class LiSnowNet(DerainingModule, Published):
             self._examples = [self._seen(scan) for scan in self.validation_scans(EXAMPLE_SCANS)]
         if not self._examples:  # batches that were made elsewhere
             return
-        changes = [self._changes(*example) for example in self._examples]
-        rule = self.selection.with_residual_of(np.concatenate(changes))
+        with self.trainer.precision_plugin.val_step_context():  # as the batches are scored
+            self._denoised = [
+                (image, valid, self.network(cube_roots(image, self.selection), valid))
+                for image, valid in self._examples
+            ]
+        changes = np.concatenate([self._changes(*example) for example in self._denoised])
+        rule = self.selection.with_residual_of(changes)
         # Several processes go on with one rule, however each has rounded.
         rule = replace(rule, residual=self.trainer.strategy.broadcast(rule.residual))
         self._log_alike({"val/rule_residual": torch.tensor(rule.residual)})
@@ -260,19 +267,30 @@ class LiSnowNet(DerainingModule, Published):
         """Forgets what the rule was fitted to in a training that did not come to its end."""
         self._examples = None
 
+    def on_validation_epoch_end(self) -> None:
+        """Logs losses and scores; from here on the network changes."""
+        self._denoised = []
+        super().on_validation_epoch_end()
+
     def on_fit_end(self) -> None:
         """Lets go of what the rule was fitted to."""
         self._examples = None
 
     def _seen(self, scan: Scan) -> tuple[Tensor, Tensor]:
         inputs = self.spec.make_view()(scan).inputs()
-        return torch.from_numpy(inputs["image"]), torch.from_numpy(inputs["valid"])
+        image, valid = (torch.from_numpy(inputs[name]) for name in ("image", "valid"))
+        return image.to(self.device), valid.to(self.device)
 
-    def _changes(self, image: Tensor, valid: Tensor) -> NDArray[np.float32]:
+    def _denoise(self, image: Tensor, valid: Tensor, seen: Tensor) -> Tensor:
+        """What the network makes of images; known of those that the rule was just fitted to."""
+        for known_image, known_valid, denoised in self._denoised:
+            if torch.equal(known_image, image) and torch.equal(known_valid, valid):
+                return denoised
+        return self.network(seen, valid)
+
+    def _changes(self, image: Tensor, valid: Tensor, denoised: Tensor) -> NDArray[np.float32]:
         """What the network changes of the returns that the rule's limits leave, float32 (M,)."""
-        image, valid = image.to(self.device), valid.to(self.device)
-        seen = cube_roots(image, self.selection)
-        changes = change(seen, self.network(seen, valid))
+        changes = change(cube_roots(image, self.selection), denoised)
         return changes[valid & possible(image, self.selection)].cpu().numpy()
 
     def configure_optimizers(self) -> OptimizerLRScheduler:

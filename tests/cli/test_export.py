@@ -11,6 +11,7 @@ import torch
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.runtime import Derainer
+from derain.export.runtimes.registry import Runtime
 from derain.files import read_scan
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import save_model
@@ -166,7 +167,9 @@ def test_calibration_scans_of_another_unit_are_warned_of_once_and_scaled(
 ) -> None:
     brightest = []
 
-    def export(model: DerainingModule, path: Path, calibration: Collection[Scan]) -> str:
+    def export(
+        model: DerainingModule, path: Path, calibration: Collection[Scan], runtime: Runtime
+    ) -> str:
         path.touch()
         brightest[:] = [scan.intensity.max() for scan in [*calibration, *calibration]]
         return "proof"

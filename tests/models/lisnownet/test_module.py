@@ -441,6 +441,30 @@ def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(
     assert run.progress.iou[run.best["epoch"]] == pytest.approx(iou)
 
 
+@pytest.mark.usefixtures("dense")
+def test_the_network_runs_once_on_a_validation_scan_that_the_rule_is_fitted_to(
+    train: Callable[..., Run], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    forward, training = LiSnowNetwork.forward, list[bool]()
+
+    def recorded(network: LiSnowNetwork, *seen: Tensor) -> Tensor:
+        training.append(network.training)
+        return forward(network, *seen)
+
+    monkeypatch.setattr(LiSnowNetwork, "forward", recorded)
+    once = train(rule=UNSTATED, seed=SEED)
+    assert training.count(False) == 5  # four epochs, and the sanity check before them
+    training.clear()
+    # As where batches hold other images than the rule is fitted to.
+    monkeypatch.setattr(torch, "equal", lambda *_: False)
+    again = train(rule=UNSTATED, seed=SEED)
+    monkeypatch.undo()
+    assert training.count(False) == 9
+    assert once.progress.loss == again.progress.loss
+    assert once.progress.iou == again.progress.iou
+    assert_same(once.model.state_dict(), again.model.state_dict())
+
+
 def test_a_stated_residual_is_not_fitted(train: Callable[..., Run]) -> None:
     assert train().model.selection.residual == LENIENT["residual"]
 
