@@ -244,6 +244,7 @@ class LiSnowNet(DerainingModule, Published):
         Before anything is scored: the epoch's scores are those of the checkpoint that it leaves.
         """
         super().on_validation_epoch_start()
+        self._denoised = []
         training = self.trainer.state.fn == "fit" and not self.trainer.sanity_checking
         if not training or "residual" in self.hparams["rule"]:
             return
