@@ -122,8 +122,9 @@ class SalsaNextModule(SupervisedModule):
 
     def forward(self, image: Tensor, valid: Tensor) -> Tensor:
         """Logits of every pixel, float (B · H · W, 2); arguments as for :func:`score_pixels`."""
-        # oneDNN's convolutions, and most of all their gradients, take this order of the channels.
-        image = image.contiguous(memory_format=torch.channels_last)
+        if self.training:
+            # The order that oneDNN's convolutions take, and most of all their gradients.
+            image = image.contiguous(memory_format=torch.channels_last)
         return score_pixels(self.network, self.mean, self.std, image, valid)
 
     def deployed(self) -> DeployedSalsaNext:
