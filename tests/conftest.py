@@ -234,7 +234,7 @@ def image_onnx(image_model: "DerainingModule", made_once: Callable[..., Path]) -
 @pytest.fixture
 def one_block(monkeypatch: pytest.MonkeyPatch) -> None:
     """Exports 3D-OutDet in one block: the same network, traced several times as quickly."""
-    monkeypatch.setattr("derain.models.outdet.BLOCKS", 1)
+    monkeypatch.setattr("derain.models.outdet.deployed.BLOCKS", 1)
 
 
 @pytest.fixture

@@ -38,13 +38,13 @@ def write_models(folder: Path) -> None:
 
     from derain.cards.card import load_card
     from derain.export.onnx_file import export
-    from derain.models import outdet
     from derain.models.checkpoint import save_model
+    from derain.models.outdet import OutDet, deployed
     from derain.models.salsanext import SalsaNext
 
-    outdet.BLOCKS = 1  # the same network, traced several times as quickly
+    deployed.BLOCKS = 1  # the same network, traced several times as quickly
     torch.manual_seed(0)
-    for model in (outdet.OutDet(), SalsaNext(grid=GRID, width=4)):
+    for model in (OutDet(), SalsaNext(grid=GRID, width=4)):
         model.adopt(model.spec_for(load_card("wads")))
         export(model.eval(), folder / f"{model.NAME}.onnx")
         save_model(model, folder / f"{model.NAME}.ckpt")

@@ -82,7 +82,7 @@ def trained(
 @pytest.fixture(scope="module")
 def derainer(trained: Path) -> Derainer:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("derain.models.outdet.BLOCKS", 1)  # traced several times as quickly
+        patch.setattr("derain.models.outdet.deployed.BLOCKS", 1)  # traced several times as quickly
         export(load_model(trained), trained.with_suffix(".onnx"))
     return Derainer(trained.with_suffix(".onnx"), threads=1)
 
