@@ -86,7 +86,8 @@ class Derainer:
             stopwatch: Takes the times of the stages view, network and back.
 
         Returns:
-            True for rain, bool (N,), in input order; False for rows that cannot be judged.
+            True for rain, bool (N,), in input order; False for rows that cannot be judged, or that
+            the model's candidates leave out.
         """
         return self.judge(points, stopwatch).rain
 
@@ -100,7 +101,8 @@ class Derainer:
             stopwatch: Takes the times of the stages view, network and back.
 
         Returns:
-            float32 (N,), in input order; 0 for rows that cannot be judged.
+            float32 (N,), in input order; 0 for rows that cannot be judged, or that the model's
+            candidates leave out.
 
         Raises:
             InputError: A network that fails, or whose scores are not finite.

@@ -62,8 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--inside",
         type=share,
-        default=RAIN_INSIDE,
-        help="share of the rain found that is within the bounds (default: %(default)s)",
+        help=f"share of the rain found that is within the bounds (default: {RAIN_INSIDE:g})",
     )
     parser.add_argument("--card", help="data card of the labelled scans (default: as they tell)")
     parser.add_argument(
@@ -88,6 +87,8 @@ def main(arguments: argparse.Namespace) -> int:
 
     if arguments.scan is not None and not is_file(arguments.scan):
         raise InputError(arguments.scan, "there is no such file", "Check --scan.")
+    if arguments.inside is not None and not arguments.candidates:
+        raise InputError("--inside", "bounds candidates, and there are none", "Give --candidates.")
     runtime = runtime_of(arguments)
     model = load_model(arguments.checkpoint)
     calibration = _calibration(arguments)
@@ -142,7 +143,8 @@ def _fit_candidates(model: "DerainingModule", arguments: argparse.Namespace) -> 
         return with_columns(scan, extra_channels(model.channels))
 
     scans = map(read, evenly_spaced(data.frames("train"), EXAMPLE_SCANS))
-    fitted = candidates_of_findings(model, scans, data.card, arguments.inside)
+    inside = RAIN_INSIDE if arguments.inside is None else arguments.inside
+    fitted = candidates_of_findings(model, scans, data.card, inside)
     notices.tell_how_many_more()
     model.adopt(replace(model.spec, candidates=fitted.candidates))
     print(fitted)

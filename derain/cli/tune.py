@@ -48,7 +48,7 @@ labelled scans, and writes them for `derain run --parameters` and `derain bench 
 A filter is searched by Optuna, from its default parameters on; each scan's neighbours are found
 once, and take some 150 bytes a point. With --storage, a second call goes on to --trials.
 With --candidates, it calls nothing rain outside bounds of range, height and intensity that hold a
-share of the scans' rain, and those who run it need search there alone.
+share of the scans' rain.
 A model's threshold is found exactly, from its probabilities, without trials.
 """
 

@@ -99,11 +99,15 @@ def test_scans_that_candidates_are_fitted_to_count_once_and_are_warned_of(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        (
+            ["--inside", "0.99"],
+            "--inside: bounds candidates, and there are none. Give --candidates",
+        ),
         (["--candidates", "scans"], "nothing in it says which labels are rain"),
         (["--candidates", "scans", "--card", "wads"], "0.bin: its labels are not at"),
         (["--candidates", "nowhere", "--card", "wads"], "nowhere: "),
     ],
-    ids=["no card", "no labels", "no scans"],
+    ids=["no candidates", "no card", "no labels", "no scans"],
 )
 def test_candidates_need_labelled_scans(
     run_derain,
