@@ -27,12 +27,9 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from derain.errors import InputError
 from derain.models.layers.batch_norm import PixelBatchNorm
-from derain.models.layers.image_size import pad_to_multiple
 from derain.models.registry import NETWORKS
+from derain.models.salsanext.plan import SalsaNextPlan
 from derain.models.salsanext.training import DeployedSalsaNext, SalsaNextModule
-
-# The image is halved four times.
-STRIDE = 16
 
 
 class FoldingLayer(nn.Module):
@@ -127,7 +124,7 @@ class DoublingBlock(nn.Module):
         return self.dropout(self.layers(joined))
 
 
-class SalsaNextLiteNetwork(nn.Module):
+class SalsaNextLiteNetwork(SalsaNextPlan):
     """The network, from normalised range images to logits.
 
     Example:
@@ -182,28 +179,6 @@ class SalsaNextLiteNetwork(nn.Module):
             )
         )
         self.head = nn.Conv2d(width, classes, 1)
-
-    def forward(self, image: Tensor) -> Tensor:
-        """Scores every pixel.
-
-        Args:
-            image: Normalised range image, 0 in every channel where there is no return, float
-                (B, channels, H, W). Where a side is no multiple of 16, it counts as continued by
-                empty pixels at the bottom and on the right.
-
-        Returns:
-            Logits, float (B, classes, H, W).
-        """
-        height, width = image.shape[-2:]
-        features = self.context(pad_to_multiple(image, STRIDE, value=0.0))
-        skips = []
-        for block, halve in zip(self.encoder, self.halve, strict=True):
-            skips.append(block(features))
-            features = halve(skips[-1])
-        features = self.bottleneck(features)
-        for block, skip in zip(self.decoder, reversed(skips), strict=True):
-            features = block(features, skip)
-        return self.head(features)[..., :height, :width]
 
     def folded(self) -> "SalsaNextLiteNetwork":
         """A copy in evaluation mode that computes the same without a BatchNorm."""

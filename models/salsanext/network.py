@@ -15,11 +15,8 @@ from torch.nn import functional
 
 from derain.errors import InputError
 from derain.models.layers.batch_norm import PixelBatchNorm
-from derain.models.layers.image_size import pad_to_multiple
 from derain.models.published import network_of, published_tensors
-
-# The image is halved four times.
-STRIDE = 16
+from derain.models.salsanext.plan import SalsaNextPlan
 
 # Slope of every LeakyReLU where its input is negative.
 SLOPE = 0.01
@@ -149,7 +146,7 @@ class DecoderBlock(nn.Module):
         return self.dropout(self.layers(joined))
 
 
-class SalsaNextNetwork(nn.Module):
+class SalsaNextNetwork(SalsaNextPlan):
     """The network as published, from normalised range images to logits.
 
     Example:
@@ -215,25 +212,3 @@ class SalsaNextNetwork(nn.Module):
         channels = tensors["context.0.shortcut.weight"].numel() // max(width, 1)
         classes = tensors["head.bias"].numel()
         return network_of(lambda: cls(channels, width, classes), tensors, "SalsaNext")
-
-    def forward(self, image: Tensor) -> Tensor:
-        """Scores every pixel.
-
-        Args:
-            image: Normalised range image, 0 in every channel where there is no return, float
-                (B, channels, H, W). Where a side is no multiple of 16, it counts as continued by
-                empty pixels at the bottom and on the right.
-
-        Returns:
-            Logits, float (B, classes, H, W).
-        """
-        height, width = image.shape[-2:]
-        features = self.context(pad_to_multiple(image, STRIDE, value=0.0))
-        skips = []
-        for block, halve in zip(self.encoder, self.halve, strict=True):
-            skips.append(block(features))
-            features = halve(skips[-1])
-        features = self.bottleneck(features)
-        for block, skip in zip(self.decoder, reversed(skips), strict=True):
-            features = block(features, skip)
-        return self.head(features)[..., :height, :width]
