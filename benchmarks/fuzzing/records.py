@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.fuzzing.reader import Reader
-from derain.sources.records import CALIBRATION, POSES, TIMES, read_numbers, read_poses
+from derain.sources.number_lines import read_numbers
+from derain.sources.records import POSES, TIMES
+from derain.sources.trajectory import CALIBRATION, read_trajectory
 
 POSE = "1 0 0 0.5 0 1 0 -0.25 0 0 1 0\n"
 TURNED = "0 -1 0 1.5e+00 1 0 0 2 0 0 1 -3.25\n"
@@ -32,7 +34,8 @@ def readers() -> list[Reader]:
 
 
 def _read_poses(path: Path) -> None:
-    poses = read_poses(path)
+    trajectory = read_trajectory(path)
+    poses = trajectory.poses
     assert poses.shape[1:] == (4, 4)
     turned = poses[:, :3, :3] @ poses[:, :3, :3].transpose(0, 2, 1)
     assert np.abs(turned - np.eye(3)).max(initial=0) < 0.01

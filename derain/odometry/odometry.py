@@ -23,9 +23,10 @@ class Odometry:
     Example:
         >>> odometry = Odometry()
         >>> wall = np.random.default_rng(0).uniform((10, -9, -2), (11, 9, 4), (4000, 3))
-        >>> ahead = odometry.take(Scan.of(wall)), odometry.take(Scan.of(wall - [0.5, 0, 0]))
-        >>> ahead[1].motion[:3, 3].round(1)
-        array([0.5, 0. , 0. ])
+        >>> standing = odometry.take(Scan.of(wall))
+        >>> moved = odometry.take(Scan.of(wall - [0.5, 0, 0]))  # the wall comes nearer
+        >>> moved.trusted, round(moved.distance, 2)
+        (True, 0.5)
 
     Args:
         threads: Threads to use; 0 takes every core this process may use. What is found does not

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.errors import InputError
-from derain.sources.records import Records, read_poses
+from derain.sources.records import Records
+from derain.sources.trajectory import read_trajectory
 
 
 def motion(degrees: float, x: float, y: float, z: float) -> np.ndarray:
@@ -114,7 +115,9 @@ def test_a_standing_point_stays_where_it_is(
     (folder / "calib.txt").write_text(f"Tr:{line(to_camera)}")
     world = np.array([3.0, -4.0, 5.0, 1.0])
     seen = np.linalg.inv(pose) @ world  # by the sensor, from its pose
-    np.testing.assert_allclose(read_poses(folder / "poses.txt")[0] @ seen, world, atol=1e-6)
+    np.testing.assert_allclose(
+        read_trajectory(folder / "poses.txt").poses[0] @ seen, world, atol=1e-6
+    )
 
 
 def test_of_a_partial_copy_each_scan_keeps_its_line(sequence: Path) -> None:
