@@ -19,8 +19,8 @@ NEAREST, FARTHEST = 5.0, 80.0
 
 # Points that are looked at. More hold the scans back, for the rings that the beams draw on the
 # ground go along with the sensor: over four scans of WADS all of its points lead 4 cm from where
-# the first and the last of them lie upon one another directly, and every third point leads 1 cm.
-MOST_POINTS = 60_000
+# the first and the last of them lie upon one another directly, and every second point leads 2 cm.
+MOST_POINTS = 100_000
 
 # Points that a surface is fitted to, and thickness that GICP gives it where it is 1 wide: both as
 # small_gicp has them.
@@ -28,8 +28,11 @@ MOST_POINTS = 60_000
 POINTS_OF_A_SURFACE = 10
 THICKNESS = 1e-3
 
-# Steps of the search; it comes to rest in one to four where it starts near, in fifteen from 4 m.
-MOST_STEPS = 50
+# Steps of the search; it comes to rest in one to four where it starts near, in fourteen from 4 m.
+MOST_STEPS = 20
+
+# How far apart partners are whose distances tell how well scans lie on one another, metres.
+PARTNERS = 1.5
 
 # With fewer surfaces nothing is laid upon anything: five times the points that one is fitted to.
 FEWEST_SURFACES = 50
@@ -104,19 +107,17 @@ class Surfaces:
             max_iterations=MOST_STEPS,
         )
         motion = np.array(found.T_target_source, np.float64)
-        residual, matched = self._distances(other, motion, within)
+        residual, matched = self._distances(other, motion)
         return Fit(motion, found.converged, residual, matched, _facing(found))
 
-    def _distances(
-        self, other: "Surfaces", motion: NDArray[np.float64], within: float
-    ) -> tuple[float, float]:
+    def _distances(self, other: "Surfaces", motion: NDArray[np.float64]) -> tuple[float, float]:
         """Median distance of partners across their surface, and the share within a voxel."""
         moved = self._cloud.points()[:, :3] @ motion[:3, :3].T + motion[:3, 3]
         rows, squared = other._tree.batch_knn_search(moved, 1, num_threads=self._threads)
         rows, squared = rows[:, 0], squared[:, 0]
         apart = moved - other._cloud.points()[rows, :3]
         across = np.einsum("ij,ij->i", apart, other._cloud.normals()[rows, :3])
-        partners = squared <= within**2
+        partners = squared <= PARTNERS**2
         residual = float(np.median(np.abs(across[partners]))) if partners.any() else np.nan
         return residual, float((squared <= VOXEL**2).mean())
 
