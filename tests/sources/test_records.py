@@ -97,6 +97,33 @@ def test_poses_of_a_camera_are_told_as_those_of_the_lidar(sequence: Path) -> Non
     np.testing.assert_allclose(ahead[:3], [5, 1, 0], atol=1e-9)
 
 
+def test_poses_by_time_go_to_the_scans_by_their_times(sequence: Path) -> None:
+    (sequence / "times.txt").write_text("10.0\n10.1\n10.2\n")
+    (sequence / "poses.txt").write_text("9.9 0 0 0 0 0 0 1\n10.3 4 0 0 0 0 0 1\n")
+    found = records(sequence)
+    ahead = [found.pose_of(scan(sequence, number))[0, 3] for number in range(3)]
+    np.testing.assert_allclose(ahead, (1, 2, 3))
+
+
+@pytest.mark.parametrize("times", [None, "1700000000\n1700000001\n1700000002\n"])
+def test_poses_by_a_time_that_the_scans_do_not_know_go_line_by_line(
+    sequence: Path, times: str | None
+) -> None:
+    if times is not None:
+        (sequence / "times.txt").write_text(times)
+    lines = [f"{number} {number} 0 0 0 0 0 1" for number in range(3)]
+    (sequence / "poses.txt").write_text("\n".join(lines))
+    found = records(sequence)
+    assert [found.pose_of(scan(sequence, number))[0, 3] for number in range(3)] == [0, 1, 2]
+
+
+def test_a_scan_taken_before_the_first_pose_is_named(sequence: Path) -> None:
+    (sequence / "times.txt").write_text("9.0\n10.1\n10.2\n")
+    (sequence / "poses.txt").write_text("10 0 0 0 0 0 0 1\n10.3 4 0 0 0 0 0 1\n")
+    with pytest.raises(InputError, match=r"no pose for 000000\.bin, which was taken at 9\.000 s"):
+        records(sequence).pose_of(scan(sequence, 0))
+
+
 @given(
     degrees=st.floats(-180, 180),
     shift=st.tuples(*3 * [st.floats(-1000, 1000)]),
