@@ -1,0 +1,16 @@
+"""The option that says where the poses of scans come from, the same in every command."""
+
+import argparse
+
+from derain.odometry.posed import ODOMETRY, STANDING
+
+
+def add_poses(parser: argparse._ActionsContainer) -> None:
+    """Declares where poses come from, as :func:`derain.odometry.posed.with_poses` takes it."""
+    parser.add_argument(
+        "--poses",
+        metavar="POSES",
+        help=f"poses of the scans: a file in KITTI's or TUM's form, a folder with <sequence>.txt "
+        f"for each sequence, {STANDING}, or {ODOMETRY} (default: poses.txt beside the scans, else "
+        f"{ODOMETRY})",
+    )
