@@ -20,7 +20,7 @@ NEAREST, FARTHEST = 5.0, 80.0
 # Points that are looked at. More hold the scans back, for the rings that the beams draw on the
 # ground go along with the sensor: over four scans of WADS all of its points lead 4 cm from where
 # the first and the last of them lie upon one another directly, and every second point leads 2 cm.
-MOST_POINTS = 100_000
+MOST_REGISTERED = 100_000
 
 # Points that a surface is fitted to, and thickness that GICP gives it where it is 1 wide: both as
 # small_gicp has them.
@@ -113,6 +113,7 @@ class Surfaces:
     def _distances(self, other: "Surfaces", motion: NDArray[np.float64]) -> tuple[float, float]:
         """Median distance of partners across their surface, and the share within a voxel."""
         moved = self._cloud.points()[:, :3] @ motion[:3, :3].T + motion[:3, 3]
+        assert other._tree is not None  # they are enough
         rows, squared = other._tree.batch_knn_search(moved, 1, num_threads=self._threads)
         rows, squared = rows[:, 0], squared[:, 0]
         apart = moved - other._cloud.points()[rows, :3]
@@ -127,7 +128,7 @@ def _points_in_reach(scan: Scan) -> NDArray[np.float64]:
     in_reach = scan.valid & (scan.range > NEAREST) & (scan.range < FARTHEST)
     xyz = scan.xyz.compress(in_reach, axis=0)
     first, _ = distinct_positions(xyz)
-    step = -(-len(first) // MOST_POINTS)
+    step = -(-len(first) // MOST_REGISTERED)
     return xyz.take(first[:: max(step, 1)], axis=0).astype(np.float64)
 
 
@@ -142,4 +143,5 @@ def _facing(found: "small_gicp.RegistrationResult") -> float:
         return 0.0
     least = float(np.linalg.eigvalsh(found.H[3:, 3:])[0]) / found.num_inliers
     along, across = 1 / 2, 1 / (2 * THICKNESS)
-    return max(0.0, (least - along) / (across - along))
+    facing: float = max(0.0, (least - along) / (across - along))
+    return facing

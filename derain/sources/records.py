@@ -52,9 +52,10 @@ class Records:
         trajectory = self._trajectory
         if trajectory is None:
             return None
-        if self._times is not None and trajectory.is_by_time(self._times):
-            return trajectory.at(self._times[self._line(scan, TIMES, len(self._times))], scan.name)
-        return trajectory.poses[self._line(scan, POSES, len(trajectory))]
+        if trajectory.times is not None and (time := self._time_on(trajectory, scan)) is not None:
+            return trajectory.at(time, scan.name)
+        pose: NDArray[np.float64] = trajectory.poses[self._line(scan, POSES, len(trajectory))]
+        return pose
 
     @cached_property
     def _times(self) -> NDArray[np.float64] | None:
@@ -77,6 +78,11 @@ class Records:
     @cached_property
     def _places(self) -> dict[str, int]:
         return {scan.name: place for place, scan in enumerate(self._scans)}
+
+    def _time_on(self, trajectory: Trajectory, scan: Path) -> float | None:
+        """When a scan was taken; None where the poses are not told by the clock of the scans."""
+        known = self._times is not None and trajectory.is_by_time(self._times)
+        return self.time_of(scan) if known else None
 
     def _line(self, scan: Path, record: str, lines: int) -> int:
         """The line of a record that belongs to a scan."""

@@ -35,7 +35,7 @@ KITTI, TUM = 12, 8
 # Between two poses up to a second apart a vehicle goes smoothly. A scan may lie so much before the
 # first or after the last of them, for times are rounded: to hundredths, if carelessly.
 LONGEST_GAP = 1.0
-ROUNDING = 0.005
+TIME_ROUNDING = 0.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,14 +82,18 @@ class Trajectory:
         assert self.times is not None
         inside = min(max(time, self.times[0]), self.times[-1])
         before, after, share = self._around(inside)
-        if abs(inside - time) > ROUNDING or self.times[after] - self.times[before] > LONGEST_GAP:
+        if (
+            abs(inside - time) > TIME_ROUNDING
+            or self.times[after] - self.times[before] > LONGEST_GAP
+        ):
             raise InputError(
                 self.name,
                 f"has no pose for {scan}, which was taken at {time:.3f} s: the nearest are of "
                 f"{self.times[before]:.3f} and {self.times[after]:.3f} s",
                 "Give the poses of the whole recording, by the clock of its scans.",
             )
-        one, other = self.poses[before], self.poses[after]
+        one: NDArray[np.float64] = self.poses[before]
+        other: NDArray[np.float64] = self.poses[after]
         if share == 0:
             return one
         pose = np.eye(4)

@@ -214,6 +214,12 @@ def test_one_damaged_record_does_not_touch_the_other(sequence: Path) -> None:
     assert records(sequence).time_of(scan(sequence)) == 1
 
 
+def test_damaged_times_do_not_touch_poses_that_need_none(sequence: Path) -> None:
+    (sequence / "times.txt").write_text("damaged")
+    (sequence / "poses.txt").write_text("\n".join(3 * [line(np.eye(4))]))
+    np.testing.assert_array_equal(records(sequence).pose_of(scan(sequence)), np.eye(4))
+
+
 def test_records_cross_to_other_processes(sequence: Path) -> None:
     (sequence / "times.txt").write_text("1\n2\n3\n")
     found = records(sequence)

@@ -12,7 +12,7 @@ from derain.fusion.extrinsics import Extrinsics
 from derain.sources.quaternions import between, quaternion_of, rotation_of
 from derain.sources.trajectory import (
     LONGEST_GAP,
-    ROUNDING,
+    TIME_ROUNDING,
     Trajectory,
     read_trajectory,
     write_trajectory,
@@ -106,7 +106,9 @@ def test_poses_by_time_are_told_at_their_times_and_between_them(tmp_path: Path) 
     middle = trajectory.at(10.25, "b")
     np.testing.assert_allclose(middle[:3, 3], (1, 2, 3))
     np.testing.assert_allclose(middle[:3, :3], turned(45), atol=1e-9)
-    np.testing.assert_array_equal(trajectory.at(10.5 + 0.9 * ROUNDING, "c"), trajectory.poses[1])
+    np.testing.assert_array_equal(
+        trajectory.at(10.5 + 0.9 * TIME_ROUNDING, "c"), trajectory.poses[1]
+    )
     assert trajectory.is_by_time([10.2])
     assert not trajectory.is_by_time([1.7e9])
     assert not trajectory.is_by_time([])
