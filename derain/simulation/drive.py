@@ -1,0 +1,62 @@
+"""What moves while a sequence is recorded: the vehicle that carries the sensor, and others."""
+
+from dataclasses import dataclass
+
+from derain.errors import InputError
+from derain.files.documents import shown
+
+# Fastest vehicle, m/s: 216 km/h.
+FASTEST = 60.0
+
+# Most things that move. A street has room for some thirty within sight of a sensor that stands.
+MOST_TRAFFIC = 100
+
+# Longest drive, metres: the street of it has five million triangles, which take 2 GB to ray-cast.
+LONGEST = 2000.0
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive along a street, or a stand in it while others move.
+
+    Attributes:
+        speed: Speed of the sensor along the street, m/s; 0 stands.
+        traffic: How many cars and pedestrians move, each at a speed of its own.
+
+    Raises:
+        InputError: A speed or a number that is impossible.
+    """
+
+    speed: float = 0.0
+    traffic: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.speed <= FASTEST:
+            raise InputError(
+                "speed",
+                f"{shown(self.speed)} m/s is impossible",
+                f"Give 0 (stands) to {FASTEST:g}.",
+            )
+        if not 0 <= self.traffic <= MOST_TRAFFIC:
+            raise InputError(
+                "traffic", f"{shown(self.traffic)} is impossible", f"Give 0 to {MOST_TRAFFIC}."
+            )
+
+    def length(self, duration: float) -> float:
+        """Length of the drive in metres.
+
+        Args:
+            duration: How long it takes, seconds.
+
+        Raises:
+            InputError: Too long a drive.
+        """
+        length = self.speed * duration
+        if length > LONGEST:
+            raise InputError(
+                "drive",
+                f"{duration:,.0f} s at {self.speed:g} m/s are {length:,.0f} m of street, more "
+                f"than {LONGEST:,.0f}",
+                "Simulate more sequences of fewer scans.",
+            )
+        return length
