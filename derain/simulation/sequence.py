@@ -73,8 +73,7 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
         assert joined.label is not None  # as both of its parts are labelled
         write_scan(folder / FOLDERS.lidar / f"{stem}.bin", scan)
         write_scan(folder / FOLDERS.scans / f"{stem}.bin", joined)
-        kind, thing = parted(joined.label)
-        write_labels(folder / FOLDERS.labels / f"{stem}.label", kind, thing)
+        write_labels(folder / FOLDERS.labels / f"{stem}.label", *parted(joined.label))
         _write_table(folder / "weather" / f"{stem}.csv", asdict(scene.weather))
     for kind in (FOLDERS.lidar, FOLDERS.scans, FOLDERS.labels, "weather"):
         _write_times(folder / kind, times)

@@ -151,7 +151,7 @@ def _junction(street: Street, near: _Moment, generator: np.random.Generator) -> 
     """One of the two junctions nearest to a place 15 m ahead of the sensor, metres along x."""
     distance = np.abs(np.array(street.junctions) - near.x - 15)
     nearest = np.argsort(distance)[: generator.integers(1, 3)]
-    return street.junctions[nearest[-1]]
+    return street.junctions[int(nearest[-1])]
 
 
 WAYS: tuple[Callable[[Street, _Moment, np.random.Generator], MovingThing], ...] = (

@@ -89,7 +89,7 @@ def test_a_drive_goes_along_a_street_without_a_radar(run_derain, tmp_path: Path)
     assert (tmp_path / "drive/sequences/000/lidar_radar_pcd/poses.txt").is_file()
     facts = json.loads(run_derain("info", tmp_path / "drive", "--json").out)
     assert facts["scans"] == 3
-    assert set(facts["class_share"]) <= {"background", "car", "rain", "pedestrian", "bike", "road"}
+    assert facts["class_share"]["car"] > 0.01
 
 
 def test_a_speed_of_0_and_no_traffic_is_what_it_is_without_them(run_derain, tmp_path: Path) -> None:
