@@ -8,10 +8,10 @@ from derain.files.documents import shown
 # Fastest vehicle, m/s: 216 km/h.
 FASTEST = 60.0
 
-# Most things that move. A street has room for some thirty within sight of a sensor that stands.
-MOST_TRAFFIC = 100
+# Most things that move. A street has room for 25 or more within sight of a sensor that stands.
+MOST_TRAFFIC = 20
 
-# Longest drive, metres: the street of it has five million triangles, which take 2 GB to ray-cast.
+# Longest drive, metres: its street has one and a half million triangles and is laid out in 10 s.
 LONGEST = 2000.0
 
 

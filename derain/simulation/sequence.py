@@ -148,7 +148,7 @@ def _write_poses(folder: Path, poses: Sequence[NDArray[np.float64]]) -> None:
     """Writes poses in KITTI's form, as seen from the first of them."""
     rows = [(np.linalg.inv(poses[0]) @ pose)[:3].ravel() for pose in poses]
     with replacing(folder / POSES) as temporary:
-        np.savetxt(temporary, rows, "%.9g")
+        np.savetxt(temporary, np.round(rows, 9) + 0.0, "%.9f")  # 0.0 takes the sign from -0
 
 
 def _write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:

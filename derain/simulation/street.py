@@ -24,6 +24,9 @@ PARKING = 2.3
 KERB = PARKING + 0.8
 PAVEMENT = KERB + 2.0
 
+# Length of road that a parked car has to itself, metres.
+LOT = 6.5
+
 # Height of the pavement above the road, metres.
 STEP = 0.12
 
@@ -108,7 +111,7 @@ def _ground(street: Street, generator: np.random.Generator) -> Iterator[Surface]
 
 
 def _parked(street: Street, side: int, generator: np.random.Generator) -> Iterator[Surface]:
-    for x in _along(street, 6.5):
+    for x in np.arange(*street.ends, LOT):
         kind = generator.choice([0, 1, 2], p=[0.6, 0.32, 0.08])  # none, a car, a bicycle
         make = (None, objects.car, objects.bike)[kind]
         if make is not None:
@@ -164,10 +167,6 @@ def _tree(x: float, y: float, generator: np.random.Generator) -> Iterator[Surfac
     crown = generator.uniform(1, 2.5)
     yield objects.trunk(generator).placed(x, y)
     yield objects.foliage((crown, crown, crown), 2 + crown, generator).placed(x, y)
-
-
-def _along(street: Street, step: float) -> Iterator[float]:
-    yield from map(float, np.arange(*street.ends, step))
 
 
 def _scattered(street: Street, per_metre: float, generator: np.random.Generator) -> Iterator[float]:

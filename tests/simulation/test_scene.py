@@ -6,7 +6,6 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from derain.errors import InputError
 from derain.simulation import shapes
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass, parted
@@ -125,8 +124,3 @@ def test_a_seed_gives_the_same_drive_again_and_another_seed_another_one() -> Non
     assert first.course is not None
     assert again.course is not None
     assert np.array_equal(first.course.pose(0.4, SENSOR), again.course.pose(0.4, SENSOR))
-
-
-def test_a_street_too_full_is_reported() -> None:
-    with pytest.raises(InputError, match="no room for 100"):
-        scene(replace(DRIVING, drive=Drive(traffic=100)))
