@@ -53,6 +53,7 @@ OF_DATA_SETS = {
     "radar": True,
     "speed": 0.0,
     "traffic": 0,
+    "skew": False,
     "workers": usable_cores(),
 }
 OF_SCANS = {"columns": DEFAULT_COLUMNS, "picture": False, "json": False}
@@ -96,6 +97,12 @@ def _add_those_of_data_sets(group: "argparse._ArgumentGroup") -> None:
         "--traffic", type=int, help=f"cars and pedestrians that move {default['traffic']}"
     )
     group.add_argument(
+        "--skew",
+        action="store_true",
+        default=None,
+        help="let them, and the sensor, move on while a scan is taken",
+    )
+    group.add_argument(
         "--radar",
         action=argparse.BooleanOptionalAction,
         help="with a 4D radar (default: yes, but not on a drive)",
@@ -120,7 +127,7 @@ def main(arguments: argparse.Namespace) -> int:
         raise InputError("--seed", f"{arguments.seed} is negative", "Give 0 or more.")
     if arguments.on is None:
         if arguments.radar is None:
-            arguments.radar = not (arguments.speed or arguments.traffic)
+            arguments.radar = not (arguments.speed or arguments.traffic or arguments.skew)
         _settle(arguments, OF_DATA_SETS, foreign=OF_SCANS, other="with")
         return _simulate(arguments)
     from derain.cli.rain_on_scans import rain_on_scans
@@ -147,7 +154,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
     from derain.simulation.drive import Drive
     from derain.simulation.radar import Radar
 
-    moves = arguments.speed or arguments.traffic
+    moves = arguments.speed, arguments.traffic, arguments.skew
     campaign = Campaign(
         *partition(arguments.sequences),
         scans=arguments.scans,
@@ -156,7 +163,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
         sensor=arguments.sensor or "mems_256",
         layout=arguments.layout,
         radar=Radar() if arguments.radar else None,
-        drive=Drive(arguments.speed, arguments.traffic) if moves else None,
+        drive=Drive(*moves) if any(moves) else None,
     )
     simulate_track(arguments.out, campaign, arguments.workers)
     scans = len(campaign.names) * campaign.scans

@@ -22,13 +22,17 @@ class Drive:
     Attributes:
         speed: Speed of the sensor along the street, m/s; 0 stands.
         traffic: How many cars and pedestrians move, each at a speed of its own.
+        skew: Whether every beam sees the scene as it is when that beam is sent, so that a scan is
+            skewed by what moves while it is taken; else all of a scan is seen as it is when the
+            scan begins, as after a perfect correction.
 
     Raises:
-        InputError: A speed or a number that is impossible.
+        InputError: A speed or a number that is impossible, or skew where nothing moves.
     """
 
     speed: float = 0.0
     traffic: int = 0
+    skew: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.speed <= FASTEST:
@@ -40,6 +44,10 @@ class Drive:
         if not 0 <= self.traffic <= MOST_TRAFFIC:
             raise InputError(
                 "traffic", f"{shown(self.traffic)} is impossible", f"Give 0 to {MOST_TRAFFIC}."
+            )
+        if self.skew and not (self.speed or self.traffic):
+            raise InputError(
+                "skew", "there is none where nothing moves", "Give a speed or traffic."
             )
 
     def length(self, duration: float) -> float:

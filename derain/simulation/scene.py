@@ -1,7 +1,7 @@
 """What a sequence is recorded of, and what a sensor sees of it scan after scan."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import Self
 
@@ -14,6 +14,7 @@ from derain.simulation.course import Course
 from derain.simulation.drive import Drive
 from derain.simulation.facility import lay_out_facility
 from derain.simulation.layout import lay_out_track
+from derain.simulation.objects import Surface
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
 from derain.simulation.sensor import Returns, Sensor
 from derain.simulation.street import Street, lay_out_street
@@ -28,16 +29,13 @@ LAYOUTS = {"street": lay_out_track, "facility": lay_out_facility}
 class SimulatedScene:
     """A place, the rain on it and the weather; and what moves in it.
 
-    All of a scan is seen from where the sensor is when it begins: neither the sensor nor anything
-    else moves on until the next one. A recording of a spinning sensor is skewed by the way that it
-    drives in a turn, where nobody has undone that.
-
     Attributes:
         track: What stands.
         rain: The rain; it is the same wherever the sensor is.
         weather: The record of it.
         course: How the sensor moves; None stands at the origin of the track.
         traffic: What else moves.
+        skew: Whether they move on while a scan is taken, see :class:`Drive`.
     """
 
     track: Track
@@ -45,6 +43,7 @@ class SimulatedScene:
     weather: Weather
     course: Course | None = None
     traffic: Sequence[MovingThing] = ()
+    skew: bool = False
 
     @classmethod
     def of(cls, campaign: Campaign, name: str, generator: np.random.Generator) -> Self:
@@ -61,7 +60,7 @@ class SimulatedScene:
         if campaign.drive is None:
             return cls(LAYOUTS[campaign.layout](generator), rain, weather)
         course, track, traffic = _drawn(campaign.drive, campaign.times, generator)
-        return cls(track, rain, weather, course, traffic)
+        return cls(track, rain, weather, course, traffic, campaign.drive.skew)
 
     def cast(self, sensor: Sensor, times: NDArray[np.float64]) -> Iterator[Returns]:
         """What every beam of a sensor would return through clear air, scan after scan.
@@ -79,21 +78,44 @@ class SimulatedScene:
         if self.course is None:
             yield from repeat(self.track.cast(sensor), len(times))
             return
+        things = [
+            (_numbered(number, thing.surface), thing.velocity)
+            for number, thing in enumerate(self.traffic, 1)
+        ]
         for time in times:
-            pose = self.course.pose(time, sensor)
+            sent, pose = self._moments(self.course, time, sensor)
             seen = self.track.cast(sensor, pose)
-            if self.traffic:
-                seen = _nearer(seen, self._moving(time).cast(sensor, pose))
+            for thing, velocity in things:
+                seen = _nearer(seen, thing.cast(sensor, _followed(pose, sent, velocity)))
             yield seen
 
-    def _moving(self, time: float) -> Track:
-        """What moves, where it is at a time. It is few triangles: what stands is not made anew."""
-        surfaces = [thing.at(time) for thing in self.traffic]
-        track = Track.of(surfaces)
-        number = np.repeat(
-            np.arange(1, len(surfaces) + 1), [len(surface.triangles) for surface in surfaces]
-        )
-        return Track(track.triangles, track.reflectivity, packed(track.label, number))
+    def _moments(
+        self, course: Course, time: float, sensor: Sensor
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """When the beams of a scan are sent, and the sensor's pose then: of all at once, or each.
+
+        Returns:
+            Seconds, float64 () or (N,); and poses, float64 (4, 4) or (N, 4, 4).
+        """
+        if not self.skew:
+            return np.array(time), course.pose(time, sensor)
+        sent, beam = np.unique(time + sensor.beam_times(), return_inverse=True)
+        return sent[beam], np.stack([course.pose(moment, sensor) for moment in sent])[beam]
+
+
+def _numbered(number: int, surface: Surface) -> Track:
+    """A track of one thing that moves, where it is at the first scan, labelled with its number."""
+    track = Track.of([surface])
+    return replace(track, label=packed(track.label, np.full_like(track.label, number)))
+
+
+def _followed(
+    pose: NDArray[np.float64], sent: NDArray[np.float64], velocity: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Poses as seen from something that moves, which itself then stays where it is at time 0."""
+    seen = pose.copy()
+    seen[..., :2, 3] -= sent[..., None] * velocity
+    return seen
 
 
 def _drawn(

@@ -12,8 +12,9 @@ Each folder also holds metadata.csv: frame, timestamp (seconds from the start). 
 files are missing, and lidar_radar_pcd holds the LiDAR's scans alone.
 
 Of a drive, both folders of scans hold poses.txt: a line a scan, the upper three rows of the motion
-that takes its points to the frame of the first scan. The upper 16 bits of a label then tell what
-moves: 1, 2, ... for each moving car or pedestrian, 0 for what stands and for rain.
+that takes its points to the frame of the first scan, both as the scans begin. The upper 16 bits of
+a label then tell what moves: 1, 2, ... for each moving car or pedestrian, 0 for what stands and for
+rain.
 """
 
 from collections.abc import Mapping, Sequence

@@ -57,15 +57,16 @@ class Track:
 
         Args:
             sensor: The sensor.
-            pose: Takes points from its frame into the track's, float64 (4, 4), metres; None stands
-                upright at the origin, at its mounting height.
+            pose: Takes points from its frame into the track's, float64 (4, 4), metres, or (N, 4, 4)
+                where every beam has a pose of its own; None stands upright at the origin, at its
+                mounting height.
 
         Raises:
             InputError: Open3D cannot be imported.
         """
         beams, place = sensor.beams(), np.array([0, 0, sensor.mounting_height])
         if pose is not None:
-            beams, place = beams @ pose[:3, :3].T, pose[:3, 3]
+            beams, place = (pose[..., :3, :3] @ beams[..., None])[..., 0], pose[..., :3, 3]
         origin = np.broadcast_to(place, beams.shape)
         hits = self._hits(np.concatenate([origin, beams], axis=1).astype(np.float32))
         hit = hits["t_hit"] <= sensor.maximum_range

@@ -1,7 +1,7 @@
 """Cars that drive and people who walk while a sequence is recorded."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +35,6 @@ class MovingThing:
 
     surface: Surface
     velocity: NDArray[np.float64]
-
-    def at(self, time: float) -> Surface:
-        """Where it is so many seconds after the first scan."""
-        moved = self.surface.triangles + np.append(time * self.velocity, 0)
-        return replace(self.surface, triangles=moved)
 
     def bounds(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Its least and greatest x and y at some times, float64 (T, 2, 2), metres."""

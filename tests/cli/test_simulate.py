@@ -84,7 +84,7 @@ def test_a_drive_goes_along_a_street_without_a_radar(run_derain, tmp_path: Path)
     options = [*QUICK, "--layout", "street", "--speed", "13", "--traffic", "2"]
     assert run_derain("simulate", "--out", tmp_path / "drive", *options).code == 0
     campaign = json.loads((tmp_path / "drive/manifest.json").read_text())["campaign"]
-    assert campaign["drive"] == {"speed": 13, "traffic": 2}
+    assert campaign["drive"] == {"speed": 13, "traffic": 2, "skew": False}
     assert campaign["radar"] is None
     assert (tmp_path / "drive/sequences/000/lidar_radar_pcd/poses.txt").is_file()
     facts = json.loads(run_derain("info", tmp_path / "drive", "--json").out)
@@ -108,6 +108,7 @@ def test_a_speed_of_0_and_no_traffic_is_what_it_is_without_them(run_derain, tmp_
         (("--speed", "-3", "--layout", "street"), "speed: -3.0 m/s is impossible"),
         (("--traffic", "-3", "--layout", "street"), "traffic: -3 is impossible"),
         (("--speed", "13", "--layout", "street", "--radar"), "drive: has no radar"),
+        (("--skew", "--layout", "street"), "skew: there is none where nothing moves"),
         (("--speed", "13", "--on", "."), "--speed: has a meaning only without --on"),
     ],
 )

@@ -50,7 +50,7 @@ def test_one_that_has_no_drive_is_described_as_before_there_were_drives() -> Non
         "radar",
     }
     drive = Campaign(drive=Drive(13, 4)).description["campaign"]["drive"]
-    assert drive == {"speed": 13, "traffic": 4}
+    assert drive == {"speed": 13, "traffic": 4, "skew": False}
 
 
 def test_scans_are_taken_at_the_frame_rate_of_the_sensor() -> None:

@@ -26,6 +26,7 @@ def test_a_drive_longer_than_any_street_is_refused() -> None:
         ({"speed": -1.0}, "speed: -1.0 m/s is impossible"),
         ({"speed": math.nan}, "speed: nan m/s is impossible"),
         ({"speed": math.inf}, "speed: inf m/s is impossible"),
+        ({"skew": True}, "skew: there is none where nothing moves"),
         ({"traffic": -1}, "traffic: -1 is impossible"),
         ({"traffic": 10**9}, "traffic: 1000000000 is impossible"),
     ],

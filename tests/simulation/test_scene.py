@@ -19,6 +19,8 @@ from derain.simulation.track import Track
 from derain.simulation.traffic import MovingThing
 from derain.simulation.weather import Weather
 
+from .moved import moved
+
 SENSOR = Sensor(rows=32, columns=200)
 TIMES = np.array([0.0, 0.1, 0.7])
 DRIVING = Campaign(scans=3, sensor=SENSOR, drive=Drive(speed=13, traffic=7))
@@ -64,7 +66,9 @@ def test_what_moves_is_seen_as_if_it_were_built_into_the_street(open3d: ModuleTy
     assert drive.course is not None
     seen = list(drive.cast(SENSOR, TIMES))
     for time, returns in zip(TIMES, seen, strict=True):
-        moving = Track.of(thing.at(time) for thing in drive.traffic)
+        moving = Track.of(
+            replace(thing.surface, triangles=moved(thing, time)) for thing in drive.traffic
+        )
         whole = Track(
             np.concatenate([drive.track.triangles, moving.triangles]),
             np.concatenate([drive.track.reflectivity, moving.reflectivity]),
@@ -86,7 +90,7 @@ def test_the_numbers_of_what_moves_are_on_it_and_on_nothing_else(open3d: ModuleT
         kind, number = parted(returns.label)
         assert number.max() <= len(drive.traffic)
         for row, thing in enumerate(drive.traffic, 1):
-            corners = thing.at(time).triangles.reshape(-1, 3)
+            corners = moved(thing, time).reshape(-1, 3)
             inside = ((ends > corners.min(0) - 2e-3) & (ends < corners.max(0) + 2e-3)).all(1)
             assert inside[number == row].all()
             assert (kind[number == row] == thing.surface.label).all()
@@ -120,7 +124,24 @@ def test_a_seed_gives_the_same_drive_again_and_another_seed_another_one() -> Non
     assert np.array_equal(first.track.triangles, again.track.triangles)
     assert len(first.track.triangles) != len(other.track.triangles)
     for one, two in zip(first.traffic, again.traffic, strict=True):
-        assert np.array_equal(one.at(0.4).triangles, two.at(0.4).triangles)
+        assert np.array_equal(moved(one, 0.4), moved(two, 0.4))
     assert first.course is not None
     assert again.course is not None
     assert np.array_equal(first.course.pose(0.4, SENSOR), again.course.pose(0.4, SENSOR))
+
+
+@pytest.mark.parametrize("speed", [0.0, 13.0])
+def test_a_skewed_scan_is_each_beam_of_the_scene_at_its_own_time(
+    open3d: ModuleType, speed: float
+) -> None:
+    sensor = Sensor(rows=16, columns=50, frame_rate=2)
+    straight = scene(Campaign(scans=2, sensor=sensor, drive=Drive(speed, traffic=7)))
+    (skewed,) = replace(straight, skew=True).cast(sensor, TIMES[1:2])
+    for column in (0, 20, 49):
+        moment = TIMES[1] + column / 50 / sensor.frame_rate
+        (expected,) = straight.cast(sensor, np.array([moment]))
+        beams = np.arange(column, 16 * 50, 50)
+        assert np.allclose(skewed.range[beams], expected.range[beams], rtol=1e-6)
+        assert np.array_equal(skewed.label[beams], expected.label[beams])
+    (at_once,) = straight.cast(sensor, TIMES[1:2])
+    assert not np.allclose(skewed.range, at_once.range, atol=0.1)

@@ -10,6 +10,8 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.street import Street
 from derain.simulation.traffic import DRIVING, WALKING, WAYS, MovingThing, draw_traffic
 
+from .moved import moved
+
 TIMES = np.arange(20) / 10
 
 
@@ -20,7 +22,7 @@ def drawn(seed: int, count: int = 10, speed: float = 13.0) -> tuple[Street, list
 
 
 def corners(thing: MovingThing, time: float) -> np.ndarray:
-    return thing.at(time).triangles[..., :2].reshape(-1, 2)
+    return moved(thing, time)[..., :2].reshape(-1, 2)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -42,11 +44,11 @@ def test_cars_drive_and_pedestrians_walk_along_against_and_across_the_street(see
             assert np.sign(y - street.axis) == -np.sign(thing.velocity[0])
 
 
-def test_a_thing_is_where_its_velocity_takes_it() -> None:
+def test_the_bounds_of_a_thing_are_where_its_velocity_takes_it() -> None:
     for thing in drawn(0)[1]:
-        before, after = thing.at(0.3).triangles, thing.at(1.1).triangles
-        moved = np.append(0.8 * thing.velocity, 0)
-        assert np.allclose(after - before, moved, atol=1e-9)
+        for time, (least, greatest) in zip(TIMES, thing.bounds(TIMES), strict=True):
+            assert np.allclose(least, corners(thing, time).min(axis=0))
+            assert np.allclose(greatest, corners(thing, time).max(axis=0))
 
 
 @pytest.mark.parametrize("speed", [0.0, 13.0])
