@@ -1,7 +1,8 @@
-"""LiSnowNet-L1: learns without a label what a range image would be without snow or rain.
+"""LiSnowNet: learns without a label what a range image would be without snow or rain.
 
 Rain is where the image changes: a network trained to make images sparse, and to change them as
-little as that takes, takes out what is small and bright against nothing.
+little as that takes, takes out what is small and bright against nothing. LiSnowNet-L1 counts a
+change by its size, LiSnowNet-L2 by its square.
 
 Source: M.-Y. Yu, R. Vasudevan, M. Johnson-Roberson, "LiSnowNet: Real-time Snow Removal for LiDAR
 Point Clouds", IROS 2022.
@@ -25,7 +26,7 @@ from derain.learning.task import EXAMPLE_SCANS
 from derain.models.base import DerainingModule
 from derain.models.lisnownet.network import LiSnowNetwork
 from derain.models.lisnownet.selection_rule import SelectionRule
-from derain.models.lisnownet.sparsity import sparsity_loss
+from derain.models.lisnownet.sparsity import RESIDUALS, sparsity_loss
 from derain.models.published import Published
 from derain.models.range_module import FITTED, per_pixel, range_view, stated
 from derain.models.registry import NETWORKS
@@ -109,7 +110,7 @@ def possible(image: Tensor, rule: SelectionRule) -> Tensor:
 
 @NETWORKS.add("lisnownet")
 class LiSnowNet(DerainingModule, Published):
-    """Trains LiSnowNet-L1 on scans without reading a label; the recipe is the published one.
+    """Trains LiSnowNet on scans without reading a label; the recipe is the published one.
 
     Example:
         >>> model = LiSnowNet(grid="rehearse3d", rule={"residual": 0.01})
@@ -125,6 +126,7 @@ class LiSnowNet(DerainingModule, Published):
         dropout: Share of feature maps dropped in training.
         alpha: How much sparsity counts against the residual: it weighs 1 - 2^-alpha.
         beta: Share of the wavelet part in sparsity.
+        norm: Norm of the residual: ``l1`` as published, or ``l2``.
         learning_rate: Of Adam.
         decay: Factor by which the learning rate falls per epoch.
         rule: Constants of the :class:`SelectionRule` that are stated, by name. Of the others,
@@ -134,7 +136,7 @@ class LiSnowNet(DerainingModule, Published):
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 
     Raises:
-        InputError: Weights of the loss, or constants of the rule, that cannot be meant.
+        InputError: Weights or a norm of the loss, or constants of the rule, that cannot be meant.
     """
 
     VIEW: ClassVar[type[View]] = RangeView
@@ -152,6 +154,7 @@ class LiSnowNet(DerainingModule, Published):
         dropout: float = 0.5,
         alpha: float = 5.5,
         beta: float = 0.5,
+        norm: str = "l1",
         learning_rate: float = 1e-3,
         decay: float = 0.95,
         rule: dict[str, float] = {},
@@ -165,6 +168,8 @@ class LiSnowNet(DerainingModule, Published):
                 f"alpha {alpha:g} and beta {beta:g} weigh no loss",
                 "Give an alpha of at least 0 and a beta from 0 to 1.",
             )
+        if norm not in RESIDUALS:
+            raise InputError(self.NAME, f"no such norm: '{norm}'", "Known are l1 and l2.")
         self.save_hyperparameters()
         self.network = LiSnowNetwork(width=width, dropout=dropout)
         self.selection = SelectionRule.fitted(rule, [])
@@ -230,7 +235,9 @@ class LiSnowNet(DerainingModule, Published):
         image, valid = batch.inputs["image"], batch.inputs["valid"]
         seen = cube_roots(image, self.selection)
         denoised = self._denoise(image, valid, seen)
-        loss = sparsity_loss(denoised, seen, valid, self.hparams["alpha"], self.hparams["beta"])
+        loss = sparsity_loss(
+            denoised, seen, valid, *(self.hparams[name] for name in ("alpha", "beta", "norm"))
+        )
         return {
             "loss": loss.total,
             "wavelet": loss.wavelet,

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from derain.models.lisnownet.sparsity import (
-    absolute_residual,
+    mean_residual,
     fold_checkerboard,
     fourier_sparsity,
     sparsity_loss,
@@ -115,7 +115,7 @@ def test_the_residual_counts_every_channel_of_every_valid_pixel() -> None:
     image = torch.tensor([[[[1.0, 2.0, math.nan]], [[0.0, 0.5, -1.0]]]])
     denoised = torch.tensor([[[[1.5, 2.0, 7.0]], [[-1.0, 1.0, 9.0]]]])
     valid = torch.tensor([[[[True, True, False]]]])
-    residual = absolute_residual(denoised, image, valid)
+    residual = mean_residual(denoised, image, valid)
     assert residual.item() == pytest.approx((0.5 + 0 + 1 + 0.5) / 4)
 
 
