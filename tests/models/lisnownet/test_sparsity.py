@@ -10,9 +10,9 @@ import torch
 from torch import Tensor
 
 from derain.models.lisnownet.sparsity import (
-    mean_residual,
     fold_checkerboard,
     fourier_sparsity,
+    mean_residual,
     sparsity_loss,
     wavelet_levels,
     wavelet_sparsity,
