@@ -1,7 +1,7 @@
 """Dual returns: which points are of one ray, and which of them is the nearer one.
 
 What stands behind the nearer return of a ray is proof that the ray went through it: drops are such,
-edges and twigs are, and walls are not. On raw WADS scans the nearer of two returns is snow in 38 to
+edges and twigs are, and walls are not. On raw WADS scans the nearer of two returns is snow in 32 to
 42 of 100, the farther in 1 to 2 (``benchmarks/dual_returns.py``).
 """
 
