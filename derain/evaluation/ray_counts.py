@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from derain.scan import Scan
 from derain.views.morton import distinct_rows
-from derain.views.returns import Returns
+from derain.views.returns import RayReturns
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class RayCounts:
     given_back: int
 
     @classmethod
-    def of(cls, scan: Scan, returns: Returns, rain: NDArray[np.bool_] | None = None) -> Self:
+    def of(cls, scan: Scan, returns: RayReturns, rain: NDArray[np.bool_] | None = None) -> Self:
         """Counts the rays of a scan.
 
         Args:

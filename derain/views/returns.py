@@ -18,11 +18,11 @@ from derain.views.return_columns import LEAST_APART, StatedReturns, stated_retur
 from derain.views.shared_directions import one_direction
 
 # By what returns are told where no column says.
-DIRECTIONS = "directions"
+BY_DIRECTIONS = "directions"
 
 
 @dataclass(frozen=True, eq=False)
-class Returns:
+class RayReturns:
     """The return that each row of a scan is of its ray.
 
     A row that cannot be judged, one of the radar, and the only return of a ray are neither nearer
@@ -64,7 +64,7 @@ class Returns:
         return bool(self.told_by)
 
 
-def pair_returns(scan: Scan) -> Returns:
+def pair_returns(scan: Scan) -> RayReturns:
     """Finds which returns of a scan are of one ray.
 
     Where columns of the file say which return a row is (:func:`stated_returns`), they count; the
@@ -87,10 +87,10 @@ def pair_returns(scan: Scan) -> Returns:
 
 
 # What was found of scans that are still there: a view, its warnings and a method ask in turn.
-_KNOWN: WeakKeyDictionary[Scan, Returns] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[Scan, RayReturns] = WeakKeyDictionary()
 
 
-def _pair(scan: Scan) -> Returns:
+def _pair(scan: Scan) -> RayReturns:
     stated = stated_returns(scan)
     first, inverse = distinct_rows(scan)
     ranges = scan.range[first]
@@ -110,13 +110,13 @@ def _pair(scan: Scan) -> Returns:
             stated = replace(stated, nearer=stated.farther, farther=stated.nearer)
     found = _of_pairs(near[apart], far[apart], ranges)
     if not found.dual and stated is None:
-        return Returns.single(len(scan))
+        return RayReturns.single(len(scan))
     return _to_rows(found, first, inverse, stated)
 
 
 def _of_pairs(
     near: NDArray[np.int64], far: NDArray[np.int64], ranges: NDArray[np.float32]
-) -> Returns:
+) -> RayReturns:
     """What points are of their rays, from the pairs of them.
 
     Args:
@@ -134,15 +134,15 @@ def _of_pairs(
     behind = np.argsort(-ranges[far], kind="stable")
     partner[near[behind]] = far[behind]
     partner_range = np.where(partner >= 0, ranges[partner], np.float32(np.nan))
-    return Returns(nearer, farther, partner, partner_range, DIRECTIONS if len(near) else "")
+    return RayReturns(nearer, farther, partner, partner_range, BY_DIRECTIONS if len(near) else "")
 
 
 def _to_rows(
-    found: Returns,
+    found: RayReturns,
     first: NDArray[np.int64],
     inverse: NDArray[np.int64],
     stated: StatedReturns | None,
-) -> Returns:
+) -> RayReturns:
     """What rows are of their rays, from what was found of distinct positions and was stated.
 
     Args:
@@ -159,9 +159,9 @@ def _to_rows(
     partner = np.append(partner_of_first, -1)[inverse]
     partner_range = np.append(found.partner_range, np.float32(np.nan))[inverse]
     if stated is None:
-        return Returns(nearer, farther, partner, partner_range, DIRECTIONS)
+        return RayReturns(nearer, farther, partner, partner_range, BY_DIRECTIONS)
     alone = partner < 0
     nearer |= alone & stated.nearer
     farther |= alone & stated.farther
     partner_range = np.where(alone, stated.other_range, partner_range)
-    return Returns(nearer, farther, partner, partner_range, stated.column)
+    return RayReturns(nearer, farther, partner, partner_range, stated.column)

@@ -14,7 +14,7 @@ from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
 from derain.scan import Scan
 from derain.views.return_columns import LEAST_APART, stated_returns
-from derain.views.returns import Returns, pair_returns
+from derain.views.returns import RayReturns, pair_returns
 from derain.views.shared_directions import FEWEST_PAIRS, TOLERANCES, one_direction
 
 from ..two_returns import Recording
@@ -23,7 +23,7 @@ HARD_CASES = dict(hard_cases(largest=3000))
 CLEAN = ["kitti_hdl64.bin", "kitti_front.bin", "pandaset_pandar64.pcd", "ouster_os1_128.npz"]
 
 
-def assert_same(found: Returns, expected: Returns) -> None:
+def assert_same(found: RayReturns, expected: RayReturns) -> None:
     for name in ("nearer", "farther", "partner", "partner_range", "told_by"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
 
@@ -268,7 +268,7 @@ def test_a_column_that_counts_inwards_is_taken_the_other_way_round() -> None:
 def test_a_column_that_tells_nothing_counts_for_nothing(column: dict[str, NDArray[Any]]) -> None:
     scan = Scan(np.random.default_rng(0).normal(5, 1, (10, 3)).astype(np.float32), fields=column)
     assert stated_returns(scan) is None
-    assert_same(pair_returns(scan), Returns.single(10))
+    assert_same(pair_returns(scan), RayReturns.single(10))
 
 
 def test_a_second_return_in_the_row_of_the_first_is_known_by_its_range() -> None:
@@ -284,7 +284,7 @@ def test_a_second_return_in_the_row_of_the_first_is_known_by_its_range() -> None
 @pytest.mark.parametrize("name", CLEAN)
 def test_real_scans_of_single_returns_have_no_pair(shared: Path, name: str) -> None:
     returns = pair_returns(read_scan(shared / "data" / "clean" / name))
-    assert_same(returns, Returns.single(len(returns.nearer)))
+    assert_same(returns, RayReturns.single(len(returns.nearer)))
 
 
 def test_ousters_second_returns_lie_behind_the_first_or_in_front(shared: Path) -> None:
