@@ -20,7 +20,7 @@ class Bound:
     """What a channel of rain is at least, and at most.
 
     Attributes:
-        channel: Its name, as :meth:`Scan.channel` takes it.
+        channel: Its name, as :func:`channel_of` takes it.
         least: Smallest value of rain, in the channel's unit; None where there is no such bound.
         most: Largest value of rain.
     """
