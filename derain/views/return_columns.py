@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.scan import Scan
+from derain.scan import LARGEST_COORDINATE, Scan
 
 # Returns nearer to each other than this are of one surface, metres: the sensor split its echo.
 # Source: tier4/nebula, `dual_return_distance_threshold`.
@@ -54,9 +54,10 @@ def stated_returns(scan: Scan) -> StatedReturns | None:
 
     Args:
         scan: The scan. Known are ``return_number`` (or ``return_id``, ``return_index``, ``echo``)
-            with or without ``number_of_returns``, counted from the sensor outwards as in LAS;
-            ``return_type`` of Nebula and Autoware; bits 4 and 5 of Livox's ``tag``; and ``range2``
-            beside ``range``, by which Ouster states a second return in the row of the first.
+            with or without ``number_of_returns``, counted from the sensor outwards; ``bit_fields``,
+            in which LAS has both; ``return_type`` of Nebula and Autoware; bits 4 and 5 of Livox's
+            ``tag``; and ``range2`` beside ``range``, by which Ouster states a second return in the
+            row of the first.
 
     Returns:
         None where no column tells.
@@ -77,10 +78,28 @@ def _of_numbers(scan: Scan, columns: Columns) -> StatedReturns | None:
     if name is None:
         return None
     number = _whole(columns[name])
-    counts = next((columns[title] for title in COUNT_NAMES if title in columns), None)
-    if counts is None:
+    count = next((_whole(columns[title]) for title in COUNT_NAMES if title in columns), None)
+    if count is None:
         return _counted(scan, name, number)
-    count = _whole(counts)
+    return _of_so_many(scan, name, number, count)
+
+
+def _of_las_bits(scan: Scan, columns: Columns) -> StatedReturns | None:
+    bits = columns.get("bit_fields")
+    if bits is None or bits.dtype != np.uint8:
+        return None
+    # Point formats 6 to 10 have four bits for each number, and flags in a byte of their own; 0 to 5
+    # have three. Source: ASPRS, LAS Specification 1.4.
+    width = 4 if "classification_flags" in columns else 3
+    ones = (1 << width) - 1
+    number, count = bits & ones, bits >> width & ones
+    return _of_so_many(scan, "bit_fields", number.astype(np.int64), count.astype(np.int64))
+
+
+def _of_so_many(
+    scan: Scan, name: str, number: NDArray[np.int64], count: NDArray[np.int64]
+) -> StatedReturns | None:
+    """What numbers from 1 say where the number of returns of each ray is known."""
     several = scan.valid & (count > 1) & (number >= 1) & (number <= count)
     if not several.any():
         return None
@@ -124,7 +143,9 @@ def _of_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
         return None
     # Whatever the unit of the columns is, the coordinates are in metres.
     other = np.zeros(len(scan))
-    other[both] = scan.range[both] * (second[both] / first[both])
+    with np.errstate(over="ignore"):
+        other[both] = scan.range[both] * (second[both] / first[both])
+    both &= other <= LARGEST_COORDINATE
     nearer = both & (other - scan.range >= LEAST_APART)
     farther = both & (scan.range - other >= LEAST_APART)
     other_range = np.where(nearer | farther, other, np.nan).astype(np.float32)
@@ -156,6 +177,7 @@ def _nowhere(scan: Scan) -> NDArray[np.float32]:
 
 _READERS: tuple[Callable[[Scan, Columns], StatedReturns | None], ...] = (
     _of_numbers,
+    _of_las_bits,
     _of_types,
     _of_tags,
     _of_second_ranges,

@@ -179,6 +179,17 @@ def of_las(recording: Recording) -> dict[str, NDArray[Any]]:
     return {"return_number": numbers(recording), "number_of_returns": counts}
 
 
+def of_las_bits(recording: Recording) -> dict[str, NDArray[Any]]:
+    counts = (1 + recording.two).astype(np.uint8)
+    flags = np.zeros(len(counts), np.uint8)
+    return {"bit_fields": numbers(recording) | counts << 4, "classification_flags": flags}
+
+
+def of_old_las_bits(recording: Recording) -> dict[str, NDArray[Any]]:
+    counts = (1 + recording.two).astype(np.uint8)
+    return {"bit_fields": numbers(recording) | counts << 3 | 0b01000000}
+
+
 def of_nebula(recording: Recording) -> dict[str, NDArray[Any]]:
     first = np.where(recording.ray % 2, 4, 9)
     kind = np.where(numbers(recording) == 2, np.where(recording.ray % 2, 10, 5), first)
@@ -199,7 +210,7 @@ def of_echoes(recording: Recording) -> dict[str, NDArray[Any]]:
     return {"Echo": numbers(recording).astype(np.float32)}
 
 
-STATED = [of_las, of_nebula, of_autoware, of_livox, of_echoes]
+STATED = [of_las, of_las_bits, of_old_las_bits, of_nebula, of_autoware, of_livox, of_echoes]
 Columns = Callable[[Recording], dict[str, NDArray[Any]]]
 
 
@@ -259,6 +270,8 @@ def test_a_column_that_counts_inwards_is_taken_the_other_way_round() -> None:
         {"return_type": np.full(10, 3, np.uint8)},
         {"return_type": np.arange(10) % 3},
         {"tag": np.full(10, 0b101, np.uint8)},
+        {"bit_fields": np.full(10, 0b01001001, np.uint8)},
+        {"bit_fields": np.full(10, 0b10010001)},
         {"tag": np.linspace(0, 99, 10)},
         {"echo": np.full(10, np.inf)},
         {"range": np.ones(10), "range2": np.zeros(10)},
@@ -275,10 +288,19 @@ def test_a_second_return_in_the_row_of_the_first_is_known_by_its_range() -> None
     xyz = np.array([[10, 0, 0], [0, 20, 0], [0, 0, 5], [7, 0, 0]], np.float32)
     columns = {"range": np.array([9990, 20_000, 5000, 0]), "range2": np.array([29_970, 4000, 0, 9])}
     returns = pair_returns(Scan(xyz, fields=columns))
+    assert returns.told_by == "range2"
     assert returns.nearer.tolist() == [True, False, False, False]
     assert returns.farther.tolist() == [False, True, False, False]
     assert (returns.partner == -1).all()
     np.testing.assert_allclose(returns.partner_range, [30, 4, np.nan, np.nan], rtol=1e-6)
+
+
+def test_ranges_that_no_sensor_measures_are_no_second_return() -> None:
+    columns = {"range": np.array([1e-300, 1, np.nan, 1]), "range2": np.array([1e300, 1e9, 1, 1.5])}
+    returns = pair_returns(Scan(np.full((4, 3), 9, np.float32), fields=columns))
+    assert returns.nearer.tolist() == [False, False, False, True]
+    assert not returns.farther.any()
+    assert np.isnan(returns.partner_range[:3]).all()
 
 
 @pytest.mark.parametrize("name", CLEAN)
