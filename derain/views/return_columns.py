@@ -50,7 +50,7 @@ class StatedReturns:
 def stated_returns(scan: Scan) -> StatedReturns | None:
     """What a scan's columns say of its returns.
 
-    A column with one value at all points says nothing: writers fill in 1 where they do not know.
+    A column by which no ray has two says nothing: writers fill in 1 where they do not know.
 
     Args:
         scan: The scan. Known are ``return_number`` (or ``return_id``, ``return_index``, ``echo``)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from derain.views.directions import directions
 
 # Returns of one ray differ by at most this much in direction, degrees: by the rounding of
-# coordinates, to float32 or to millimetres. The first that shows returns of one ray is taken. Rays
-# of one shot lie no nearer than a twentieth of a degree.
+# coordinates to float32, or to millimetres. Of these the largest counts at which the returns of
+# one ray stand out, which is where neighbouring rays are out of reach.
 TOLERANCES = (0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 
 # More returns in one direction are not of one ray: sensors tell up to three apart.
