@@ -12,6 +12,7 @@ A file of this folder enters by ``@FILTERS.add("its name")``, and needs to be na
 :class:`PointFilter` says what it brings with it.
 """
 
+from derain.filters.crf import CRF
 from derain.filters.derainer import FilterDerainer
 from derain.filters.dror import DROR
 from derain.filters.dsor import DSOR
@@ -24,6 +25,7 @@ from derain.filters.sor import SOR
 from derain.filters.ssr import SSR
 
 __all__ = [
+    "CRF",
     "DROR",
     "DSOR",
     "FILTERS",

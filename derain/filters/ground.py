@@ -1,0 +1,139 @@
+"""The road as a plane, where a scan shows one."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Within so many metres a road is flat, and beyond the first of them lies no longer the vehicle.
+NEAREST, FARTHEST = 1.5, 30.0
+
+# No road climbs more to either side, as the sensor sees it, than its own tilt and a ramp.
+STEEPEST = 30.0
+
+# Slopes that are tried, and heights that are told apart by them: between two slopes, points at
+# the middle of the distances are off by no more than a step of height.
+STEP_OF_SLOPE, STEP_OF_HEIGHT = 4.0, 0.25
+
+# Points that the plane is sought among. A thousand show it as well as all of them.
+SAMPLE = 1024
+
+# Distances beyond which points have no say, metres, from the first guess to the last: the rough
+# plane is a quarter of a metre off, and curbs, snow and bumpers are above this last one.
+SCALES = (0.5, 0.4, 0.3, 0.2, 0.2, 0.2, 0.2)
+
+# Points this near to the plane lie in it, metres.
+IN_PLANE = 0.3
+
+# A plane that holds a smaller share of the points is none of the scene's.
+LEAST_SHARE = 0.1
+
+# What is higher than so many deviations of the plane's own points, and 0.1 m, is above the ground.
+DEVIATIONS, LEAST_HEIGHT = 3.0, 0.1
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A plane z = slope_x · x + slope_y · y + offset.
+
+    Attributes:
+        slope_x: Metres that it climbs per metre ahead.
+        slope_y: Metres that it climbs per metre to the left.
+        offset: Its height under the sensor, metres, below 0.
+        deviation: Standard deviation of the points in it, metres, from the median.
+    """
+
+    slope_x: float
+    slope_y: float
+    offset: float
+    deviation: float
+
+    def height(self, xyz: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Height above the plane along z, float64 (M,), metres.
+
+        Args:
+            xyz: Coordinates, (M, 3), metres, sensor frame.
+        """
+        x, y, z = np.array(xyz.T, np.float64, order="C")
+        height: NDArray[np.float64] = z - (self.slope_x * x + self.slope_y * y + self.offset)
+        return height
+
+    def is_below(self, xyz: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
+        """True for points that stand out of the ground, bool (M,).
+
+        Args:
+            xyz: Coordinates, (M, 3), metres, sensor frame.
+        """
+        limit = max(DEVIATIONS * self.deviation, LEAST_HEIGHT)
+        return self.height(xyz) > limit
+
+
+def find_ground(xyz: NDArray[np.floating[Any]]) -> Ground | None:
+    """Finds the plane that most of the surface around the sensor lies in.
+
+    Points are weighed by their distance, for near ground is seen in many more of them. Of planes of
+    all slopes, and heights by steps, the one that holds the most is moved onto its points by
+    weighted least squares (Tukey's biweight). Nothing is drawn at random.
+
+    Args:
+        xyz: Distinct positions along a Morton curve, (M, 3), metres, sensor frame.
+
+    Returns:
+        The plane; None where there is none below the sensor that holds a tenth of the points, and
+        more than lie beneath it.
+    """
+    sample = _sample(xyz)
+    if len(sample) < SAMPLE // 16:
+        return None
+    x, y, z = sample.T
+    weight = np.hypot(x, y)
+    terms = np.column_stack([x, y, np.ones(len(x))])
+    plane = _roughly(x, y, z, weight)
+    for scale in SCALES:
+        ratio = (z - terms @ plane) / scale
+        weighted = terms * (weight * np.square(np.maximum(1 - ratio * ratio, 0)))[:, None]
+        plane = np.linalg.lstsq(weighted.T @ terms, weighted.T @ z, rcond=None)[0]
+    off = z - terms @ plane
+    inside = np.abs(off) < IN_PLANE
+    is_ground = inside.mean() > max(LEAST_SHARE, (off < -IN_PLANE).mean())
+    slope_x, slope_y, offset = map(float, plane)
+    flat_enough = math.hypot(slope_x, slope_y) < math.tan(math.radians(STEEPEST))
+    if not (is_ground and flat_enough and offset < 0):
+        return None
+    # The median of what is normally distributed is .6745 of its standard deviation.
+    return Ground(slope_x, slope_y, offset, float(np.median(np.abs(off[inside])) / 0.6745))
+
+
+def _sample(xyz: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """Points around the sensor, evenly from the order that they are in, float64 (S, 3)."""
+    x, y, z = xyz.T
+    squared = x * x + y * y
+    around = (squared > NEAREST**2) & (squared < FARTHEST**2) & (np.abs(z) < FARTHEST)
+    rows = np.flatnonzero(around)
+    return xyz[rows[:: -(-len(rows) // SAMPLE) or 1]].astype(np.float64)
+
+
+def _roughly(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    z: NDArray[np.float64],
+    weight: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The slopes and the height, by steps, of the plane that holds most of the points' weight."""
+    slopes = np.tan(np.radians(np.arange(-STEEPEST, STEEPEST + 1, STEP_OF_SLOPE)))
+    ahead, left = (slope.ravel() for slope in np.meshgrid(slopes, slopes))
+    height = z - ahead[:, None] * x - left[:, None] * y
+    step = np.floor(height / STEP_OF_HEIGHT).astype(np.int64)
+    lowest = int(step.min())
+    steps = int(step.max()) - lowest + 1
+    numbers = step - lowest + steps * np.arange(len(ahead))[:, None]
+    held = np.bincount(
+        numbers.ravel(), np.broadcast_to(weight, step.shape).ravel(), steps * len(ahead)
+    ).reshape(len(ahead), steps)
+    # Two steps together, so that a plane that lies across a boundary is not missed.
+    held[:, :-1] += held[:, 1:]
+    of_slopes, lower = np.unravel_index(int(held.argmax()), held.shape)
+    offset = (int(lower) + lowest + 1) * STEP_OF_HEIGHT
+    return np.array([ahead[of_slopes], left[of_slopes], offset])
