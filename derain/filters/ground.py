@@ -11,14 +11,23 @@ from numpy.typing import NDArray
 NEAREST, FARTHEST = 1.5, 30.0
 
 # No road climbs more to either side, as the sensor sees it, than its own tilt and a ramp.
-STEEPEST = 30.0
+STEEPEST = 28.0
 
 # Slopes that are tried, and heights that are told apart by them: between two slopes, points at
 # the middle of the distances are off by no more than a step of height.
 STEP_OF_SLOPE, STEP_OF_HEIGHT = 4.0, 0.25
 
-# Points that the plane is sought among. A thousand show it as well as all of them.
-SAMPLE = 1024
+# Points that low ones are sought among, evenly along the curve that they are on.
+SAMPLE = 8192
+
+# One point is taken of each square of this side, metres: near ground is seen in many more points
+# than far ground. It is the one that so much of its square's points are below, so that neither
+# what stands on the ground nor an echo from beneath it is taken.
+SQUARE = 2.0
+BELOW_IT = 0.2
+
+# Fewer squares show no plane.
+FEWEST = 30
 
 # Distances beyond which points have no say, metres, from the first guess to the last: the rough
 # plane is a quarter of a metre off, and curbs, snow and bumpers are above this last one.
@@ -84,16 +93,14 @@ def find_ground(xyz: NDArray[np.floating[Any]]) -> Ground | None:
         The plane; None where there is none below the sensor that holds a tenth of the points, and
         more than lie beneath it.
     """
-    sample = _sample(xyz)
-    if len(sample) < SAMPLE // 16:
+    x, y, z = _low_points(xyz).T
+    if len(x) < FEWEST:
         return None
-    x, y, z = sample.T
-    weight = np.hypot(x, y)
     terms = np.column_stack([x, y, np.ones(len(x))])
-    plane = _roughly(x, y, z, weight)
+    plane = _roughly(x, y, z)
     for scale in SCALES:
         ratio = (z - terms @ plane) / scale
-        weighted = terms * (weight * np.square(np.maximum(1 - ratio * ratio, 0)))[:, None]
+        weighted = terms * np.square(np.maximum(1 - ratio * ratio, 0))[:, None]
         plane = np.linalg.lstsq(weighted.T @ terms, weighted.T @ z, rcond=None)[0]
     off = z - terms @ plane
     inside = np.abs(off) < IN_PLANE
@@ -106,22 +113,24 @@ def find_ground(xyz: NDArray[np.floating[Any]]) -> Ground | None:
     return Ground(slope_x, slope_y, offset, float(np.median(np.abs(off[inside])) / 0.6745))
 
 
-def _sample(xyz: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """Points around the sensor, evenly from the order that they are in, float64 (S, 3)."""
+def _low_points(xyz: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """A low point of each square around the sensor, float64 (S, 3)."""
     x, y, z = xyz.T
     squared = x * x + y * y
     around = (squared > NEAREST**2) & (squared < FARTHEST**2) & (np.abs(z) < FARTHEST)
     rows = np.flatnonzero(around)
-    return xyz[rows[:: -(-len(rows) // SAMPLE) or 1]].astype(np.float64)
+    points = xyz[rows[:: -(-len(rows) // SAMPLE) or 1]].astype(np.float64)
+    column, line = np.floor(points[:, :2].T / SQUARE).astype(np.int64)
+    square = column * int(4 * FARTHEST / SQUARE) + line
+    order = np.lexsort((*points.T, square))
+    _, start, count = np.unique(square[order], return_index=True, return_counts=True)
+    return points[order[start + (BELOW_IT * count).astype(np.int64)]]
 
 
 def _roughly(
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    z: NDArray[np.float64],
-    weight: NDArray[np.float64],
+    x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The slopes and the height, by steps, of the plane that holds most of the points' weight."""
+    """The slopes and the height, by steps, of the plane that holds the most points."""
     slopes = np.tan(np.radians(np.arange(-STEEPEST, STEEPEST + 1, STEP_OF_SLOPE)))
     ahead, left = (slope.ravel() for slope in np.meshgrid(slopes, slopes))
     height = z - ahead[:, None] * x - left[:, None] * y
@@ -129,9 +138,7 @@ def _roughly(
     lowest = int(step.min())
     steps = int(step.max()) - lowest + 1
     numbers = step - lowest + steps * np.arange(len(ahead))[:, None]
-    held = np.bincount(
-        numbers.ravel(), np.broadcast_to(weight, step.shape).ravel(), steps * len(ahead)
-    ).reshape(len(ahead), steps)
+    held = np.bincount(numbers.ravel(), minlength=steps * len(ahead)).reshape(len(ahead), steps)
     # Two steps together, so that a plane that lies across a boundary is not missed.
     held[:, :-1] += held[:, 1:]
     of_slopes, lower = np.unravel_index(int(held.argmax()), held.shape)
