@@ -14,7 +14,7 @@ from derain.filters.scatter import scatter_through_space
 Around = Callable[[NDArray[np.int64]], tuple[NDArray[np.int64], NDArray[np.float32]]]
 
 # Points whose neighbourhoods are looked at, evenly along the curve that they are on.
-SAMPLE = 8192
+SAMPLE = 4096
 
 # Beyond, no LiDAR is known to see rain or snow, metres.
 FARTHEST_RAIN = 60.0

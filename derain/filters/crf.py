@@ -175,8 +175,8 @@ class CRF(PointFilter):
         scatter = scatter_through_space(xyz, neighbours)
         feature = np.full(len(points), -1.0)
         feature[rows] = self._feature(scatter, spacing, intensity[rows].astype(np.float64))
-        place = _from_near_to_far(xyz, squared_range)
-        return decide_in_turn(feature, place, rows, neighbours, distances, self.vote)
+        place = _from_near_to_far(xyz[rows], squared_range[rows])
+        return decide_in_turn(feature, rows, place, neighbours, distances, self.vote)
 
     def _is_candidate(
         self,

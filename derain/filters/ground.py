@@ -18,7 +18,7 @@ STEEPEST = 28.0
 STEP_OF_SLOPE, STEP_OF_HEIGHT = 4.0, 0.25
 
 # Points that low ones are sought among, evenly along the curve that they are on.
-SAMPLE = 8192
+SAMPLE = 4096
 
 # One point is taken of each square of this side, metres: near ground is seen in many more points
 # than far ground. It is the one that so much of its square's points are below, so that neither

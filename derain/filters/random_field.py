@@ -15,8 +15,8 @@ AT_LEAST_APART = 0.01
 
 def decide_in_turn(
     feature: NDArray[np.float64],
-    place: NDArray[np.int64],
     rows: NDArray[np.int64],
+    place: NDArray[np.int64],
     neighbours: NDArray[np.int64],
     distances: NDArray[np.float32],
     vote: float,
@@ -29,12 +29,13 @@ def decide_in_turn(
 
     All that may be rain is taken for it first. Then what must turn is turned, wave by wave. A turn
     bears on later points alone, and makes none of them rain; so the waves end where a loop over
-    the points in their order would.
+    the points in their order would. Most points say the same whatever is said to them, and are
+    asked but once.
 
     Args:
         feature: Feature of all points, float64 (M,), from -1 to 1.
-        place: Place of each point in the order of judgement, int64 (M,).
         rows: Points that may be rain, int64 (Q,); the features of all others rule rain out.
+        place: Place of each of these in the order of judgement, int64 (Q,).
         neighbours: Points in the neighbourhoods of these, the point itself first, int64 (Q, k).
         distances: Their distances, float32 (Q, k), metres.
         vote: See above.
@@ -43,52 +44,84 @@ def decide_in_turn(
         True for rain, bool (M,).
     """
     rain = feature > CERTAIN
-    uncertain = (feature[rows] > RULED_OUT) & (feature[rows] <= CERTAIN)
-    rows = rows[uncertain]
-    others = np.ascontiguousarray(neighbours[uncertain, 1:].T)
-    weights = 1 / (AT_LEAST_APART + distances[uncertain, 1:].T.astype(np.float64))
-    said = np.where(rain, vote, np.where(feature < RULED_OUT, -vote, feature))
-    number = np.full(len(feature), -1)
-    number[rows] = np.arange(len(rows))
-    is_earlier = (number[others] >= 0) & (place[others] < place[rows])
-    later = _Later(number[others], is_earlier)
-    # What is said to each point, once all uncertain ones before it are taken for rain.
-    to_points = np.where(is_earlier, vote, said[others]) * weights
-    is_rain = np.ones(len(rows), bool)
-    asked = np.arange(len(rows))
-    while len(asked):
-        total = feature[rows[asked]]
-        for heard in to_points[:, asked]:  # in this order, on which the rounding depends
-            total = total + heard
-        turned = asked[total <= 0]
+    uncertain = np.flatnonzero((feature[rows] > RULED_OUT) & (feature[rows] <= CERTAIN))
+    rows, place = rows[uncertain], place[uncertain]
+    others = neighbours.take(uncertain, axis=0)[:, 1:].T
+    weights = 1 / (AT_LEAST_APART + distances.take(uncertain, axis=0)[:, 1:].T.astype(np.float64))
+    is_earlier = _by_point(len(feature), rows, place)[others] < place
+    feature_said = np.where(rain, vote, np.where(feature < RULED_OUT, -vote, feature))[others]
+    at_most = np.where(is_earlier, vote, feature_said) * weights
+    at_least = np.where(is_earlier, -vote, feature_said) * weights
+    own = feature[rows]
+    is_rain = _total(own, at_most) > 0
+    open_ = np.flatnonzero(is_rain & (_total(own, at_least) <= 0))
+    number = _by_point(len(feature), rows, np.arange(len(rows)))[others[:, open_]]
+    hearing = _Hearing(number, is_earlier[:, open_], len(rows))
+    said, at_least, own = at_most[:, open_], at_least[:, open_], own[open_]
+    turned = np.flatnonzero(~is_rain)
+    while len(turned):
+        column, hearer = hearing.of(turned)
+        said[column, hearer] = at_least[column, hearer]
+        asked = np.unique(hearer[is_rain[open_[hearer]]])
+        turned = open_[asked[_total(own[asked], said[:, asked]) <= 0]]
         is_rain[turned] = False
-        column, point = later.than(turned)
-        to_points[column, point] = -vote * weights[column, point]
-        asked = np.unique(point[is_rain[point]])
     rain[rows] = is_rain
     return rain
 
 
-class _Later:
+def _by_point(points: int, rows: NDArray[np.int64], values: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Values of some points by their rows, and what is beyond them all for others, int64 (M,)."""
+    by_point = np.full(points, np.iinfo(np.int64).max)
+    by_point[rows] = values
+    return by_point
+
+
+def _total(own: NDArray[np.float64], said: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What points have of themselves and what is said to each, from the nearest neighbour on.
+
+    Sums that are rounded in one order keep the order of their terms: where less is said, the total
+    is no more.
+
+    Args:
+        own: float64 (U,).
+        said: float64 (k - 1, U).
+    """
+    total = own.copy()
+    for heard in said:
+        total += heard
+    return total
+
+
+class _Hearing:
     """Who hears of the decision on each of U uncertain points.
 
     Args:
-        neighbours: Numbers of the neighbours of each, int64 (k - 1, U).
-        is_earlier: Which of these are uncertain and judged before it, bool (k - 1, U).
+        neighbours: Numbers of the neighbours of each of H hearers, int64 (k - 1, H).
+        is_earlier: Which of these are uncertain and judged before it, bool (k - 1, H).
+        uncertain: U.
     """
 
-    def __init__(self, neighbours: NDArray[np.int64], is_earlier: NDArray[np.bool_]) -> None:
-        self._column, self._point = np.nonzero(is_earlier)
-        order = np.argsort(neighbours[is_earlier], kind="stable")
-        self._column, self._point = self._column[order], self._point[order]
-        count = np.bincount(neighbours[is_earlier], minlength=neighbours.shape[1])
+    def __init__(
+        self, neighbours: NDArray[np.int64], is_earlier: NDArray[np.bool_], uncertain: int
+    ) -> None:
+        of = neighbours[is_earlier]
+        order = np.argsort(of, kind="stable")
+        self._column, self._hearer = (place[order] for place in np.nonzero(is_earlier))
+        count = np.bincount(of, minlength=uncertain)
         self._end = np.cumsum(count)
         self._start = self._end - count
 
-    def than(self, points: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Who hears of the decisions on some points: which neighbour each is, and of whom."""
+    def of(self, points: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Who hears of the decisions on some points, and as which of its neighbours.
+
+        Args:
+            points: Numbers of the points, int64 (P,).
+
+        Returns:
+            Columns and hearers of every such pair, int64 each.
+        """
         start, end = self._start[points], self._end[points]
         count = end - start
         before = np.cumsum(count) - count
         listed = np.repeat(start - before, count) + np.arange(count.sum())
-        return self._column[listed], self._point[listed]
+        return self._column[listed], self._hearer[listed]
