@@ -120,7 +120,8 @@ def _is_airborne(
     neighbours, distances = neighbourhoods
     spacing = distances.T.astype(np.float64).mean(axis=0) / distance
     sparse = spacing > sparseness * np.median(spacing)
-    return sparse & (scatter_through_space(xyz, neighbours) > OFF_SURFACES)
+    airborne: NDArray[np.bool_] = sparse & (scatter_through_space(xyz, neighbours) > OFF_SURFACES)
+    return airborne
 
 
 def _greatest_difference(

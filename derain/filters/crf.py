@@ -211,7 +211,8 @@ class CRF(PointFilter):
             least, largest = float(feature.min()), float(feature.max())
         if largest == least:  # nothing stands out
             return np.full(len(feature), -1.0)
-        return 2 * (feature - least) / (largest - least) - 1
+        scaled: NDArray[np.float64] = 2 * (feature - least) / (largest - least) - 1
+        return scaled
 
 
 def _from_near_to_far(

@@ -13,9 +13,9 @@ NEAREST, FARTHEST = 1.5, 30.0
 # No road climbs more to either side, as the sensor sees it, than its own tilt and a ramp.
 STEEPEST = 28.0
 
-# Slopes that are tried, and heights that are told apart by them: between two slopes, points at
-# the middle of the distances are off by no more than a step of height.
-STEP_OF_SLOPE, STEP_OF_HEIGHT = 4.0, 0.25
+# Slopes that are tried, degrees, and heights that are told apart, metres. Only points within so
+# many metres are asked, where a plane between two slopes is off by no more than a step of height.
+STEP_OF_SLOPE, STEP_OF_HEIGHT, FARTHEST_ASKED = 2.0, 0.25, 15.0
 
 # Points that low ones are sought among, evenly along the curve that they are on.
 SAMPLE = 4096
@@ -33,14 +33,14 @@ FEWEST = 30
 # plane is a quarter of a metre off, and curbs, snow and bumpers are above this last one.
 SCALES = (0.5, 0.4, 0.3, 0.2, 0.2, 0.2, 0.2)
 
-# Points this near to the plane lie in it, metres.
+# A road is a plane to so many metres: its camber, its curbs and the snow that lies on it are in it.
 IN_PLANE = 0.3
+
+# Nearer than this to the road, no sensor is mounted, metres.
+LOWEST_SENSOR = 0.3
 
 # A plane that holds a smaller share of the points is none of the scene's.
 LEAST_SHARE = 0.1
-
-# What is higher than so many deviations of the plane's own points, and 0.1 m, is above the ground.
-DEVIATIONS, LEAST_HEIGHT = 3.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,11 @@ class Ground:
         slope_x: Metres that it climbs per metre ahead.
         slope_y: Metres that it climbs per metre to the left.
         offset: Its height under the sensor, metres, below 0.
-        deviation: Standard deviation of the points in it, metres, from the median.
     """
 
     slope_x: float
     slope_y: float
     offset: float
-    deviation: float
 
     def height(self, xyz: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
         """Height above the plane along z, float64 (M,), metres.
@@ -75,8 +73,7 @@ class Ground:
         Args:
             xyz: Coordinates, (M, 3), metres, sensor frame.
         """
-        limit = max(DEVIATIONS * self.deviation, LEAST_HEIGHT)
-        return self.height(xyz) > limit
+        return self.height(xyz) > IN_PLANE
 
 
 def find_ground(xyz: NDArray[np.floating[Any]]) -> Ground | None:
@@ -94,10 +91,11 @@ def find_ground(xyz: NDArray[np.floating[Any]]) -> Ground | None:
         more than lie beneath it.
     """
     x, y, z = _low_points(xyz).T
-    if len(x) < FEWEST:
+    is_near = np.hypot(x, y) < FARTHEST_ASKED
+    if np.count_nonzero(is_near) < FEWEST:
         return None
     terms = np.column_stack([x, y, np.ones(len(x))])
-    plane = _roughly(x, y, z)
+    plane = _roughly(x[is_near], y[is_near], z[is_near])
     for scale in SCALES:
         ratio = (z - terms @ plane) / scale
         weighted = terms * np.square(np.maximum(1 - ratio * ratio, 0))[:, None]
@@ -107,10 +105,9 @@ def find_ground(xyz: NDArray[np.floating[Any]]) -> Ground | None:
     is_ground = inside.mean() > max(LEAST_SHARE, (off < -IN_PLANE).mean())
     slope_x, slope_y, offset = map(float, plane)
     flat_enough = math.hypot(slope_x, slope_y) < math.tan(math.radians(STEEPEST))
-    if not (is_ground and flat_enough and offset < 0):
+    if not (is_ground and flat_enough and offset < -LOWEST_SENSOR):
         return None
-    # The median of what is normally distributed is .6745 of its standard deviation.
-    return Ground(slope_x, slope_y, offset, float(np.median(np.abs(off[inside])) / 0.6745))
+    return Ground(slope_x, slope_y, offset)
 
 
 def _low_points(xyz: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
@@ -130,7 +127,7 @@ def _low_points(xyz: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
 def _roughly(
     x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The slopes and the height, by steps, of the plane that holds the most points."""
+    """Both slopes and the height, by steps, of the plane that holds most points, float64 (3,)."""
     slopes = np.tan(np.radians(np.arange(-STEEPEST, STEEPEST + 1, STEP_OF_SLOPE)))
     ahead, left = (slope.ravel() for slope in np.meshgrid(slopes, slopes))
     height = z - ahead[:, None] * x - left[:, None] * y

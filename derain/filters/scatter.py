@@ -42,4 +42,5 @@ def scatter_through_space(
 
 def _about_their_mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """The values of each column less their mean, float64 (k, Q)."""
-    return values - values.mean(axis=0)
+    about: NDArray[np.float64] = values - values.mean(axis=0)
+    return about
