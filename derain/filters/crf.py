@@ -50,8 +50,9 @@ class CRF(PointFilter):
     a plane and 1/3 where they are scattered alike in all directions
     (:func:`derain.filters.scatter.scatter_through_space`). F is scaled to -1..1; above 0.6 the
     point is rain, up to -0.4 it is not, and between them
-    :func:`derain.filters.random_field.decide_in_turn` says, from the nearest point to the farthest:
-    decisions spread as light does, and do not depend on the order of the file.
+    :func:`derain.filters.random_field.decide_in_turn` says, in the order of azimuth from behind the
+    sensor once around it. That is the order of files which a spinning sensor wrote, by which the
+    authors' program goes; but it does not depend on the file.
 
     Variant ``published`` has its authors' bounds, which are for one sensor on one car and its unit
     of intensity: ``intensity``, ``range`` and ``sensor_height`` above the ground. It scales F from
@@ -89,11 +90,13 @@ class CRF(PointFilter):
         InputError: Another variant, and as of :class:`derain.filters.PointFilter`.
 
     Source: W. Wang et al., "Snow Removal for LiDAR Point Clouds With Spatio-Temporal Conditional
-        Random Fields", RA-L 2023, and its constants at github.com/dut-mdmu/CRFOR. Its order is that
-        of the file. The fitted bounds are derain's own.
+        Random Fields", RA-L 2023, and its constants at github.com/dut-mdmu/CRFOR. The order
+        by azimuth and the fitted bounds are derain's own.
     """
 
-    HELP: ClassVar[str] = "rain is near, above ground, dim or bright, and beside other rain"
+    HELP: ClassVar[str] = (
+        "rain is near, above the ground, as dim or bright as drops are, and beside rain"
+    )
     SPACE: ClassVar[Mapping[str, Span]] = {
         "neighbours": (4, 12),  # fewer points are always in a plane
         "vote": (0.1, 20.0),
@@ -165,17 +168,17 @@ class CRF(PointFilter):
             return neighbours[:, :size], distances[:, :size]
 
         xyz, intensity = points[:, :3].astype(np.float64), points[:, 3]
-        squared_range = np.square(xyz).sum(axis=1)
-        rows = np.flatnonzero(self._is_candidate(xyz, intensity, np.sqrt(squared_range), around))
+        distance = _length(xyz)
+        rows = np.flatnonzero(self._is_candidate(xyz, intensity, distance, around))
         if not len(rows):
             return np.zeros(len(points), bool)
         neighbours, distances = around(rows)
         mean = distances.T.astype(np.float64).mean(axis=0)
-        spacing = mean / (np.sqrt(squared_range[rows]) + BESIDE_RANGE)
+        spacing = mean / (distance[rows] + BESIDE_RANGE)
         scatter = scatter_through_space(xyz, neighbours)
         feature = np.full(len(points), -1.0)
         feature[rows] = self._feature(scatter, spacing, intensity[rows].astype(np.float64))
-        place = _from_near_to_far(xyz[rows], squared_range[rows])
+        place = _along_the_sweep(xyz.take(rows, axis=0))
         return decide_in_turn(feature, rows, place, neighbours, distances, self.vote)
 
     def _is_candidate(
@@ -215,22 +218,25 @@ class CRF(PointFilter):
         return scaled
 
 
-def _from_near_to_far(
-    xyz: NDArray[np.float64], squared_range: NDArray[np.float64]
-) -> NDArray[np.int64]:
-    """Place of each point in the order of range, and of coordinates where ranges are equal.
+def _length(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distances from the sensor, float64 (M,)."""
+    x, y, z = xyz.T
+    length: NDArray[np.float64] = np.sqrt(x * x + y * y + z * z)
+    return length
+
+
+def _along_the_sweep(xyz: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Place of each point in the order of azimuth; along the curve where that is equal.
 
     Args:
-        xyz: Distinct positions, float64 (M, 3), metres.
-        squared_range: Of each, float64 (M,), square metres.
+        xyz: Distinct positions along a Morton curve, float64 (Q, 3), metres.
 
     Returns:
-        int64 (M,).
+        int64 (Q,).
     """
-    order = np.argsort(squared_range)
-    ascending = squared_range[order]
-    if (ascending[1:] == ascending[:-1]).any():
-        order = np.lexsort((*xyz.T, squared_range))
+    x, y, _ = xyz.T
+    # What is just behind may have a y of -0.0, which is 0.0 then.
+    order = np.argsort(np.arctan2(y + 0.0, x), kind="stable")
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     return place

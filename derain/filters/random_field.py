@@ -46,8 +46,10 @@ def decide_in_turn(
     rain = feature > CERTAIN
     uncertain = np.flatnonzero((feature[rows] > RULED_OUT) & (feature[rows] <= CERTAIN))
     rows, place = rows[uncertain], place[uncertain]
-    others = neighbours.take(uncertain, axis=0)[:, 1:].T
-    weights = 1 / (AT_LEAST_APART + distances.take(uncertain, axis=0)[:, 1:].T.astype(np.float64))
+    # A row for the nearest neighbours of all points, one for the next, and so on.
+    others = np.ascontiguousarray(neighbours.take(uncertain, axis=0)[:, 1:].T)
+    apart = np.array(distances.take(uncertain, axis=0)[:, 1:].T, np.float64, order="C")
+    weights = 1 / (AT_LEAST_APART + apart)
     is_earlier = _by_point(len(feature), rows, place)[others] < place
     feature_said = np.where(rain, vote, np.where(feature < RULED_OUT, -vote, feature))[others]
     at_most = np.where(is_earlier, vote, feature_said) * weights
