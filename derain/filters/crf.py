@@ -94,9 +94,7 @@ class CRF(PointFilter):
         by azimuth and the fitted bounds are derain's own.
     """
 
-    HELP: ClassVar[str] = (
-        "rain is near, above the ground, as dim or bright as drops are, and beside rain"
-    )
+    HELP: ClassVar[str] = "rain is near, above the ground, as bright as drops are, and beside rain"
     SPACE: ClassVar[Mapping[str, Span]] = {
         "neighbours": (4, 12),  # fewer points are always in a plane
         "vote": (0.1, 20.0),
