@@ -52,7 +52,8 @@ class CRF(PointFilter):
     point is rain, up to -0.4 it is not, and between them
     :func:`derain.filters.random_field.decide_in_turn` says, in the order of azimuth from behind the
     sensor once around it. That is the order of files which a spinning sensor wrote, by which the
-    authors' program goes; but it does not depend on the file.
+    authors' program goes; but it does not depend on the file, save that of equally near neighbours
+    the one of the lower row comes first.
 
     Variant ``published`` has its authors' bounds, which are for one sensor on one car and its unit
     of intensity: ``intensity``, ``range`` and ``sensor_height`` above the ground. It scales F from

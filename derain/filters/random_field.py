@@ -59,7 +59,30 @@ def decide_in_turn(
     open_ = np.flatnonzero(is_rain & (_total(own, at_least) <= 0))
     number = _by_point(len(feature), rows, np.arange(len(rows)))[others[:, open_]]
     hearing = _Hearing(number, is_earlier[:, open_], len(rows))
-    said, at_least, own = at_most[:, open_], at_least[:, open_], own[open_]
+    _turn_in_waves(is_rain, open_, own[open_], at_most[:, open_], at_least[:, open_], hearing)
+    rain[rows] = is_rain
+    return rain
+
+
+def _turn_in_waves(
+    is_rain: NDArray[np.bool_],
+    open_: NDArray[np.int64],
+    own: NDArray[np.float64],
+    said: NDArray[np.float64],
+    at_least: NDArray[np.float64],
+    hearing: "_Hearing",
+) -> None:
+    """Turns what is taken for rain and is none, until nothing turns any more.
+
+    Args:
+        is_rain: What the U uncertain points are taken for, bool (U,); decided in place.
+        open_: Numbers of the H points whose verdicts are open, int64 (H,).
+        own: Their features, float64 (H,).
+        said: What is said to them while all before them are rain, float64 (k - 1, H); changed in
+            place.
+        at_least: What is said to them where none before them is, float64 (k - 1, H).
+        hearing: Which of them hear of whose decision.
+    """
     turned = np.flatnonzero(~is_rain)
     while len(turned):
         column, hearer = hearing.of(turned)
@@ -67,8 +90,6 @@ def decide_in_turn(
         asked = np.unique(hearer[is_rain[open_[hearer]]])
         turned = open_[asked[_total(own[asked], said[:, asked]) <= 0]]
         is_rain[turned] = False
-    rain[rows] = is_rain
-    return rain
 
 
 def _by_point(points: int, rows: NDArray[np.int64], values: NDArray[np.int64]) -> NDArray[np.int64]:
