@@ -18,6 +18,7 @@ from derain.cli import (
     info,
     run,
     simulate,
+    teach,
     tune,
     view,
 )
@@ -46,6 +47,7 @@ COMMANDS: dict[str, ModuleType] = {
     "import-weights": import_weights,
     "simulate": simulate,
     "annotate": annotate,
+    "teach": teach,
     "fuse": fuse,
     "demo": demo,
 }
