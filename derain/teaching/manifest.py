@@ -4,6 +4,7 @@ Scans are not copied. Where their paths are relative, they are so to the folder 
 can be moved together.
 """
 
+import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -120,7 +121,8 @@ class Manifest:
         content = {
             "made_by": TEACHING,
             "derain": __version__,
-            "teacher": dict(self.teacher),
+            # Values of their own, for what stands twice would be written once, and be no value.
+            "teacher": json.loads(json.dumps(dict(self.teacher))),
             "columns": list(self.columns),
             "intensity_scale": self.intensity_scale,
             "finished": self.finished,
