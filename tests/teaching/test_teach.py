@@ -58,17 +58,21 @@ def test_labels_are_what_the_method_says(
     drive, out = make_drive(), tmp_path / "taught"
     told = []
     manifest = teach(make(), of(drive), out, watch=lambda answer, labels: told.append(labels))
-    assert [scan.key for scan in manifest.scans] == [f"{number:06d}" for number in range(6)]
+    keys = [scan.key for scan in manifest.scans]
     unlabelled = named_frames([drive])
     for labels, (frame, judgement, _) in zip(told, judgements(make(), unlabelled), strict=True):
         np.testing.assert_array_equal(labels, labels_of(judgement))
-        written = read_labels(out / LABELS / f"{frame.key}.label", POINTS)
-        np.testing.assert_array_equal(written, labels)
+        assert (frame.key in keys) == bool(judgement.answered.any())
+        if frame.key in keys:
+            written = read_labels(out / LABELS / f"{frame.key}.label", POINTS)
+            np.testing.assert_array_equal(written, labels)
+    # Of the first and the last the method that looks before and after knows nothing.
+    numbers = range(1, 5) if isinstance(make(), Between) else range(6)
+    assert keys == [f"{number:06d}" for number in numbers]
+    assert [scan.number for scan in manifest.scans] == [*numbers]
+    assert manifest.scans[-1].part == "validation"
     assert Manifest.read(out).teacher == make().as_dict()
-    assert {*files(out)} == {
-        *(CARD, TAUGHT_MANIFEST),
-        *(f"{LABELS}/{number:06d}.label" for number in range(6)),
-    }
+    assert {*files(out)} == {CARD, TAUGHT_MANIFEST, *(f"{LABELS}/{key}.label" for key in keys)}
 
 
 def test_the_card_says_what_the_labels_mean(make_drive: MakeDrive, tmp_path: Path) -> None:
