@@ -10,7 +10,9 @@ from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.labelled import card_of, labelled_scans
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
+from derain.evaluation.baselines import no_points
 from derain.evaluation.hard_cases import scene
+from derain.evaluation.scores import score
 from derain.files.labels import write_labels
 from derain.filters import DROR, FilterDerainer
 from derain.sources.folders import named_frames
@@ -93,6 +95,17 @@ def test_commands_that_measure_know_the_folder(root: Path) -> None:
     assert isinstance(data, Taught)
     with pytest.raises(InputError, match="is a data set, of which no part can be taken"):
         labelled_scans([root, root], card, Loading())
+
+
+def test_scores_are_agreement_with_the_teacher(root: Path, tmp_path: Path) -> None:
+    source = named_frames([tmp_path / "drives"])
+    dror = FilterDerainer(DROR(), 1)
+    teach(dror, source, tmp_path / "by_dror")
+    data = labelled_scans([tmp_path / "by_dror"], card_of([tmp_path / "by_dror"], None), Loading())
+    scans = [data.read_measured(frame) for frame in data.frames("test")]
+    itself, nothing = score([dror, no_points], scans, data.card)
+    assert itself.pooled.true_positive > 0
+    assert (itself.pooled.iou, nothing.pooled.iou) == (1, 0)
 
 
 def test_what_is_no_such_folder_is_refused(root: Path, tmp_path: Path) -> None:
