@@ -160,6 +160,8 @@ class _Telling:
 
     def tell_all(self, manifest: "Manifest") -> None:
         """Tells of all scans, and of what a student could not do with them."""
+        from derain.teaching.manifest import HELD_OUT_PART
+
         stream = sys.stderr if self.as_json else sys.stdout
         self.notices.tell_how_many_more()
         say(f"{self.judged:,} scans\n{self.shares}", stream)
@@ -173,5 +175,5 @@ class _Telling:
             warn(f"{nothing:,} of {self.judged:,} scans are left out: of them nothing is known")
         if not self.shares.rain:
             warn("no rain was found: a network would learn that nothing is rain")
-        if not any(scan.part == "validation" for scan in manifest.scans):
+        if not any(scan.part == HELD_OUT_PART for scan in manifest.scans):
             warn("no scan is held out, for that a sequence needs three: all are for training")

@@ -37,7 +37,9 @@ HIGHEST_NUMBER, LARGEST_SCALE = 10**9, 1e9
 
 # What a scan is for: every sequence ends with scans that are held out.
 TaughtPart = Literal["train", "validation"]
-TAUGHT_PARTS: tuple[TaughtPart, ...] = ("train", "validation")
+TRAINING_PART: TaughtPart = "train"
+HELD_OUT_PART: TaughtPart = "validation"
+TAUGHT_PARTS = (TRAINING_PART, HELD_OUT_PART)
 
 
 @dataclass(frozen=True)
