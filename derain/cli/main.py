@@ -16,6 +16,7 @@ from derain.cli import (
     fuse,
     import_weights,
     info,
+    odometry,
     run,
     simulate,
     teach,
@@ -49,6 +50,7 @@ COMMANDS: dict[str, ModuleType] = {
     "annotate": annotate,
     "teach": teach,
     "fuse": fuse,
+    "odometry": odometry,
     "demo": demo,
 }
 

@@ -1,33 +1,36 @@
-"""Arguments that say where the sensor was, the same in every command that takes recordings."""
+"""The option that says where the poses of scans come from, the same in every command."""
 
 import argparse
-from pathlib import Path
 
-from derain.sources.placing import along, standing
+from derain.odometry.posed import ODOMETRY, STANDING, with_poses
 from derain.sources.source import Source
 
 
-def add_poses(parser: argparse.ArgumentParser) -> None:
-    """Declares them."""
+def add_poses(parser: argparse._ActionsContainer) -> None:
+    """Declares where poses come from, as :func:`derain.odometry.posed.with_poses` takes it."""
     poses = parser.add_mutually_exclusive_group()
     poses.add_argument(
         "--poses",
-        type=Path,
-        metavar="FILE",
-        help="where the sensor was at each scan, as `derain odometry` writes it "
-        "(default: the poses.txt beside the scans, if there is one)",
+        metavar="POSES",
+        help=f"poses of the scans: a file in KITTI's or TUM's form, a folder with <sequence>.txt "
+        f"for each sequence, {STANDING}, or {ODOMETRY} (default: poses.txt beside the scans, else "
+        "as the method finds them)",
     )
     poses.add_argument(
-        "--standing", action="store_true", help="the sensor stood still throughout each recording"
+        "--standing",
+        dest="poses",
+        action="store_const",
+        const=STANDING,
+        help=f"the sensor stood still: --poses {STANDING}",
     )
 
 
 def placed(source: Source, arguments: argparse.Namespace) -> Source:
-    """The same frames, where the arguments say that they were taken.
+    """The same frames at the poses that the arguments name; as they are where they name none.
 
     Raises:
         InputError: Poses that cannot be read or do not fit the scans.
     """
-    if arguments.poses is not None:
-        return along(source, arguments.poses)
-    return standing(source) if arguments.standing else source
+    if arguments.poses is None:
+        return source
+    return with_poses(source, arguments.poses, arguments.threads)
