@@ -16,7 +16,6 @@ from derain.filters.ground import find_ground
 from derain.filters.point_filter import PointFilter, RainAndJudged, Span
 from derain.filters.random_field import decide_in_turn
 from derain.filters.registry import FILTERS
-from derain.views.scatter import scatter_through_space
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
@@ -25,6 +24,7 @@ from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
 from derain.views.neighbours import Neighbourhoods
 from derain.views.oddities import Oddity, intensity_of_another_scale, missing_intensity
+from derain.views.scatter import scatter_through_space
 
 Variant = Literal["fitted", "published"]
 
