@@ -111,6 +111,12 @@ def test_a_filter_loads_nothing_heavy(scan: Path, tmp_path: Path) -> None:
     assert (out / "scan.label").stat().st_size == 400
 
 
+def test_odometry_loads_nothing_heavy(scan: Path, tmp_path: Path) -> None:
+    out = tmp_path / "poses.txt"
+    assert not loaded_by(COMMAND, "odometry", scan, "--out", out) & HEAVY
+    assert out.exists()
+
+
 def test_the_statistics_of_a_folder_load_nothing_heavy(scan: Path) -> None:
     assert not loaded_by(COMMAND, "info", scan.parent) & HEAVY
 

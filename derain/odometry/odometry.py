@@ -79,7 +79,7 @@ class Odometry:
             if not self._trust.misfit(fit):
                 return fit
         afar = surfaces.onto(before, np.eye(4), WITHIN_AT_FIRST)
-        return afar if self._trust.misfit(afar) else surfaces.onto(before, afar.motion, WITHIN)
+        return surfaces.onto(before, afar.motion, WITHIN)
 
     def _going_on(self, fit: Fit | None, reason: str) -> Registration:
         """Where the sensor would be if it had gone on as it did."""

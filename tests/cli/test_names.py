@@ -121,6 +121,8 @@ def test_odd_names_are_drawn(run_derain, scans: list[Path], number: int) -> None
         ["simulate", "--on", "{long}", "--rain", "5", "--out", "out"],
         ["simulate", "--out", "{long}"],
         ["annotate", "a.bin", "--scene", "{long}", "--out", "out"],
+        ["odometry", "{long}", "--out", "poses.txt"],
+        ["odometry", "a.bin", "--out", "{long}.txt"],
         ["fuse", "--lidar", ".", "--radar", ".", "--extrinsics", "{long}", "--out", "out"],
     ],
     ids=" ".join,

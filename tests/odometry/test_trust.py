@@ -14,6 +14,7 @@ from derain.odometry.trust import (
     LEAST_MATCHED,
     MOST_APART,
     TIMES_THE_USUAL,
+    WELL_ENOUGH,
     Trust,
 )
 
@@ -49,6 +50,14 @@ def test_what_is_usual_is_learnt_from_trusted_scans_alone() -> None:
         trust.remember(GOOD, trusted=True)
     assert "where 0.090 m is the most" in trust.misfit(poor)
     assert trust.misfit(replace(GOOD, residual=0.089)) == ""
+
+
+def test_a_sensor_that_drives_off_is_trusted_though_it_fitted_better_standing() -> None:
+    trust = Trust()
+    for _ in range(10):
+        trust.remember(replace(GOOD, residual=0.001), trusted=True)
+    assert trust.misfit(replace(GOOD, residual=WELL_ENOUGH)) == ""
+    assert trust.misfit(replace(GOOD, residual=WELL_ENOUGH + 0.01)) != ""
 
 
 def test_a_motion_is_likely_where_it_is_near_the_last_or_the_last_trusted_one() -> None:
