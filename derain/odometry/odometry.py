@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from derain.odometry.registration import Registration
 from derain.odometry.surfaces import Fit, Surfaces
-from derain.odometry.trust import LEAST_MATCHED, Trust
+from derain.odometry.trust import Trust
 from derain.scan import Scan
 from derain.system.cores import usable_cores
 
@@ -79,8 +79,6 @@ class Odometry:
             if not self._trust.misfit(fit):
                 return fit
         afar = surfaces.onto(before, np.eye(4), WITHIN_AT_FIRST)
-        if afar.matched < LEAST_MATCHED:
-            return afar
         return surfaces.onto(before, afar.motion, WITHIN)
 
     def _going_on(self, fit: Fit | None, reason: str) -> Registration:

@@ -34,8 +34,9 @@ MOST_STEPS = 20
 # How far apart partners are whose distances tell how well scans lie on one another, metres.
 PARTNERS = 1.5
 
-# With fewer surfaces nothing is laid upon anything: five times the points that one is fitted to.
-FEWEST_SURFACES = 50
+# With fewer surfaces nothing is laid upon anything. Of indoor scans, moved by known motions through
+# 2 cm of noise, those with 75 to 128 surfaces were 22 cm off at worst, those with 287 or more 2 cm.
+FEWEST_SURFACES = 200
 
 
 @dataclass(frozen=True)

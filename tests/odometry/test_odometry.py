@@ -184,7 +184,7 @@ def test_surfaces_that_lie_farther_apart_than_usual_are_not_trusted(driven) -> N
 
 
 def test_few_surfaces_are_counted_as_they_are() -> None:
-    corners = np.mgrid[10:20:2, 0:20:2, 0:1].reshape(3, -1).T
+    corners = np.mgrid[10:30:2, 0:40:2, 0:1].reshape(3, -1).T
     few = Surfaces(Scan.of(corners), 1)
     assert len(few) == FEWEST_SURFACES
     assert few.are_enough
