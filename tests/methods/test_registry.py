@@ -32,7 +32,7 @@ def test_what_it_cannot_do_is_one_error() -> None:
         load_method("between", {}, runtime=Runtime("openvino"))
     with pytest.raises(InputError, match="between: sees the scans around the one that it judges"):
         load_method_of_one_scan("between", {})
-    with pytest.raises(InputError, match=r"ssr.*, between\.|between.*ssr"):
+    with pytest.raises(InputError, match=r"one of .*dror.*, between"):
         load_method("nobody", {})
 
 
@@ -46,5 +46,6 @@ def test_parameters_are_fields_of_a_dataclass() -> None:
 @pytest.mark.parametrize("command", ["run", "teach"])
 def test_help_lists_it(run_derain, command: str) -> None:
     told = run_derain(command, "--help").out
-    assert "  between  rain is what is dim between two scans" in told
-    assert "  dror " in told
+    lines = [line.split(maxsplit=1) for line in told.splitlines()]
+    assert ["between", "rain is what is dim between two scans"] in lines
+    assert "dror" in [name for name, *_ in filter(None, lines)]
