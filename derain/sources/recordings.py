@@ -40,9 +40,9 @@ def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
     for recording in recordings_of(frames):
         if len(recording) <= window.before + window.after:
             yield (
-                f"{recording[0].name}: {_scans(len(recording))} in its recording, each judged "
-                f"with {window.before} before and {window.after} after it: what those would show "
-                "is not known"
+                f"{recording[0].name}: {_scans(len(recording))} in its recording, where each is "
+                f"judged by {window.before} before and {window.after} after it: without them less "
+                "is known"
             )
         yield from _of_steps(recording)
 
