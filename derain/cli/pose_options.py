@@ -2,7 +2,8 @@
 
 import argparse
 
-from derain.odometry.posed import ODOMETRY, STANDING
+from derain.odometry.posed import ODOMETRY, STANDING, with_poses
+from derain.sources.source import Source
 
 
 def add_poses(parser: argparse._ActionsContainer) -> None:
@@ -14,3 +15,17 @@ def add_poses(parser: argparse._ActionsContainer) -> None:
         f"for each sequence, {STANDING}, or {ODOMETRY} (default: poses.txt beside the scans, else "
         f"{ODOMETRY})",
     )
+
+
+def placed(source: Source, arguments: argparse.Namespace) -> Source:
+    """The same frames, where the option says that they were taken.
+
+    Without it they are as they were: a method that needs poses takes those beside the scans, or
+    finds them as it goes.
+
+    Raises:
+        InputError: Poses that cannot be read or do not fit the scans.
+    """
+    if arguments.poses is None:
+        return source
+    return with_poses(source, arguments.poses, arguments.threads)
