@@ -6,13 +6,18 @@ from derain.datamodules.base import ScanDataModule
 from derain.files.format import Format
 from derain.filters.point_filter import PointFilter
 from derain.filters.radius_filter import RadiusFilter
+from derain.methods.recording_method import RecordingMethod
 from derain.models.base import DerainingModule
 from derain.models.published import Published
 from derain.models.supervised import SupervisedModule
+from derain.sources.method import Method
 from derain.views.view import SeenScan, View
 
 MODEL = ("view_for", "forward", "losses", "configure_optimizers")
+METHOD = ("window", "waiting", "starts_anew", "push", "flush", "oddities", "as_dict")
 DEMANDED = {
+    Method: METHOD,
+    RecordingMethod: (*METHOD, "with_parameters"),
     DerainingModule: MODEL,
     SupervisedModule: tuple(name for name in MODEL if name != "losses"),
     Published: ("from_published",),

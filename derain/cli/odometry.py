@@ -16,10 +16,11 @@ from derain.cli.pose_files import files_of, tell_whose_poses
 from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns
 from derain.errors import InputError, printable
-from derain.odometry.recordings import FrameOdometry, recordings_of
+from derain.odometry.recordings import FrameOdometry
 from derain.odometry.registration import Registration
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
+from derain.sources.recordings import recordings_of
 from derain.sources.records import POSES
 from derain.sources.trajectory import Trajectory, write_trajectory
 from derain.system.memory import keep_freed_memory

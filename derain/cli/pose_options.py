@@ -8,22 +8,29 @@ from derain.sources.source import Source
 
 def add_poses(parser: argparse._ActionsContainer) -> None:
     """Declares where poses come from, as :func:`derain.odometry.posed.with_poses` takes it."""
-    parser.add_argument(
+    poses = parser.add_mutually_exclusive_group()
+    poses.add_argument(
         "--poses",
         metavar="POSES",
         help=f"poses of the scans: a file in KITTI's or TUM's form, a folder with <sequence>.txt "
         f"for each sequence, {STANDING}, or {ODOMETRY} (default: poses.txt beside the scans, else "
-        f"{ODOMETRY})",
+        "as the method finds them)",
+    )
+    poses.add_argument(
+        "--standing",
+        dest="poses",
+        action="store_const",
+        const=STANDING,
+        help=f"the sensor stood still: --poses {STANDING}",
     )
 
 
 def placed(source: Source, arguments: argparse.Namespace) -> Source:
-    """The same frames, where the option says that they were taken.
-
-    Without it they are as they were: a method that needs poses takes those beside the scans, or
-    finds them as it goes.
+    """The same frames at the poses that the arguments name; as they are where they name none.
 
     Raises:
         InputError: Poses that cannot be read or do not fit the scans.
     """
-    return source if arguments.poses is None else with_poses(source, arguments.poses)
+    if arguments.poses is None:
+        return source
+    return with_poses(source, arguments.poses, arguments.threads)

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.reading import reading
-from derain.odometry.recordings import FrameOdometry, recordings_of
+from derain.odometry.recordings import FrameOdometry
 from derain.odometry.registration import Registration
 from derain.scan import Scan
 from derain.sources.frame import Frame
+from derain.sources.recordings import recordings_of
 from derain.sources.records import line_of
 from derain.sources.source import Frames
 from derain.sources.trajectory import Trajectory, read_trajectory

@@ -1,6 +1,5 @@
 """Odometry over the frames of a source, recording by recording."""
 
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -11,20 +10,6 @@ from derain.scan import Scan
 from derain.sources.frame import Frame
 
 NO_POINTS = Scan.of(np.zeros((0, 3), np.float32))
-
-
-def recordings_of(frames: Iterable[Frame]) -> list[list[Frame]]:
-    """Frames by recording: each follows the one before it, as those of one folder do.
-
-    Args:
-        frames: The frames, in order.
-    """
-    recordings: list[list[Frame]] = []
-    for frame in frames:
-        if not (recordings and frame.follows(recordings[-1][-1])):
-            recordings.append([])
-        recordings[-1].append(frame)
-    return recordings
 
 
 class FrameOdometry:

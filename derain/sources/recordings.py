@@ -17,15 +17,14 @@ from derain.views.window import Window
 LONGEST_STEP = 1.0
 
 
-def recordings(frames: Iterable[Frame]) -> list[list[Frame]]:
+def recordings_of(frames: Iterable[Frame]) -> list[list[Frame]]:
     """Frames in groups, in each of which every frame follows the one before it."""
-    found: list[list[Frame]] = []
+    recordings: list[list[Frame]] = []
     for frame in frames:
-        if found and frame.follows(found[-1][-1]):
-            found[-1].append(frame)
-        else:
-            found.append([frame])
-    return found
+        if not (recordings and frame.follows(recordings[-1][-1])):
+            recordings.append([])
+        recordings[-1].append(frame)
+    return recordings
 
 
 def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
@@ -38,7 +37,7 @@ def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
     """
     if window.is_one_scan:
         return
-    for recording in recordings(frames):
+    for recording in recordings_of(frames):
         if len(recording) <= window.before + window.after:
             yield (
                 f"{recording[0].name}: {_scans(len(recording))} in its recording, each judged "

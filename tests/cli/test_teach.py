@@ -147,3 +147,33 @@ def test_the_cleaned_recording_has_its_best_guesses(
     assert (facts["rain"], facts["not_known"]) == (int((scene(POINTS)[:, 3] < 20).sum()), POINTS)
     outcome = run_derain("run", "dror", drive, "--out", tmp_path / "out", "--json")
     assert json.loads(outcome.out.splitlines()[0])["not_known"] is None
+
+
+@pytest.mark.parametrize("command", ["run", "teach"])
+def test_the_sensor_is_where_the_user_says(
+    run_derain, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    made: list[Between] = []
+
+    class Noted(Between):
+        def __init__(self, *arguments: object) -> None:
+            super().__init__()
+            made.append(self)
+
+    monkeypatch.setattr(METHODS, "_members", {"between": Noted})
+    poses = tmp_path / "poses.txt"
+    poses.write_text("".join(f"1 0 0 {n} 0 1 0 0 0 0 1 0\n" for n in range(6)))
+    ways = {"none": [], "file": ["--poses", poses], "standing": ["--standing"]}
+    for name, options in ways.items():
+        outcome = run_derain(command, "between", drive, "--out", tmp_path / name, *options)
+        assert outcome.code == 0, outcome.err
+    unknown, read, standing = (method.poses for method in made)
+    assert unknown == [None] * 6
+    assert [pose[0, 3] for pose in read] == [0, 1, 2, 3, 4, 5]
+    for pose in standing:
+        np.testing.assert_array_equal(pose, np.eye(4))
+    poses.write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
+    outcome = run_derain(command, "between", drive, "--out", tmp_path / "short", *ways["file"])
+    assert outcome.code == 2
+    assert "has 1 lines for 6 scans" in outcome.err
+    assert not (tmp_path / "short").exists()

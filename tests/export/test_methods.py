@@ -1,16 +1,20 @@
 """A method is found by its name, or what is wrong with the name is said in one line."""
 
 import errno
+import json
 import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from derain.errors import InputError
-from derain.export.methods import load_method
+from derain.export.methods import load_method, named_method
 from derain.files.reading import is_file
+from derain.filters.parameters import CANDIDATES
+from derain.views.candidates import Bound, Candidates
 
 KEPT = Path(__file__).parent / "kept"
 
@@ -26,6 +30,28 @@ def test_a_checkpoint_is_to_be_exported_first() -> None:
 def test_a_checkpoint_that_is_not_there_is_missing_first_of_all() -> None:
     with pytest.raises(InputError, match=r"none\.ckpt: no such file"):
         load_method("none.ckpt", {})
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("dror", {"neighbours": 3}),
+        (
+            "dsor",
+            {CANDIDATES: Candidates((Bound("range", most=30.0), Bound("z", least=-1.5)), 0.5)},
+        ),
+        (str(KEPT / "outdet.onnx"), {"threshold": 0.25}),
+    ],
+)
+def test_what_a_method_says_of_itself_makes_the_same_again(
+    tmp_path: Path, name: str, parameters: dict[str, Any]
+) -> None:
+    told = load_method(name, parameters, 1).as_dict()
+    (tmp_path / "same.yaml").write_text(yaml.safe_dump(json.loads(json.dumps(told))))
+    same_name, same_parameters = named_method(str(tmp_path / "same.yaml"))
+    assert same_name == name
+    assert parameters.items() <= same_parameters.items()
+    assert load_method(same_name, same_parameters, 1).as_dict() == told
 
 
 def test_a_name_too_long_for_a_file_is_one_line() -> None:

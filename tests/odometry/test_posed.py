@@ -10,11 +10,12 @@ import pytest
 from derain.errors import InputError
 from derain.files import write_scan
 from derain.odometry.posed import with_poses
-from derain.odometry.recordings import FrameOdometry, recordings_of
+from derain.odometry.recordings import FrameOdometry
 from derain.odometry.registration import Registration, shift_of
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.recordings import recordings_of
 from derain.sources.source import Frames
 
 from .street import motion, scan_from

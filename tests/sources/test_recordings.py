@@ -10,7 +10,7 @@ from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame, MemoryFrame
-from derain.sources.recordings import irregularities, recordings
+from derain.sources.recordings import irregularities, recordings_of
 from derain.views.window import Window
 
 SEVERAL = Window(1, 1)
@@ -26,9 +26,9 @@ def frames(*seconds: float | None, sequence: str = "drive") -> list[Frame]:
 
 def test_a_recording_ends_where_a_frame_does_not_follow() -> None:
     drive, other = frames(0, 1, 2, 3), frames(0, 1, sequence="other")
-    found = recordings([*drive[:2], drive[3], *other, *drive])
+    found = recordings_of([*drive[:2], drive[3], *other, *drive])
     assert found == [drive[:2], drive[3:], other, drive]
-    assert recordings([]) == []
+    assert recordings_of([]) == []
 
 
 @pytest.mark.parametrize(
