@@ -24,11 +24,11 @@ from sklearn.linear_model import LogisticRegression
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import NamedScans
-from derain.odometry.recordings import recordings_of
 from derain.persistence.points import ScanPoints
 from derain.persistence.rays import ask_rays, mean_evidence
 from derain.persistence.surroundings import describe
 from derain.sources.frame import Frame
+from derain.sources.recordings import recordings_of
 from derain.system.cores import usable_cores
 
 # What is known of the points of one scan: by rays, (M, 3), and of themselves, (M, 10), and the
