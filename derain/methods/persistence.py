@@ -1,8 +1,8 @@
 """Rain by free space: what rays of the scans before and after went through was not there."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
-from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 from weakref import WeakKeyDictionary
 
@@ -52,17 +52,17 @@ class Persistence:
 
     def __post_init__(self) -> None:
         for name in ("before", "after"):
-            number = getattr(self, name)
-            if not (isinstance(number, Integral) and 0 <= number <= MOST_SCANS):
+            number: Any = getattr(self, name)  # whatever a user gave
+            whole = isinstance(number, int) and not isinstance(number, bool)
+            if not (whole and 0 <= number <= MOST_SCANS):
                 raise InputError(
                     "persistence",
                     f"{name} is {shown(number)}",
                     f"Give a whole number from 0 to {MOST_SCANS}.",
                 )
-        if not (isinstance(self.sure, Real) and 1 <= self.sure < np.inf):
-            raise InputError(
-                "persistence", f"sure is {shown(self.sure)}", "Give odds of 1 or more."
-            )
+        sure: Any = self.sure
+        if not (isinstance(sure, int | float) and 1 <= sure < math.inf):
+            raise InputError("persistence", f"sure is {shown(sure)}", "Give odds of 1 or more.")
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,13 +13,13 @@ from derain.persistence.rays import RayEvidence
 from derain.persistence.surroundings import describe
 
 # Log-odds of rain: of any point; for each share of rays that end at it, and that went through.
-OF_RAYS = (-1.67, -12.45, 4.51)
+OF_RAYS = (-1.3, -13.01, 3.78)
 
 # Log-odds of rain for what ``describe`` says of its surroundings, in that order.
-OF_SURROUNDINGS = (-4.05, 7.64, 1.5, -3.77, -2.23, -0.29, -4.53, -0.6, -3.26, -1.91)
+OF_SURROUNDINGS = (-3.13, 7.13, 1.76, -1.27, -2.06, -0.31, -3.63, -0.79, -3.71, -1.97)
 
 # Log-odds of rain in the simulated drives, which both witnesses count, and the sum only once.
-PRIOR = -2.42
+PRIOR = -2.49
 
 
 def of_surroundings(points: ScanPoints) -> NDArray[np.float64]:

@@ -105,7 +105,8 @@ class ScanPoints:
     @cached_property
     def _directions(self) -> NDArray[np.float64]:
         """Unit vectors from the sensor, float64 (M, 3)."""
-        return self.xyz / self.range[:, None]
+        directions: NDArray[np.float64] = self.xyz / self.range[:, None]
+        return directions
 
     @cached_property
     def _tree(self) -> "small_gicp.KdTree":
