@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 NEAREST, FARTHEST = 1.5, 30.0
 
 # No road climbs more to either side, as the sensor sees it, than its own tilt and a ramp.
-STEEPEST = 28.0
+STEEPEST_ROAD = 28.0
 
 # Slopes that are tried, degrees, and heights that are told apart, metres. Only points within so
 # many metres are asked, where a plane between two slopes is off by no more than a step of height.
@@ -27,7 +27,7 @@ SQUARE = 2.0
 BELOW_IT = 0.2
 
 # Fewer squares show no plane.
-FEWEST = 30
+FEWEST_LOW_POINTS = 30
 
 # Distances beyond which points have no say, metres, from the first guess to the last: the rough
 # plane is a quarter of a metre off, and curbs, snow and bumpers are above this last one.
@@ -92,7 +92,7 @@ def find_ground(xyz: NDArray[np.floating[Any]]) -> Ground | None:
     """
     x, y, z = _low_points(xyz).T
     is_near = np.hypot(x, y) < FARTHEST_ASKED
-    if np.count_nonzero(is_near) < FEWEST:
+    if np.count_nonzero(is_near) < FEWEST_LOW_POINTS:
         return None
     terms = np.column_stack([x, y, np.ones(len(x))])
     plane = _roughly(x[is_near], y[is_near], z[is_near])
@@ -104,7 +104,7 @@ def find_ground(xyz: NDArray[np.floating[Any]]) -> Ground | None:
     inside = np.abs(off) < IN_PLANE
     is_ground = inside.mean() > max(LEAST_SHARE, (off < -IN_PLANE).mean())
     slope_x, slope_y, offset = map(float, plane)
-    flat_enough = math.hypot(slope_x, slope_y) < math.tan(math.radians(STEEPEST))
+    flat_enough = math.hypot(slope_x, slope_y) < math.tan(math.radians(STEEPEST_ROAD))
     if not (is_ground and flat_enough and offset < -LOWEST_SENSOR):
         return None
     return Ground(slope_x, slope_y, offset)
@@ -128,7 +128,7 @@ def _roughly(
     x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Both slopes and the height, by steps, of the plane that holds most points, float64 (3,)."""
-    slopes = np.tan(np.radians(np.arange(-STEEPEST, STEEPEST + 1, STEP_OF_SLOPE)))
+    slopes = np.tan(np.radians(np.arange(-STEEPEST_ROAD, STEEPEST_ROAD + 1, STEP_OF_SLOPE)))
     ahead, left = (slope.ravel() for slope in np.meshgrid(slopes, slopes))
     height = z - ahead[:, None] * x - left[:, None] * y
     step = np.floor(height / STEP_OF_HEIGHT).astype(np.int64)

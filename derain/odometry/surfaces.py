@@ -29,7 +29,7 @@ POINTS_OF_A_SURFACE = 10
 THICKNESS = 1e-3
 
 # Steps of the search; it comes to rest in one to four where it starts near, in fourteen from 4 m.
-MOST_STEPS = 20
+MOST_ITERATIONS = 20
 
 # How far apart partners are whose distances tell how well scans lie on one another, metres.
 PARTNERS = 1.5
@@ -105,7 +105,7 @@ class Surfaces:
             other._tree,
             start,
             max_correspondence_distance=within,
-            max_iterations=MOST_STEPS,
+            max_iterations=MOST_ITERATIONS,
         )
         motion = np.array(found.T_target_source, np.float64)
         residual, matched = self._distances(other, motion)

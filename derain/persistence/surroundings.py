@@ -12,7 +12,7 @@ FLATTEST, USUAL_SCATTER, SPREAD_OF_SCATTER = 1e-4, -4.5, 2.0
 USUAL_RANGE = 10.0
 
 # Radians; a scan whose rays are said to lie closer has too few to say.
-FINEST_STEP = 1e-5
+LEAST_STEP = 1e-5
 
 
 def describe(points: ScanPoints) -> NDArray[np.float64]:
@@ -28,7 +28,7 @@ def describe(points: ScanPoints) -> NDArray[np.float64]:
     Returns:
         One, the numbers, and their six squares and products, float64 (M, 10), finite.
     """
-    step = max(points.step, FINEST_STEP)
+    step = max(points.step, LEAST_STEP)
     steps_apart = points.distances[:, 1:].mean(axis=1) / (points.range * step)
     scatter = scatter_through_space(points.xyz, points.neighbours)
     apart = np.log(steps_apart + FEWEST_STEPS) - USUAL_STEPS

@@ -31,7 +31,7 @@ LOT = 6.5
 STEP = 0.12
 
 # How far apart side streets are, and how far ahead of the last scan there is one, metres.
-BLOCK = (45.0, 70.0)
+LENGTH_OF_BLOCK = (45.0, 70.0)
 NEXT_JUNCTION = (14.0, 26.0)
 
 
@@ -56,9 +56,9 @@ class Street:
         ahead = length + generator.uniform(*NEXT_JUNCTION)
         junctions = [ahead]
         while junctions[0] > -SIGHT:
-            junctions.insert(0, junctions[0] - generator.uniform(*BLOCK))
+            junctions.insert(0, junctions[0] - generator.uniform(*LENGTH_OF_BLOCK))
         while junctions[-1] < length + SIGHT:
-            junctions.append(junctions[-1] + generator.uniform(*BLOCK))
+            junctions.append(junctions[-1] + generator.uniform(*LENGTH_OF_BLOCK))
         return cls(length, generator.uniform(3.0, 3.75), tuple(junctions))
 
     @property

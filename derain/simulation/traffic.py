@@ -20,7 +20,7 @@ WALKING = (0.8, 2.0)
 VEHICLE = np.array([[-3.0, -1.0], [2.5, 1.0]])
 
 # Free space between any two things that move, metres, and how often a place is looked for.
-CLEARANCE = 0.7
+KEPT_APART = 0.7
 TRIES = 500
 
 
@@ -95,7 +95,7 @@ def draw_traffic(
 
 def _meet(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
     """Whether bounds, float64 (T, 2, 2) each, come nearer than the clearance at one time."""
-    apart = (first[:, 0] > second[:, 1] + CLEARANCE) | (second[:, 0] > first[:, 1] + CLEARANCE)
+    apart = (first[:, 0] > second[:, 1] + KEPT_APART) | (second[:, 0] > first[:, 1] + KEPT_APART)
     return bool((~apart.any(axis=1)).any())
 
 
