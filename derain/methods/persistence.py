@@ -146,12 +146,11 @@ class PersistenceDerainer(RecordingMethod):
         The stages are read, odometry where no pose is told, view, network (the evidence) and back.
         """
         stopwatch = stopwatch or Stopwatch()
-        if isinstance(frame, Frame):
-            with stopwatch.stage("read"):
-                scan = frame.read()
-        else:
-            scan, number = Scan.of(frame), self._recent.next_number
-            frame = MemoryFrame(key=f"{number:06d}", number=number, scan=scan)
+        if not isinstance(frame, Frame):
+            number = self._recent.next_number
+            frame = MemoryFrame(key=f"{number:06d}", number=number, scan=Scan.of(frame))
+        with stopwatch.stage("read"):
+            scan = frame.read()  # an object of its own, even of a scan that is pushed again
         with stopwatch.stage("odometry"):
             pose, stretch = self._place(frame, scan)
         with stopwatch.stage("view"):
