@@ -108,7 +108,11 @@ def main(arguments: argparse.Namespace) -> int:
     method = method_of(arguments)
     card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
-        arguments.scans, arguments.columns, labelled=True, layouts=layouts_for(card)
+        arguments.scans,
+        arguments.columns,
+        labelled=True,
+        layouts=layouts_for(card),
+        recordings=True,
     )
     refuse_to_overwrite(arguments.out, found)
     source = placed(found, arguments).map(

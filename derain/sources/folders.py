@@ -26,6 +26,7 @@ def named_frames(
     columns: Sequence[str] = DEFAULT_COLUMNS,
     labelled: bool = False,
     layouts: Sequence[Layout] | None = None,
+    recordings: bool = False,
 ) -> Frames:
     """The scans that a user names.
 
@@ -42,10 +43,12 @@ def named_frames(
             finds them by the layouts.
         layouts: What the folders of data sets may be called, the likeliest first; by default as the
             packaged data cards say. An empty sequence takes no data sets.
+        recordings: Whether each folder is a recording, which numbers its scans as others do.
 
     Returns:
         The scans in the order they are named, those of a folder sorted by name. Each has its stem
-        for a key; where a data set is named, its path from the folder that all scans lie below.
+        for a key; where a data set is named, or several recordings, its path from the folder that
+        all scans lie below.
 
     Raises:
         InputError: A path that does not exist, or a folder without scans.
@@ -57,7 +60,8 @@ def named_frames(
         of_data_set = of_data_set or len(folders) > 1
         scans += find_scans(folders or [path])
     where = partial(label_of, layouts=layouts) if labelled else _nowhere
-    return frames_of(scans, where, columns, relative_keys(scans) if of_data_set else None)
+    by_path = of_data_set or (recordings and len({scan.parent for scan in scans}) > 1)
+    return frames_of(scans, where, columns, relative_keys(scans) if by_path else None)
 
 
 def frame_of(
