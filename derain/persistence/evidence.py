@@ -13,7 +13,7 @@ from derain.persistence.rays import RayEvidence
 from derain.persistence.surroundings import describe
 
 # Log-odds of rain: of any point; for each share of rays that end at it, and that went through.
-OF_RAYS = (-1.3, -13.01, 3.78)
+OF_RAYS = (-1.41, -9.29, 3.94)
 
 # Log-odds of rain for what ``describe`` says of its surroundings, in that order.
 OF_SURROUNDINGS = (-3.13, 7.13, 1.76, -1.27, -2.06, -0.31, -3.63, -0.79, -3.71, -1.97)

@@ -21,12 +21,22 @@ ENDS_AT = (0.1, 0.01)
 WENT_THROUGH = (0.5, 0.01)
 
 
+# A ray that passes the place by this angle, degrees, counts half as much as one that meets it: of a
+# sensor that stands the same ray comes back, and what it met tells more than all those around it.
+# No nearer do rays of a sensor that moves pass: its poses are true to a tenth of a degree.
+HALF_HEARD_AT = 0.1
+
+# Where no ray passes near, what all of them say counts the less.
+LEAST_HEARD = 0.2
+
+
 @dataclass(frozen=True, eq=False)
 class RayEvidence:
     """What the rays of another scan, or of several, say of the places of M points.
 
     Attributes:
-        ending: Share of the ``RAYS`` asked that end at the place, float64 (M,).
+        ending: Share of the rays near it that end at the place, float64 (M,), each counting the
+            more the nearer it passes.
         through: Share of them that went through it to something behind, float64 (M,).
     """
 
@@ -56,8 +66,11 @@ def ask_rays(points: ScanPoints, other: ScanPoints, to_other: NDArray[np.float64
     asked = angles <= max(np.radians(WITHIN), WITHIN_STEPS * points.step)
     behind = other.range.take(rays) - reach[:, None]
     at, through = (offset + slope * reach[:, None] for offset, slope in (ENDS_AT, WENT_THROUGH))
+    heard = asked / (1 + np.square(angles / np.radians(HALF_HEARD_AT)))
+    all_heard = np.maximum(heard.sum(axis=1), LEAST_HEARD)
     return RayEvidence(
-        (asked & (np.abs(behind) <= at)).mean(axis=1), (asked & (behind > through)).mean(axis=1)
+        (heard * (np.abs(behind) <= at)).sum(axis=1) / all_heard,
+        (heard * (behind > through)).sum(axis=1) / all_heard,
     )
 
 

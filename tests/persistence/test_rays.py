@@ -7,7 +7,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from derain.persistence.points import ScanPoints, range_of
-from derain.persistence.rays import ENDS_AT, RAYS, WENT_THROUGH, WITHIN, WITHIN_STEPS, ask_rays
+from derain.persistence.rays import (
+    ENDS_AT,
+    HALF_HEARD_AT,
+    LEAST_HEARD,
+    RAYS,
+    WENT_THROUGH,
+    WITHIN,
+    WITHIN_STEPS,
+    ask_rays,
+)
 from derain.scan import Scan
 
 # A quarter of a degree, as far as the rays of many sensors lie apart.
@@ -40,8 +49,8 @@ def test_rays_end_at_a_wall_and_go_through_a_drop_before_it() -> None:
     evidence = ask_rays(points, other, np.eye(4))
     of_drop = np.abs(points.xyz[:, 0] - 6) < 0.1
     assert evidence.ending[of_drop] == 0
-    assert evidence.through[of_drop] == 1
-    assert (evidence.ending[~of_drop] == 1).all()
+    assert evidence.through[of_drop] == pytest.approx(1)
+    assert evidence.ending[~of_drop] == pytest.approx(1)
     assert (evidence.through[~of_drop] == 0).all()
 
 
@@ -53,8 +62,17 @@ def test_a_sensor_that_moved_sees_the_same() -> None:
     evidence = ask_rays(points_of(after), points_of(before), motion)
     middle = np.abs(after[:, 1]) < 1
     of_drop = np.argmin(np.abs(points_of(after).xyz[:, 0] - after[-1, 0]))
-    assert evidence.through[of_drop] == 1
-    assert np.median(evidence.ending[middle]) == 1
+    assert evidence.through[of_drop] == pytest.approx(1)
+    assert np.median(evidence.ending[middle]) == pytest.approx(1)
+
+
+def test_a_ray_that_comes_back_tells_more_than_those_around_it() -> None:
+    twig = wall(10)[[500]] * 0.6
+    points = points_of(np.concatenate([wall(10), twig]))
+    again = np.delete(wall(10), 500, axis=0)  # the ray to the twig ends there, not at the wall
+    evidence = ask_rays(points, points_of(np.concatenate([again, twig])), np.eye(4))
+    of_twig = np.argmin(np.linalg.norm(points.xyz - twig, axis=1))
+    assert evidence.ending[of_twig] > 0.4 > 1 / RAYS
 
 
 def test_what_stands_before_a_place_says_nothing_of_it() -> None:
@@ -91,10 +109,13 @@ def test_it_is_what_asking_every_ray_says(seed: int) -> None:
         chords = np.linalg.norm(other.xyz / ends[:, None] - place / reach, axis=1)
         near = np.argsort(chords, kind="stable")[:RAYS]
         near = near[chords[near] <= within]
+        heard = 1 / (1 + (chords[near] / np.radians(HALF_HEARD_AT)) ** 2)
+        total = max(heard.sum(), LEAST_HEARD)
         behind = ends[near] - reach
         at, through = (offset + slope * reach for offset, slope in (ENDS_AT, WENT_THROUGH))
-        assert evidence.ending[number] == pytest.approx((np.abs(behind) <= at).sum() / RAYS)
-        assert evidence.through[number] == pytest.approx((behind > through).sum() / RAYS)
+        ending = heard[np.abs(behind) <= at].sum() / total
+        assert evidence.ending[number] == pytest.approx(ending)
+        assert evidence.through[number] == pytest.approx(heard[behind > through].sum() / total)
 
 
 def test_the_step_is_that_of_the_rays() -> None:
