@@ -16,6 +16,7 @@ from derain.cli import (
     fuse,
     import_weights,
     info,
+    learn,
     run,
     simulate,
     tune,
@@ -47,6 +48,7 @@ COMMANDS: dict[str, ModuleType] = {
     "simulate": simulate,
     "annotate": annotate,
     "fuse": fuse,
+    "learn": learn,
     "demo": demo,
 }
 

@@ -1,0 +1,193 @@
+"""Pictures of what a teacher says of points, and of what its student removes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+from numpy.typing import NDArray
+
+from derain.cards.card import DataCard
+from derain.evaluation.answers import (
+    FINE_EDGES,
+    NOT_KNOWN,
+    NOT_RAIN,
+    RAIN,
+    TEACHERS_ANSWERS,
+    Answers,
+    AnswersOfScan,
+    answer_of,
+    coarse_bands,
+    total,
+)
+from derain.evaluation.counts import ratio
+from derain.pictures.scan_pictures import OUTCOMES, draw_from_above
+from derain.scan import Scan
+
+# Told apart by colour-blind eyes and in grey.
+OF_ANSWERS = ("#c9ced6", "#1f77b4", "#f2c14e")
+STUDENT = "#111827"
+HELD_OUT = "#eef1f5"
+
+# Colours of the pictures of scans, as numbers of ``OUTCOMES``.
+KEPT, REMOVED, LEFT, LOST = range(len(OUTCOMES))
+
+# Points in a band of range from which a share is drawn: of fewer it is a matter of chance.
+FEWEST_POINTS = 100
+
+
+def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
+    """How sure the teacher was: shares of its answers by scan and by range.
+
+    Args:
+        scans: The scans, in time order, one or more.
+        title: Heading.
+    """
+    figure = Figure(figsize=(12, 4.6), layout="constrained")
+    figure.suptitle(title)
+    by_scan, by_range = figure.subplots(1, 2, width_ratios=(3, 2), sharey=True)
+    _draw_by_scan(by_scan, scans)
+    bands = coarse_bands(total([scan.answers for scan in scans]))
+    filled = {name: answers for name, answers in bands.items() if answers.points}
+    _draw_shares(by_range, np.arange(len(filled)), list(filled.values()), width=0.8)
+    by_range.set_xticks(range(len(filled)), list(filled))
+    by_range.set_title("by range, all scans", fontsize=10)
+    figure.legend(
+        *by_range.get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=len(TEACHERS_ANSWERS),
+        frameon=False,
+    )
+    return figure
+
+
+def removed_figure(held_out: Answers, title: str) -> Figure:
+    """Share removed by range on the held-out scans, beside what the teacher says there.
+
+    Args:
+        held_out: The answers of all held-out scans.
+        title: Heading.
+    """
+    figure = Figure(figsize=(9, 4.6), layout="constrained")
+    axes = figure.add_subplot()
+    axes.set_title(title)
+    points = held_out.table.sum(axis=(1, 2))
+    answers = held_out.table.sum(axis=2)
+    drawn = points >= FEWEST_POINTS
+    rain = _shares(answers[:, RAIN], points, drawn)
+    perhaps = _shares(answers[:, RAIN] + answers[:, NOT_KNOWN], points, drawn)
+    student = _shares(held_out.table[..., 1].sum(axis=1), points, drawn)
+    steps = {"edges": [*FINE_EDGES, FINE_EDGES[-1] + FINE_EDGES[1]], "baseline": None}
+    axes.stairs(rain, **(steps | {"baseline": 0}), fill=True, color=OF_ANSWERS[RAIN], alpha=0.35)
+    axes.stairs(
+        perhaps,
+        **(steps | {"baseline": rain}),
+        fill=True,
+        color=OF_ANSWERS[NOT_KNOWN],
+        alpha=0.45,
+        label="teacher: not known",
+    )
+    axes.stairs(rain, **steps, color=OF_ANSWERS[RAIN], linewidth=1.5, label="teacher: rain")
+    axes.stairs(student, **steps, color=STUDENT, linewidth=2.2, label="student: removed")
+    axes.set_xlabel(f"range / m (the last band: {FINE_EDGES[-1]} m and more)")
+    axes.set_ylabel("share of the points at that range")
+    axes.set_xlim(0, steps["edges"][-1])
+    top = np.nanmax(np.fmax(student, rain), initial=0)
+    axes.set_ylim(0, min(1.0, max(1.15 * top, 0.01)))
+    axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+    axes.legend(frameon=False)
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def answers_figure(
+    scan: Scan, card: DataCard, called_rain: NDArray[np.bool_], title: str
+) -> Figure:
+    """What a teacher says of a scan, what its student does, and where they differ; from above.
+
+    Args:
+        scan: A scan with the teacher's labels.
+        card: Data card of these labels.
+        called_rain: What the student calls rain, bool (N,).
+        title: Heading.
+
+    Raises:
+        InputError: A scan without labels.
+    """
+    answer = answer_of(scan, card)
+    differs = np.select(
+        [called_rain & (answer == NOT_RAIN), ~called_rain & (answer == RAIN)],
+        [LOST, LEFT],
+        default=KEPT,
+    )
+    panels = {
+        "teacher": np.choose(answer, [KEPT, REMOVED, LEFT]),
+        "student": np.where(called_rain, REMOVED, KEPT),
+        "where they differ": differs,
+    }
+    meanings = {
+        "rain": REMOVED,
+        "not known to the teacher, or rain to it alone": LEFT,
+        "rain to the student alone": LOST,
+    }
+    figure = Figure(figsize=(16, 6.4), layout="constrained")
+    figure.suptitle(title)
+    row = figure.subplots(1, 3, sharex=True, sharey=True)
+    for axes, (name, outcome) in zip(row, panels.items(), strict=True):
+        axes.set_title(name)
+        draw_from_above(axes, scan, outcome)
+        axes.set_xlabel("right / m")
+    row[0].set_ylabel("forward / m")
+    colours = list(OUTCOMES.values())
+    figure.legend(
+        handles=[Patch(color=colours[number], label=name) for name, number in meanings.items()],
+        loc="outside lower center",
+        ncols=len(meanings),
+        frameon=False,
+    )
+    return figure
+
+
+def _draw_by_scan(axes: Axes, scans: Sequence[AnswersOfScan]) -> None:
+    """Bars in time order, those of held-out scans on a ground of their own."""
+    _draw_shares(axes, np.arange(len(scans)), [scan.answers for scan in scans], width=1.0)
+    for place, scan in enumerate(scans):
+        if scan.held_out:
+            axes.axvspan(
+                place - 0.5, place + 0.5, ymin=1.0, ymax=1.04, color=STUDENT, clip_on=False
+            )
+    axes.set_xlim(-0.5, len(scans) - 0.5)
+    axes.set_ylim(0, 1)
+    axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("scan, in time order (black above: held out)")
+    axes.set_ylabel("share of the points")
+    axes.set_title("by scan", fontsize=10, pad=14)
+
+
+def _draw_shares(
+    axes: Axes, places: NDArray[np.int64], answers: Sequence[Answers], width: float
+) -> None:
+    """Stacked bars: rain below, then what is not known, then the rest."""
+    shares = np.array([one.shares for one in answers]).reshape(-1, len(TEACHERS_ANSWERS))
+    bottom = np.zeros(len(answers))
+    for answer in (RAIN, NOT_KNOWN, NOT_RAIN):
+        axes.bar(
+            places,
+            shares[:, answer],
+            width,
+            bottom,
+            color=OF_ANSWERS[answer],
+            label=TEACHERS_ANSWERS[answer],
+        )
+        bottom = bottom + shares[:, answer]
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _shares(
+    part: NDArray[np.int64], whole: NDArray[np.int64], drawn: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """What each part is of its whole; NaN where it is not drawn."""
+    return np.where(drawn, ratio(part, whole, undefined=0), np.nan)
