@@ -1,4 +1,4 @@
-"""A method by the name that a user gives it: an exported model, or a filter."""
+"""A method by the name that a user gives it: a model, a filter, or one that sees several scans."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,6 +11,8 @@ from derain.export.runtimes.registry import Runtime
 from derain.files.reading import is_file
 from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
 from derain.filters.parameters import CANDIDATES
+from derain.methods.registry import METHODS
+from derain.sources.method import Method
 
 PARAMETER_SUFFIXES = (".yaml", ".yml")
 CHECKPOINT_SUFFIX = ".ckpt"
@@ -30,33 +32,34 @@ def named_method(text: str) -> tuple[str, dict[str, Any]]:
 
 def load_method(
     name: str, parameters: Mapping[str, Any], threads: int = 0, runtime: Runtime = Runtime()
-) -> Derainer | FilterDerainer:
+) -> Method:
     """Makes a method ready to judge scans.
 
     Args:
-        name: A filter (one of ``FILTERS``), or an ONNX file written by ``derain export``.
-        parameters: Parameters by name: those of the filter and its ``candidates``, or the
-            ``threshold`` of the model.
+        name: A filter (one of ``FILTERS``), a method that sees several scans (one of ``METHODS``),
+            or an ONNX file written by ``derain export``.
+        parameters: Parameters by name: those of the filter and its ``candidates``, those of the
+            method, or the ``threshold`` of the model.
         threads: Threads to use; 0 takes every core this process may use.
         runtime: What runs the model's network.
 
     Raises:
-        InputError: Neither a filter nor an exported model, a parameter that it does not have, or
-            one out of its bounds; a runtime that cannot run it, or any but the usual for a filter.
+        InputError: No such method, a parameter that it does not have, or one out of its bounds; a
+            runtime that cannot run it, or any but the usual for what has no network.
     """
     # What has a suffix is a file, for which other packages need not be asked.
-    if not Path(name).suffix and name in FILTERS:
-        if not runtime.is_default:
-            raise InputError(
-                name, f"a filter, which has no network that {runtime} could run", "Leave it out."
-            )
-        of_filter = {key: value for key, value in parameters.items() if key != CANDIDATES}
-        return FilterDerainer(filter_from(name, of_filter), threads, parameters.get(CANDIDATES))
+    if not Path(name).suffix:
+        if name in FILTERS:
+            _refuse_runtime(name, "filter", runtime)
+            of_filter = {key: value for key, value in parameters.items() if key != CANDIDATES}
+            return FilterDerainer(filter_from(name, of_filter), threads, parameters.get(CANDIDATES))
+        if name in METHODS:
+            _refuse_runtime(name, "method", runtime)
+            return METHODS[name].with_parameters(parameters, threads)
     if not is_file(Path(name)):
+        known = ", ".join([*FILTERS, *METHODS])
         raise InputError(
-            name,
-            "no such file",
-            f"Give a model written by `derain export`, or one of {', '.join(FILTERS)}.",
+            name, "no such file", f"Give a model written by `derain export`, or one of {known}."
         )
     if Path(name).suffix == CHECKPOINT_SUFFIX:
         raise InputError(
@@ -68,17 +71,40 @@ def load_method(
     return _with_threshold(derainer, name, parameters)
 
 
-def require_one_scan(derainer: Derainer) -> None:
-    """Refuses a model that sees several scans at a time, where scans are measured one by one.
+def load_method_of_one_scan(
+    name: str, parameters: Mapping[str, Any], threads: int = 0, runtime: Runtime = Runtime()
+) -> Derainer | FilterDerainer:
+    """Makes a method ready to judge scans one by one; arguments and errors as there.
 
     Raises:
-        InputError: Such a model: it would be measured without what it was trained to see.
+        InputError: A method that sees several scans, besides.
     """
-    if not derainer.view.window.is_one_scan:
+    method = load_method(name, parameters, threads, runtime)
+    require_one_scan(method)
+    if not isinstance(method, Derainer | FilterDerainer):
+        raise InputError(name, "is no filter and no model", "Use `derain run` with it.")
+    return method
+
+
+def require_one_scan(method: Method) -> None:
+    """Refuses a method that sees several scans at a time, where scans are measured one by one.
+
+    Raises:
+        InputError: Such a method: it would be measured without what it is meant to see.
+    """
+    if not method.window.is_one_scan:
         raise InputError(
-            derainer.path,
+            method.as_dict()["method"],
             "sees the scans around the one that it judges, which are not given to it here",
-            "Use `derain run` or `derain test`, which take recordings whole.",
+            "Use `derain run`, `derain teach` or `derain test`, which take recordings whole.",
+        )
+
+
+def _refuse_runtime(name: str, kind: str, runtime: Runtime) -> None:
+    """Refuses to run by a runtime what has no network."""
+    if not runtime.is_default:
+        raise InputError(
+            name, f"a {kind}, which has no network that {runtime} could run", "Leave it out."
         )
 
 

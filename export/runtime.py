@@ -15,16 +15,19 @@ from derain.export.runtimes.session import FLOAT32_PRECISION, Session, TensorTyp
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.judgement import Judgement
+from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
 from derain.system.cores import usable_cores
 from derain.system.stopwatch import Stopwatch
+from derain.views.oddities import Oddity, outside_view
 from derain.views.probability import probability_of_rain
 from derain.views.view import SeenScan, View
+from derain.views.window import Window
 
 __all__ = ["METADATA_KEY", "Derainer", "Judgement"]
 
 
-class Derainer:
+class Derainer(Method):
     """An exported model, ready to judge scans.
 
     Example:
@@ -123,6 +126,11 @@ class Derainer:
         return self._judged(scan, lambda: self.view(scan), stopwatch or Stopwatch())
 
     @property
+    def window(self) -> Window:
+        """How many scans before and after the one that it judges its view asks for."""
+        return self.view.window
+
+    @property
     def waiting(self) -> int:
         """How many frames were pushed and are not answered for: they wait for frames after them."""
         return self._recent.waiting
@@ -190,6 +198,15 @@ class Derainer:
         while self._recent.waiting:
             yield self._judged_in_window(self._recent.give(), stopwatch or Stopwatch())
         self._recent = RecentFrames(self.view.window)
+
+    def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
+        """What is odd about a scan for the model, and whether much of it lies outside its grid."""
+        yield from self.spec.oddities(judgement.scan)
+        yield from outside_view(judgement.scan, judgement.judged, self.spec.data)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The model's file, and what it calls rain by."""
+        return {"method": str(self.path), "threshold": self.spec.threshold}
 
     def logits(self, view: SeenScan) -> NDArray[np.float32]:
         """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).

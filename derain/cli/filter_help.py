@@ -1,16 +1,23 @@
-"""Help that lists the filters there are, those of other packages included."""
+"""Help that lists the filters and other methods there are, those of other packages included."""
 
 import argparse
 
 from derain.filters import FILTERS
+from derain.methods.registry import METHODS
 
-_FILTERS_HERE = "{filters}"
+_FILTERS_HERE, _METHODS_HERE = "{filters}", "{methods}"
 
 
 def list_filters(parser: argparse.ArgumentParser) -> None:
     """Ends the help of a command with the filters, one a line."""
     parser.formatter_class = _FilterHelp
     parser.epilog = f"filters:\n{_FILTERS_HERE}"
+
+
+def list_methods(parser: argparse.ArgumentParser) -> None:
+    """Ends the help of a command with the filters, and the methods that see several scans."""
+    list_filters(parser)
+    parser.epilog = f"{parser.epilog}\n{_METHODS_HERE}"
 
 
 class _FilterHelp(argparse.RawDescriptionHelpFormatter):
@@ -21,9 +28,17 @@ class _FilterHelp(argparse.RawDescriptionHelpFormatter):
     """
 
     def add_text(self, text: str | None) -> None:
-        """Adds a text of the parser's, with the list where it belongs."""
+        """Adds a text of the parser's, with the lists where they belong."""
         if text and _FILTERS_HERE in text:
-            width = max(map(len, FILTERS))
-            lines = (f"  {name:{width}}  {kind.HELP}".rstrip() for name, kind in FILTERS.items())
-            text = text.replace(_FILTERS_HERE, "\n".join(lines))
+            text = text.replace(_FILTERS_HERE, _listed({n: f.HELP for n, f in FILTERS.items()}))
+        if text and _METHODS_HERE in text:
+            listed = _listed({name: method.HELP for name, method in METHODS.items()})
+            heading = "methods that see several scans of a recording:\n" if listed else ""
+            text = text.replace(_METHODS_HERE, heading + listed)
         super().add_text(text)
+
+
+def _listed(helps: dict[str, str]) -> str:
+    """Names, a line each, and what stands for each."""
+    width = max(map(len, helps), default=0)
+    return "\n".join(f"  {name:{width}}  {help_}".rstrip() for name, help_ in helps.items())

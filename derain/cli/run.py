@@ -5,26 +5,26 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from derain.cli.arguments import add_threads, share
-from derain.cli.filter_help import list_filters
+from derain.cli.method_options import add_method, add_parameters, method_of
 from derain.cli.outputs import folder_sink, tell
-from derain.cli.runtime_options import add_runtime, runtime_of
+from derain.cli.pose_options import add_poses, placed
+from derain.cli.runtime_options import add_runtime
 from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError, printable
-from derain.export.methods import load_method, named_method
-from derain.export.runtime import Derainer
-from derain.filters import FilterDerainer, read_parameters
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
+from derain.sources.judging import judgements
+from derain.sources.method import Method
+from derain.sources.recordings import irregularities
 from derain.sources.sink import Sink
 from derain.system.memory import keep_freed_memory
-from derain.system.notices import Notices
+from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import Oddity, left_out, much_removed, outside_view
+from derain.views.oddities import left_out, much_removed
 
 SUMMARY = "clean scans on a CPU, without torch"
 
@@ -40,9 +40,12 @@ rain, in the input's format with every field kept.
   derain run dror WADS/ --out cleaned
   derain run best.yaml scans/ --out cleaned
   derain run dsor scans/ --out cleaned --parameters best.yaml --set range_multiplier=0.08
+  derain run persistence recording/ --out cleaned --poses poses.txt
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
-or a filter (below). Of a data set, results are named by their paths in it.
+a filter, or a method that sees several scans (below): for that, a recording's scans have to come in
+time order. Where a method is not sure of a point, its best guess decides. Of a data set, results
+are named by their paths in it.
 What is odd about a scan is warned of, each fault once. One of which more than --most-removed is
 called rain is left alone. It and a scan that cannot be read are reported and passed over; the exit
 code is then 2.
@@ -59,6 +62,8 @@ class Cleaned:
         valid: Those of them that can be judged.
         rain: Those of them that were removed.
         share_removed: Share of ``rain`` in ``valid``.
+        not_known: Those of ``valid`` of which the method is not sure; None of one that says nothing
+            of that.
         milliseconds: By stage.
         warnings: What is odd about it.
     """
@@ -68,23 +73,27 @@ class Cleaned:
     valid: int
     rain: int
     share_removed: float
+    not_known: int | None
     milliseconds: dict[str, float]
     warnings: list[str]
 
     def __str__(self) -> str:
         name, total = printable(self.scan), sum(self.milliseconds.values())
+        unsure = "" if self.not_known is None else f", {self.share_not_known:.1%} not known"
         return (
             f"{name}: {self.points:,} points, {self.rain:,} of rain "
-            f"({self.share_removed:.1%}), {total:.0f} ms"
+            f"({self.share_removed:.1%}){unsure}, {total:.0f} ms"
         )
+
+    @property
+    def share_not_known(self) -> float:
+        """Share of ``not_known`` in ``valid``."""
+        return (self.not_known or 0) / max(self.valid, 1)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument(
-        "method", metavar="METHOD", help="ONNX file, YAML file of parameters, or name of a filter"
-    )
-    list_filters(parser)
+    add_method(parser)
     parser.add_argument(
         "scans", nargs="+", type=Path, help="scans, folders of scans, or a data set's folder"
     )
@@ -101,33 +110,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SHARE",
         help="leave a scan alone of which a greater share is called rain, e.g. 0.5 (default: 1)",
     )
-    parser.add_argument(
-        "--parameters", type=Path, metavar="YAML", help="the method's parameters, as tuned"
-    )
-    parser.add_argument(
-        "--set",
-        type=_assignment,
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="one parameter of the method, over those of --parameters; may be given again",
-    )
+    add_parameters(parser)
+    add_poses(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
-    runtime = runtime_of(arguments)
-    method = load_method(*_named_method(arguments), arguments.threads, runtime)
-    source = named_frames(arguments.scans, arguments.columns)
+    method = method_of(arguments)
+    source = placed(named_frames(arguments.scans, arguments.columns), arguments)
     cleaning = _Cleaning(method, folder_sink(arguments.out, source), arguments)
-    scans = ScanByScan(source)
-    for frame in scans:
-        if method.starts_anew(frame):
-            cleaning.finish(scans)
+    for sentence in irregularities(source, method.window):
+        warn(sentence)
+    in_unit = source.map(lambda frame: frame.with_intensity_times(arguments.intensity_scale))
+    scans = ScanByScan(in_unit)
+    for frame, judgement, stopwatch in judgements(method, scans, scans.passing_over):
         with scans.passing_over(frame):
-            cleaning.clean(frame)
-    cleaning.finish(scans)
+            cleaning.write(frame, judgement, stopwatch)
     cleaning.notices.tell_how_many_more()
     if len(cleaning.done) > 1:
         print(_summary(cleaning.done), file=sys.stderr if arguments.json else sys.stdout)
@@ -135,40 +134,21 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 class _Cleaning:
-    """What cleans frame after frame, and remembers what was done."""
+    """What writes the clean scans, and remembers what was done."""
 
-    def __init__(
-        self, method: Derainer | FilterDerainer, sink: Sink, arguments: argparse.Namespace
-    ) -> None:
+    def __init__(self, method: Method, sink: Sink, arguments: argparse.Namespace) -> None:
         self.method = method
         self.sink = sink
         self.arguments = arguments
         self.notices = Notices()
         self.done: list[Cleaned] = []
 
-    def clean(self, frame: Frame) -> None:
-        """Judges the next frame, and writes what is known by then: of this one, or an earlier."""
-        stopwatch = Stopwatch()
-        frame = frame.with_intensity_times(self.arguments.intensity_scale)
-        judgement = self.method.push(frame, stopwatch)
-        if judgement is not None:
-            self._write(judgement, stopwatch)
-
-    def finish(self, scans: ScanByScan) -> None:
-        """Writes what still waits for scans after the last of a recording."""
-        while self.method.waiting:  # where one fails, the others go on waiting
-            with scans.passing_over(scans.source[-1]):
-                stopwatch = Stopwatch()
-                for judgement in self.method.flush(stopwatch):
-                    self._write(judgement, stopwatch)
-                    stopwatch.milliseconds.clear()
-
-    def _write(self, judgement: Judgement, stopwatch: Stopwatch) -> None:
-        scan, frame, rain = judgement.scan, judgement.frame, judgement.rain
-        assert frame is not None  # it was pushed
+    def write(self, frame: Frame, judgement: Judgement, stopwatch: Stopwatch) -> None:
+        """Writes a scan without what is rain of it; where that is not known, the guess decides."""
+        scan, rain = judgement.scan, judgement.rain
         valid, removed = int(scan.valid.sum()), int(rain.sum())
         share_removed = removed / max(valid, 1)
-        odd = [*_oddities(judgement, self.method), *much_removed(share_removed), *left_out(scan)]
+        odd = [*self.method.oddities(judgement), *much_removed(share_removed), *left_out(scan)]
         self.notices.tell(frame.name, odd)
         if share_removed > self.arguments.most_removed:
             raise InputError(
@@ -180,17 +160,10 @@ class _Cleaning:
             self.sink.write(frame, scan.take(~rain), rain)
         told = [oddity.detail for oddity in odd]
         times = dict(stopwatch.milliseconds)
-        cleaned = Cleaned(frame.name, len(scan), valid, removed, share_removed, times, told)
+        unsure = None if judgement.known is None else int((scan.valid & ~judgement.answered).sum())
+        cleaned = Cleaned(frame.name, len(scan), valid, removed, share_removed, unsure, times, told)
         self.done.append(cleaned)
         tell(cleaned, self.arguments.json)
-
-
-def _oddities(judgement: Judgement, method: Derainer | FilterDerainer) -> Sequence[Oddity]:
-    """What is odd about a scan for the method that judged it."""
-    if isinstance(method, FilterDerainer):
-        return list(method.filter.oddities(judgement.scan))
-    outside = outside_view(judgement.scan, judgement.judged, method.spec.data)
-    return [*method.spec.oddities(judgement.scan), *outside]
 
 
 def _summary(done: Sequence[Cleaned]) -> str:
@@ -201,32 +174,3 @@ def _summary(done: Sequence[Cleaned]) -> str:
         f"{len(done):,} scans: {sum(item.points for item in done):,} points, {removed:,} of rain "
         f"({removed / max(valid, 1):.1%}); {odd:,} scans with warnings"
     )
-
-
-def _named_method(arguments: argparse.Namespace) -> tuple[str, dict[str, Any]]:
-    """The method, and its parameters: those of the files, and over them those set one by one."""
-    name, parameters = named_method(arguments.method)
-    if arguments.parameters is not None:
-        method, tuned = read_parameters(arguments.parameters)
-        # Models are files, which have more than one name.
-        if Path(method).resolve() != Path(name).resolve():
-            raise InputError(
-                arguments.parameters,
-                f"holds parameters of {method}, not of {name}",
-                f"Run {method} with it.",
-            )
-        parameters |= tuned
-    return name, parameters | dict(arguments.set)
-
-
-def _assignment(text: str) -> tuple[str, int | float | str]:
-    """A parameter's name and value: a number where it reads as one."""
-    name, equals, value = text.partition("=")
-    if not (name and equals and value):
-        raise argparse.ArgumentTypeError(f"{text} is not NAME=VALUE")
-    for kind in (int, float):
-        try:
-            return name, kind(value)
-        except ValueError:
-            continue
-    return name, value

@@ -156,15 +156,14 @@ def _tuned_model(
     frames: list["Frame"],
     notices: Notices,
 ) -> "Tuned":
-    from derain.export.methods import load_method, require_one_scan
+    from derain.export.methods import load_method_of_one_scan
     from derain.export.runtime import Derainer
     from derain.export.tuning import tune_threshold
 
     if arguments.candidates is not None:
         raise InputError("--candidates", "a model has its own", "Give it to `derain export`.")
-    derainer = load_method(arguments.method, {}, arguments.threads)
+    derainer = load_method_of_one_scan(arguments.method, {}, arguments.threads)
     assert isinstance(derainer, Derainer)  # filters are tuned by _tuned_filter
-    require_one_scan(derainer)
 
     def judged() -> Iterator[tuple[Any, Any]]:
         for frame in tqdm(frames, desc="judging", unit="scan", disable=None):

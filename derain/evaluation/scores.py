@@ -14,7 +14,7 @@ from derain.scan import Scan
 from derain.views.morton import first_rows
 
 # Says which points of a scan are rain, bool (N,).
-Method = Callable[[Scan], NDArray[np.bool_]]
+ScoredMethod = Callable[[Scan], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Scores:
 
 
 def score(
-    methods: Sequence[Method],
+    methods: Sequence[ScoredMethod],
     scans: Iterable[Scan],
     card: DataCard,
     distinct: bool = False,
@@ -82,7 +82,7 @@ class _Scoring:
         self.by_sensor: dict[str, list[Counts]] = {}
         self.failures: dict[str, str] = {}
 
-    def judge(self, method: Method, scan: Scan, counted: NDArray[np.int64]) -> None:
+    def judge(self, method: ScoredMethod, scan: Scan, counted: NDArray[np.int64]) -> None:
         """Judges a whole scan, and counts some of its rows."""
         try:
             predicted = method(scan)

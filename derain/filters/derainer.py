@@ -9,22 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
+from derain.filters.parameters import CANDIDATES
 from derain.filters.point_filter import PointFilter
 from derain.filters.radius_filter import RadiusFilter
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
+from derain.sources.method import Method
 from derain.system.cores import usable_cores
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.morton import distinct_rows
 from derain.views.neighbours import Neighbourhoods, NeighbourView
+from derain.views.oddities import Oddity
+from derain.views.window import Window
 
 # Which rows are rain, and which were judged at all, bool (N,) each.
 RainAndJudged = tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 
-class FilterDerainer:
+class FilterDerainer(Method):
     """A filter, called as :class:`derain.export.runtime.Derainer` is.
 
     Example:
@@ -82,6 +86,11 @@ class FilterDerainer:
         return Judgement(rain.astype(np.float32), rain, judged, scan)
 
     @property
+    def window(self) -> Window:
+        """No scans but the one that it judges."""
+        return Window()
+
+    @property
     def waiting(self) -> int:
         """How many frames were pushed and not answered for: none, a filter sees one at a time."""
         return 0
@@ -112,6 +121,17 @@ class FilterDerainer:
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
         """Answers for the frames that wait for others after them: none do."""
         return iter(())
+
+    def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
+        """What is odd about a scan for the filter."""
+        return self.filter.oddities(judgement.scan)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The filter's name and parameters, and its candidates if it has any."""
+        content: dict[str, Any] = {"method": self.filter.name, **self.filter.as_dict()}
+        if self.candidates is not None:
+            content[CANDIDATES] = self.candidates.as_dict()
+        return content
 
     def _by_neighbours(self, scan: Scan, stopwatch: Stopwatch) -> RainAndJudged:
         with stopwatch.stage("view"):

@@ -52,6 +52,8 @@ class FileFrame(Frame):
     @property
     def pose(self) -> NDArray[np.float64] | None:
         """Sensor to world, float64 (4, 4): see :class:`~derain.sources.records.Records`."""
+        if self.sensor_to_world is not None:
+            return self.sensor_to_world
         return None if self.records is None else self.records.pose_of(self.path)
 
     @property

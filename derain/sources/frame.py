@@ -25,6 +25,8 @@ class Frame(ABC):
         number: Its place in its sequence, from 0.
         label_path: Where its labels are, or should be; None where none are to be read.
         intensity_scale: What takes its intensities to the unit in which they are to be seen.
+        sensor_to_world: Its pose, where it was told, float64 (4, 4), metres; None leaves it to the
+            records that may lie beside the scan.
     """
 
     key: str
@@ -32,6 +34,7 @@ class Frame(ABC):
     number: int = 0
     label_path: Path | None = None
     intensity_scale: float = 1.0
+    sensor_to_world: NDArray[np.float64] | None = None
 
     @property
     @abstractmethod
@@ -61,7 +64,7 @@ class Frame(ABC):
         Raises:
             InputError: A record of poses that is damaged or does not fit the scans.
         """
-        return None
+        return self.sensor_to_world
 
     @property
     @abstractmethod
@@ -119,6 +122,15 @@ class Frame(ABC):
         """The same frame, whose labels nobody reads."""
         return replace(self, label_path=None)
 
+    def at(self, sensor_to_world: NDArray[np.float64]) -> Self:
+        """The same frame, whose pose is known, whatever a record says.
+
+        Args:
+            sensor_to_world: From the sensor's frame to one that stays where it is, float64 (4, 4),
+                metres.
+        """
+        return replace(self, sensor_to_world=sensor_to_world)
+
     def with_intensity_times(self, factor: float) -> Self:
         """The same frame, whose intensities are read in another unit.
 
@@ -138,13 +150,11 @@ class MemoryFrame(Frame):
     Attributes:
         scan: The scan.
         seconds: When it was taken, seconds; None where that is not known.
-        sensor_to_world: Its pose, float64 (4, 4), metres; None where that is not known.
         reads_labels: Whether its labels are to be read.
     """
 
     scan: Scan
     seconds: float | None = None
-    sensor_to_world: NDArray[np.float64] | None = None
     reads_labels: bool = True
 
     @property
@@ -161,11 +171,6 @@ class MemoryFrame(Frame):
     def time(self) -> float | None:
         """When it was taken, as it was told."""
         return self.seconds
-
-    @property
-    def pose(self) -> NDArray[np.float64] | None:
-        """Its pose, as it was told, float64 (4, 4)."""
-        return self.sensor_to_world
 
     @property
     def has_labels(self) -> bool:

@@ -21,6 +21,8 @@ class Judgement:
             nor for points outside the grid of an image.
         scan: The scan.
         frame: Its frame; None where points were judged by themselves.
+        known: True for rows of whose answer the method is sure, bool (N,): of the others ``rain``
+            is its best guess. None of a method that knows no doubt.
     """
 
     probability: NDArray[np.float32]
@@ -28,3 +30,9 @@ class Judgement:
     judged: NDArray[np.bool_]
     scan: Scan
     frame: Frame | None = None
+    known: NDArray[np.bool_] | None = None
+
+    @property
+    def answered(self) -> NDArray[np.bool_]:
+        """True for rows that were judged, and for sure where the method says so, bool (N,)."""
+        return self.judged if self.known is None else self.judged & self.known

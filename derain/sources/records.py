@@ -39,10 +39,12 @@ class Records:
 
     Args:
         folder: The folder of scans. Its records lie in it, or in the folder that it lies in.
+        poses: The record of poses, where it lies elsewhere.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, poses: Path | None = None) -> None:
         self.folder = folder
+        self.poses = poses
 
     def time_of(self, scan: Path) -> float | None:
         """When a scan of the folder was taken, seconds; None where nothing says so.
@@ -105,7 +107,9 @@ class Records:
         return int(stem)
 
     def _beside(self, name: str) -> Path | None:
-        """A record in the folder of scans or in that above it."""
+        """A record in the folder of scans or in that above it; poses, where they are said to be."""
+        if name == POSES and self.poses is not None:
+            return self.poses
         folder = self.folder.absolute()
         places = (folder / name, folder.parent / name)
         return next((place for place in places if is_file(place)), None)

@@ -21,7 +21,7 @@ from derain.evaluation.intensity_rule import IntensityRule
 from derain.export.bench.contestant import Contestant
 from derain.export.bench.functions import TimedFunction
 from derain.export.bench.other_runtime import beside_themselves, run_by
-from derain.export.methods import load_method, named_method, require_one_scan
+from derain.export.methods import load_method_of_one_scan, named_method, require_one_scan
 from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import Runtime
 from derain.filters import FilterDerainer, PointFilter
@@ -89,7 +89,8 @@ def _contestant(method: GivenMethod, learn_from: LearnFrom | None) -> Contestant
         case FilterDerainer():
             return _filter(method.filter.name, method)
         case Derainer(path=path, spec=spec):
-            ready = partial(load_method, str(path), {"threshold": spec.threshold})
+            known = {"threshold": spec.threshold}
+            ready = partial(load_method_of_one_scan, str(path), known)
             row = _model(printable(path.stem), str(path), method, ready)
             return row if method.runtime.is_default else run_by(row, method.runtime)
         case _ if callable(method) and not isinstance(method, type):
@@ -116,7 +117,7 @@ def _named(text: str, learn_from: LearnFrom | None) -> Contestant:
 
 def _deployable(title: str, name: str, parameters: dict[str, Any]) -> Contestant:
     """What ``derain run`` runs; made here once, so that it is refused before any work."""
-    ready = partial(load_method, name, parameters)
+    ready = partial(load_method_of_one_scan, name, parameters)
     match ready(1):
         case FilterDerainer() as derainer:
             return _filter(title, derainer)

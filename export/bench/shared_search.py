@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.evaluation.scores import Method
+from derain.evaluation.scores import ScoredMethod
 from derain.export.bench.contestant import Contestant, TimedMethod
 from derain.filters import PointFilter
 from derain.filters.derainer import filter_view, rain_among
@@ -15,7 +15,7 @@ from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 
 
-def scored_methods(contestants: Sequence[Contestant], threads: int) -> list[Method]:
+def scored_methods(contestants: Sequence[Contestant], threads: int) -> list[ScoredMethod]:
     """The methods, ready to judge one scan after the other; filters share what they see of it.
 
     Args:

@@ -1,0 +1,65 @@
+"""Frame after frame of whole recordings given to a method, and what it says of each."""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+
+from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
+from derain.sources.method import Method
+from derain.system.stopwatch import Stopwatch
+
+# Surrounds the work on a frame, so that one which fails may be told of and passed over.
+Guard = Callable[[Frame], AbstractContextManager[None]]
+
+
+# A frame, what a method says of it, and the times of the stages since the answer before.
+Answer = tuple[Frame, Judgement, Stopwatch]
+
+
+def unguarded(frame: Frame) -> AbstractContextManager[None]:
+    """Lets whatever is wrong with a frame end the whole work."""
+    return nullcontext()
+
+
+def judgements(
+    method: Method, frames: Iterable[Frame], guard: Guard = unguarded
+) -> Iterator[Answer]:
+    """All that a method has to say of recordings.
+
+    Args:
+        method: The method.
+        frames: Frames in time order, one sequence after the other.
+        guard: Surrounds the work on each; where it holds an error back, the frame has no answer.
+
+    Yields:
+        What the method says of each frame, in the order of the frames.
+
+    Raises:
+        InputError: A frame that cannot be read or judged, where the guard lets that through.
+    """
+    last = None
+    for frame in frames:
+        if last is not None and method.starts_anew(frame):
+            yield from _those_waiting(method, last, guard)
+        last, judgement, stopwatch = frame, None, Stopwatch()
+        with guard(frame):
+            judgement = method.push(frame, stopwatch)
+        if judgement is not None:
+            yield _frame_of(judgement), judgement, stopwatch
+    if last is not None:
+        yield from _those_waiting(method, last, guard)
+
+
+def _those_waiting(method: Method, last: Frame, guard: Guard) -> Iterator[Answer]:
+    """What it says of frames that wait for others, where the last of a recording was pushed."""
+    while method.waiting:  # where one fails, the others go on waiting
+        with guard(last):
+            stopwatch = Stopwatch()
+            for judgement in method.flush(stopwatch):
+                yield _frame_of(judgement), judgement, stopwatch
+                stopwatch.milliseconds.clear()
+
+
+def _frame_of(judgement: Judgement) -> Frame:
+    assert judgement.frame is not None  # a frame was pushed, not points
+    return judgement.frame

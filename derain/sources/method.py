@@ -1,0 +1,96 @@
+"""What every method does that judges the frames of a recording."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import Any
+
+from numpy.typing import NDArray
+
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
+from derain.system.stopwatch import Stopwatch
+from derain.views.oddities import Oddity
+from derain.views.window import Window
+
+
+class Method(ABC):
+    """Says which points of a recording are rain: a model, a filter, or what sees several scans.
+
+    Frames go in by :meth:`push`, one after the other. A method that sees one scan at a time answers
+    at once; one that asks for scans after the one that it judges answers when they are there, and
+    for the last ones by :meth:`flush`. So whoever cleans a recording does the same for each::
+
+        for frame in source:
+            if method.starts_anew(frame):
+                answers += method.flush()
+            answers += filter(None, [method.push(frame)])
+        answers += method.flush()
+
+    :func:`derain.sources.judging.judgements` does it.
+    """
+
+    @property
+    @abstractmethod
+    def window(self) -> Window:
+        """How many scans before and after the one that it judges it asks for."""
+
+    @property
+    @abstractmethod
+    def waiting(self) -> int:
+        """How many frames were pushed and are not answered for."""
+
+    @abstractmethod
+    def starts_anew(self, frame: Frame) -> bool:
+        """Whether pushing a frame would let go of those that wait: it does not follow them."""
+
+    @abstractmethod
+    def push(
+        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> Judgement | None:
+        """Takes the next frame of a recording.
+
+        A frame of another sequence, or after a gap, starts anew: call :meth:`flush` before it, or
+        the frames that still wait are let go of.
+
+        Args:
+            frame: A frame, which is read; or a Scan, or (N, ≥ 3) numbers: x, y, z in metres in the
+                sensor's frame, then intensity; each of these is taken for the next of one sequence.
+            stopwatch: Takes the times of the stages, such as read, view, network and back.
+
+        Returns:
+            What the method says of the frame that has all of its window by now; None until there is
+            one.
+
+        Raises:
+            InputError: A frame that cannot be read or judged.
+        """
+
+    @abstractmethod
+    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
+        """Ends a recording: answers for the frames that still wait, with the scans that there are.
+
+        What is pushed afterwards is of another recording. Where one of those that wait cannot be
+        judged, those after it go on waiting.
+
+        Args:
+            stopwatch: Takes the times of the stages.
+
+        Raises:
+            InputError: A frame that cannot be judged.
+        """
+
+    @abstractmethod
+    def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
+        """What is odd about a scan that it judged, as far as that matters to the method.
+
+        Args:
+            judgement: What it said of the scan.
+        """
+
+    @abstractmethod
+    def as_dict(self) -> dict[str, Any]:
+        """What it is, for whoever repeats its work: ``method``, its name, and its parameters.
+
+        Texts, finite numbers, true, false, or nothing; or lists and mappings of these.
+        """

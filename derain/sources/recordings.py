@@ -1,0 +1,83 @@
+"""Frames by the recordings that they are of, and whether these are fit to be seen several at once.
+
+Most methods see one scan at a time and ask for none of this.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+
+from derain.errors import InputError
+from derain.files.names import scan_stem
+from derain.sources.file_frame import FileFrame
+from derain.sources.frame import Frame
+from derain.views.window import Window
+
+# Seconds. Scans come ten or twenty times in one; after more than one, a car has gone so far that a
+# scan says little of the place of another's points.
+LONGEST_STEP = 1.0
+
+
+def recordings(frames: Iterable[Frame]) -> list[list[Frame]]:
+    """Frames in groups, in each of which every frame follows the one before it."""
+    found: list[list[Frame]] = []
+    for frame in frames:
+        if found and frame.follows(found[-1][-1]):
+            found[-1].append(frame)
+        else:
+            found.append([frame])
+    return found
+
+
+def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
+    """What of recordings does not suit a method that sees several scans, a sentence each.
+
+    Args:
+        frames: Frames in time order, one recording after the other.
+        window: How many scans the method asks for. For one alone, everything suits, and nothing is
+            read.
+    """
+    if window.is_one_scan:
+        return
+    for recording in recordings(frames):
+        if len(recording) <= window.before + window.after:
+            yield (
+                f"{recording[0].name}: {len(recording)} scans in its recording, each judged with "
+                f"{window.before} before and {window.after} after it: what they would show of it "
+                "stays unknown"
+            )
+        yield from _of_steps(recording)
+
+
+def _of_steps(recording: Sequence[Frame]) -> Iterator[str]:
+    """What of the steps from scan to scan does not suit: the first of each kind."""
+    try:
+        times = [frame.time for frame in recording]
+    except InputError as error:  # the method may well do without
+        yield f"its times are not known: {error}"
+        return
+    steps = [
+        (after, _step(before, after, *seconds))
+        for (before, after), seconds in zip(pairwise(recording), pairwise(times), strict=True)
+    ]
+    backwards = [frame for frame, step in steps if step is not None and step <= 0]
+    if backwards:
+        yield (
+            f"{backwards[0].name}: not later than the scan before it, nor are "
+            f"{len(backwards) - 1:,} others: name the scans in the order that they were taken in"
+        )
+    apart = [frame for frame, step in steps if step is not None and step > LONGEST_STEP]
+    if apart and times[0] is not None:
+        yield (
+            f"{apart[0].name}: more than {LONGEST_STEP:g} s after the scan before it, and so are "
+            f"{len(apart) - 1:,} others: they say little of one another"
+        )
+
+
+def _step(before: Frame, after: Frame, first: float | None, second: float | None) -> float | None:
+    """How far on a frame is from the one before it: seconds, or numbers in the names of files."""
+    if first is not None and second is not None:
+        return second - first
+    names = [scan_stem(f.path) for f in (before, after) if isinstance(f, FileFrame)]
+    if len(names) == 2 and all(name.isascii() and name.isdigit() for name in names):
+        return float(int(names[1]) - int(names[0]))
+    return None
