@@ -1,0 +1,1 @@
+"""How the sensor moved from scan to scan, found from the scans themselves."""
