@@ -29,7 +29,6 @@ from derain.scan import Scan
 # Told apart by colour-blind eyes and in grey.
 OF_ANSWERS = ("#c9ced6", "#1f77b4", "#f2c14e")
 STUDENT = "#111827"
-HELD_OUT = "#eef1f5"
 
 # Colours of the pictures of scans, as numbers of ``OUTCOMES``.
 KEPT, REMOVED, LEFT, LOST = range(len(OUTCOMES))
@@ -132,7 +131,7 @@ def answers_figure(
         "not known to the teacher, or rain to it alone": LEFT,
         "rain to the student alone": LOST,
     }
-    figure = Figure(figsize=(16, 6.4), layout="constrained")
+    figure = Figure(figsize=(16, 5.9), layout="constrained")
     figure.suptitle(title)
     row = figure.subplots(1, 3, sharex=True, sharey=True)
     for axes, (name, outcome) in zip(row, panels.items(), strict=True):
@@ -153,18 +152,17 @@ def answers_figure(
 def _draw_by_scan(axes: Axes, scans: Sequence[AnswersOfScan]) -> None:
     """Bars in time order, those of held-out scans on a ground of their own."""
     _draw_shares(axes, np.arange(len(scans)), [scan.answers for scan in scans], width=1.0)
-    for place, scan in enumerate(scans):
-        if scan.held_out:
-            axes.axvspan(
-                place - 0.5, place + 0.5, ymin=1.0, ymax=1.04, color=STUDENT, clip_on=False
-            )
+    kept_back = [place for place, scan in enumerate(scans) if scan.held_out]
+    if kept_back:
+        axes.axvline(kept_back[0] - 0.5, color=STUDENT, linestyle=":")
+        axes.text(kept_back[0] - 0.4, 0.97, "held out", color=STUDENT, va="top", fontsize=9)
     axes.set_xlim(-0.5, len(scans) - 0.5)
     axes.set_ylim(0, 1)
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel("scan, in time order (black above: held out)")
+    axes.set_xlabel("scan, in time order")
     axes.set_ylabel("share of the points")
-    axes.set_title("by scan", fontsize=10, pad=14)
+    axes.set_title("by scan", fontsize=10)
 
 
 def _draw_shares(
