@@ -96,6 +96,7 @@ def _fit(inputs: SmallInputs, *options: str) -> list[str | Path]:
 # Arguments of each command; it writes into the folder "out" of the folder where it is started.
 COMMANDS: dict[str, Callable[[SmallInputs], list[str | Path]]] = {
     "run": lambda i: ["run", "dror", i.scans(), "--out", "out"],
+    "teach": lambda i: ["teach", "dror", i.scans(), "--out", "out", "--card", "wads"],
     "bench": lambda i: [
         *("bench", "--data", i.scans(), "--card", "wads", "--methods", "dror", "dsor", "all"),
         *("--repeats", "1", "--out", "out"),

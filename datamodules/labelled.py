@@ -10,11 +10,13 @@ from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
 from derain.datamodules.base import Loading, Part, ScanDataModule
 from derain.datamodules.sequences import SequenceDataModule
+from derain.datamodules.taught import Taught
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.simulation.manifest import RAIN_RATE, manifest_of, rates_of_sequences, read_manifest
 from derain.sources.folders import find_layout, named_frames
 from derain.sources.source import Source
+from derain.teaching.manifest import CARD, is_taught
 
 
 class NamedScans(ScanDataModule):
@@ -47,7 +49,8 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> S
 
     Args:
         paths: Scans and folders of scans; or the root of one data set, which has a folder
-            ``sequences`` and the split of its manifest, if it was simulated, else of its card.
+            ``sequences`` and the split of its manifest, if it was simulated, else of its card; or
+            one that ``derain teach`` wrote, by whose labels it is measured then.
         card: Data card of the scans.
         loading: How the scans are read.
 
@@ -55,7 +58,8 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> S
         InputError: A root beside other paths, or whose sequences hold no folder of scans that is
             known.
     """
-    roots = [path for path in paths if os.path.isdir(path / card.layout.sequences)]
+    taught = [path for path in paths if is_taught(path)]
+    roots = taught or [path for path in paths if os.path.isdir(path / card.layout.sequences)]
     if not roots:
         return NamedScans(paths, card, loading)
     root = roots[0]
@@ -65,6 +69,8 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> S
             "is a data set, of which no part can be taken beside other scans",
             "Name it alone, or its sequences one by one.",
         )
+    if taught:
+        return Taught(str(root), loading)
     split = read_manifest(root).get("split")
     return SequenceDataModule(str(root), card, _layout_of(root, card), split, loading)
 
@@ -75,7 +81,8 @@ def card_of(paths: Sequence[Path], name: str | None) -> DataCard:
     Args:
         paths: Scans and folders of scans, or the root of one data set.
         name: A packaged card or a YAML file; None asks the manifest of the simulated data set that
-            the first of them is or lies in, and else knows REHEARSE-3D by its folders.
+            the first of them is or lies in, or takes what a teacher's labels are called, and else
+            knows REHEARSE-3D by its folders.
 
     Raises:
         InputError: No such card, or data that do not say whose they are.
@@ -85,6 +92,8 @@ def card_of(paths: Sequence[Path], name: str | None) -> DataCard:
     root = paths[0]
     if manifest_of(root):
         return load_card("simulated")
+    if is_taught(root):
+        return load_card(root / CARD)
     layout = find_layout(root)
     if layout is not None and (card := card_by_folders(layout, "rain")):
         return card

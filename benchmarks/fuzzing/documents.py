@@ -1,6 +1,7 @@
 """Small documents of every kind that a user gives."""
 
 import math
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import astuple
 from pathlib import Path
@@ -23,6 +24,7 @@ from derain.fusion.extrinsics import read_extrinsics
 from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MANIFEST, rates_of_sequences, read_manifest
 from derain.simulation.sensor import load_sensor, packaged_sensors
+from derain.teaching.manifest import LABELS, TAUGHT_PARTS, Manifest
 
 SCENE = """
 height: 0.1
@@ -54,6 +56,16 @@ EXTRINSICS = (
     "{x: 0.5, y: 0.0, z: -0.7, roll: 0, pitch: 0, yaw: 1.5}",
     "matrix: [[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, -0.7], [0, 0, 0, 1]]",
 )
+TAUGHT = """made_by: derain.teaching
+derain: 0.1.0
+teacher: {method: persistence, reach: 0.6, candidates: {bounds: [{channel: range, most: 30.0}]}}
+columns: [x, y, z, intensity]
+intensity_scale: 255.0
+finished: true
+scans:
+- {key: '000000', scan: ../drive/000000.bin, sequence: drive, number: 0, part: train}
+- {key: a/000001, scan: /drives/000001.bin, sequence: drive, number: 1, part: validation}
+"""
 TIMES = "frame,timestamp,other\n000000,1.5,a\n000001.bin,1.6,b\n000002,1.7,\n"
 WEATHER = "time,rain_rate_mm_h,wind\n0,25.0,1\n1,nan,1\n2,10,2\n"
 
@@ -73,6 +85,7 @@ def readers() -> list[Reader]:
         _of_yaml("parameters", _read_parameters, filters),
         _of_yaml("rates", _read_rates, ['"005": 25\n"010": 10.5\n']),
         _of_yaml("sensor", _read_sensor, sensors),
+        _of_yaml("taught", _read_taught, [TAUGHT]),
         Reader(
             "manifest",
             MANIFEST,
@@ -174,6 +187,15 @@ def _read_manifest(path: Path) -> None:
     assert all(map(math.isfinite, manifest.get("rain_rate_mm_h", {}).values()))
     for sequences in manifest.get("split", {}).values():
         assert all(isinstance(name, str) for name in sequences)
+
+
+def _read_taught(path: Path) -> None:
+    manifest = Manifest.read(path.parent)
+    for part in TAUGHT_PARTS:
+        for frame in manifest.frames(path.parent, part):
+            assert path.parent / LABELS in Path(os.path.normpath(frame.label_path)).parents
+            assert frame.path.is_absolute()
+            assert math.isfinite(frame.intensity_scale)
 
 
 def _read_times(path: Path) -> None:

@@ -19,6 +19,7 @@ from derain.cli import (
     learn,
     run,
     simulate,
+    teach,
     tune,
     view,
 )
@@ -47,6 +48,7 @@ COMMANDS: dict[str, ModuleType] = {
     "import-weights": import_weights,
     "simulate": simulate,
     "annotate": annotate,
+    "teach": teach,
     "fuse": fuse,
     "learn": learn,
     "demo": demo,

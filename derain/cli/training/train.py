@@ -27,6 +27,7 @@ from derain.datamodules.rehearse3d import Rehearse3D
 from derain.datamodules.scan_check import ScanCheck
 from derain.datamodules.sequences import Sequences
 from derain.datamodules.simulated import Simulated
+from derain.datamodules.taught import Taught
 from derain.datamodules.wads import Wads
 from derain.errors import InputError
 from derain.models.base import DerainingModule
@@ -56,6 +57,7 @@ __all__ = [
     "Rehearse3D",
     "Sequences",
     "Simulated",
+    "Taught",
     "Wads",
     "train",
 ]
@@ -67,7 +69,7 @@ def choices() -> dict[str, tuple[type, ...]]:
     They are loaded then, and a configuration may name their classes without a module.
     """
     return {
-        "data": (Folder, Rehearse3D, Sequences, Simulated, Wads),
+        "data": (Folder, Rehearse3D, Sequences, Simulated, Taught, Wads),
         "model": tuple(NETWORKS.values()),
         "trainer.logger": (TensorBoardLogger,),
     }

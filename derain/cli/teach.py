@@ -1,0 +1,172 @@
+"""``derain teach``: labels recordings by a method, for a network to learn from."""
+
+import argparse
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from derain.cards.card import DataCard, load_card, packaged_cards
+from derain.cards.known import layouts_for
+from derain.cli.arguments import add_threads
+from derain.cli.method_options import add_method, add_parameters, method_of
+from derain.cli.outputs import say, tell
+from derain.cli.pose_options import add_poses, placed
+from derain.cli.runtime_options import add_runtime
+from derain.cli.scan_by_scan import ScanByScan
+from derain.cli.scan_options import add_columns, add_intensity_scale
+from derain.errors import InputError, printable
+from derain.sources.folders import named_frames
+from derain.sources.recordings import irregularities
+from derain.system.memory import keep_freed_memory
+from derain.system.notices import Notices, warn
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from derain.sources.judging import Answer
+    from derain.sources.method import Method
+    from derain.sources.source import Source
+    from derain.teaching.manifest import Manifest
+
+SUMMARY = "label recordings by a method, for a network to learn from"
+
+DESCRIPTION = """\
+Labels recordings by what a method says of them, for a network to learn from: 0 is not rain, 1 rain,
+and 255 not known, which is neither trained on nor measured.
+
+  derain teach persistence drive/ --out taught
+  derain teach persistence drive/ --out taught --poses poses.txt
+  derain teach crf drive/ other_drive/ --out taught
+  derain teach persistence WADS/sequences/36 --out taught --card wads
+  derain fit --config outdet_taught.yaml --data.root taught
+
+METHOD is a method that sees several scans, a filter (below), a model (.onnx), or parameters that
+`derain tune` wrote (.yaml). The folder gets labels, their data card and a list of the scans, which
+stay where they are. The last fifth of each sequence is held out, as the validation part.
+With --card, which says what the scans' own labels mean, what is taught is measured beside them, for
+the record only: they change nothing.
+"""
+
+
+@dataclass(frozen=True)
+class TaughtFacts:
+    """What was said of one scan.
+
+    Attributes:
+        scan: Its file.
+        points: Its points that can be judged.
+        rain: Share of them called rain.
+        not_rain: Share of them called something else.
+        not_known: Share of them of which it is not known.
+        milliseconds: By stage.
+    """
+
+    scan: str
+    points: int
+    rain: float
+    not_rain: float
+    not_known: float
+    milliseconds: dict[str, float]
+
+    def __str__(self) -> str:
+        return (
+            f"{printable(self.scan)}: {self.points:,} points, {self.rain:.1%} rain, "
+            f"{self.not_rain:.1%} not rain, {self.not_known:.1%} not known, "
+            f"{sum(self.milliseconds.values()):.0f} ms"
+        )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's arguments."""
+    add_method(parser)
+    parser.add_argument(
+        "scans", nargs="+", type=Path, help="folders of consecutive scans, or a data set's folder"
+    )
+    parser.add_argument("--out", type=Path, required=True, help="folder to write to")
+    parser.add_argument(
+        "--card",
+        help="data card of the scans, to measure by their own labels for the record: "
+        f"{', '.join(packaged_cards())}, or a YAML file",
+    )
+    add_threads(parser)
+    add_runtime(parser, help="what runs a model")
+    parser.add_argument("--json", action="store_true", help="print one JSON object a scan")
+    add_columns(parser)
+    add_intensity_scale(parser)
+    add_parameters(parser)
+    add_poses(parser)
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Runs the command."""
+    from derain.teaching.teach import refuse_to_overwrite, teach
+
+    keep_freed_memory()
+    method = method_of(arguments)
+    card = None if arguments.card is None else load_card(arguments.card)
+    found = named_frames(
+        arguments.scans, arguments.columns, labelled=True, layouts=layouts_for(card)
+    )
+    refuse_to_overwrite(arguments.out, found)
+    source = placed(found, arguments).map(
+        lambda frame: frame.with_intensity_times(arguments.intensity_scale)
+    )
+    for sentence in irregularities(source, method.window):
+        warn(sentence)
+    scans = ScanByScan(source)
+    telling = _Telling(method, source, card, arguments.json)
+    manifest = teach(method, source, arguments.out, card, scans.passing_over, telling.watch)
+    telling.tell_all(manifest)
+    return scans.exit_code("{scans} could not be judged, and have no labels")
+
+
+class _Telling:
+    """Tells of each scan what was said of it, and of all of them at the end."""
+
+    def __init__(
+        self, method: "Method", source: "Source", card: DataCard | None, as_json: bool
+    ) -> None:
+        from derain.teaching.shares import TaughtShares
+
+        self.method = method
+        self.frames = {frame.key: frame for frame in source}
+        self.as_json = as_json
+        self.shares = TaughtShares()
+        self.notices = Notices()
+        self.record = None
+        if card is not None and any(frame.has_labels for frame in source):
+            from derain.teaching.truth import TruthRecord
+
+            self.record = TruthRecord(card)
+
+    def watch(self, answer: "Answer", labels: "NDArray[np.uint32]") -> None:
+        """Tells of one scan, whose labels are written."""
+        frame, judgement, stopwatch = answer
+        self.notices.tell(frame.name, self.method.oddities(judgement))
+        not_rain, rain, unknown = self.shares.add(judgement.scan, labels).tolist()
+        points = int(judgement.scan.valid.sum())
+        times = dict(stopwatch.milliseconds)
+        tell(TaughtFacts(frame.name, points, rain, not_rain, unknown, times), self.as_json)
+        if self.record is not None:
+            try:
+                self.record.add(self.frames[frame.key], judgement)
+            except InputError as error:
+                warn(f"not measured: {error}")
+
+    def tell_all(self, manifest: "Manifest") -> None:
+        """Tells of all scans, and of what a student could not do with them."""
+        stream = sys.stderr if self.as_json else sys.stdout
+        self.notices.tell_how_many_more()
+        say(f"{len(manifest.scans):,} scans\n{self.shares}", stream)
+        if self.record is not None and self.record.scans:
+            say(
+                f"for the record only, beside {self.record.card.title}'s own labels of "
+                f"{self.record.scans:,} scans, which changed nothing:\n{self.record}",
+                stream,
+            )
+        if not self.shares.rain:
+            warn("no rain was found: a network would learn that nothing is rain")
+        if not any(scan.part == "validation" for scan in manifest.scans):
+            warn("no scan is held out, for that a sequence needs three: all are for training")

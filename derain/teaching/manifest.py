@@ -1,0 +1,222 @@
+"""The manifest of taught labels: who taught, and which scans, where they lie.
+
+Scans are not copied. Where their paths are relative, they are so to the folder of the labels: both
+can be moved together.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import yaml
+
+from derain import __version__
+from derain.errors import InputError
+from derain.files import DEFAULT_COLUMNS
+from derain.files.atomic import replacing
+from derain.files.documents import Entry, shown
+from derain.files.labels import LABEL
+from derain.files.reading import is_file, reading
+from derain.sources.file_frame import FileFrame
+from derain.sources.records import Records
+from derain.sources.source import Frames
+
+TAUGHT_MANIFEST, CARD, LABELS = "taught.yaml", "card.yaml", "labels"
+
+# What stands under ``made_by``: by this the manifest is told from any other YAML file.
+TEACHING = "derain.teaching"
+
+# In bytes. The entry of a scan takes some hundred, and eleven values: ninety thousand fit.
+LARGEST_TAUGHT = 2**24
+
+# More scans than any recording has, and more than any unit of intensity is of another.
+HIGHEST_NUMBER, LARGEST_SCALE = 10**9, 1e9
+
+# What a scan is for: every sequence ends with scans that are held out.
+TaughtPart = Literal["train", "validation"]
+TAUGHT_PARTS: tuple[TaughtPart, ...] = ("train", "validation")
+
+
+@dataclass(frozen=True)
+class TaughtScan:
+    """One scan that has labels of a teacher.
+
+    Attributes:
+        key: Its labels are ``labels/<key>.label``.
+        scan: Its file.
+        sequence: Name of its sequence.
+        number: Its place in that, from 0.
+        part: What it is for.
+    """
+
+    key: str
+    scan: Path
+    sequence: str
+    number: int
+    part: TaughtPart
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What stands in a folder of taught labels.
+
+    Attributes:
+        teacher: Its name under ``method``, and its parameters.
+        scans: The scans, in time order, one sequence after the other.
+        columns: Names of the columns of files that do not name them.
+        intensity_scale: What takes the scans' intensities to the unit that the teacher saw.
+        finished: Whether all labels are there.
+    """
+
+    teacher: Mapping[str, Any]
+    scans: Sequence[TaughtScan] = ()
+    columns: tuple[str, ...] = DEFAULT_COLUMNS
+    intensity_scale: float = 1.0
+    finished: bool = field(default=True)
+
+    @classmethod
+    def read(cls, root: Path) -> Self:
+        """Reads the manifest of a folder, and trusts nothing in it.
+
+        Raises:
+            InputError: None, one that is damaged, or one of a teaching that was not finished.
+        """
+        path = root / TAUGHT_MANIFEST
+        if not is_file(path):
+            raise InputError(
+                root, f"has no {TAUGHT_MANIFEST}", "Give a folder that `derain teach` wrote."
+            )
+        entry = Entry.of_yaml(path, LARGEST_TAUGHT)
+        if not _is_ours(entry.value):
+            raise entry.fault("`derain teach` did not write it", "Give a folder that it wrote.")
+        home = Path(os.path.realpath(root))
+        content = entry.record(
+            {
+                "made_by": Entry.text,
+                "derain": Entry.text,
+                "teacher": lambda item: {key: part.value for key, part in item.members().items()},
+                "columns": Entry.texts,
+                "intensity_scale": lambda item: item.within(1 / LARGEST_SCALE, LARGEST_SCALE),
+                "finished": Entry.truth,
+                "scans": lambda item: tuple(_scan_of(part, home) for part in item.items()),
+            },
+            required=("teacher", "columns", "intensity_scale", "finished", "scans"),
+        )
+        manifest = cls(**{key: content[key] for key in content.keys() - {"made_by", "derain"}})
+        if not manifest.finished:
+            raise entry.fault("its labels are not complete", "Run the same `derain teach` again.")
+        _refuse_twice(entry, manifest.scans)
+        return manifest
+
+    def write(self, root: Path) -> None:
+        """Writes it.
+
+        Raises:
+            InputError: It cannot be written.
+        """
+        home = Path(os.path.realpath(root))
+        content = {
+            "made_by": TEACHING,
+            "derain": __version__,
+            "teacher": dict(self.teacher),
+            "columns": list(self.columns),
+            "intensity_scale": self.intensity_scale,
+            "finished": self.finished,
+            "scans": [_as_dict(scan, home) for scan in self.scans],
+        }
+        with replacing(root / TAUGHT_MANIFEST) as temporary:
+            text = yaml.safe_dump(content, sort_keys=False, width=10**6, default_flow_style=None)
+            temporary.write_text(text, "utf-8")
+
+    def frames(self, root: Path, part: TaughtPart) -> Frames:
+        """The scans of a part, in order, each with the labels that it was given."""
+        folders = {scan.scan.parent for scan in self.scans}
+        records = {folder: Records(folder) for folder in folders}
+        return Frames(
+            FileFrame(
+                key=scan.key,
+                sequence=scan.sequence,
+                number=scan.number,
+                label_path=label_path(root, scan.key),
+                intensity_scale=self.intensity_scale,
+                path=scan.scan,
+                columns=self.columns,
+                records=records[scan.scan.parent],
+            )
+            for scan in self.scans
+            if scan.part == part
+        )
+
+
+def is_taught(root: Path) -> bool:
+    """Whether a folder holds taught labels, complete or not."""
+    path, head = root / TAUGHT_MANIFEST, f"made_by: {TEACHING}\n".encode()
+    if not is_file(path):
+        return False
+    with reading(path), path.open("rb") as file:
+        return file.read(len(head)) == head
+
+
+def label_path(root: Path, key: str) -> Path:
+    """Where the labels of a scan lie."""
+    return root / LABELS / f"{key}{LABEL}"
+
+
+def _is_ours(content: object) -> bool:
+    return isinstance(content, dict) and content.get("made_by") == TEACHING
+
+
+def _as_dict(scan: TaughtScan, home: Path) -> dict[str, Any]:
+    return {
+        "key": scan.key,
+        "scan": _seen_from(home, scan.scan),
+        "sequence": scan.sequence,
+        "number": scan.number,
+        "part": scan.part,
+    }
+
+
+def _seen_from(home: Path, scan: Path) -> str:
+    """The path of a scan from a folder; the whole path where no way leads from there to it."""
+    place = Path(os.path.realpath(scan.parent)) / scan.name
+    try:
+        return Path(os.path.relpath(place, home)).as_posix()
+    except ValueError:  # another drive of Windows
+        return str(place)
+
+
+def _scan_of(entry: Entry, home: Path) -> TaughtScan:
+    def place(item: Entry) -> Path:
+        return Path(os.path.normpath(home / item.text()))
+
+    fields = {
+        "key": _key,
+        "scan": place,
+        "sequence": Entry.text,
+        "number": lambda item: item.whole(0, HIGHEST_NUMBER),
+        "part": _part,
+    }
+    return TaughtScan(**entry.record(fields, required=fields))
+
+
+def _key(entry: Entry) -> str:
+    """A path that leads nowhere but into the folder of labels."""
+    key = entry.text()
+    if not key or Path(key).is_absolute() or {"..", ""} & set(key.split("/")):
+        raise entry.fault(f"{shown(key)} is not the name of a scan", "Teach it again.")
+    return key
+
+
+def _part(entry: Entry) -> TaughtPart:
+    for part in TAUGHT_PARTS:
+        if entry.value == part:
+            return part
+    raise entry.fault(f"is {shown(entry.value)}", f"Give {' or '.join(TAUGHT_PARTS)}.")
+
+
+def _refuse_twice(entry: Entry, scans: Sequence[TaughtScan]) -> None:
+    keys = [scan.key for scan in scans]
+    if len(set(keys)) < len(keys):
+        raise entry.fault("two scans have one key", "Teach it again.")

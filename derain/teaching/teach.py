@@ -1,0 +1,171 @@
+"""Labels recordings by what a method says of them."""
+
+import os
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from derain.cards.card import DataCard
+from derain.errors import InputError
+from derain.files.labels import write_labels
+from derain.sources.file_frame import FileFrame
+from derain.sources.frame import Frame
+from derain.sources.judging import Answer, Guard, judgements, unguarded
+from derain.sources.label_sink import LabelSink
+from derain.sources.method import Method
+from derain.sources.sink import FolderSink
+from derain.sources.source import Source
+from derain.teaching.held_out import parts_of
+from derain.teaching.labels import TAUGHT_UNKNOWN, labels_of, write_card
+from derain.teaching.manifest import (
+    CARD,
+    LABELS,
+    TAUGHT_MANIFEST,
+    Manifest,
+    TaughtScan,
+    is_taught,
+    label_path,
+)
+
+# Labels lie there until all of them are known.
+UNFINISHED = ".unfinished"
+
+# Told of each scan: what the teacher says of it, and the labels, uint32 (N,), that come of that.
+Watch = Callable[[Answer, NDArray[np.uint32]], None]
+
+
+def teach(
+    method: Method,
+    source: Source,
+    out: Path,
+    card: DataCard | None = None,
+    guard: Guard = unguarded,
+    watch: Watch = lambda answer, labels: None,
+) -> Manifest:
+    """Labels recordings: 0 is not rain, 1 rain, 255 not known.
+
+    Labels of the scans are never read. Until every scan is judged, what the folder held before
+    stays as it was.
+
+    Args:
+        method: The teacher.
+        source: Scans in files, in time order, one sequence after the other.
+        out: Folder to write: a new one, or one that was written so before. It gets the labels,
+            their data card, and a manifest that names the scans where they lie.
+        card: Data card of the scans, of which the new one takes over licence and unit.
+        guard: Surrounds the work on each scan; one whose error it holds back gets no labels.
+        watch: Is told of each scan as soon as it is judged, in order.
+
+    Returns:
+        What was written to the manifest.
+
+    Raises:
+        InputError: Scans that are in no files; a folder that holds something else, or where the
+            labels would lie that belong to the scans; a scan that cannot be read or judged, where
+            the guard lets that through; nothing that is known of any point.
+    """
+    refuse_to_overwrite(out, source)
+    frames: list[FileFrame] = []
+    knows = False
+    with _unfinished(out) as folder:
+        unlabelled = source.map(Frame.without_labels)
+        shown = tqdm(unlabelled, desc="teaching", unit="scan", disable=None)
+        for answer in judgements(method, shown, guard):
+            frame, judgement, _ = answer
+            assert isinstance(frame, FileFrame)  # refused above
+            labels = labels_of(judgement)
+            write_labels(label_path(folder, frame.key), labels)
+            frames.append(frame)
+            knows = knows or bool((labels != TAUGHT_UNKNOWN).any())
+            watch(answer, labels)
+        if not knows:
+            raise InputError(
+                out,
+                "nothing is written, for of no point it is known whether it is rain",
+                "See whether the method suits the scans: some need several of one recording.",
+            )
+        manifest = _manifest_of(method, frames)
+        _put_in_place(folder, out, manifest, card)
+    return manifest
+
+
+def refuse_to_overwrite(out: Path, source: Source) -> None:
+    """Refuses, before any work, a folder or scans that cannot be taught.
+
+    Raises:
+        InputError: As for :func:`teach`.
+    """
+    for frame in source:
+        if not isinstance(frame, FileFrame):
+            raise InputError(
+                frame.name, "is in no file, where it could be found again", "Write it to one."
+            )
+    # Neither where labels of the scans lie, nor where they would be looked for.
+    for sink in (FolderSink(out / LABELS, again=False), LabelSink(out / LABELS, again=False)):
+        sink.refuse_clashes(source)
+    if is_taught(out):
+        return
+    for name in (TAUGHT_MANIFEST, CARD, LABELS):
+        if os.path.lexists(out / name):
+            raise InputError(
+                out / name, "is there already, and no teacher's", "Give --out another folder."
+            )
+
+
+def _manifest_of(method: Method, frames: Sequence[FileFrame]) -> Manifest:
+    return Manifest(
+        method.as_dict(),
+        [
+            TaughtScan(frame.key, frame.path, frame.sequence, frame.number, part)
+            for frame, part in zip(frames, parts_of(frames), strict=True)
+        ],
+        frames[0].columns,
+        frames[0].intensity_scale,
+    )
+
+
+def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | None) -> None:
+    """Replaces what the folder held; what is killed meanwhile is known to be incomplete."""
+    former = _former_keys(out)
+    Manifest(manifest.teacher, finished=False).write(out)
+    for key in (scan.key for scan in manifest.scans):
+        label_path(out, key).parent.mkdir(parents=True, exist_ok=True)
+        label_path(folder, key).replace(label_path(out, key))
+    for key in former - {scan.key for scan in manifest.scans}:
+        label_path(out, key).unlink(missing_ok=True)
+    write_card(out / CARD, Path(manifest.teacher["method"]).stem, card)
+    manifest.write(out)
+
+
+def _former_keys(out: Path) -> set[str]:
+    """Keys of the scans that were taught here before."""
+    with suppress(InputError):
+        return {scan.key for scan in Manifest.read(out).scans}
+    return set()
+
+
+@contextmanager
+def _unfinished(out: Path) -> Iterator[Path]:
+    """Lends a hidden folder that is gone at the end, as is the folder around it if it is empty."""
+    folder = out / UNFINISHED
+    there = out.is_dir()
+    try:
+        shutil.rmtree(folder, ignore_errors=True)  # left behind by a run that was killed
+        folder.mkdir(parents=True)
+        yield folder
+    except OSError as error:
+        raise InputError(
+            out,
+            f"cannot be written ({error.strerror or error})",
+            "Choose a folder that is writable and has room.",
+        ) from error
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if not there:
+            with suppress(OSError):
+                out.rmdir()
