@@ -3,7 +3,7 @@
 import argparse
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from derain.cli.arguments import count
@@ -12,10 +12,14 @@ from derain.cli.outputs import refuse_unwritable, say
 from derain.cli.pose_options import add_poses
 from derain.cli.results import last_line, proof_of
 from derain.cli.scan_options import add_columns
+from derain.cli.training.lightning_silence import no_news
 from derain.errors import InputError
+from derain.files import DEFAULT_COLUMNS
 from derain.files.atomic import replacing
 from derain.sources.folders import named_frames
 from derain.sources.source import Source
+from derain.teaching.held_out import FEWEST_SCANS
+from derain.teaching.manifest import TAUGHT_MANIFEST, Manifest
 
 SUMMARY = "a derainer from an unlabelled recording, in about ten minutes"
 
@@ -44,9 +48,6 @@ STUDENTS = ("outdet", "salsanext", "salsanext_lite")
 BLIND = {"outdet": "[x,y,z]", "salsanext": "[range,x,y,z]", "salsanext_lite": "[range,x,y,z]"}
 
 PERSISTENCE = "persistence"
-
-# A scan to learn from, one to choose by, and one beside each, by which persistence judges it.
-FEWEST_SCANS = 3
 
 # By this file a folder is known for one that a second run may clear.
 MARK = "learning.txt"
@@ -78,7 +79,7 @@ class Lesson:
     poses: Path | None = None
     standing: bool = False
     blind: bool = False
-    columns: Sequence[str] = ()
+    columns: Sequence[str] = DEFAULT_COLUMNS
     fit: Sequence[str] = ()
     card: str | None = None
 
@@ -92,11 +93,17 @@ class Lesson:
         """Checkpoint of the student, the best by its agreement with the teacher."""
         return self.work / "student.ckpt"
 
-    @property
-    def needs_odometry(self) -> bool:
-        """Whether the teacher asks where the sensor was, and nobody says so."""
-        placed = self.standing or self.poses is not None
-        return self.teacher == PERSISTENCE and not placed and len(self.recordings) == 1
+    def needs_odometry(self, source: Source) -> bool:
+        """Whether the teacher asks where the sensor was, and nobody says so.
+
+        Args:
+            source: The scans. Of several recordings, poses have to lie beside them.
+
+        Raises:
+            InputError: A record of poses that is damaged or does not fit the scans.
+        """
+        told = self.standing or self.poses is not None or source[0].pose is not None
+        return self.teacher == PERSISTENCE and not told and len(self.recordings) == 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -164,12 +171,16 @@ def learn(lesson: Lesson) -> None:
     refuse_unwritable(lesson.out)
     _clear(lesson.work)
     narrator = Narrator(derain, lesson.work / "log.txt")
-    say(f"{len(source):,} scans to learn from. All but the model goes to {lesson.work}/\n")
-    _teach(narrator, lesson)
+    say(f"{len(source):,} scans to learn from. All but the model goes to {lesson.work}/")
+    if not lesson.blind and source[0].read().intensity is None:
+        say("They have no intensities: the network learns without.")
+        lesson = replace(lesson, blind=True)
+    _teach(narrator, lesson, source)
     report = LearningReport(lesson, narrator)
     report.write()  # what the teacher says is worth reading, whatever comes after
     report.refuse_clean()
-    _fit(narrator, lesson)
+    with no_news():  # which would stand between the lines of ours
+        _fit(narrator, lesson)
     narrator.step(
         *("export", str(lesson.checkpoint), "--out", str(lesson.out)),
         *("--scan", report.held_out[0].name, "--columns", ",".join(lesson.columns)),
@@ -211,17 +222,19 @@ def _clear(work: Path) -> None:
         temporary.write_text("Written by derain learn, which clears this folder.\n", "utf-8")
 
 
-def _teach(narrator: Narrator, lesson: Lesson) -> None:
+def _teach(narrator: Narrator, lesson: Lesson, source: Source) -> None:
     """Finds out where the sensor was, if need be, and has the scans labelled."""
     scans, columns = [*map(str, lesson.recordings)], ("--columns", ",".join(lesson.columns))
     poses = lesson.poses
-    if lesson.needs_odometry:
+    if lesson.needs_odometry(source):
         poses = lesson.work / "poses.txt"
-        narrator.step("odometry", *scans, "--out", str(poses), *columns, result=last_line)
+        command = ("odometry", *scans, "--out", str(poses), *columns)
+        narrator.step(*command, result=last_line, leaves=poses)
     where = ("--standing",) if lesson.standing else ("--poses", str(poses)) if poses else ()
     narrator.step(
         *("teach", lesson.teacher, *scans, "--out", str(lesson.taught), *where, *columns),
-        result=last_line,
+        result=lambda _: f"{len(Manifest.read(lesson.taught).scans):,} scans labelled",
+        leaves=lesson.taught / TAUGHT_MANIFEST,
     )
 
 

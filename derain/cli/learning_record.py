@@ -1,9 +1,10 @@
 """How a finished model compares with labels beside its scans, where a user asks for that."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import label_of, layouts_for
@@ -12,16 +13,18 @@ from derain.evaluation.answers import NOT_KNOWN, RAIN, answer_of
 from derain.evaluation.counts import SCORES
 from derain.evaluation.metrics import RainMetrics
 from derain.evaluation.text_tables import markdown_table
-from derain.export.runtime import Derainer
+from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.views.morton import first_rows
 
+Student = Callable[[Scan], NDArray[np.bool_]]
+
 SURE = "teacher, where it is sure"
 
 
-def record_of(frames: Sequence[Frame], taught: DataCard, name: str, derainer: Derainer) -> str:
+def record_of(frames: Sequence[Frame], taught: DataCard, name: str, student: Student) -> str:
     """Scores of teacher and student on held-out scans, by the labels that lie beside these.
 
     It is called when the model is finished: nothing follows from what it finds.
@@ -30,20 +33,20 @@ def record_of(frames: Sequence[Frame], taught: DataCard, name: str, derainer: De
         frames: Held-out scans with the teacher's labels.
         taught: Data card of the teacher's labels.
         name: Data card of the labels that lie beside the scans.
-        derainer: The student.
+        student: Says which points of a scan are rain, bool (N,).
 
     Returns:
         Tables in Markdown; where the labels cannot be used, the reason.
     """
     try:
         card = load_card(name)
-        return _tables(card, _measured(frames, taught, card, derainer))
+        return _tables(card, _measured(frames, taught, card, student))
     except InputError as error:
         return f"Nothing could be measured: {error}"
 
 
 def _measured(
-    frames: Sequence[Frame], taught: DataCard, card: DataCard, derainer: Derainer
+    frames: Sequence[Frame], taught: DataCard, card: DataCard, student: Student
 ) -> dict[str, RainMetrics]:
     """Teacher and student beside the labels, over all points and where the teacher is sure."""
     titles = ("teacher", SURE, "student")
@@ -52,7 +55,7 @@ def _measured(
     for frame in frames:
         assert isinstance(frame, FileFrame)  # what is taught lies in files
         scan = reader.read(frame)
-        answer, called_rain = answer_of(scan, taught), derainer(scan)
+        answer, called_rain = answer_of(scan, taught), student(scan)
         labelled = replace(frame, label_path=label_of(frame.path, layouts)).read_label(len(scan))
         rows = first_rows(scan) if card.deduplicate else np.flatnonzero(scan.valid)
         sure = rows[answer[rows] != NOT_KNOWN]

@@ -7,7 +7,6 @@ from derain.cli.learn import Lesson
 from derain.cli.learning_record import record_of
 from derain.cli.learning_text import LEAST_RAIN, Learnt, as_markdown, summary
 from derain.cli.narration import Narrator
-from derain.datamodules.loading import Loading
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
 from derain.evaluation.answers import Answers, AnswersOfScan
@@ -43,7 +42,7 @@ class LearningReport:
         self.lesson = lesson
         self.narrator = narrator
         self.path = lesson.work / "report.md"
-        self.data = Taught(str(lesson.taught), loading=Loading(columns=tuple(lesson.columns)))
+        self.data = Taught(str(lesson.taught))
         self.held_out: list[Frame] = list(self.data.frames("validation"))
         learnt_from = evenly_spaced(self.data.frames("train"), MOST_COUNTED)
         frames = [*learnt_from, *evenly_spaced(self.held_out, MOST_ASKED)]

@@ -16,8 +16,8 @@ from derain.cli.outputs import refuse_unwritable
 # Seconds between reports of how far a command has come: on a terminal (True), and in a file.
 PERIODS = {True: 0.5, False: 15.0}
 
-# How a warning of derain's begins.
-WARNING = "derain: warning: "
+# How a warning or an error of derain's begins.
+OF_DERAIN = "derain: "
 
 # A progress bar of Lightning or tqdm: what is counted, and the share that is done.
 _BAR = re.compile(r"(?P<what>[^|\r\n]*?):?\s*(?P<share>\d+%)?\|.*\|\s*\d+/")
@@ -93,12 +93,16 @@ class Narrator:
         refuse_unwritable(log)
         log.write_text("", "utf-8")
 
-    def step(self, *command: str, result: Callable[[Transcript], str]) -> list[str]:
+    def step(
+        self, *command: str, result: Callable[[Transcript], str], leaves: Path | None = None
+    ) -> list[str]:
         """Runs one command.
 
         Args:
             command: Its arguments.
             result: Makes the line that is printed as its result, of what it printed itself.
+            leaves: A file that it leaves where it could not do all, but what could be done; None
+                where there is no such thing.
 
         Returns:
             The lines that it printed.
@@ -119,8 +123,8 @@ class Narrator:
             redirect_stderr(warned),
         ):
             code = self._run(list(command))
-        self.warned += [line.removeprefix(WARNING) for line in warned.said if WARNING in line]
-        if code:
+        self.warned += [line for line in warned.said if line.startswith(OF_DERAIN)]
+        if code and not (leaves and leaves.is_file()):
             print(*warned.said[-1:], f"All it said: {self.log}", sep="\n", file=sys.stderr)
             raise SystemExit(code)
         print(f"  {_clock(time.monotonic() - begun)}  {result(printed)}", flush=True)
