@@ -1,6 +1,7 @@
 """The report of ``derain learn``: text and pictures, written as far as the lesson has come."""
 
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
+
 from tqdm import tqdm
 
 from derain.cli.learn import Lesson
@@ -16,6 +17,9 @@ from derain.pictures.answers import answers_figure, removed_figure, teacher_figu
 from derain.pictures.scan_pictures import before_after_figure, save
 from derain.sources.frame import Frame
 from derain.sources.spread import evenly_spaced
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Of a long recording so many scans are counted, and so many held-out ones asked and drawn.
 MOST_COUNTED = 300
@@ -134,7 +138,7 @@ class LearningReport:
         figure = answers_figure(scan, self.data.card, called_rain, heading)
         self._save(figure, f"held_out_{number}_beside.png", f"{frame.key}: teacher and student")
 
-    def _save(self, figure: Figure, name: str, shows: str) -> None:
+    def _save(self, figure: "Figure", name: str, shows: str) -> None:
         path = self.path.with_name(name)
         save(figure, path)
         self.learnt.pictures[path] = shows

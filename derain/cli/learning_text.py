@@ -30,7 +30,7 @@ ALWAYS = """\
 - Run it on a recording in dry air, and see that it removes nothing: `derain run`, and the share it
   prints."""
 
-READING = """\
+AGREEMENT_EXPLAINED = """\
 P, R and IoU compare the student with the teacher as if that were the truth, on the points of
 held-out scans that the teacher is sure of. A student can be better than its teacher: what the
 teacher gets wrong here and there, but right on the whole, it does not learn."""
@@ -89,7 +89,11 @@ def as_markdown(learnt: Learnt) -> str:
     parts += [f"## The teacher: {learnt.teacher}", _teacher_table(learnt.taught)]
     parts += _pictures(learnt.pictures, "teacher")
     if learnt.asked:
-        parts += [f"## The student: {learnt.student}", READING, _student_table(learnt.student_says)]
+        parts += [
+            f"## The student: {learnt.student}",
+            AGREEMENT_EXPLAINED,
+            _student_table(learnt.student_says),
+        ]
         parts += _pictures(learnt.pictures, "removed")
         parts += ["## Held-out scans", *_pictures(learnt.pictures, "held_out")]
     if learnt.record:

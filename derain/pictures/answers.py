@@ -30,6 +30,9 @@ from derain.scan import Scan
 OF_ANSWERS = ("#c9ced6", "#1f77b4", "#f2c14e")
 STUDENT = "#111827"
 
+# Where the last band, which is open, is drawn to, metres.
+LAST_EDGE = FINE_EDGES[-1] + FINE_EDGES[1]
+
 # Colours of the pictures of scans, as numbers of ``OUTCOMES``.
 KEPT, REMOVED, LEFT, LOST = range(len(OUTCOMES))
 
@@ -78,21 +81,26 @@ def removed_figure(held_out: Answers, title: str) -> Figure:
     rain = _shares(answers[:, RAIN], points, drawn)
     perhaps = _shares(answers[:, RAIN] + answers[:, NOT_KNOWN], points, drawn)
     student = _shares(held_out.table[..., 1].sum(axis=1), points, drawn)
-    steps = {"edges": [*FINE_EDGES, FINE_EDGES[-1] + FINE_EDGES[1]], "baseline": None}
-    axes.stairs(rain, **(steps | {"baseline": 0}), fill=True, color=OF_ANSWERS[RAIN], alpha=0.35)
+    edges = [*FINE_EDGES, LAST_EDGE]
+    axes.stairs(rain, edges, fill=True, color=OF_ANSWERS[RAIN], alpha=0.35)
     axes.stairs(
         perhaps,
-        **(steps | {"baseline": rain}),
+        edges,
+        baseline=rain,
         fill=True,
         color=OF_ANSWERS[NOT_KNOWN],
         alpha=0.45,
         label="teacher: not known",
     )
-    axes.stairs(rain, **steps, color=OF_ANSWERS[RAIN], linewidth=1.5, label="teacher: rain")
-    axes.stairs(student, **steps, color=STUDENT, linewidth=2.2, label="student: removed")
+    axes.stairs(
+        rain, edges, baseline=None, color=OF_ANSWERS[RAIN], linewidth=1.5, label="teacher: rain"
+    )
+    axes.stairs(
+        student, edges, baseline=None, color=STUDENT, linewidth=2.2, label="student: removed"
+    )
     axes.set_xlabel(f"range / m (the last band: {FINE_EDGES[-1]} m and more)")
     axes.set_ylabel("share of the points at that range")
-    axes.set_xlim(0, steps["edges"][-1])
+    axes.set_xlim(0, LAST_EDGE)
     top = np.nanmax(np.fmax(student, rain), initial=0)
     axes.set_ylim(0, min(1.0, max(1.15 * top, 0.01)))
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
