@@ -1,4 +1,4 @@
-"""Times the filters against the same filters on KD-trees, and Open3D's own, in one run.
+"""Times the filters against each other, and against the same on KD-trees and Open3D's own.
 
     python benchmarks/filters.py WADS/sample.bin --threads 2
 
@@ -8,6 +8,7 @@ pip install scipy scikit-learn
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,8 @@ from turns import milliseconds_in_turns
 from derain.errors import InputError
 from derain.export.machine import versions
 from derain.files import read_scan
-from derain.filters import DROR, DSOR, ROR, SOR, FilterDerainer, PointFilter
+from derain.filters import CRF, DROR, DSOR, ROR, SOR, SSR, FilterDerainer, PointFilter
+from derain.scan import Scan
 from derain.system.open3d_import import import_open3d
 
 ROUNDS = 9
@@ -27,7 +29,7 @@ Method = Callable[[], NDArray[np.bool_]]
 
 
 def main() -> None:
-    """Prints every method's median, and of the rivals how many times ours it is."""
+    """Prints the medians of all filters, and of their rivals how many times ours each is."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scan", type=Path)
     parser.add_argument("--threads", type=int, default=2)
@@ -37,6 +39,7 @@ def main() -> None:
     scan = scan.take(scan.valid)
     xyz = scan.xyz.astype(np.float64)
     print(f"{len(scan):,} points, {arguments.threads} threads, median of {ROUNDS}")
+    _report_in_turns(scan, arguments.threads)
     for filter_, rivals in (
         (DROR(), _dror(xyz, arguments.threads)),
         (DSOR(), _dsor(xyz, arguments.threads)),
@@ -116,6 +119,21 @@ def _of_open3d(
         return rain
 
     return {"Open3D, all cores": removed}
+
+
+def _report_in_turns(scan: Scan, threads: int) -> None:
+    """Prints how long each filter takes beside DSOR."""
+    filters = (DSOR(), CRF(), CRF(variant="published"), SSR(), SOR(), DROR(), ROR())
+    # A scan of its own for every run, so that nobody finds ranges that another has worked out.
+    derainers = {
+        str(filter_): lambda filter_=filter_: FilterDerainer(filter_, threads)(replace(scan))
+        for filter_ in filters
+    }
+    times = milliseconds_in_turns(derainers, ROUNDS)
+    usual = np.median(times[str(DSOR())])
+    for name, values in times.items():
+        median = np.median(values)
+        print(f"{median:7.1f} ms, {median / usual:4.2f} of DSOR's: {name}")
 
 
 def _report(filter_: PointFilter, methods: dict[str, Method]) -> None:

@@ -6,7 +6,7 @@ from derain.cards.card import load_card
 from derain.datamodules.base import Loading, Part, ScanDataModule
 from derain.errors import InputError
 from derain.sources.source import Source
-from derain.teaching.manifest import CARD, Manifest
+from derain.teaching.manifest import CARD, HELD_OUT_PART, TRAINING_PART, Manifest
 
 
 class Taught(ScanDataModule):
@@ -46,7 +46,9 @@ class Taught(ScanDataModule):
         Raises:
             InputError: No scan was held out.
         """
-        frames = self.manifest.frames(self.root, "train" if part == "train" else "validation")
+        frames = self.manifest.frames(
+            self.root, TRAINING_PART if part == "train" else HELD_OUT_PART
+        )
         if not len(frames):
             raise InputError(
                 self.root,

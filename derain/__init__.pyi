@@ -17,6 +17,7 @@ from derain.export.bench.bench import bench as bench
 from derain.export.runtime import Derainer as Derainer
 from derain.files import read_scan as read_scan
 from derain.files import write_scan as write_scan
+from derain.filters import CRF as CRF
 from derain.filters import DROR as DROR
 from derain.filters import DSOR as DSOR
 from derain.filters import ROR as ROR

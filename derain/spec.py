@@ -11,7 +11,7 @@ from derain.files.documents import Entry, shown
 from derain.files.labels import LARGEST_ID
 from derain.scan import Scan
 from derain.views.candidates import Candidates, bounded_channels, candidates_at
-from derain.views.channels import MOST_CHANNELS
+from derain.views.channels import MOST_CHANNELS, channel_of
 from derain.views.oddities import Oddity, intensity_unlike_training, missing_channels
 from derain.views.registry import VIEWS
 from derain.views.view import View
@@ -99,7 +99,7 @@ class Spec:
 
     def missing_channels(self, scan: Scan) -> dict[str, float]:
         """Channels that a scan has not got, and the means that stand in for them, by name."""
-        return {name: mean for name, mean in self.means.items() if scan.channel(name) is None}
+        return {name: mean for name, mean in self.means.items() if channel_of(scan, name) is None}
 
     def oddities(self, scan: Scan) -> Iterator[Oddity]:
         """What is odd about a scan for the network, before it is judged.

@@ -40,7 +40,7 @@ class DerainingModule(MeasuredModule):
         VIEW: Kind of the view that it sees a scan through.
         AMPLIFIES: How many times more than other networks' its logits amplify rounding.
         INTEGER_OPERATORS: What computes in eight bits in a model that is exported so; ONNX names.
-        channels: Names of its input channels, as :meth:`Scan.channel` takes them.
+        channels: Names of its input channels, as :func:`channel_of` takes them.
         network: The network itself.
         card: Data card of the data it is trained or tested on, once that is agreed with them.
 

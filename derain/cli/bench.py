@@ -158,8 +158,9 @@ def _labelled_frames(
 def _learn_from(arguments: argparse.Namespace, data: "ScanDataModule") -> "LearnFrom | None":
     """What gives the training scans; None where none are named."""
     from derain.datamodules.sequences import SequenceDataModule
+    from derain.datamodules.taught import Taught
 
-    if arguments.train is None and not isinstance(data, SequenceDataModule):
+    if arguments.train is None and not isinstance(data, SequenceDataModule | Taught):
         return None
 
     training = data if arguments.train is None else labelled(arguments, arguments.train)

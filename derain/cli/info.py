@@ -3,7 +3,6 @@
 import argparse
 import json
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,10 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from derain.cards.card import load_card
+from derain.cards.known import layouts_for
 from derain.cli.info_folder import draw, facts_of_folder
+from derain.cli.info_returns import facts_of_returns
 from derain.cli.outputs import say
 from derain.cli.scan_options import ListFormats, add_columns
 from derain.errors import InputError, printable
@@ -28,13 +30,16 @@ from derain.views.morton import distinct_rows
 SUMMARY = "say what is in a scan, a label file, a model or a data set"
 
 DESCRIPTION = """\
-Says what is in a scan, a label file, an exported model or a checkpoint, and what range image fits
-a scan; and how many scans and points, by class and by rain rate, are in a data set: a folder of
-sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated), one sequence, or a folder of scans. With
---grid, fits one grid to all the scans, to be written into a configuration.
+Says what is in a scan, a label file, an exported model or a checkpoint, what range image fits a
+scan, and how many of its rays have two returns; with --card, also how often the second one of a
+labelled scan gives back what lies behind rain. And how many scans and points, by class and by rain
+rate, are in a data set: a folder of sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated), one
+sequence, or a folder of scans. With --grid, fits one grid to all the scans, to be written into a
+configuration.
 
   derain info scan.bin
   derain info scan.bin --columns x,y,z,intensity,ring --json
+  derain info velodyne/042228.bin --card wads
   derain info labels/000000.label
   derain info model.onnx
   derain info --grid scans
@@ -55,7 +60,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--card",
-        help="data card that names a folder's classes, and its folders (default: as those tell)",
+        help="data card that names a folder's classes, and its folders (default: as those tell), "
+        "or says which points of a labelled scan are rain",
     )
     parser.add_argument(
         "--layout",
@@ -81,7 +87,7 @@ def main(arguments: argparse.Namespace) -> int:
         if os.path.isdir(path):
             _describe_folder(path, arguments)
             continue
-        facts = _facts(path, arguments.columns)
+        facts = _facts(path, arguments)
         if arguments.json:
             print(json.dumps({"file": str(path), **facts}))
         else:
@@ -105,7 +111,7 @@ def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
         draw(facts, arguments.picture)
 
 
-def _facts(path: Path, columns: Sequence[str]) -> dict[str, Any]:
+def _facts(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     with reading(path):
         exists = path.exists()
     if not exists:
@@ -130,7 +136,10 @@ def _facts(path: Path, columns: Sequence[str]) -> dict[str, Any]:
                 "Make a checkpoint of them with `derain import-weights`.",
             )
         case _:
-            return _of_scan(frame_of(path, columns).read())
+            card = None if arguments.card is None else load_card(arguments.card)
+            frame = frame_of(path, arguments.columns, layouts_for(card))
+            scan = frame.read()
+            return {**_of_scan(scan), "returns": facts_of_returns(scan, frame, card)}
 
 
 def _of_scan(scan: Scan) -> dict[str, Any]:

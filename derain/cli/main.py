@@ -17,6 +17,7 @@ from derain.cli import (
     import_weights,
     info,
     learn,
+    odometry,
     run,
     simulate,
     teach,
@@ -51,6 +52,7 @@ COMMANDS: dict[str, ModuleType] = {
     "teach": teach,
     "fuse": fuse,
     "learn": learn,
+    "odometry": odometry,
     "demo": demo,
 }
 

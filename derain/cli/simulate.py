@@ -24,9 +24,12 @@ To train takes three or more; one is enough to look at.
   derain simulate --out heavy --rain 50 --sequences 5 --scans 20 --seed 1
   derain simulate --out quick --sensor mems_64 --no-radar --workers 1
   derain simulate --out streets --layout street
+  derain simulate --out drive --layout street --speed 13 --traffic 8 --sensor spinning_64
 
 In the facility nothing but rain is near, as in the real one: a rule that learns places finds it. In
-the streets there are boughs and bushes between the drops.
+the streets there are boughs and bushes between the drops. With --speed the sensor drives along a
+street, without a radar; with --traffic others move, whether it drives or stands. Beside such scans
+lies poses.txt, and the upper 16 bits of their labels number what moves.
 
 The sequences take the rain rates in turn, 0 being clean. An interrupted run is taken up where it
 ended. To train on the data set:
@@ -48,6 +51,9 @@ OF_DATA_SETS = {
     "sequences": 10,
     "scans": 10,
     "radar": True,
+    "speed": 0.0,
+    "traffic": 0,
+    "skew": False,
     "workers": usable_cores(),
 }
 OF_SCANS = {"columns": DEFAULT_COLUMNS, "picture": False, "json": False}
@@ -82,7 +88,24 @@ def _add_those_of_data_sets(group: "argparse._ArgumentGroup") -> None:
     group.add_argument("--sequences", type=count, help=f"sequences {default['sequences']}")
     group.add_argument("--scans", type=count, help=f"scans per sequence {default['scans']}")
     group.add_argument(
-        "--radar", action=argparse.BooleanOptionalAction, help="with a 4D radar (default: yes)"
+        "--speed",
+        type=float,
+        metavar="M_S",
+        help=f"speed of the sensor along the street, m/s {default['speed']}",
+    )
+    group.add_argument(
+        "--traffic", type=int, help=f"cars and pedestrians that move {default['traffic']}"
+    )
+    group.add_argument(
+        "--skew",
+        action="store_true",
+        default=None,
+        help="let them, and the sensor, move on while a scan is taken",
+    )
+    group.add_argument(
+        "--radar",
+        action=argparse.BooleanOptionalAction,
+        help="with a 4D radar (default: yes, but not on a drive)",
     )
     group.add_argument("--workers", type=count, help="processes (default: one per core)")
 
@@ -103,6 +126,8 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.seed < 0:
         raise InputError("--seed", f"{arguments.seed} is negative", "Give 0 or more.")
     if arguments.on is None:
+        if arguments.radar is None:
+            arguments.radar = not (arguments.speed or arguments.traffic or arguments.skew)
         _settle(arguments, OF_DATA_SETS, foreign=OF_SCANS, other="with")
         return _simulate(arguments)
     from derain.cli.rain_on_scans import rain_on_scans
@@ -126,8 +151,10 @@ def _settle(
 def _simulate(arguments: argparse.Namespace) -> int:
     from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, partition
     from derain.simulation.dataset import simulate_track
+    from derain.simulation.drive import Drive
     from derain.simulation.radar import Radar
 
+    moves = arguments.speed, arguments.traffic, arguments.skew
     campaign = Campaign(
         *partition(arguments.sequences),
         scans=arguments.scans,
@@ -136,6 +163,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
         sensor=arguments.sensor or "mems_256",
         layout=arguments.layout,
         radar=Radar() if arguments.radar else None,
+        drive=Drive(*moves) if any(moves) else None,
     )
     simulate_track(arguments.out, campaign, arguments.workers)
     scans = len(campaign.names) * campaign.scans

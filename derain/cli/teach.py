@@ -44,7 +44,8 @@ and 255 not known, which is neither trained on nor measured.
 
 METHOD is a method that sees several scans, a filter (below), a model (.onnx), or parameters that
 `derain tune` wrote (.yaml). The folder gets labels, their data card and a list of the scans, which
-stay where they are. The last fifth of each sequence is held out, as the validation part.
+stay where they are. The last fifth of each sequence is held out, as the validation part. A scan of
+which nothing is known is left out.
 With --card, which says what the scans' own labels mean, what is taught is measured beside them, for
 the record only: they change nothing.
 """
@@ -132,6 +133,7 @@ class _Telling:
 
         self.method = method
         self.frames = {frame.key: frame for frame in source}
+        self.judged = 0
         self.as_json = as_json
         self.shares = TaughtShares()
         self.notices = Notices()
@@ -142,8 +144,9 @@ class _Telling:
             self.record = TruthRecord(card)
 
     def watch(self, answer: "Answer", labels: "NDArray[np.uint32]") -> None:
-        """Tells of one scan, whose labels are written."""
+        """Tells of one scan, as it is judged."""
         frame, judgement, stopwatch = answer
+        self.judged += 1
         self.notices.tell(frame.name, self.method.oddities(judgement))
         not_rain, rain, unknown = self.shares.add(judgement.scan, labels).tolist()
         points = int(judgement.scan.valid.sum())
@@ -157,16 +160,20 @@ class _Telling:
 
     def tell_all(self, manifest: "Manifest") -> None:
         """Tells of all scans, and of what a student could not do with them."""
+        from derain.teaching.manifest import HELD_OUT_PART
+
         stream = sys.stderr if self.as_json else sys.stdout
         self.notices.tell_how_many_more()
-        say(f"{len(manifest.scans):,} scans\n{self.shares}", stream)
+        say(f"{self.judged:,} scans\n{self.shares}", stream)
         if self.record is not None and self.record.scans:
             say(
                 f"for the record only, beside {self.record.card.title}'s own labels of "
                 f"{self.record.scans:,} scans, which changed nothing:\n{self.record}",
                 stream,
             )
+        if nothing := self.judged - len(manifest.scans):
+            warn(f"{nothing:,} of {self.judged:,} scans are left out: of them nothing is known")
         if not self.shares.rain:
             warn("no rain was found: a network would learn that nothing is rain")
-        if not any(scan.part == "validation" for scan in manifest.scans):
+        if not any(scan.part == HELD_OUT_PART for scan in manifest.scans):
             warn("no scan is held out, for that a sequence needs three: all are for training")

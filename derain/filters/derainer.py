@@ -1,6 +1,5 @@
 """A filter, ready to judge scans as an exported model does."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.filters.parameters import CANDIDATES
 from derain.filters.point_filter import PointFilter
-from derain.filters.radius_filter import RadiusFilter
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -19,13 +17,8 @@ from derain.sources.method import Method
 from derain.system.cores import usable_cores
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
-from derain.views.morton import distinct_rows
-from derain.views.neighbours import Neighbourhoods, NeighbourView
 from derain.views.oddities import Oddity
 from derain.views.window import Window
-
-# Which rows are rain, and which were judged at all, bool (N,) each.
-RainAndJudged = tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 
 class FilterDerainer(Method):
@@ -79,10 +72,7 @@ class FilterDerainer(Method):
             stopwatch: Takes the times of the stages view, network and back.
         """
         scan, stopwatch = Scan.of(points), stopwatch or Stopwatch()
-        if isinstance(self.filter, RadiusFilter):
-            rain, judged = self._by_radius(self.filter, scan, stopwatch)
-        else:
-            rain, judged = self._by_neighbours(scan, stopwatch)
+        rain, judged = self.filter.judge_scan(scan, self.threads, self.candidates, stopwatch)
         return Judgement(rain.astype(np.float32), rain, judged, scan)
 
     @property
@@ -132,60 +122,3 @@ class FilterDerainer(Method):
         if self.candidates is not None:
             content[CANDIDATES] = self.candidates.as_dict()
         return content
-
-    def _by_neighbours(self, scan: Scan, stopwatch: Stopwatch) -> RainAndJudged:
-        with stopwatch.stage("view"):
-            view = filter_view(self.filter.neighbours, self.threads)(scan)
-        with stopwatch.stage("network"):
-            rain = rain_among(self.filter, view, scan, self.candidates)
-        with stopwatch.stage("back"):
-            return view.back(rain.astype(np.float32)) > 0, view.judged
-
-    def _by_radius(self, filter: RadiusFilter, scan: Scan, stopwatch: Stopwatch) -> RainAndJudged:
-        with stopwatch.stage("view"):
-            first, inverse = distinct_rows(scan)
-            xyz = scan.xyz.take(first, axis=0)
-        with stopwatch.stage("network"):
-            among = None if self.candidates is None else self.candidates.among(scan)[first]
-            few = filter.judge_alone(xyz, self.threads, among)
-        with stopwatch.stage("back"):
-            rain = np.zeros(len(scan), bool)
-            judged = inverse >= 0
-            rain[judged] = few[inverse[judged]]
-            return rain, judged
-
-
-def rain_among(
-    filter: PointFilter, view: Neighbourhoods, scan: Scan, candidates: Candidates | None
-) -> NDArray[np.bool_]:
-    """What a filter calls rain among candidates.
-
-    A filter looks at all points to say what is usual, whether or not they are candidates. So what
-    it says of a candidate is what it says without bounds.
-
-    Args:
-        filter: The filter.
-        view: What it sees of the scan, M points.
-        scan: The scan.
-        candidates: Bounds outside which nothing is rain; None where anything may be.
-
-    Returns:
-        True for rain, bool (M,).
-    """
-    rain = filter.judge(view)
-    return rain if candidates is None else rain & candidates.among(scan)[view.first]
-
-
-def filter_view(neighbours: int, threads: int = 0) -> NeighbourView:
-    """How filters see a scan.
-
-    One view serves several filters: each looks at no more than its own number of neighbours.
-
-    Args:
-        neighbours: Size of a neighbourhood, the point itself included; the largest that any of the
-            filters looks at.
-        threads: Threads of the search; 0 takes every core this process may use.
-    """
-    # In a scan without intensity every point has NaN for it, and no comparison with NaN is true: a
-    # filter that judges by intensity finds nothing there.
-    return NeighbourView(neighbours, stand_in={"intensity": math.nan}, threads=threads)

@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import shown
+from derain.filters.filter_view import filter_view, rain_among
 from derain.filters.registry import FILTERS
 from derain.scan import Scan
+from derain.system.stopwatch import Stopwatch
+from derain.views.candidates import Candidates
 from derain.views.neighbours import Neighbourhoods
 from derain.views.oddities import Oddity
 
@@ -26,6 +29,9 @@ LARGEST_NUMBER = 1e100
 
 # Smallest and largest value of a parameter, whole numbers or not.
 Span = tuple[int, int] | tuple[float, float]
+
+# Which rows are rain, and which were judged at all, bool (N,) each.
+RainAndJudged = tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 # Where derain's own filters look for the best number of neighbours. Tuning finds as many of every
 # point as the largest says, and keeps them in memory for all trials.
@@ -92,6 +98,30 @@ class PointFilter(ABC):
         Returns:
             True for rain, bool (M,), M being the points of the view.
         """
+
+    def judge_scan(
+        self, scan: Scan, threads: int, candidates: Candidates | None, stopwatch: Stopwatch
+    ) -> RainAndJudged:
+        """Says which rows of a scan are rain, as :meth:`judge` does of every point of a view.
+
+        A filter that comes to the same verdict without every point's neighbours goes its shorter
+        way here.
+
+        Args:
+            scan: The scan, of N rows.
+            threads: Threads to use.
+            candidates: Bounds outside which nothing is rain; None where anything may be.
+            stopwatch: Takes the times of the stages view, network (the filter) and back.
+
+        Returns:
+            Rows that are rain, and those that were judged, bool (N,) each.
+        """
+        with stopwatch.stage("view"):
+            view = filter_view(self.neighbours, threads)(scan)
+        with stopwatch.stage("network"):
+            rain = rain_among(self, view, scan, candidates)
+        with stopwatch.stage("back"):
+            return view.back(rain.astype(np.float32)) > 0, view.judged
 
     def oddities(self, scan: Scan) -> Iterator[Oddity]:
         """What is odd about a scan for this filter; nothing, for one that looks at places alone.

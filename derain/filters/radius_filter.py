@@ -7,7 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.filters.crowding import few_around
-from derain.filters.point_filter import PointFilter
+from derain.filters.filter_view import rows_of
+from derain.filters.point_filter import PointFilter, RainAndJudged
+from derain.scan import Scan
+from derain.system.stopwatch import Stopwatch
+from derain.views.candidates import Candidates
+from derain.views.morton import distinct_rows
 from derain.views.neighbours import Neighbourhoods
 
 
@@ -40,6 +45,19 @@ class RadiusFilter(PointFilter):
         last = view.distances[:, self.neighbours - 1]
         lonely: NDArray[np.bool_] = last > self.radius_at(view.points)
         return lonely
+
+    def judge_scan(
+        self, scan: Scan, threads: int, candidates: Candidates | None, stopwatch: Stopwatch
+    ) -> RainAndJudged:
+        """Says which rows of a scan are rain; see :class:`PointFilter`."""
+        with stopwatch.stage("view"):
+            first, inverse = distinct_rows(scan)
+            xyz = scan.xyz.take(first, axis=0)
+        with stopwatch.stage("network"):
+            among = None if candidates is None else candidates.among(scan)[first]
+            few = self.judge_alone(xyz, threads, among)
+        with stopwatch.stage("back"):
+            return rows_of(few, inverse), inverse >= 0
 
     def judge_alone(
         self, xyz: NDArray[np.float32], threads: int, candidate: NDArray[np.bool_] | None = None

@@ -1,11 +1,11 @@
 """Filters by name: those of this folder, and those that other packages bring."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from derain.errors import InputError
 from derain.files.documents import short
+from derain.system.parameters import made_of
 from derain.system.registry import Registry
 
 if TYPE_CHECKING:
@@ -26,9 +26,4 @@ def filter_from(name: str, parameters: Mapping[str, Any]) -> "PointFilter":
     """
     if name not in FILTERS:
         raise InputError(short(name), "no such filter", f"Give one of {', '.join(FILTERS)}.")
-    known = [field.name for field in fields(FILTERS[name])]
-    if unknown := sorted(set(parameters) - set(known)):
-        raise InputError(
-            name, f"it has no parameter {', '.join(unknown)}", f"It has {', '.join(known)}."
-        )
-    return FILTERS[name](**parameters)
+    return made_of(FILTERS[name], name, parameters)

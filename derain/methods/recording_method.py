@@ -35,5 +35,6 @@ class RecordingMethod(Method):
             threads: Threads to use; 0 takes every core this process may use.
 
         Raises:
-            InputError: A parameter that it does not have, or a value that it cannot have.
+            InputError: A parameter that it does not have, or a value that it cannot have:
+                :func:`derain.system.parameters.made_of` says so of a dataclass.
         """

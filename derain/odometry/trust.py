@@ -1,6 +1,5 @@
 """Which registrations are to be believed: those that fit, and that a vehicle could have driven."""
 
-from collections.abc import Iterator
 from statistics import median
 
 import numpy as np
@@ -48,7 +47,21 @@ class Trust:
         Args:
             fit: How they lie.
         """
-        return ", ".join(self._faults(fit))
+        if fit.matched < LEAST_MATCHED:
+            return (
+                f"only {fit.matched:.0%} of its surfaces are where the scan before has some: it is "
+                "of another place, or too far on"
+            )
+        if fit.residual > (most := self._most_apart()):
+            return (
+                f"its surfaces lie {fit.residual:.3f} m from those of the scan before, where "
+                f"{most:.3f} m is the most"
+            )
+        if fit.facing < LEAST_FACING:
+            return (
+                "too little stands across some direction to tell how far the sensor went along it"
+            )
+        return "" if fit.converged else "the search for the motion did not come to rest"
 
     def unlikely(self, motion: NDArray[np.float64]) -> str:
         """Why no vehicle moves so between two scans; empty where one may.
@@ -81,16 +94,6 @@ class Trust:
             self._residuals.append(fit.residual)
         believed = fit.motion if trusted or not self._motions else self._motions[0]
         self._motions = [believed, fit.motion]
-
-    def _faults(self, fit: Fit) -> Iterator[str]:
-        if not fit.converged:
-            yield "the search for the motion did not come to rest"
-        if fit.matched < LEAST_MATCHED:
-            yield f"only {fit.matched:.0%} of the surfaces are where the scan before has some"
-        elif fit.residual > (most := self._most_apart()):
-            yield f"surfaces lie {fit.residual:.2f} m apart, where {most:.2f} m is the most"
-        if fit.facing < LEAST_FACING:
-            yield "too little stands across some direction to tell how far it went along it"
 
     def _most_apart(self) -> float:
         """The largest residual of a scan that fits, metres."""

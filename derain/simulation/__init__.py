@@ -1,1 +1,1 @@
-"""Simulated rain: a ray-cast test track, rain drawn per beam, files like REHEARSE-3D's."""
+"""Simulated rain: ray-cast tracks and drives, rain drawn per beam, files like REHEARSE-3D's."""

@@ -5,9 +5,13 @@ from dataclasses import asdict, dataclass, field, replace
 from itertools import cycle
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from derain import __version__
 from derain.errors import InputError
 from derain.files.documents import shown
+from derain.simulation.drive import Drive
 from derain.simulation.manifest import MAKER, RAIN_RATE
 from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain
@@ -43,10 +47,11 @@ class Campaign:
         layout: ``street``, a random street in even rain, or ``facility``, a test track under
             sprinklers.
         radar: The radar; None leaves it out, and with it the folders of its scans.
+        drive: What moves, in a street and without a radar; None stands where nothing does.
 
     Raises:
         InputError: Too few or too many sequences or scans, a negative seed, no rain rate or an
-            impossible one.
+            impossible one, or a drive that is too long, in a facility or with a radar.
     """
 
     train: int = 16
@@ -58,6 +63,7 @@ class Campaign:
     sensor: Sensor | str = field(default_factory=Sensor)
     layout: Literal["street", "facility"] = "street"
     radar: Radar | None = None
+    drive: Drive | None = None
 
     def __post_init__(self) -> None:
         for name, least in (("train", 1), ("validation", 0), ("test", 0), ("scans", 1)):
@@ -73,6 +79,15 @@ class Campaign:
             raise InputError("rain rate", "none is given", "Give one or more, in mm/h.")
         for rate in self.rain_rates:
             UniformRain(rate)
+        if self.drive is not None:
+            self._check(self.drive)
+
+    def _check(self, drive: Drive) -> None:
+        if self.layout != "street":
+            raise InputError("drive", f"a {self.layout} has none", "Take the layout street.")
+        if self.radar is not None:
+            raise InputError("drive", "has no radar", "Leave the radar out.")
+        drive.length(self.times[-1])
 
     @property
     def lidar(self) -> Sensor:
@@ -82,6 +97,11 @@ class Campaign:
             InputError: A sensor file that is missing or damaged.
         """
         return load_sensor(self.sensor) if isinstance(self.sensor, str) else self.sensor
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """When the scans of a sequence are taken, float64 (scans,), seconds from 0 on."""
+        return np.arange(self.scans) / self.lidar.frame_rate
 
     @property
     def names(self) -> list[str]:
@@ -106,10 +126,13 @@ class Campaign:
     @property
     def description(self) -> dict[str, Any]:
         """Everything that the files depend on, as reading it back from JSON gives it."""
+        campaign = asdict(replace(self, sensor=self.lidar))
+        if self.drive is None:
+            del campaign["drive"]  # as in the manifests of before there were drives
         content = {
             "made_by": MAKER,
             "version": __version__,
-            "campaign": asdict(replace(self, sensor=self.lidar)),
+            "campaign": campaign,
             "split": self.split,
             RAIN_RATE: self.rain_rate,
         }

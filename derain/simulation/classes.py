@@ -2,6 +2,9 @@
 
 from enum import IntEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 class TrackClass(IntEnum):
     """Semantic class ids of REHEARSE-3D.
@@ -17,3 +20,18 @@ class TrackClass(IntEnum):
     BIKE = 5
     TARGET = 6
     ROAD = 7
+
+
+def packed(kind: NDArray[np.int64], thing: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Classes with the number of the moving thing in the upper 16 bits, int64 (N,).
+
+    Args:
+        kind: TrackClass, int64 (N,).
+        thing: Number from 1 on, int64 (N,); 0 does not move.
+    """
+    return kind | thing << 16
+
+
+def parted(label: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Classes and numbers, int64 (N,) each, of labels as :func:`packed` gives them."""
+    return label & 0xFFFF, label >> 16

@@ -149,6 +149,14 @@ class Sensor:
         z = np.broadcast_to(np.sin(inclination), x.shape)
         return np.stack([x, y, z], axis=-1).reshape(-1, 3)
 
+    def beam_times(self) -> NDArray[np.float64]:
+        """When each beam is sent, float64 (rows · columns,), seconds after the scan begins.
+
+        Columns follow each other from the left to the right, as of a sensor that spins clockwise.
+        """
+        column = np.arange(self.rows * self.columns) % self.columns
+        return column / (self.columns * self.frame_rate)
+
     @property
     def beam_spread(self) -> float:
         """Width that a beam gains with distance, metres per metre."""

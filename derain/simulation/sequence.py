@@ -10,12 +10,16 @@ extrinsics.yaml                  takes points of radar_pcd and ext_radar to the 
 
 Each folder also holds metadata.csv: frame, timestamp (seconds from the start). Without a radar its
 files are missing, and lidar_radar_pcd holds the LiDAR's scans alone.
+
+Of a drive, both folders of scans hold poses.txt: a line a scan, the upper three rows of the motion
+that takes its points to the frame of the first scan, both as the scans begin. The upper 16 bits of
+a label then tell what moves: 1, 2, ... for each moving car or pedestrian, 0 for what stands and for
+rain.
 """
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 import yaml
@@ -30,38 +34,15 @@ from derain.fusion.extrinsics import POSE, Extrinsics
 from derain.fusion.fuse import NO_DETECTIONS, fuse, nearest_in_time
 from derain.scan import Scan, to_float32
 from derain.simulation.campaign import Campaign
-from derain.simulation.facility import lay_out_facility
-from derain.simulation.layout import lay_out_track
+from derain.simulation.classes import parted
 from derain.simulation.radar import Radar, detect, mean_echoes
 from derain.simulation.rain import rain_on_beams
-from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
+from derain.simulation.scene import SimulatedScene
 from derain.simulation.sensor import Sensor
-from derain.simulation.track import Track
-from derain.simulation.weather import Weather, draw_wind
+from derain.sources.records import POSES
 
 # What the folders of a sequence are called.
 FOLDERS = load_card("simulated").layout
-
-LAYOUTS = {"street": lay_out_track, "facility": lay_out_facility}
-
-
-@dataclass(frozen=True)
-class SimulatedScene:
-    """What stays the same throughout a sequence: the track, the rain on it, the weather."""
-
-    track: Track
-    rain: RainField
-    weather: Weather
-
-    @classmethod
-    def of(cls, campaign: Campaign, name: str, generator: np.random.Generator) -> Self:
-        """Draws the scene of a sequence."""
-        nominal, wind = campaign.rain_rate[name], draw_wind(generator)
-        sprinkled = campaign.layout == "facility" and nominal > 0
-        rain = SprinkledRain(nominal, wind) if sprinkled else UniformRain(nominal)
-        at_sensor = float(rain.rate(np.zeros(1), np.zeros(1))[0])
-        track = LAYOUTS[campaign.layout](generator)
-        return cls(track, rain, Weather.of(nominal, at_sensor, wind))
 
 
 def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
@@ -79,24 +60,28 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
     seeds = np.random.SeedSequence(campaign.seed, spawn_key=(int(name),)).spawn(3)
     scene_generator, lidar_generator, radar_generator = map(np.random.default_rng, seeds)
     scene, sensor = SimulatedScene.of(campaign, name, scene_generator), campaign.lidar
-    times = np.arange(campaign.scans) / sensor.frame_rate
+    times = campaign.times
     beside = [NO_DETECTIONS] * len(times)
     mounting = Extrinsics(np.eye(4))
     if campaign.radar is not None:
         mounting = _write_mounting(folder, campaign.radar, sensor)
         beside = _record_radar(folder, scene, campaign.radar, times, radar_generator)
-    beams, clear = sensor.beams(), scene.track.cast(sensor)
-    for stem, frame in zip(_stems(len(times)), beside, strict=True):
+    beams, clear_air = sensor.beams(), scene.cast(sensor, times)
+    for stem, clear, frame in zip(_stems(len(times)), clear_air, beside, strict=True):
         detected = rain_on_beams(clear, beams, scene.rain, sensor, lidar_generator)
         scan = sensor.measure(detected, lidar_generator)
         joined = fuse(scan, frame, mounting)
         assert joined.label is not None  # as both of its parts are labelled
         write_scan(folder / FOLDERS.lidar / f"{stem}.bin", scan)
         write_scan(folder / FOLDERS.scans / f"{stem}.bin", joined)
-        write_labels(folder / FOLDERS.labels / f"{stem}.label", joined.label)
+        write_labels(folder / FOLDERS.labels / f"{stem}.label", *parted(joined.label))
         _write_table(folder / "weather" / f"{stem}.csv", asdict(scene.weather))
     for kind in (FOLDERS.lidar, FOLDERS.scans, FOLDERS.labels, "weather"):
         _write_times(folder / kind, times)
+    if scene.course is not None:
+        poses = [scene.course.pose(time, sensor) for time in times]
+        for kind in (FOLDERS.lidar, FOLDERS.scans):
+            _write_poses(folder / kind, poses)
 
 
 def _write_mounting(folder: Path, radar: Radar, sensor: Sensor) -> Extrinsics:
@@ -158,6 +143,13 @@ def _write_times(folder: Path, times: NDArray[np.float64]) -> None:
     rows = [f"{stem},{time:.6f}" for stem, time in zip(_stems(len(times)), times, strict=True)]
     with replacing(folder / METADATA) as temporary:
         temporary.write_text("\n".join([",".join(FRAME_COLUMNS), *rows]) + "\n", "utf-8")
+
+
+def _write_poses(folder: Path, poses: Sequence[NDArray[np.float64]]) -> None:
+    """Writes poses in KITTI's form, as seen from the first of them."""
+    rows = [(np.linalg.inv(poses[0]) @ pose)[:3].ravel() for pose in poses]
+    with replacing(folder / POSES) as temporary:
+        np.savetxt(temporary, np.round(rows, 9) + 0.0, "%.9f")  # 0.0 takes the sign from -0
 
 
 def _write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:

@@ -1,4 +1,4 @@
-"""A test track as triangles, and what a standing sensor sees of it through clear air."""
+"""A test track as triangles, and what a sensor sees of it through clear air."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -49,20 +49,25 @@ class Track:
             np.concatenate(label),
         )
 
-    def cast(self, sensor: Sensor) -> Returns:
+    def cast(self, sensor: Sensor, pose: NDArray[np.float64] | None = None) -> Returns:
         """What every beam of a sensor would return through clear air to a perfect detector.
 
         A beam is one ray. Surfaces scatter like Lambert's: their apparent reflectivity falls with
         the cosine of the angle of incidence.
 
         Args:
-            sensor: The sensor; it stands at the origin, at its mounting height.
+            sensor: The sensor.
+            pose: Takes points from its frame into the track's, float64 (4, 4), metres, or (N, 4, 4)
+                where every beam has a pose of its own; None stands upright at the origin, at its
+                mounting height.
 
         Raises:
             InputError: Open3D cannot be imported.
         """
-        beams = sensor.beams()
-        origin = np.broadcast_to((0, 0, sensor.mounting_height), beams.shape)
+        beams, place = sensor.beams(), np.array([0, 0, sensor.mounting_height])
+        if pose is not None:
+            beams, place = (pose[..., :3, :3] @ beams[..., None])[..., 0], pose[..., :3, 3]
+        origin = np.broadcast_to(place, beams.shape)
         hits = self._hits(np.concatenate([origin, beams], axis=1).astype(np.float32))
         hit = hits["t_hit"] <= sensor.maximum_range
         triangle = hits["primitive_ids"][hit]

@@ -51,10 +51,10 @@ class FileFrame(Frame):
 
     @property
     def pose(self) -> NDArray[np.float64] | None:
-        """Sensor to world, float64 (4, 4): see :class:`~derain.sources.records.Records`."""
-        if self.sensor_to_world is not None:
+        """Sensor to world, float64 (4, 4), as it was told, or else as its records say."""
+        if self.sensor_to_world is not None or self.records is None:
             return self.sensor_to_world
-        return None if self.records is None else self.records.pose_of(self.path)
+        return self.records.pose_of(self.path)
 
     @property
     def has_labels(self) -> bool:

@@ -25,8 +25,8 @@ class Frame(ABC):
         number: Its place in its sequence, from 0.
         label_path: Where its labels are, or should be; None where none are to be read.
         intensity_scale: What takes its intensities to the unit in which they are to be seen.
-        sensor_to_world: Its pose, where it was told, float64 (4, 4), metres; None leaves it to the
-            records that may lie beside the scan.
+        sensor_to_world: Its pose, float64 (4, 4), metres, where somebody told it; None leaves it to
+            what lies beside the scan.
     """
 
     key: str
@@ -122,14 +122,13 @@ class Frame(ABC):
         """The same frame, whose labels nobody reads."""
         return replace(self, label_path=None)
 
-    def at(self, sensor_to_world: NDArray[np.float64]) -> Self:
-        """The same frame, whose pose is known, whatever a record says.
+    def with_pose(self, pose: NDArray[np.float64]) -> Self:
+        """The same frame at a pose that is told, whatever lies beside the scan.
 
         Args:
-            sensor_to_world: From the sensor's frame to one that stays where it is, float64 (4, 4),
-                metres.
+            pose: Sensor to world, float64 (4, 4), metres.
         """
-        return replace(self, sensor_to_world=sensor_to_world)
+        return replace(self, sensor_to_world=pose)
 
     def with_intensity_times(self, factor: float) -> Self:
         """The same frame, whose intensities are read in another unit.

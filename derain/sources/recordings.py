@@ -41,9 +41,9 @@ def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
     for recording in recordings(frames):
         if len(recording) <= window.before + window.after:
             yield (
-                f"{recording[0].name}: {len(recording)} scans in its recording, each judged with "
-                f"{window.before} before and {window.after} after it: what they would show of it "
-                "stays unknown"
+                f"{recording[0].name}: {_scans(len(recording))} in its recording, each judged "
+                f"with {window.before} before and {window.after} after it: what those would show "
+                "is not known"
             )
         yield from _of_steps(recording)
 
@@ -62,14 +62,14 @@ def _of_steps(recording: Sequence[Frame]) -> Iterator[str]:
     backwards = [frame for frame, step in steps if step is not None and step <= 0]
     if backwards:
         yield (
-            f"{backwards[0].name}: not later than the scan before it, nor are "
-            f"{len(backwards) - 1:,} others: name the scans in the order that they were taken in"
+            f"{backwards[0].name}: not later than the scan before it ({_scans(len(backwards))} in "
+            "all): name them in the order that they were taken in"
         )
     apart = [frame for frame, step in steps if step is not None and step > LONGEST_STEP]
     if apart and times[0] is not None:
         yield (
-            f"{apart[0].name}: more than {LONGEST_STEP:g} s after the scan before it, and so are "
-            f"{len(apart) - 1:,} others: they say little of one another"
+            f"{apart[0].name}: more than {LONGEST_STEP:g} s after the scan before it "
+            f"({_scans(len(apart))} in all): they say little of one another"
         )
 
 
@@ -81,3 +81,7 @@ def _step(before: Frame, after: Frame, first: float | None, second: float | None
     if len(names) == 2 and all(name.isascii() and name.isdigit() for name in names):
         return float(int(names[1]) - int(names[0]))
     return None
+
+
+def _scans(number: int) -> str:
+    return f"{number:,} scan{'' if number == 1 else 's'}"

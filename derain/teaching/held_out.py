@@ -1,9 +1,10 @@
 """Which scans of a recording are held out, to see how well a student agrees with its teacher."""
 
 from collections.abc import Iterator, Sequence
+from itertools import repeat
 
 from derain.sources.frame import Frame
-from derain.teaching.manifest import TaughtPart
+from derain.teaching.manifest import HELD_OUT_PART, TRAINING_PART, TaughtPart
 
 # One scan in so many is held out, and one at least of a recording of so many scans.
 ONE_IN, FEWEST_SCANS = 5, 3
@@ -34,5 +35,4 @@ def _is_later(frame: Frame, other: Frame) -> bool:
 
 def _parts(scans: int) -> list[TaughtPart]:
     held_out = max(scans // ONE_IN, 1) if scans >= FEWEST_SCANS else 0
-    training: list[TaughtPart] = ["train"] * (scans - held_out)
-    return [*training, *(["validation"] * held_out)]
+    return [*repeat(TRAINING_PART, scans - held_out), *repeat(HELD_OUT_PART, held_out)]

@@ -4,6 +4,7 @@ Scans are not copied. Where their paths are relative, they are so to the folder 
 can be moved together.
 """
 
+import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -36,7 +37,9 @@ HIGHEST_NUMBER, LARGEST_SCALE = 10**9, 1e9
 
 # What a scan is for: every sequence ends with scans that are held out.
 TaughtPart = Literal["train", "validation"]
-TAUGHT_PARTS: tuple[TaughtPart, ...] = ("train", "validation")
+TRAINING_PART: TaughtPart = "train"
+HELD_OUT_PART: TaughtPart = "validation"
+TAUGHT_PARTS = (TRAINING_PART, HELD_OUT_PART)
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,8 @@ class Manifest:
         content = {
             "made_by": TEACHING,
             "derain": __version__,
-            "teacher": dict(self.teacher),
+            # Values of their own, for what stands twice would be written once, and be no value.
+            "teacher": json.loads(json.dumps(dict(self.teacher))),
             "columns": list(self.columns),
             "intensity_scale": self.intensity_scale,
             "finished": self.finished,

@@ -49,8 +49,9 @@ def teach(
 ) -> Manifest:
     """Labels recordings: 0 is not rain, 1 rain, 255 not known.
 
-    Labels of the scans are never read. Until every scan is judged, what the folder held before
-    stays as it was.
+    Labels of the scans are never read. A scan of which nothing is known teaches nothing, and agrees
+    with whatever is said of it: it is left out. Until every scan is judged, what the folder held
+    before stays as it was.
 
     Args:
         method: The teacher.
@@ -71,7 +72,6 @@ def teach(
     """
     refuse_to_overwrite(out, source)
     frames: list[FileFrame] = []
-    knows = False
     with _unfinished(out) as folder:
         unlabelled = source.map(Frame.without_labels)
         shown = tqdm(unlabelled, desc="teaching", unit="scan", disable=None)
@@ -79,11 +79,11 @@ def teach(
             frame, judgement, _ = answer
             assert isinstance(frame, FileFrame)  # refused above
             labels = labels_of(judgement)
-            write_labels(label_path(folder, frame.key), labels)
-            frames.append(frame)
-            knows = knows or bool((labels != TAUGHT_UNKNOWN).any())
             watch(answer, labels)
-        if not knows:
+            if (labels != TAUGHT_UNKNOWN).any():
+                write_labels(label_path(folder, frame.key), labels)
+                frames.append(frame)
+        if not frames:
             raise InputError(
                 out,
                 "nothing is written, for of no point it is known whether it is rain",
@@ -105,6 +105,10 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
             raise InputError(
                 frame.name, "is in no file, where it could be found again", "Write it to one."
             )
+        if not _is_text(frame.path):
+            raise InputError(
+                frame.name, "its name is no text, which a list of scans could hold", "Rename it."
+            )
     # Neither where labels of the scans lie, nor where they would be looked for.
     for sink in (FolderSink(out / LABELS, again=False), LabelSink(out / LABELS, again=False)):
         sink.refuse_clashes(source)
@@ -115,6 +119,15 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
             raise InputError(
                 out / name, "is there already, and no teacher's", "Give --out another folder."
             )
+
+
+def _is_text(path: Path) -> bool:
+    """Whether a path can be written in UTF-8: names of files may be any bytes."""
+    try:
+        os.path.realpath(path).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _manifest_of(method: Method, frames: Sequence[FileFrame]) -> Manifest:

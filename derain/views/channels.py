@@ -1,7 +1,9 @@
 """Input channels: the values of a point that a network sees, by name.
 
-A channel is ``x``, ``y``, ``z``, ``range``, ``intensity``, ``radar``, or any other column of the
-scan's file, such as ``doppler`` or ``rcs``.
+A channel is ``x``, ``y``, ``z``, ``range``, ``intensity``, ``radar``, any other column of the
+scan's file, such as ``doppler`` or ``rcs``, or ``dual_return``, which is made of the scan: 1 at the
+nearer of two returns of a ray, -1 at the farther, 0 at the only one. Drops are rarest at -1, and
+most frequent at 1.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,6 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import Scan
+from derain.views.returns import pair_returns
+
+# The channel of the place of a return in its ray.
+DUAL_RETURN = "dual_return"
 
 # What networks see unless they are told otherwise. All other channels are extra: a scan need not
 # have them, and a data card has their statistics only where a network has asked for them.
@@ -24,6 +30,7 @@ UNITS = {
     "doppler": "m/s",
     "rcs": "dBsm",
     "radar": "0 or 1",
+    DUAL_RETURN: "-1, 0 or 1",
 }
 
 
@@ -32,9 +39,31 @@ def extra_channels(channels: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in channels if name not in USUAL_CHANNELS)
 
 
+def channel_of(scan: Scan, name: str) -> NDArray[np.float32] | None:
+    """One value per point, by name.
+
+    Args:
+        scan: The scan.
+        name: As :meth:`Scan.channel` knows it, or ``dual_return``.
+
+    Returns:
+        float32 (N,), in the channel's own unit; NaN where a value is missing. None where the scan
+        has no such channel: no ``dual_return`` where nothing shows that any ray has two returns,
+        for a sensor that tells one is another than one that has seen none behind it.
+    """
+    column = scan.channel(name)
+    if column is not None or name != DUAL_RETURN:
+        return column
+    returns = pair_returns(scan)
+    if not returns.dual:
+        return None
+    # In the middle of three, the ray went through as well.
+    return np.where(returns.nearer, 1, np.where(returns.farther, -1, 0)).astype(np.float32)
+
+
 def with_columns(scan: Scan, channels: Sequence[str]) -> Scan:
     """The same scan with nothing in `fields` but some channels, float32, where it has them."""
-    columns = {name: scan.channel(name) for name in channels}
+    columns = {name: channel_of(scan, name) for name in channels}
     present = {name: column for name, column in columns.items() if column is not None}
     return replace(scan, fields=present)
 
@@ -54,7 +83,7 @@ def channel_values(
     """
     values = np.full((len(channels), len(rows)), np.nan, np.float32)
     for of_channel, name in zip(values, channels, strict=True):
-        column = scan.channel(name)
+        column = channel_of(scan, name)
         if column is not None:
             of_channel[:] = column[rows]
     return values
@@ -79,7 +108,7 @@ def filled_values(
     """
     of_all = np.empty((len(scan), len(channels)), np.float32)
     for number, name in enumerate(channels):
-        column = scan.channel(name)
+        column = channel_of(scan, name)
         of_all[:, number] = np.nan if column is None else column
     # All of a point at once: four times faster than channel by channel.
     values = of_all.take(rows, axis=0)
@@ -107,7 +136,7 @@ def channel_image(
     """
     image = np.empty((len(channels), len(winner)), np.float32)
     for of_channel, name in zip(image, channels, strict=True):
-        column = scan.channel(name)
+        column = channel_of(scan, name)
         if column is None:
             column = np.full(len(scan), np.nan, np.float32)
         # The last value is what row -1 has, so that no pass over the empty pixels is needed.

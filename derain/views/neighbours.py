@@ -138,7 +138,7 @@ class NeighbourView(View):
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
-        channels: What the network sees of a point, in order, as :meth:`Scan.channel` names it.
+        channels: What the network sees of a point, in order, as :func:`channel_of` names it.
         stand_in: What stands in for a value that a scan lacks, by channel; 0 if not named.
         threads: Threads of the search; 0 takes every core this process may use.
         candidates: Which points are scored; None for all.

@@ -142,7 +142,7 @@ class RangeView(View):
 
     Args:
         grid: Rows and columns of the image.
-        channels: What a pixel holds, in order, as :meth:`Scan.channel` names it.
+        channels: What a pixel holds, in order, as :func:`channel_of` names it.
         way_back: Name of the back-projection, by which points that lost their pixel get a score:
             ``nearest range``, ``copy`` or ``vote``. It is called so in options and in Specs, which
             users type and files hold.

@@ -104,7 +104,7 @@ class View(ABC):
 
         Args:
             entry: What stands under ``view`` in a Spec.
-            channels: What the network sees of a point, in order, as :meth:`Scan.channel` names it.
+            channels: What the network sees of a point, in order, as :func:`channel_of` names it.
             stand_in: What stands in for a value that a scan lacks, by channel.
             threads: Threads that it may use; 0 takes every core this process may use.
 

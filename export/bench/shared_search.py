@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from derain.evaluation.scores import ScoredMethod
 from derain.export.bench.contestant import Contestant, TimedMethod
 from derain.filters import PointFilter
-from derain.filters.derainer import filter_view, rain_among
+from derain.filters.filter_view import filter_view, rain_among
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates

@@ -1,7 +1,8 @@
-"""LiSnowNet-L1: learns without a label what a range image would be without snow or rain.
+"""LiSnowNet: learns without a label what a range image would be without snow or rain.
 
 Rain is where the image changes: a network trained to make images sparse, and to change them as
-little as that takes, takes out what is small and bright against nothing.
+little as that takes, takes out what is small and bright against nothing. LiSnowNet-L1 counts a
+change by its size, LiSnowNet-L2 by its square.
 
 Source: M.-Y. Yu, R. Vasudevan, M. Johnson-Roberson, "LiSnowNet: Real-time Snow Removal for LiDAR
 Point Clouds", IROS 2022.
@@ -15,7 +16,7 @@ import numpy as np
 import torch
 from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import Tensor
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
@@ -23,11 +24,18 @@ from derain.files.documents import Entry
 from derain.learning.batch import Batch
 from derain.learning.task import EXAMPLE_SCANS
 from derain.models.base import DerainingModule
+from derain.models.lisnownet.deployed import (
+    DeployedLiSnowNet,
+    change,
+    cube_roots,
+    possible,
+    select,
+)
 from derain.models.lisnownet.network import LiSnowNetwork
 from derain.models.lisnownet.selection_rule import SelectionRule
-from derain.models.lisnownet.sparsity import sparsity_loss
+from derain.models.lisnownet.sparsity import RESIDUALS, sparsity_loss
 from derain.models.published import Published
-from derain.models.range_module import FITTED, per_pixel, range_view, stated
+from derain.models.range_module import FITTED, range_view, stated
 from derain.models.registry import NETWORKS
 from derain.scan import Scan
 from derain.views.range_image import RangeView
@@ -35,81 +43,10 @@ from derain.views.view import View
 
 __all__ = ["DeployedLiSnowNet", "LiSnowNet", "LiSnowNetwork"]
 
-# How surely a residual of twice the rule's threshold is rain: its logit.
-STEEPNESS = 4.0
-
-# Logit of what the rule decides whatever the residual is.
-CERTAIN = 20.0
-
-
-class DeployedLiSnowNet(nn.Module):
-    """The network with its selection rule: from a raw range image to logits of its pixels.
-
-    Args:
-        network: A trained network.
-        rule: What it calls rain.
-    """
-
-    def __init__(self, network: LiSnowNetwork, rule: SelectionRule) -> None:
-        super().__init__()
-        self.network = network
-        self.rule = rule
-
-    def forward(self, image: Tensor, valid: Tensor) -> Tensor:
-        """Scores every pixel; arguments and result as for :class:`LiSnowNet`."""
-        seen = cube_roots(image, self.rule)
-        return select(image, valid, seen, self.network(seen, valid), self.rule)
-
-
-def cube_roots(image: Tensor, rule: SelectionRule) -> Tensor:
-    """What the network sees: cube roots of range and of intensity, in 0..1, float (B, 2, H, W).
-
-    Args:
-        image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
-        rule: Its full scale of intensity.
-    """
-    share = (image[:, 2:] / rule.full_scale).clamp(0, 1)
-    return torch.cat([image[:, :1], share], dim=1) ** (1 / 3)
-
-
-def select(
-    image: Tensor, valid: Tensor, seen: Tensor, denoised: Tensor, rule: SelectionRule
-) -> Tensor:
-    """Logits of "not rain" and "rain" of every pixel, float (B · H · W, 2), row by row.
-
-    The published rule says yes or no. Here its answer is that of a probability of one half, which
-    the residual moves. A pixel without a return is not rain.
-
-    Args:
-        image: Range (m), z (m) and intensity (the data's unit), float (B, 3, H, W).
-        valid: Pixels with a return, bool (B, 1, H, W).
-        seen: What the network saw, float (B, 2, H, W).
-        denoised: What it made of that, float (B, 2, H, W).
-        rule: The rule.
-    """
-    excess = change(seen, denoised) / rule.residual - 1
-    margin = (STEEPNESS * excess).clamp(-CERTAIN, CERTAIN)
-    margin = torch.where(possible(image, rule), margin, -CERTAIN)
-    margin = torch.where(image[:, :1] < rule.near, CERTAIN, margin)
-    margin = torch.where(valid, margin, -CERTAIN)
-    return per_pixel(torch.cat([-margin, margin], dim=1) / 2)
-
-
-def change(seen: Tensor, denoised: Tensor) -> Tensor:
-    """What denoising changed: of range, times that of intensity cubed, float (B, 1, H, W)."""
-    of_range, of_intensity = (denoised - seen).split(1, dim=1)
-    return of_range * of_intensity**3
-
-
-def possible(image: Tensor, rule: SelectionRule) -> Tensor:
-    """Which pixels may be rain by their height and intensity, bool (B, 1, H, W)."""
-    _, height, intensity = image.split(1, dim=1)
-    return (height > rule.ground) & (intensity < rule.intensity * rule.full_scale)
-
 
 @NETWORKS.add("lisnownet")
 class LiSnowNet(DerainingModule, Published):
-    """Trains LiSnowNet-L1 on scans without reading a label; the recipe is the published one.
+    """Trains LiSnowNet on scans without reading a label; the recipe is the published one.
 
     Example:
         >>> model = LiSnowNet(grid="rehearse3d", rule={"residual": 0.01})
@@ -125,6 +62,7 @@ class LiSnowNet(DerainingModule, Published):
         dropout: Share of feature maps dropped in training.
         alpha: How much sparsity counts against the residual: it weighs 1 - 2^-alpha.
         beta: Share of the wavelet part in sparsity.
+        norm: Norm of the residual: ``l1`` as published, or ``l2``.
         learning_rate: Of Adam.
         decay: Factor by which the learning rate falls per epoch.
         rule: Constants of the :class:`SelectionRule` that are stated, by name. Of the others,
@@ -134,7 +72,7 @@ class LiSnowNet(DerainingModule, Published):
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 
     Raises:
-        InputError: Weights of the loss, or constants of the rule, that cannot be meant.
+        InputError: Weights or a norm of the loss, or constants of the rule, that cannot be meant.
     """
 
     VIEW: ClassVar[type[View]] = RangeView
@@ -152,6 +90,7 @@ class LiSnowNet(DerainingModule, Published):
         dropout: float = 0.5,
         alpha: float = 5.5,
         beta: float = 0.5,
+        norm: str = "l1",
         learning_rate: float = 1e-3,
         decay: float = 0.95,
         rule: dict[str, float] = {},
@@ -165,6 +104,8 @@ class LiSnowNet(DerainingModule, Published):
                 f"alpha {alpha:g} and beta {beta:g} weigh no loss",
                 "Give an alpha of at least 0 and a beta from 0 to 1.",
             )
+        if norm not in RESIDUALS:
+            raise InputError(self.NAME, f"no such norm: '{norm}'", "Known are l1 and l2.")
         self.save_hyperparameters()
         self.network = LiSnowNetwork(width=width, dropout=dropout)
         self.selection = SelectionRule.fitted(rule, [])
@@ -230,7 +171,9 @@ class LiSnowNet(DerainingModule, Published):
         image, valid = batch.inputs["image"], batch.inputs["valid"]
         seen = cube_roots(image, self.selection)
         denoised = self._denoise(image, valid, seen)
-        loss = sparsity_loss(denoised, seen, valid, self.hparams["alpha"], self.hparams["beta"])
+        loss = sparsity_loss(
+            denoised, seen, valid, *(self.hparams[name] for name in ("alpha", "beta", "norm"))
+        )
         return {
             "loss": loss.total,
             "wavelet": loss.wavelet,

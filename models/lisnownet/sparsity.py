@@ -8,6 +8,7 @@ Source: M.-Y. Yu, R. Vasudevan, M. Johnson-Roberson, "LiSnowNet: Real-time Snow 
 Point Clouds", IROS 2022.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
@@ -15,6 +16,9 @@ from torch import Tensor
 
 from derain.learning.losses import at_least_float32
 from derain.models.lisnownet.haar import haar
+
+# What the residual takes the mean of, by the name of its norm: each change's size, or its square.
+RESIDUALS: dict[str, Callable[[Tensor], Tensor]] = {"l1": torch.abs, "l2": torch.square}
 
 
 class SparsityLoss(NamedTuple):
@@ -27,7 +31,7 @@ class SparsityLoss(NamedTuple):
 
 
 def sparsity_loss(
-    denoised: Tensor, image: Tensor, valid: Tensor, alpha: float, beta: float
+    denoised: Tensor, image: Tensor, valid: Tensor, alpha: float, beta: float, norm: str = "l1"
 ) -> SparsityLoss:
     """How far denoised images are from sparse ones, and from the images they were made of.
 
@@ -39,12 +43,13 @@ def sparsity_loss(
         valid: Which pixels hold a return, bool (B, 1, H, W).
         alpha: How much sparsity counts against the residual, at least 0.
         beta: Share of the wavelet part in sparsity, 0 to 1.
+        norm: Norm of the residual, one of ``RESIDUALS``.
     """
     with torch.autocast(denoised.device.type, enabled=False):
         denoised, image = at_least_float32(denoised), at_least_float32(image)
         folded = fold_checkerboard(denoised - denoised.mean(dim=-1, keepdim=True))
         wavelet, fourier = wavelet_sparsity(folded), fourier_sparsity(folded)
-        residual = absolute_residual(denoised, image, valid)
+        residual = mean_residual(denoised, image, valid, norm)
         weight = 1 - 2**-alpha
         sparsity = beta * wavelet + (1 - beta) * fourier
         return SparsityLoss(weight * sparsity + (1 - weight) * residual, wavelet, fourier, residual)
@@ -104,15 +109,16 @@ def fourier_sparsity(image: Tensor) -> Tensor:
     return torch.view_as_real(spectrum).abs().log1p().mean()
 
 
-def absolute_residual(denoised: Tensor, image: Tensor, valid: Tensor) -> Tensor:
-    """Mean |denoised - image| over all channels of all pixels with a return.
+def mean_residual(denoised: Tensor, image: Tensor, valid: Tensor, norm: str = "l1") -> Tensor:
+    """Mean |denoised - image|, or its square, over all channels of all pixels with a return.
 
     Args:
         denoised: float (B, C, H, W).
         image: float (B, C, H, W).
         valid: bool (B, 1, H, W). Where no pixel is valid, the residual is 0.
+        norm: One of ``RESIDUALS``.
     """
-    residual = torch.where(valid, denoised - image, 0).abs()
+    residual = RESIDUALS[norm](torch.where(valid, denoised - image, 0))
     return residual.sum() / valid.expand_as(residual).sum().clamp(min=1)
 
 

@@ -20,6 +20,8 @@ from derain.scan import Scan
 from derain.views.grid_fit import fit_grid
 from derain.views.spherical_grid import grid_of
 
+from ..two_returns import Recording
+
 
 @pytest.fixture
 def scan(tmp_path: Path) -> Path:
@@ -80,6 +82,7 @@ def test_a_scan_is_described_by_its_valid_points(run_derain, scan: Path) -> None
         "azimuth / deg": {"min": 0.0, "median": 90.0, "max": 180.0},
         "inclination / deg": {"min": 0.0, "median": 0.0, "max": 53.1301},
         "intensity": {"min": 0.0, "median": 15.0, "max": 30.0},
+        "returns": "one of each ray",
     }
 
 
@@ -185,6 +188,53 @@ def test_a_model_on_range_images_says_its_grid_and_rule(
         assert f"network: {image_model.NAME}" in text
         assert "kind: range" in text
         assert "way_back: nearest range" in text
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
+    """A labelled scan of a sensor of two returns: the nearer of two is snow on every other ray."""
+    recording = Recording(0)
+    _, nearer, _ = recording.truth()
+    snow = nearer & (recording.ray % 2 == 0)
+    write_scan(tmp_path / "dual.npz", Scan.of(recording.xyz))
+    write_labels(tmp_path / "dual.label", np.where(snow, 110, 0))
+    return recording
+
+
+def test_rays_of_two_returns_are_counted(run_derain, tmp_path: Path, recording: Recording) -> None:
+    _, nearer, _ = recording.truth()
+    rays, dual = len(np.unique(recording.ray)), int(nearer.sum())
+    expected = {
+        "told by": "directions",
+        "rays": rays,
+        "with two returns": dual,
+        "share": round(dual / rays, 4),
+    }
+    facts = strict_json(run_derain("info", tmp_path / "dual.npz", "--json").out)
+    assert facts["returns"] == expected
+
+
+def test_what_a_second_return_gives_back_is_told_where_labels_and_card_say_what_rain_is(
+    run_derain, tmp_path: Path, recording: Recording
+) -> None:
+    _, nearer, _ = recording.truth()
+    met = int((nearer & (recording.ray % 2 == 0)).sum())
+    arguments = ["info", tmp_path / "dual.npz", "--card", "wads", "--json"]
+    found = strict_json(run_derain(*arguments).out)["returns"]
+    assert isinstance(found, dict)
+    assert found["that met rain first"] == found["with something else behind"] == met > 0
+    assert found["share given back"] == 1
+    (tmp_path / "dual.label").unlink()
+    assert "share given back" not in strict_json(run_derain(*arguments).out)["returns"]
+
+
+def test_labels_of_another_scan_are_refused(
+    run_derain, tmp_path: Path, recording: Recording
+) -> None:
+    write_labels(tmp_path / "dual.label", np.zeros(3, np.int64))
+    outcome = run_derain("info", tmp_path / "dual.npz", "--card", "wads")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "holds 3 labels of 4 bytes for a scan of" in outcome.err
 
 
 def test_a_scan_without_a_valid_point_has_no_grid(run_derain, tmp_path: Path) -> None:

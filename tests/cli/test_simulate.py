@@ -80,6 +80,47 @@ def test_streets_are_other_places_than_facilities(run_derain, tmp_path: Path) ->
     assert lowest[1] < lowest[0]
 
 
+def test_a_drive_goes_along_a_street_without_a_radar(run_derain, tmp_path: Path) -> None:
+    options = [*QUICK, "--layout", "street", "--speed", "13", "--traffic", "2"]
+    assert run_derain("simulate", "--out", tmp_path / "drive", *options).code == 0
+    campaign = json.loads((tmp_path / "drive/manifest.json").read_text())["campaign"]
+    assert campaign["drive"] == {"speed": 13, "traffic": 2, "skew": False}
+    assert campaign["radar"] is None
+    assert (tmp_path / "drive/sequences/000/lidar_radar_pcd/poses.txt").is_file()
+    facts = json.loads(run_derain("info", tmp_path / "drive", "--json").out)
+    assert facts["scans"] == 3
+    assert facts["class_share"]["car"] > 0.01
+
+
+def test_a_speed_of_0_and_no_traffic_is_what_it_is_without_them(run_derain, tmp_path: Path) -> None:
+    options = [*QUICK, "--no-radar", "--layout", "street", "--sequences", "1"]
+    run_derain("simulate", "--out", tmp_path / "plain", *options)
+    run_derain("simulate", "--out", tmp_path / "zero", *options, "--speed", "0", "--traffic", "0")
+    for file in (file for file in (tmp_path / "plain").rglob("*") if file.is_file()):
+        same = tmp_path / "zero" / file.relative_to(tmp_path / "plain")
+        assert file.read_bytes() == same.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--speed", "13"), "drive: a facility has none. Take the layout street."),
+        (("--speed", "-3", "--layout", "street"), "speed: -3.0 m/s is impossible"),
+        (("--traffic", "-3", "--layout", "street"), "traffic: -3 is impossible"),
+        (("--speed", "13", "--layout", "street", "--radar"), "drive: has no radar"),
+        (("--skew", "--layout", "street"), "skew: there is none where nothing moves"),
+        (("--speed", "13", "--on", "."), "--speed: has a meaning only without --on"),
+    ],
+)
+def test_an_impossible_drive_is_refused_before_anything_is_written(
+    run_derain, tmp_path: Path, options: tuple[str, ...], message: str
+) -> None:
+    outcome = run_derain("simulate", "--out", tmp_path / "drive", *options)
+    assert outcome.code == 2
+    assert outcome.err.startswith(f"derain: {message}")
+    assert not (tmp_path / "drive").exists()
+
+
 def test_one_sequence_is_enough_to_look_at_but_not_to_train(run_derain, tmp_path: Path) -> None:
     root = tmp_path / "one"
     assert run_derain("simulate", "--out", root, *QUICK, "--sequences", "1").code == 0

@@ -8,6 +8,7 @@ import pytest
 
 from derain.errors import InputError
 from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, partition
+from derain.simulation.drive import Drive
 from derain.simulation.radar import Radar
 from derain.simulation.sensor import Sensor, load_sensor
 
@@ -30,11 +31,32 @@ def test_a_sensor_is_given_by_its_name_or_as_it_is() -> None:
 def test_the_description_tells_campaigns_apart_and_is_json() -> None:
     plain = Campaign().description
     assert json.loads(json.dumps(plain)) == plain
-    changes = [{"seed": 1}, {"sensor": "mems_256"}, {"layout": "facility"}, {"radar": Radar()}]
+    changes = [
+        {"seed": 1},
+        {"sensor": "mems_256"},
+        {"layout": "facility"},
+        {"radar": Radar()},
+        {"drive": Drive()},
+    ]
     for change in changes:
         assert replace(Campaign(), **change).description != plain
     # A sensor file may change under its name: what it said counts.
     assert replace(Campaign(), sensor="mems_64").description == plain
+
+
+def test_one_that_has_no_drive_is_described_as_before_there_were_drives() -> None:
+    assert set(Campaign().description["campaign"]) == {
+        *("train", "validation", "test", "scans", "rain_rates", "seed", "sensor", "layout"),
+        "radar",
+    }
+    drive = Campaign(drive=Drive(13, 4)).description["campaign"]["drive"]
+    assert drive == {"speed": 13, "traffic": 4, "skew": False}
+
+
+def test_scans_are_taken_at_the_frame_rate_of_the_sensor() -> None:
+    assert Campaign(scans=4, sensor=Sensor(frame_rate=20)).times == pytest.approx(
+        [0, 0.05, 0.1, 0.15]
+    )
 
 
 @pytest.mark.parametrize("sequences", [3, 4, 5, 10, 25, 143])
@@ -62,6 +84,9 @@ def test_two_of_five_sequences_are_clean() -> None:
         ({"seed": -1}, "seed: -1 is negative"),
         ({"rain_rates": ()}, "rain rate: none is given"),
         ({"rain_rates": (-5.0,)}, "rain rate: -5.0 mm/h is no rain rate"),
+        ({"drive": Drive(13), "layout": "facility"}, "drive: a facility has none"),
+        ({"drive": Drive(13), "radar": Radar()}, "drive: has no radar"),
+        ({"drive": Drive(13), "scans": 2000}, "drive: 200 s at 13 m/s are 2,599 m of street"),
         ({"rain_rates": (float("nan"),)}, "rain rate: nan mm/h is no rain rate"),
     ],
 )

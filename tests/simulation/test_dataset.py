@@ -24,6 +24,7 @@ from derain.simulation import dataset, sequence
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
 from derain.simulation.dataset import ensure_track, simulate_track
+from derain.simulation.drive import Drive
 from derain.simulation.manifest import read_manifest
 from derain.simulation.sensor import Sensor
 
@@ -286,6 +287,20 @@ def test_a_file_is_no_folder_to_write_to(tmp_path: Path) -> None:
     (tmp_path / "track").write_text("")
     with pytest.raises(InputError, match="track: is not a folder"):
         simulate_track(tmp_path / "track", TINY)
+
+
+def test_a_drive_is_the_same_from_two_workers_and_when_it_is_taken_up_again(
+    open3d: ModuleType, tmp_path: Path
+) -> None:
+    campaign = replace(TINY, train=1, test=0, drive=Drive(speed=13, traffic=3))
+    simulate_track(tmp_path / "whole", campaign)
+    simulate_track(tmp_path / "again", campaign, workers=2)
+    assert checksums(tmp_path / "again") == checksums(tmp_path / "whole")
+    shutil.rmtree(tmp_path / "again/sequences/001")
+    simulate_track(tmp_path / "again", campaign)
+    assert checksums(tmp_path / "again") == checksums(tmp_path / "whole")
+    with pytest.raises(InputError, match="other parameters"):
+        simulate_track(tmp_path / "again", replace(campaign, drive=Drive(speed=12)))
 
 
 def test_a_folder_with_other_things_is_left_alone(tmp_path: Path) -> None:

@@ -110,8 +110,14 @@ def test_packaged_sensors_have_the_beams_of_their_names() -> None:
         "mems_64": 64 * 400,
         "spinning_128": 128 * 2048,
         "spinning_64": 64 * 2048,
+        "spinning_64_far": 64 * 2048,
     }
     assert load_sensor("mems_64") == Sensor()
+
+
+def test_the_sensor_that_sees_far_drops_is_otherwise_its_namesake() -> None:
+    changes = {"minimum_range": 2.5, "detection_threshold": 2e-7}
+    assert load_sensor("spinning_64_far") == replace(load_sensor("spinning_64"), **changes)
 
 
 def test_every_packaged_sensor_is_written_out_in_full_and_survives_json() -> None:

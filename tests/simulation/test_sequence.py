@@ -10,12 +10,14 @@ import pytest
 from numpy.typing import NDArray
 
 from derain.files import read_scan
-from derain.files.labels import read_labels
+from derain.files.labels import instance, read_labels, semantic
 from derain.fusion.extrinsics import read_extrinsics
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
+from derain.simulation.drive import Drive
 from derain.simulation.radar import Radar
 from derain.simulation.sequence import write_sequence
+from derain.sources.folders import named_frames
 
 FACILITY = {"scans": 3, "sensor": "mems_64", "layout": "facility", "rain_rates": (25.0,)}
 OF_LIDAR = {"innoviz", "lidar_radar_pcd", "lidar_radar_labels", "weather"}
@@ -129,3 +131,85 @@ def test_the_weather_is_that_of_the_campaign(folder: Path) -> None:
 def test_clear_air_is_recorded_as_such(open3d: ModuleType, tmp_path: Path) -> None:
     weather = table(written(tmp_path / "000", rain_rates=(0.0,)) / "weather/000000.csv")
     assert (weather["rain_rate_mm_h"], weather["visibility_m"]) == (["0"], ["inf"])
+
+
+DRIVE = {"layout": "street", "rain_rates": (100.0,), "drive": Drive(speed=13, traffic=5)}
+
+
+@pytest.fixture(scope="module")
+def drive(open3d: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written(tmp_path_factory.mktemp("drive") / "000", **DRIVE)
+
+
+def test_poses_and_times_of_a_drive_are_found_beside_its_scans(drive: Path) -> None:
+    for kind in ("innoviz", "lidar_radar_pcd"):
+        frames = list(named_frames([drive / kind]))
+        assert [frame.time for frame in frames] == pytest.approx([0, 0.1, 0.2])
+        poses = [frame.pose for frame in frames]
+        assert np.allclose(poses[0], np.eye(4), atol=1e-12)
+        for pose, travelled in zip(poses, (0, 1.3, 2.6), strict=True):
+            assert pose is not None
+            assert np.linalg.norm(pose[:3, 3]) == pytest.approx(travelled, abs=0.1)
+
+
+def test_the_poses_take_the_road_and_the_walls_of_every_scan_to_the_same_place(
+    drive: Path,
+) -> None:
+    road = []
+    for frame in named_frames([drive / "innoviz"]):
+        scan, pose = frame.read(), frame.pose
+        label = read_labels(drive / f"lidar_radar_labels/{frame.number:06d}.label", len(scan))
+        assert pose is not None
+        world = scan.xyz @ pose[:3, :3].T + pose[:3, 3]
+        # The road and what is no higher than it: a plane, and within 20 m the beams meet it well.
+        on_road = (semantic(label) == TrackClass.ROAD) & (scan.range < 20)
+        road.append(world[on_road])
+    middle = road[0].mean(axis=0)
+    normal = np.linalg.svd(road[0] - middle, full_matrices=False)[2][2]
+    for of_scan in road:
+        off = (of_scan - middle) @ normal
+        assert len(off) > 500
+        assert abs(off.mean()) < 0.003
+        assert off.std() < 0.01
+
+
+def test_labels_number_what_moves_and_what_stands_not(drive: Path) -> None:
+    seen: set[int] = set()
+    for file in sorted((drive / "lidar_radar_labels").glob("*.label")):
+        raw = np.fromfile(file, "<u4")
+        moving = instance(raw) > 0
+        assert set(semantic(raw)) <= set(TrackClass)
+        assert set(semantic(raw)[moving]) <= {TrackClass.CAR, TrackClass.PEDESTRIAN}
+        assert (semantic(raw) == TrackClass.RAIN).sum() > 50
+        seen |= set(instance(raw)[moving])
+    assert len(seen) >= 2
+    assert seen <= set(range(1, 6))
+
+
+def test_whoever_stands_among_traffic_has_poses_that_say_so(
+    open3d: ModuleType, tmp_path: Path
+) -> None:
+    folder = written(tmp_path / "000", **{**DRIVE, "drive": Drive(traffic=5)})
+    for frame in named_frames([folder / "innoviz"]):
+        assert np.allclose(frame.pose, np.eye(4), atol=1e-12)
+
+
+def test_no_drop_stays_from_scan_to_scan(open3d: ModuleType, tmp_path: Path) -> None:
+    folder = written(tmp_path / "000", **{**DRIVE, "drive": Drive(traffic=1)})
+    drops = []
+    for number in range(2):
+        raw = np.fromfile(folder / f"lidar_radar_labels/{number:06d}.label", "<u4")
+        scan = points(folder / f"lidar_radar_pcd/{number:06d}.bin")
+        drops.append(scan[semantic(raw) == TrackClass.RAIN, :3])
+    apart = np.linalg.norm(drops[0][::20, None] - drops[1], axis=2).min(axis=1)
+    assert (apart < 0.05).mean() < 0.05
+
+
+def test_a_drive_is_written_the_same_again(drive: Path, open3d: ModuleType, tmp_path: Path) -> None:
+    again = written(tmp_path / "000", **DRIVE)
+    for file in (file for file in drive.rglob("*") if file.is_file()):
+        assert file.read_bytes() == (again / file.relative_to(drive)).read_bytes()
+
+
+def test_one_that_stands_where_nothing_moves_has_no_poses(without_radar: Path) -> None:
+    assert not list(without_radar.rglob("poses.txt"))

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.errors import InputError
-from derain.sources.records import Records, read_poses
+from derain.sources.records import Records
+from derain.sources.trajectory import read_trajectory
 
 
 def motion(degrees: float, x: float, y: float, z: float) -> np.ndarray:
@@ -96,6 +97,33 @@ def test_poses_of_a_camera_are_told_as_those_of_the_lidar(sequence: Path) -> Non
     np.testing.assert_allclose(ahead[:3], [5, 1, 0], atol=1e-9)
 
 
+def test_poses_by_time_go_to_the_scans_by_their_times(sequence: Path) -> None:
+    (sequence / "times.txt").write_text("10.0\n10.1\n10.2\n")
+    (sequence / "poses.txt").write_text("9.9 0 0 0 0 0 0 1\n10.3 4 0 0 0 0 0 1\n")
+    found = records(sequence)
+    ahead = [found.pose_of(scan(sequence, number))[0, 3] for number in range(3)]
+    np.testing.assert_allclose(ahead, (1, 2, 3))
+
+
+@pytest.mark.parametrize("times", [None, "1700000000\n1700000001\n1700000002\n"])
+def test_poses_by_a_time_that_the_scans_do_not_know_go_line_by_line(
+    sequence: Path, times: str | None
+) -> None:
+    if times is not None:
+        (sequence / "times.txt").write_text(times)
+    lines = [f"{number} {number} 0 0 0 0 0 1" for number in range(3)]
+    (sequence / "poses.txt").write_text("\n".join(lines))
+    found = records(sequence)
+    assert [found.pose_of(scan(sequence, number))[0, 3] for number in range(3)] == [0, 1, 2]
+
+
+def test_a_scan_taken_before_the_first_pose_is_named(sequence: Path) -> None:
+    (sequence / "times.txt").write_text("9.0\n10.1\n10.2\n")
+    (sequence / "poses.txt").write_text("10 0 0 0 0 0 0 1\n10.3 4 0 0 0 0 0 1\n")
+    with pytest.raises(InputError, match=r"no pose for 000000\.bin, which was taken at 9\.000 s"):
+        records(sequence).pose_of(scan(sequence, 0))
+
+
 @given(
     degrees=st.floats(-180, 180),
     shift=st.tuples(*3 * [st.floats(-1000, 1000)]),
@@ -114,7 +142,9 @@ def test_a_standing_point_stays_where_it_is(
     (folder / "calib.txt").write_text(f"Tr:{line(to_camera)}")
     world = np.array([3.0, -4.0, 5.0, 1.0])
     seen = np.linalg.inv(pose) @ world  # by the sensor, from its pose
-    np.testing.assert_allclose(read_poses(folder / "poses.txt")[0] @ seen, world, atol=1e-6)
+    np.testing.assert_allclose(
+        read_trajectory(folder / "poses.txt").poses[0] @ seen, world, atol=1e-6
+    )
 
 
 def test_of_a_partial_copy_each_scan_keeps_its_line(sequence: Path) -> None:
@@ -182,6 +212,12 @@ def test_one_damaged_record_does_not_touch_the_other(sequence: Path) -> None:
     (sequence / "times.txt").write_text("1\n2\n3\n")
     (sequence / "poses.txt").write_text("damaged")
     assert records(sequence).time_of(scan(sequence)) == 1
+
+
+def test_damaged_times_do_not_touch_poses_that_need_none(sequence: Path) -> None:
+    (sequence / "times.txt").write_text("damaged")
+    (sequence / "poses.txt").write_text("\n".join(3 * [line(np.eye(4))]))
+    np.testing.assert_array_equal(records(sequence).pose_of(scan(sequence)), np.eye(4))
 
 
 def test_records_cross_to_other_processes(sequence: Path) -> None:

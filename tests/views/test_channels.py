@@ -1,5 +1,7 @@
 """Channels: values where a scan has them, and one stand-in where it has not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,14 +11,20 @@ from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases
 from derain.scan import Scan
+from derain.views.candidates import Bound, Candidates
 from derain.views.channels import (
+    DUAL_RETURN,
     USUAL_CHANNELS,
     channel_image,
+    channel_of,
     channel_values,
     extra_channels,
     filled_values,
     with_columns,
 )
+from derain.views.returns import pair_returns
+
+from ..two_returns import Recording
 
 HARD_CASES = dict(hard_cases(largest=3000))
 EVERYTHING = (*USUAL_CHANNELS, "radar", "doppler")
@@ -96,3 +104,39 @@ def test_an_image_of_all_valid_points_holds_what_they_measure(scan: Scan) -> Non
     filled = filled_values(scan, np.flatnonzero(scan.valid), EVERYTHING, {"intensity": 9.0}).T
     np.testing.assert_array_equal(image[:, scan.valid], filled)
     assert not image[:, ~scan.valid].any()
+
+
+def test_the_place_of_a_return_in_its_ray_is_a_channel() -> None:
+    recording = Recording(0)
+    _, nearer, farther = recording.truth()
+    expected = nearer.astype(np.float32) - farther.astype(np.float32)
+    assert set(expected) == {-1, 0, 1}
+    scan = Scan.of(recording.xyz)
+    np.testing.assert_array_equal(channel_of(scan, DUAL_RETURN), expected)
+    rows = np.arange(len(scan))
+    np.testing.assert_array_equal(channel_values(scan, rows, [DUAL_RETURN])[0], expected)
+    np.testing.assert_array_equal(filled_values(scan, rows, [DUAL_RETURN], {})[:, 0], expected)
+    np.testing.assert_array_equal(channel_image(scan, rows, [DUAL_RETURN], {})[0], expected)
+
+
+def test_a_scan_of_single_returns_has_no_place_of_them() -> None:
+    scan = Scan.of(Recording(0, share=0).xyz)
+    assert channel_of(scan, DUAL_RETURN) is None
+    assert filled_values(scan, np.arange(5), [DUAL_RETURN], {DUAL_RETURN: 0.25}).max() == 0.25
+    assert with_columns(scan, [DUAL_RETURN]).fields == {}
+
+
+def test_places_of_returns_stay_with_them_when_points_are_taken_out_or_turned() -> None:
+    scan = Scan.of(Recording(0).xyz)
+    kept = with_columns(scan, [DUAL_RETURN])
+    rows = np.random.default_rng(0).permutation(len(scan))[:100]
+    part = replace(kept.take(rows), xyz=np.ones((100, 3), np.float32))
+    expected = channel_of(scan, DUAL_RETURN)
+    assert expected is not None
+    np.testing.assert_array_equal(channel_of(part, DUAL_RETURN), expected[rows])
+
+
+def test_candidates_may_be_bounded_by_the_place_of_their_return() -> None:
+    scan = Scan.of(Recording(0).xyz)
+    candidates = Candidates((Bound(DUAL_RETURN, least=0.0),))
+    np.testing.assert_array_equal(candidates.among(scan), ~pair_returns(scan).farther)

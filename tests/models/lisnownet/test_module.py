@@ -22,7 +22,7 @@ from derain.files.labels import write_labels
 from derain.learning.batch import Batch, Sample
 from derain.models.checkpoint import load_model, save_model
 from derain.models.lisnownet import LiSnowNet
-from derain.models.lisnownet.module import cube_roots, select
+from derain.models.lisnownet.deployed import cube_roots, select
 from derain.models.lisnownet.network import LiSnowNetwork, published_key
 from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule
 from derain.models.lisnownet.sparsity import sparsity_loss
@@ -204,17 +204,23 @@ def test_the_model_applies_its_rule_to_what_the_network_changed(
     np.testing.assert_array_equal((probability > 0.5)[valid], snow[valid])
 
 
+def test_the_residual_is_l1_unless_another_norm_is_named() -> None:
+    assert LiSnowNet().hparams["norm"] == "l1"
+    with pytest.raises(InputError, match=r"no such norm: 'l3'\. Known are l1 and l2"):
+        LiSnowNet(norm="l3")
+
+
 @torch.no_grad()
-@pytest.mark.parametrize(("alpha", "beta"), [(5.5, 0.5), (3.0, 0.2)])
+@pytest.mark.parametrize(("alpha", "beta", "norm"), [(5.5, 0.5, "l1"), (3.0, 0.2, "l2")])
 def test_the_losses_are_those_of_what_the_network_saw(
-    image_network: MakeModel, image_sample: MakeSample, alpha: float, beta: float
+    image_network: MakeModel, image_sample: MakeSample, alpha: float, beta: float, norm: str
 ) -> None:
-    model = image_network(LiSnowNet, alpha=alpha, beta=beta)
+    model = image_network(LiSnowNet, alpha=alpha, beta=beta, norm=norm)
     batch = Batch.of([image_sample(model, scene(3000, seed)) for seed in range(2)])
     losses, logits = model.losses(batch)
     image, valid = batch.inputs["image"], batch.inputs["valid"]
     seen = torch.stack([image[:, 0], (image[:, 2] / 255).clamp(0, 1)], dim=1).pow(1 / 3)
-    expected = sparsity_loss(model.network(seen, valid), seen, valid, alpha, beta)
+    expected = sparsity_loss(model.network(seen, valid), seen, valid, alpha, beta, norm)
     assert set(losses) == {"loss", "wavelet", "fourier", "residual"}
     torch.testing.assert_close(losses["loss"], expected.total)
     for part in ("wavelet", "fourier", "residual"):

@@ -10,9 +10,9 @@ import torch
 from torch import Tensor
 
 from derain.models.lisnownet.sparsity import (
-    absolute_residual,
     fold_checkerboard,
     fourier_sparsity,
+    mean_residual,
     sparsity_loss,
     wavelet_levels,
     wavelet_sparsity,
@@ -115,8 +115,27 @@ def test_the_residual_counts_every_channel_of_every_valid_pixel() -> None:
     image = torch.tensor([[[[1.0, 2.0, math.nan]], [[0.0, 0.5, -1.0]]]])
     denoised = torch.tensor([[[[1.5, 2.0, 7.0]], [[-1.0, 1.0, 9.0]]]])
     valid = torch.tensor([[[[True, True, False]]]])
-    residual = absolute_residual(denoised, image, valid)
+    residual = mean_residual(denoised, image, valid)
     assert residual.item() == pytest.approx((0.5 + 0 + 1 + 0.5) / 4)
+
+
+def test_the_l2_residual_counts_squares() -> None:
+    image = torch.tensor([[[[1.0, 2.0, math.nan]], [[0.0, 0.5, -1.0]]]])
+    denoised = torch.tensor([[[[1.5, 2.0, 7.0]], [[-1.0, 1.0, 9.0]]]])
+    valid = torch.tensor([[[[True, True, False]]]])
+    residual = mean_residual(denoised, image, valid, "l2")
+    assert residual.item() == pytest.approx((0.25 + 0 + 1 + 0.25) / 4)
+
+
+def test_the_norm_is_of_the_residual_alone() -> None:
+    denoised, image = noise(2, 2, 16, 32), noise(2, 2, 16, 32, seed=1)
+    l1, l2 = (
+        sparsity_loss(denoised, image, all_valid(image), alpha=1, beta=0.5, norm=norm)
+        for norm in ("l1", "l2")
+    )
+    assert (l1.wavelet, l1.fourier) == (l2.wavelet, l2.fourier)
+    assert l2.residual.item() == pytest.approx(float((denoised - image).square().mean()))
+    torch.testing.assert_close(l2.total - l1.total, (l2.residual - l1.residual) / 2)
 
 
 def test_images_of_a_batch_count_alike_in_sparsity_and_pixels_in_the_residual() -> None:
@@ -138,13 +157,15 @@ def test_images_of_a_batch_count_alike_in_sparsity_and_pixels_in_the_residual() 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0], ids=["empty", "half", "full"])
 @pytest.mark.parametrize("value", [None, 0.0, 2.7], ids=["noise", "zero", "constant"])
 @pytest.mark.parametrize("size", [(1, 1), (1, 2), (15, 33), (40, 60), (64, 128)])
+@pytest.mark.parametrize("norm", ["l1", "l2"])
 def test_values_and_gradients_are_finite(
-    size: tuple[int, int], value: float | None, share: float
+    size: tuple[int, int], value: float | None, share: float, norm: str
 ) -> None:
     image = noise(2, 2, *size).float() if value is None else torch.full((2, 2, *size), value)
     valid = torch.rand(2, 1, *size) < share
     denoised = image.clone().requires_grad_()
-    loss = sparsity_loss(denoised, torch.where(valid, image, math.nan), valid, alpha=5, beta=0.5)
+    seen = torch.where(valid, image, math.nan)
+    loss = sparsity_loss(denoised, seen, valid, alpha=5, beta=0.5, norm=norm)
     loss.total.backward()
     assert all(part.isfinite() for part in loss)
     assert denoised.grad is not None

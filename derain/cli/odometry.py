@@ -1,0 +1,208 @@
+"""``derain odometry``: finds where a sensor was, scan by scan, and writes its poses."""
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from derain.cli.arguments import add_threads
+from derain.cli.outputs import say, tell
+from derain.cli.pose_files import files_of, tell_whose_poses
+from derain.cli.scan_by_scan import ScanByScan
+from derain.cli.scan_options import add_columns
+from derain.errors import InputError, printable
+from derain.odometry.recordings import FrameOdometry, recordings_of
+from derain.odometry.registration import Registration
+from derain.sources.folders import named_frames
+from derain.sources.frame import Frame
+from derain.sources.records import POSES
+from derain.sources.trajectory import Trajectory, write_trajectory
+from derain.system.memory import keep_freed_memory
+from derain.system.notices import warn
+from derain.system.stopwatch import Stopwatch
+
+SUMMARY = "find where the sensor was, scan by scan"
+
+DESCRIPTION = """\
+Finds how the sensor moved from the scans alone, each laid upon the one before it, and writes its
+poses: a line a scan, which takes its points to the frame of the first scan.
+
+  derain odometry drive --out poses.txt
+  derain odometry drive --out drive/poses.txt               where derain finds them from then on
+  derain odometry drive --out drive.tum --format tum        time x y z qx qy qz qw
+  derain odometry WADS --out poses                          poses/11.txt, poses/12.txt, ...
+  derain odometry drive --out poses.txt --json
+
+SEQUENCE is a folder of consecutive scans, or a data set, or a part of one. The residual is the
+median distance between a scan's surfaces and those of the scan before it. A scan that cannot be
+registered is warned of, with the reason: for it the file says where the sensor would be if it had
+gone on as it did, and the exit code is 2.
+"""
+
+
+@dataclass(frozen=True)
+class Registered:
+    """What was found of one scan.
+
+    Attributes:
+        scan: Its file.
+        metres: How far the sensor moved since the scan before.
+        degrees: By how much it turned.
+        residual: Median distance from the surfaces of the scan before, metres; None if unknown.
+        matched: Share of its surfaces that the scan before has too.
+        trusted: Whether that is to be believed.
+        reason: Why not.
+        milliseconds: By stage.
+    """
+
+    scan: str
+    metres: float
+    degrees: float
+    residual: float | None
+    matched: float
+    trusted: bool
+    reason: str
+    milliseconds: dict[str, float]
+
+    def __str__(self) -> str:
+        apart = "none" if self.residual is None else f"{self.residual:.3f} m"
+        told = "" if self.trusted else ", NOT TRUSTED"
+        return (
+            f"{printable(self.scan)}: {self.metres:.2f} m, {self.degrees:.2f} deg, residual "
+            f"{apart}, {self.matched:.0%} matched, {sum(self.milliseconds.values()):.0f} ms{told}"
+        )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's arguments."""
+    parser.add_argument(
+        "sequences", nargs="+", type=Path, metavar="SEQUENCE", help="folders of consecutive scans"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        help="file to write, or for several sequences a folder, of a file <sequence>.txt each",
+    )
+    parser.add_argument(
+        "--format",
+        choices=("kitti", "tum"),
+        default="kitti",
+        help="what a line is: twelve numbers of a matrix, or time, position and quaternion, for "
+        "which the scans need times (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--replace", action="store_true", help=f"replace a {POSES} that came with the scans"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object a scan")
+    add_threads(parser)
+    add_columns(parser)
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Runs the command."""
+    keep_freed_memory()
+    source = named_frames(arguments.sequences, arguments.columns)
+    recordings = recordings_of(source)
+    files = files_of(recordings, arguments.out, arguments.replace)
+    times = [_times(recording, arguments.format) for recording in recordings]
+    if arguments.format == "kitti":
+        tell_whose_poses(files, recordings)
+    scans, odometry = ScanByScan(source), FrameOdometry(arguments.threads)
+    found = [_register(frame, scans, odometry, arguments.json) for frame in scans]
+    for recording, file, seconds in zip(recordings, files, times, strict=True):
+        of_recording, found = found[: len(recording)], found[len(recording) :]
+        _write(file, of_recording, seconds if arguments.format == "tum" else None)
+        summary = _summary(file, of_recording, recording, seconds)
+        say(summary, sys.stderr if arguments.json else None)
+    return scans.exit_code("{scans} could not be registered")
+
+
+def _register(
+    frame: Frame, scans: ScanByScan, odometry: FrameOdometry, as_json: bool
+) -> Registration:
+    """Registers one scan, and tells what was found."""
+    stopwatch, scan = Stopwatch(), None
+    failed = scans.failed
+    with scans.passing_over(frame), stopwatch.stage("read"):
+        scan = frame.read()
+    with stopwatch.stage("register"):
+        registration = odometry.take(frame, scan)
+    if not registration.trusted and scans.failed == failed:
+        scans.failed += 1
+        warn(f"{frame.name}: not to be trusted: {registration.reason}")
+    residual = None if math.isnan(registration.residual) else registration.residual
+    facts = Registered(
+        frame.name,
+        registration.distance,
+        registration.turn,
+        residual,
+        registration.matched,
+        registration.trusted,
+        registration.reason,
+        dict(stopwatch.milliseconds),
+    )
+    tell(facts, as_json)
+    return registration
+
+
+def _write(
+    file: Path, registrations: Sequence[Registration], times: Sequence[float] | None
+) -> None:
+    """Writes the poses of a recording, unless nothing is known of them."""
+    if len(registrations) > 1 and not any(each.trusted for each in registrations[1:]):
+        raise InputError(
+            file,
+            "was not written: no two scans of the recording could be laid upon one another "
+            f"({registrations[1].reason})",
+            "See that they are consecutive, in order of time, and of one sensor.",
+        )
+    poses = np.array([each.pose for each in registrations])
+    write_trajectory(file, Trajectory(poses, None if times is None else np.array(times)))
+
+
+def _summary(
+    file: Path,
+    registrations: Sequence[Registration],
+    recording: Sequence[Frame],
+    times: Sequence[float],
+) -> str:
+    """What was found of a whole recording."""
+    if len(registrations) == 1:
+        return f"{file}: 1 scan alone tells of no motion: its pose is the identity"
+    moves = registrations[1:]
+    path = sum(each.distance for each in moves)
+    lasted = times[-1] - times[0] if times else 0.0
+    speed = f", {path / lasted:.1f} m/s" if lasted > 0 else ""
+    residuals = {
+        each.residual: frame.key
+        for each, frame in zip(moves, recording[1:], strict=True)
+        if not math.isnan(each.residual)
+    }
+    worst = max(residuals, default=math.nan)
+    failed = sum(not each.trusted for each in registrations)
+    return (
+        f"{file}: {len(registrations):,} scans, path {path:.1f} m, {path / len(moves):.2f} m a scan"
+        f"{speed}; residual median {median(residuals or [math.nan]):.3f} m, worst {worst:.3f} m "
+        f"({residuals.get(worst, 'none')}); {failed:,} not to be trusted"
+    )
+
+
+def _times(recording: Sequence[Frame], form: str) -> list[float]:
+    """When the scans of a recording were taken, seconds; empty where not all of it is known."""
+    times = [time for frame in recording if (time := frame.time) is not None]
+    if len(times) == len(recording):
+        return times
+    if form == "tum":
+        lacking = next(frame for frame in recording if frame.time is None)
+        raise InputError(
+            lacking.name,
+            "nothing says when it was taken, and a line of TUM's form begins with the time",
+            "Write a times.txt beside the scans, a line of seconds each, or take --format kitti.",
+        )
+    return []

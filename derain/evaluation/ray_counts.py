@@ -1,0 +1,62 @@
+"""How many rays of a scan have two returns, and what the second one gives back behind rain."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.scan import Scan
+from derain.views.morton import distinct_rows
+from derain.views.returns import RayReturns
+
+
+@dataclass(frozen=True)
+class RayCounts:
+    """Counts of rays that came back; rows at one position are one return.
+
+    Attributes:
+        rays: All of them.
+        dual: Those with two returns or more.
+        met_rain: Those whose nearest return is rain.
+        given_back: Of these, those with another return behind that is not rain: what a sensor of
+            one return would have lost to the drop.
+    """
+
+    rays: int
+    dual: int
+    met_rain: int
+    given_back: int
+
+    @classmethod
+    def of(cls, scan: Scan, returns: RayReturns, rain: NDArray[np.bool_] | None = None) -> Self:
+        """Counts the rays of a scan.
+
+        Args:
+            scan: The scan, of N rows; a radar's detections are of no ray.
+            returns: Its returns.
+            rain: Which rows are rain, bool (N,), by their labels or by a method; None where nobody
+                says.
+        """
+        nearest = distinct_rows(scan)[0]
+        if scan.radar is not None:
+            nearest = nearest[~scan.radar[nearest]]
+        # What lies behind a return that is a row itself is counted there.
+        nearest = nearest[~(returns.farther & (returns.partner >= 0))[nearest]]
+        dual = (returns.nearer | returns.farther)[nearest]
+        if rain is None:
+            return cls(len(nearest), int(dual.sum()), 0, 0)
+        met = nearest[rain[nearest] & ~returns.farther[nearest]]
+        behind = returns.partner[met]
+        given_back = (behind >= 0) & ~rain[behind]
+        return cls(len(nearest), int(dual.sum()), len(met), int(given_back.sum()))
+
+    @property
+    def dual_share(self) -> float:
+        """Share of the rays that have two returns or more."""
+        return self.dual / max(self.rays, 1)
+
+    @property
+    def given_back_share(self) -> float:
+        """Share of the rays whose nearest return is rain that go on to what is not rain."""
+        return self.given_back / max(self.met_rain, 1)

@@ -1,0 +1,149 @@
+"""What is known of a scan's rain before any point is judged: how bright it is, and how far."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.filters.scatter import scatter_through_space
+
+# Neighbourhoods of some points, given by their rows: rows of points int64 (Q, k), the point itself
+# first, and distances in metres, float32 (Q, k).
+Around = Callable[[NDArray[np.int64]], tuple[NDArray[np.int64], NDArray[np.float32]]]
+
+# Points whose neighbourhoods are looked at, evenly along the curve that they are on.
+SAMPLE = 4096
+
+# Beyond, no LiDAR is known to see rain or snow, metres.
+FARTHEST_RAIN = 60.0
+
+# What is scattered through space by more than this, of 1/3, is on no surface.
+OFF_SURFACES = 0.1
+
+# Where less is in the air, it does not rain. Of the streets that derain simulates, so much and more
+# is where it does, at any rate above 5 mm/h.
+LEAST_AIRBORNE = 0.01
+FEWEST_AIRBORNE = 10
+
+# What is in the air has to differ in intensity from what is not, or intensity tells nothing: the
+# share of it beyond some value has to be larger by at least this (Kolmogorov and Smirnov's
+# distance, half of what is possible).
+LEAST_DIFFERENCE = 0.5
+
+# Share of what is in the air that tells how far the rain is seen; others may be stray.
+SEEN = 0.95
+
+
+@dataclass(frozen=True)
+class RainBounds:
+    """The bounds of a scan's rain.
+
+    Attributes:
+        intensity: Bound of its intensity, in the scan's own unit.
+        is_bright: Whether rain is above that bound; else it is at most so bright.
+        range: Distance that it is within, metres.
+    """
+
+    intensity: float
+    is_bright: bool
+    range: float
+
+    def hold(
+        self, intensity: NDArray[np.float32], distance: NDArray[np.floating[Any]]
+    ) -> NDArray[np.bool_]:
+        """True for points within the bounds, bool (M,).
+
+        Args:
+            intensity: Of each point, float32 (M,), in the scan's unit.
+            distance: From the sensor, (M,), metres.
+        """
+        return self._on_its_side(intensity) & (distance <= self.range)
+
+    def _on_its_side(self, intensity: NDArray[np.float32]) -> NDArray[np.bool_]:
+        return intensity > self.intensity if self.is_bright else intensity <= self.intensity
+
+
+def fit_rain_bounds(
+    xyz: NDArray[np.float64],
+    intensity: NDArray[np.float32],
+    may_be: NDArray[np.bool_],
+    around: Around,
+    sparseness: float,
+    reach: float,
+) -> RainBounds | None:
+    """Finds out from a scan itself how bright its rain is, and how far it is seen.
+
+    Geometry alone gives a first sample of the rain: what is in the air is scattered through space,
+    and sparse, its neighbours being farther off for its range than is usual in the scan. That finds
+    less than half of the rain, but hardly anything else. By how the intensities of this sample
+    differ from those of the others the bound is set, to either side: where the share of what is in
+    the air and of what is not that lie beyond it differ most.
+
+    Args:
+        xyz: Distinct positions along a Morton curve, float64 (M, 3), metres.
+        intensity: Their intensities, float32 (M,); not numbers where the scan has none.
+        may_be: Points that may be rain, such as those above the ground, bool (M,).
+        around: Finds neighbourhoods.
+        sparseness: How many times as far as usual the neighbours of a sparse point are.
+        reach: How many times as far as most of the sample rain may be.
+
+    Returns:
+        The bounds; None where no intensity was measured, nothing is in the air, or what is differs
+        from the rest in nothing.
+    """
+    distance = np.sqrt(np.square(xyz).sum(axis=1))
+    rows = np.flatnonzero(may_be & (distance < FARTHEST_RAIN) & ~np.isnan(intensity))
+    rows = rows[:: -(-len(rows) // SAMPLE) or 1]
+    if len(rows) < FEWEST_AIRBORNE:
+        return None
+    distance, intensity = distance[rows], intensity[rows]
+    airborne = _is_airborne(xyz, distance, around(rows), sparseness)
+    found = np.count_nonzero(airborne)
+    if not max(FEWEST_AIRBORNE, LEAST_AIRBORNE * len(rows)) <= found < len(rows):
+        return None
+    bound, is_bright, difference = _greatest_difference(intensity, airborne)
+    if difference < LEAST_DIFFERENCE:
+        return None
+    rain = airborne & RainBounds(bound, is_bright, FARTHEST_RAIN).hold(intensity, distance)
+    return RainBounds(bound, is_bright, reach * float(np.quantile(distance[rain], SEEN)))
+
+
+def _is_airborne(
+    xyz: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    neighbourhoods: tuple[NDArray[np.int64], NDArray[np.float32]],
+    sparseness: float,
+) -> NDArray[np.bool_]:
+    """Which neighbourhoods are scattered through space and sparse, bool (Q,)."""
+    neighbours, distances = neighbourhoods
+    spacing = distances.T.astype(np.float64).mean(axis=0) / distance
+    sparse = spacing > sparseness * np.median(spacing)
+    airborne: NDArray[np.bool_] = sparse & (scatter_through_space(xyz, neighbours) > OFF_SURFACES)
+    return airborne
+
+
+def _greatest_difference(
+    intensity: NDArray[np.float32], airborne: NDArray[np.bool_]
+) -> tuple[float, bool, float]:
+    """The bound that tells best what is in the air.
+
+    Args:
+        intensity: Intensities, float32 (Q,).
+        airborne: Which of the points are in the air, bool (Q,); some are, and some are not.
+
+    Returns:
+        The bound, whether what is in the air is brighter than it, and by how much the shares beyond
+        it differ, of 1.
+    """
+    values = np.unique(intensity)
+    of_air, of_others = (
+        np.searchsorted(np.sort(intensity[part]), values, "right") / np.count_nonzero(part)
+        for part in (airborne, ~airborne)
+    )
+    dimmer = of_air - of_others
+    dimmest, brightest = int(dimmer.argmax()), int(dimmer.argmin())
+    if dimmer[dimmest] >= -dimmer[brightest]:
+        return float(values[dimmest]), False, float(dimmer[dimmest])
+    return float(values[brightest]), True, float(-dimmer[brightest])

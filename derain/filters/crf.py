@@ -1,0 +1,240 @@
+"""The filter of conditional random fields."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.documents import shown
+from derain.filters.airborne import Around, fit_rain_bounds
+from derain.filters.filter_view import filter_view, rows_of
+from derain.filters.ground import find_ground
+from derain.filters.point_filter import PointFilter, RainAndJudged, Span
+from derain.filters.random_field import decide_in_turn
+from derain.filters.registry import FILTERS
+from derain.filters.scatter import scatter_through_space
+from derain.scan import Scan
+from derain.system.stopwatch import Stopwatch
+from derain.views.candidates import Candidates
+from derain.views.channels import filled_values
+from derain.views.morton import distinct_rows
+from derain.views.neighbour_search import NeighbourSearch
+from derain.views.neighbours import Neighbourhoods
+from derain.views.oddities import Oddity, intensity_of_another_scale, missing_intensity
+
+Variant = Literal["fitted", "published"]
+
+# Added to every range, metres, so that none is 0.
+# Source: CRFOR.
+BESIDE_RANGE = 0.1
+
+# Of points of any intensity up to 2 the feature is at least 5 / 3, and at most 4 / 3 · (5 + 1)
+# where neighbours are no farther, on average, than the sensor. Fitted, it is scaled by these.
+LEAST_FEATURE, LARGEST_FEATURE = 5 / 3, 8.0
+
+
+@FILTERS.add("crf")
+@dataclass(frozen=True)
+class CRF(PointFilter):
+    """Calls a point rain by its neighbourhood, and by what it calls the points around it.
+
+    Only candidates may be rain: near, above the ground, and as bright as rain is. Of each of them
+
+        F = (1 + s) · (5 + mean(d) / (range + 0.1 m)) / (1 + intensity)
+
+    over its neighbourhood, itself included; d are the distances, and s is 0 where the points lie in
+    a plane and 1/3 where they are scattered alike in all directions
+    (:func:`derain.filters.scatter.scatter_through_space`). F is scaled to -1..1; above 0.6 the
+    point is rain, up to -0.4 it is not, and between them
+    :func:`derain.filters.random_field.decide_in_turn` says, in the order of azimuth from behind the
+    sensor once around it. That is the order of files which a spinning sensor wrote, by which the
+    authors' program goes; but it does not depend on the file.
+
+    Variant ``published`` has its authors' bounds, which are for one sensor on one car and its unit
+    of intensity: ``intensity``, ``range`` and ``sensor_height`` above the ground. It scales F from
+    its least to its largest value in the scan.
+
+    Variant ``fitted`` takes all bounds from the scan itself, whatever the unit or the mounting, and
+    whether rain is darker or brighter than the rest: what is above the plane of the road
+    (:func:`derain.filters.ground.find_ground`), and within the intensities and ranges of what is in
+    the air (:func:`derain.filters.airborne.fit_rain_bounds`). Within these bounds intensity tells
+    nothing more: F is that of intensity 0, and is scaled by constants. Where it does not rain,
+    there are no such bounds, and nothing is called rain.
+
+    Without intensity, nothing is found.
+
+    Example:
+        >>> scan = derain.read_scan("scan.bin")  # a wall of 800 points and 20 drops before it
+        >>> rain = derain.FilterDerainer(CRF())(scan)
+        >>> int(rain.sum()), bool((scan.range[rain] < 15).all())
+        (20, True)
+
+    Attributes:
+        neighbours: Size of a neighbourhood, the point itself included.
+        variant: ``fitted`` or ``published``.
+        vote: What a neighbour that is judged says, beside features from -1 to 1.
+        sparseness: Of variant ``fitted``: how many times as far as usual, for its range, the
+            neighbours of a point are that is in the air.
+        reach: Of variant ``fitted``: how many times as far as 95 % of what is in the air rain may
+            be.
+        intensity: Of variant ``published``: of rain it is at most this.
+        range: Of variant ``published``: rain is no farther, metres.
+        sensor_height: Of variant ``published``: rain is no deeper below the sensor, metres.
+        FULL_SCALE: Of the intensities that variant ``published`` is for.
+
+    Raises:
+        InputError: Another variant, and as of :class:`derain.filters.PointFilter`.
+
+    Source: W. Wang et al., "Snow Removal for LiDAR Point Clouds With Spatio-Temporal Conditional
+        Random Fields", RA-L 2023, and its constants at github.com/dut-mdmu/CRFOR. The order
+        by azimuth and the fitted bounds are derain's own.
+    """
+
+    HELP: ClassVar[str] = "rain is near, above the ground, as bright as drops are, and beside rain"
+    SPACE: ClassVar[Mapping[str, Span]] = {
+        "neighbours": (4, 12),  # fewer points are always in a plane
+        "vote": (0.1, 20.0),
+        "sparseness": (1.5, 10.0),
+        "reach": (0.5, 5.0),
+    }
+    FULL_SCALE: ClassVar[float] = 255.0
+
+    neighbours: int = 8
+    variant: Variant = "fitted"
+    vote: float = 2.0
+    sparseness: float = 3.0
+    reach: float = 2.0
+    intensity: float = 2.0
+    range: float = 30.0
+    sensor_height: float = 1.8
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.variant not in get_args(Variant):
+            raise InputError(
+                self.name,
+                f"variant is {shown(self.variant)}",
+                f"Give one of {', '.join(get_args(Variant))}.",
+            )
+
+    def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
+        """Says which points are rain; see :class:`PointFilter`."""
+
+        def around(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+            return view.neighbours.take(rows, axis=0), view.distances.take(rows, axis=0)
+
+        return self._rain(view.points, around)
+
+    def judge_scan(
+        self, scan: Scan, threads: int, candidates: Candidates | None, stopwatch: Stopwatch
+    ) -> RainAndJudged:
+        """Says which rows are rain, with neighbours of candidates; see :class:`PointFilter`."""
+        with stopwatch.stage("view"):
+            first, inverse = distinct_rows(scan)
+            view = filter_view(self.neighbours, threads)
+            points = filled_values(scan, first, view.channels, view.stand_in)
+            search = NeighbourSearch(points[:, :3], rank=first, threads=threads)
+        with stopwatch.stage("network"):
+            rain = self._rain(points, partial(search, self.neighbours))
+            if candidates is not None:
+                rain &= candidates.among(scan)[first]
+        with stopwatch.stage("back"):
+            return rows_of(rain, inverse), inverse >= 0
+
+    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+        """What is odd about a scan: no intensity, or another unit than the published bound's."""
+        yield from missing_intensity(scan)
+        if self.variant == "published":
+            yield from intensity_of_another_scale(scan, self.FULL_SCALE, self.name)
+
+    def _rain(self, points: NDArray[np.float32], wider: Around) -> NDArray[np.bool_]:
+        """Which points are rain, bool (M,).
+
+        Args:
+            points: Distinct x, y and z in metres along a Morton curve, and intensity,
+                float32 (M, 4).
+            wider: Finds neighbourhoods, of as many points as the filter looks at or more.
+        """
+        size = min(self.neighbours, len(points))  # where there are fewer, the rest are stand-ins
+
+        def around(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+            neighbours, distances = wider(rows)
+            return neighbours[:, :size], distances[:, :size]
+
+        xyz, intensity = points[:, :3].astype(np.float64), points[:, 3]
+        distance = _length(xyz)
+        rows = np.flatnonzero(self._is_candidate(xyz, intensity, distance, around))
+        if not len(rows):
+            return np.zeros(len(points), bool)
+        neighbours, distances = around(rows)
+        mean = distances.T.astype(np.float64).mean(axis=0)
+        spacing = mean / (distance[rows] + BESIDE_RANGE)
+        scatter = scatter_through_space(xyz, neighbours)
+        feature = np.full(len(points), -1.0)
+        feature[rows] = self._feature(scatter, spacing, intensity[rows].astype(np.float64))
+        place = _along_the_sweep(xyz.take(rows, axis=0))
+        return decide_in_turn(feature, rows, place, neighbours, distances, self.vote)
+
+    def _is_candidate(
+        self,
+        xyz: NDArray[np.float64],
+        intensity: NDArray[np.float32],
+        distance: NDArray[np.float64],
+        around: Around,
+    ) -> NDArray[np.bool_]:
+        """Which points may be rain, bool (M,)."""
+        if self.variant == "published":
+            is_near = (distance <= self.range) & (xyz[:, 2] >= -self.sensor_height)
+            return is_near & (intensity <= self.intensity)
+        ground = find_ground(xyz)
+        above = np.ones(len(xyz), bool) if ground is None else ground.is_below(xyz)
+        bounds = fit_rain_bounds(xyz, intensity, above, around, self.sparseness, self.reach)
+        if bounds is None:
+            return np.zeros(len(xyz), bool)
+        return above & bounds.hold(intensity, distance)
+
+    def _feature(
+        self,
+        scatter: NDArray[np.float64],
+        spacing: NDArray[np.float64],
+        intensity: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """F of each candidate, scaled to -1..1, float64 (Q,)."""
+        if self.variant == "fitted":
+            feature = (1 + scatter) * (5 + np.minimum(spacing, 1))
+            least, largest = LEAST_FEATURE, LARGEST_FEATURE
+        else:
+            feature = (1 + scatter) * (5 + spacing) / (1 + np.maximum(intensity, 0))
+            least, largest = float(feature.min()), float(feature.max())
+        if largest == least:  # nothing stands out
+            return np.full(len(feature), -1.0)
+        scaled: NDArray[np.float64] = 2 * (feature - least) / (largest - least) - 1
+        return scaled
+
+
+def _length(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distances from the sensor, float64 (M,)."""
+    x, y, z = xyz.T
+    length: NDArray[np.float64] = np.sqrt(x * x + y * y + z * z)
+    return length
+
+
+def _along_the_sweep(xyz: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Place of each point in the order of azimuth; along the curve where that is equal.
+
+    Args:
+        xyz: Distinct positions along a Morton curve, float64 (Q, 3), metres.
+
+    Returns:
+        int64 (Q,).
+    """
+    x, y, _ = xyz.T
+    # What is just behind may have a y of -0.0, which is 0.0 then.
+    order = np.argsort(np.arctan2(y + 0.0, x), kind="stable")
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    return place

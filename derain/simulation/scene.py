@@ -1,0 +1,138 @@
+"""What a sequence is recorded of, and what a sensor sees of it scan after scan."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import repeat
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation.campaign import Campaign
+from derain.simulation.classes import packed
+from derain.simulation.course import Course
+from derain.simulation.drive import Drive
+from derain.simulation.facility import lay_out_facility
+from derain.simulation.layout import lay_out_track
+from derain.simulation.objects import Surface
+from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
+from derain.simulation.sensor import Returns, Sensor
+from derain.simulation.street import Street, lay_out_street
+from derain.simulation.track import Track
+from derain.simulation.traffic import MovingThing, draw_traffic
+from derain.simulation.weather import Weather, draw_wind
+
+LAYOUTS = {"street": lay_out_track, "facility": lay_out_facility}
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedScene:
+    """A place, the rain on it and the weather; and what moves in it.
+
+    Attributes:
+        track: What stands.
+        rain: The rain; it is the same wherever the sensor is.
+        weather: The record of it.
+        course: How the sensor moves; None stands at the origin of the track.
+        traffic: What else moves.
+        skew: Whether they move on while a scan is taken, see :class:`Drive`.
+    """
+
+    track: Track
+    rain: RainField
+    weather: Weather
+    course: Course | None = None
+    traffic: Sequence[MovingThing] = ()
+    skew: bool = False
+
+    @classmethod
+    def of(cls, campaign: Campaign, name: str, generator: np.random.Generator) -> Self:
+        """Draws the scene of a sequence.
+
+        Raises:
+            InputError: A street without room for so much traffic.
+        """
+        nominal, wind = campaign.rain_rate[name], draw_wind(generator)
+        sprinkled = campaign.layout == "facility" and nominal > 0
+        rain = SprinkledRain(nominal, wind) if sprinkled else UniformRain(nominal)
+        at_sensor = float(rain.rate(np.zeros(1), np.zeros(1))[0])
+        weather = Weather.of(nominal, at_sensor, wind)
+        if campaign.drive is None:
+            return cls(LAYOUTS[campaign.layout](generator), rain, weather)
+        course, track, traffic = _drawn(campaign.drive, campaign.times, generator)
+        return cls(track, rain, weather, course, traffic, campaign.drive.skew)
+
+    def cast(self, sensor: Sensor, times: NDArray[np.float64]) -> Iterator[Returns]:
+        """What every beam of a sensor would return through clear air, scan after scan.
+
+        Args:
+            sensor: The sensor.
+            times: When the scans begin, float64 (T,), seconds.
+
+        Yields:
+            As :meth:`Track.cast`; labels have the number of what moves in their upper 16 bits.
+
+        Raises:
+            InputError: Open3D cannot be imported.
+        """
+        if self.course is None:
+            yield from repeat(self.track.cast(sensor), len(times))
+            return
+        things = [
+            (_numbered(number, thing.surface), thing.velocity)
+            for number, thing in enumerate(self.traffic, 1)
+        ]
+        for time in times:
+            sent, pose = self._moments(self.course, time, sensor)
+            seen = self.track.cast(sensor, pose)
+            for thing, velocity in things:
+                seen = _nearer(seen, thing.cast(sensor, _followed(pose, sent, velocity)))
+            yield seen
+
+    def _moments(
+        self, course: Course, time: float, sensor: Sensor
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """When the beams of a scan are sent, and the sensor's pose then: of all at once, or each.
+
+        Returns:
+            Seconds, float64 () or (N,); and poses, float64 (4, 4) or (N, 4, 4).
+        """
+        if not self.skew:
+            return np.array(time), course.pose(time, sensor)
+        sent, beam = np.unique(time + sensor.beam_times(), return_inverse=True)
+        return sent[beam], np.stack([course.pose(moment, sensor) for moment in sent])[beam]
+
+
+def _numbered(number: int, surface: Surface) -> Track:
+    """A track of one thing that moves, where it is at the first scan, labelled with its number."""
+    track = Track.of([surface])
+    return replace(track, label=packed(track.label, np.full_like(track.label, number)))
+
+
+def _followed(
+    pose: NDArray[np.float64], sent: NDArray[np.float64], velocity: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Poses as seen from something that moves, which itself then stays where it is at time 0."""
+    seen = pose.copy()
+    seen[..., :2, 3] -= sent[..., None] * velocity
+    return seen
+
+
+def _drawn(
+    drive: Drive, times: NDArray[np.float64], generator: np.random.Generator
+) -> tuple[Course, Track, list[MovingThing]]:
+    street = Street.draw(drive.length(times[-1]), generator)
+    course = Course.draw(drive.speed, generator)
+    traffic = draw_traffic(drive.traffic, street, drive.speed, times, generator)
+    return course, Track.of(lay_out_street(street, generator)), traffic
+
+
+def _nearer(first: Returns, second: Returns) -> Returns:
+    """Of two returns of every beam the nearer."""
+    nearer = second.range < first.range
+    return Returns(
+        np.where(nearer, second.range, first.range),
+        np.where(nearer, second.reflectivity, first.reflectivity),
+        np.where(nearer, second.label, first.label),
+        first.beam,
+    )

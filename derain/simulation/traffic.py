@@ -1,0 +1,158 @@
+"""Cars that drive and people who walk while a sequence is recorded."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.simulation import objects
+from derain.simulation.objects import Surface
+from derain.simulation.street import KERB, PAVEMENT, Street
+
+# How fast vehicles drive and people walk, m/s.
+DRIVING = (3.0, 15.0)
+WALKING = (0.8, 2.0)
+
+# What the vehicle that carries the sensor takes up ahead of the sensor, behind it and on either
+# side, metres.
+VEHICLE = np.array([[-3.0, -1.0], [2.5, 1.0]])
+
+# Free space between any two things that move, metres, and how often a place is looked for.
+CLEARANCE = 0.7
+TRIES = 500
+
+
+@dataclass(frozen=True, eq=False)
+class MovingThing:
+    """Something that moves at a steady speed.
+
+    Attributes:
+        surface: Where it is at the first scan.
+        velocity: Along x and y, float64 (2,), m/s.
+    """
+
+    surface: Surface
+    velocity: NDArray[np.float64]
+
+    def bounds(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Its least and greatest x and y at some times, float64 (T, 2, 2), metres."""
+        corners = self.surface.triangles[..., :2].reshape(-1, 2)
+        box = np.stack([corners.min(axis=0), corners.max(axis=0)])
+        return np.asarray(box + (times[:, None] * self.velocity)[:, None, :])
+
+
+@dataclass(frozen=True)
+class _Moment:
+    """Where and when something is near the sensor, which then is at x."""
+
+    time: float
+    x: float
+
+
+def draw_traffic(
+    count: int,
+    street: Street,
+    speed: float,
+    times: NDArray[np.float64],
+    generator: np.random.Generator,
+) -> list[MovingThing]:
+    """Draws who moves in a street.
+
+    In turn: a car in the sensor's lane, an oncoming one, somebody who walks along a pavement, a car
+    that crosses at a junction, somebody who crosses there on foot. Each is near the sensor at some
+    moment of the drive, and none comes too near another or the sensor's vehicle at any scan.
+
+    Args:
+        count: How many.
+        street: Where.
+        speed: Of the sensor, m/s.
+        times: When the scans are taken, float64 (T,), seconds from 0 on.
+        generator: Random generator.
+
+    Raises:
+        InputError: There is no room for so many.
+    """
+    taken = [VEHICLE + np.stack([speed * times, 0 * times], axis=1)[:, None, :]]
+    things = []
+    for number in range(count):
+        draw = WAYS[number % len(WAYS)]
+        for _ in range(TRIES):
+            time = generator.uniform(0, times[-1])
+            thing = draw(street, _Moment(time, speed * time), generator)
+            bounds = thing.bounds(times)
+            if not any(_meet(bounds, other) for other in taken):
+                break
+        else:
+            raise InputError(
+                "traffic", f"the street has no room for {count}", f"Give {number} or fewer."
+            )
+        taken.append(bounds)
+        things.append(thing)
+    return things
+
+
+def _meet(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
+    """Whether bounds, float64 (T, 2, 2) each, come nearer than the clearance at one time."""
+    apart = (first[:, 0] > second[:, 1] + CLEARANCE) | (second[:, 0] > first[:, 1] + CLEARANCE)
+    return bool((~apart.any(axis=1)).any())
+
+
+def _moving(
+    surface: Surface, place: tuple[float, float], heading: float, speed: float, time: float
+) -> MovingThing:
+    """A thing that is at a place at some time, and moves where it heads."""
+    velocity = speed * np.array([np.cos(heading), np.sin(heading)])
+    x, y = place - time * velocity
+    return MovingThing(surface.placed(x, y, heading), velocity)
+
+
+def _car_ahead(street: Street, near: _Moment, generator: np.random.Generator) -> MovingThing:
+    # Three of four are ahead, where every sensor looks.
+    away = generator.uniform(8, 45) * generator.choice([1, -1], p=[0.75, 0.25])
+    place = near.x + away, generator.uniform(-0.3, 0.3)
+    return _moving(objects.car(generator), place, 0, generator.uniform(*DRIVING), near.time)
+
+
+def _car_oncoming(street: Street, near: _Moment, generator: np.random.Generator) -> MovingThing:
+    place = near.x + generator.uniform(-5, 45), street.lane + generator.uniform(-0.3, 0.3)
+    return _moving(objects.car(generator), place, np.pi, generator.uniform(*DRIVING), near.time)
+
+
+def _walker(street: Street, near: _Moment, generator: np.random.Generator) -> MovingThing:
+    side, heading = generator.choice([-1, 1]), np.pi * generator.integers(2)
+    y = street.beside(side, generator.uniform(KERB + 0.5, PAVEMENT - 0.4))
+    place, pace = (near.x + generator.uniform(-5, 35), y), generator.uniform(*WALKING)
+    return _moving(objects.pedestrian(generator), place, heading, pace, near.time)
+
+
+def _car_crossing(street: Street, near: _Moment, generator: np.random.Generator) -> MovingThing:
+    way = generator.choice([-1, 1])  # to the left or to the right, on the right of its street
+    x = _junction(street, near, generator) + way * street.lane / 2
+    place, speed = (x, generator.uniform(-12, 12)), generator.uniform(*DRIVING)
+    return _moving(objects.car(generator), place, way * np.pi / 2, speed, near.time)
+
+
+def _walker_crossing(street: Street, near: _Moment, generator: np.random.Generator) -> MovingThing:
+    way, edge = generator.choice([-1, 1]), generator.choice([-1, 1])
+    x = _junction(street, near, generator) + edge * (street.lane + generator.uniform(0.5, 2))
+    place = x, street.axis + generator.uniform(-1, 1) * street.lane
+    pace = generator.uniform(*WALKING)
+    return _moving(objects.pedestrian(generator), place, way * np.pi / 2, pace, near.time)
+
+
+def _junction(street: Street, near: _Moment, generator: np.random.Generator) -> float:
+    """One of the two junctions nearest to a place 15 m ahead of the sensor, metres along x."""
+    distance = np.abs(np.array(street.junctions) - near.x - 15)
+    nearest = np.argsort(distance)[: generator.integers(1, 3)]
+    return street.junctions[int(nearest[-1])]
+
+
+WAYS: tuple[Callable[[Street, _Moment, np.random.Generator], MovingThing], ...] = (
+    _car_ahead,
+    _car_oncoming,
+    _walker,
+    _car_crossing,
+    _walker_crossing,
+)

@@ -1,0 +1,74 @@
+"""Records that are lines of numbers."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.reading import read_bytes, reading
+
+# A pose takes 160 bytes: those of four hundred thousand scans.
+LARGEST_RECORD = 2**26
+
+
+def read_numbers(path: Path, *columns: int, comments: bool = False) -> NDArray[np.float64]:
+    """Reads lines of so many finite numbers each; empty ones are passed over.
+
+    Args:
+        path: The file.
+        columns: How many numbers a line may have; the first line says which of them it is.
+        comments: Whether lines that begin with # are passed over too.
+
+    Returns:
+        float64 (T, columns); of a file without lines, as many as are named last.
+
+    Raises:
+        InputError: A file that cannot be read, is too large, or has another line.
+    """
+    lines = enumerate(read_lines(path), 1)
+    filled = [(place, line.split()) for place, line in lines if _says_something(line, comments)]
+    width = len(filled[0][1]) if filled and len(filled[0][1]) in columns else columns[-1]
+    rows = [finite_numbers(path, place, words, width) for place, words in filled]
+    return np.array(rows, np.float64).reshape(-1, width)
+
+
+def read_lines(path: Path) -> list[str]:
+    """The lines of a record.
+
+    Raises:
+        InputError: A file that cannot be read, or is too large.
+    """
+    with reading(path, ValueError):
+        return read_bytes(path, LARGEST_RECORD).decode("utf-8").splitlines()
+
+
+def finite_numbers(path: Path, place: int, words: Sequence[str], count: int) -> list[float]:
+    """The numbers of one line.
+
+    Args:
+        path: The file.
+        place: Number of the line, for messages.
+        words: What stands in it.
+        count: How many it has to be.
+
+    Raises:
+        InputError: Something else.
+    """
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not np.isfinite(numbers).all():
+        raise InputError(
+            path,
+            f"line {place} is not {count} number{'s' if count > 1 else ''}",
+            "Write the file again, a line for each scan.",
+        )
+    return numbers
+
+
+def _says_something(line: str, comments: bool) -> bool:
+    words = line.strip()
+    return bool(words) and not (comments and words.startswith("#"))

@@ -1,0 +1,222 @@
+"""Where a sensor was, in files of two forms.
+
+- KITTI's: twelve numbers a line, the upper three rows of a pose, row by row. With a ``calib.txt``
+  beside it they are poses of the camera that it names ``Tr`` for; without one, the sensor's own.
+- TUM's: ``time x y z qx qy qz qw`` a line, seconds and metres, the sensor's own; lines that begin
+  with # are remarks.
+
+Sources: A. Geiger et al., "Are we ready for Autonomous Driving? The KITTI Vision Benchmark Suite",
+CVPR 2012, readme of the odometry benchmark; J. Behley et al., SemanticKITTI, for Tr; J. Sturm et
+al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012, for TUM's.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.atomic import replacing
+from derain.files.reading import is_file
+from derain.fusion.extrinsics import ROTATION_TOLERANCE, Extrinsics
+from derain.sources.number_lines import finite_numbers, read_lines, read_numbers
+from derain.sources.quaternions import between, quaternion_of, rotation_of
+
+CALIBRATION = "calib.txt"
+
+# Name of the motion in a calibration that takes points of the LiDAR to the camera.
+LIDAR_TO_CAMERA = "Tr"
+
+# Numbers in a line of either form.
+KITTI, TUM = 12, 8
+
+# Between two poses up to a second apart a vehicle goes smoothly. A scan may lie so much before the
+# first or after the last of them, for times are rounded: to hundredths, if carelessly.
+LONGEST_GAP = 1.0
+TIME_ROUNDING = 0.005
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Poses of a sensor, one after the other.
+
+    Attributes:
+        poses: Sensor to world, float64 (T, 4, 4), metres.
+        times: When it was there, seconds, ascending, float64 (T,); None where that is not known.
+        name: What messages call it, such as its file.
+    """
+
+    poses: NDArray[np.float64]
+    times: NDArray[np.float64] | None = None
+    name: str | Path = "poses"
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    def is_by_time(self, times: Sequence[float] | NDArray[np.float64]) -> bool:
+        """Whether scans find their poses by time: both have times, of one clock it seems.
+
+        Args:
+            times: When the scans were taken, seconds, (N,).
+        """
+        if self.times is None or not len(self.times) or not len(times):
+            return False
+        first, last = self.times[0] - LONGEST_GAP, self.times[-1] + LONGEST_GAP
+        return bool(first <= max(times) and min(times) <= last)
+
+    def at(self, time: float, scan: str) -> NDArray[np.float64]:
+        """The pose at a time; between two poses, on the way from one to the other.
+
+        Args:
+            time: Seconds.
+            scan: What was taken then, for messages.
+
+        Returns:
+            Sensor to world, float64 (4, 4), metres.
+
+        Raises:
+            InputError: There is no pose near enough.
+        """
+        assert self.times is not None
+        inside = min(max(time, self.times[0]), self.times[-1])
+        before, after, share = self._around(inside)
+        if (
+            abs(inside - time) > TIME_ROUNDING
+            or self.times[after] - self.times[before] > LONGEST_GAP
+        ):
+            raise InputError(
+                self.name,
+                f"has no pose for {scan}, which was taken at {time:.3f} s: the nearest are of "
+                f"{self.times[before]:.3f} and {self.times[after]:.3f} s",
+                "Give the poses of the whole recording, by the clock of its scans.",
+            )
+        one: NDArray[np.float64] = self.poses[before]
+        other: NDArray[np.float64] = self.poses[after]
+        if share == 0:
+            return one
+        pose = np.eye(4)
+        pose[:3, 3] = (1 - share) * one[:3, 3] + share * other[:3, 3]
+        turned = between(quaternion_of(one[:3, :3]), quaternion_of(other[:3, :3]), share)
+        pose[:3, :3] = rotation_of(turned)
+        return pose
+
+    def _around(self, time: float) -> tuple[int, int, float]:
+        """Places of the poses before and after a time, and how far it is on the way, 0..1."""
+        assert self.times is not None
+        after = int(np.searchsorted(self.times, time))
+        if after == len(self) or self.times[after] == time or not after:
+            place = min(after, len(self) - 1)
+            return place, place, 0.0
+        start, end = self.times[after - 1 : after + 1]
+        return after - 1, after, float((time - start) / (end - start))
+
+
+def read_trajectory(path: Path) -> Trajectory:
+    """Reads poses of a LiDAR, in the form that the first line has.
+
+    Args:
+        path: A file in KITTI's form, or in TUM's.
+
+    Returns:
+        The sensor's poses. Of a camera's, the world is the LiDAR's frame where the camera's has its
+        origin.
+
+    Raises:
+        InputError: A file that cannot be read, a line that is no rigid motion, or times that do not
+            ascend.
+    """
+    rows = read_numbers(path, TUM, KITTI, comments=True)
+    if rows.shape[1] == TUM:
+        return _of_tum(path, rows)
+    poses = _motions(path, rows)
+    calibration = path.with_name(CALIBRATION)
+    if is_file(calibration):
+        to_camera = _lidar_to_camera(calibration)
+        poses = np.linalg.inv(to_camera) @ poses @ to_camera
+    return Trajectory(poses, name=path)
+
+
+def write_trajectory(path: Path, trajectory: Trajectory) -> None:
+    """Writes poses whole or not at all, as :func:`read_trajectory` reads them.
+
+    Args:
+        path: The file. Beside a ``calib.txt``, poses without times are written as the camera's.
+        trajectory: The sensor's poses; in TUM's form where their times are known, else in KITTI's.
+
+    Raises:
+        InputError: It cannot be written, or the ``calib.txt`` beside it cannot be read.
+    """
+    if trajectory.times is None:
+        poses = trajectory.poses
+        calibration = path.with_name(CALIBRATION)
+        if is_file(calibration):
+            to_camera = _lidar_to_camera(calibration)
+            poses = to_camera @ poses @ np.linalg.inv(to_camera)
+        lines = [_words(pose[:3].ravel()) for pose in poses]
+    else:
+        lines = [
+            f"{time:.6f} {_words(pose[:3, 3])} {_words(quaternion_of(pose[:3, :3]))}"
+            for time, pose in zip(trajectory.times, trajectory.poses, strict=True)
+        ]
+    with replacing(path) as temporary:
+        temporary.write_text("".join(f"{line}\n" for line in lines), "utf-8")
+
+
+def _words(numbers: NDArray[np.float64]) -> str:
+    return " ".join(f"{number:.12g}" for number in numbers)
+
+
+def _of_tum(path: Path, rows: NDArray[np.float64]) -> Trajectory:
+    times = rows[:, 0]
+    if not (np.diff(times) > 0).all():
+        place = int(np.argmin(np.diff(times) > 0)) + 2
+        raise InputError(
+            path,
+            f"pose {place} is not later than the one before it",
+            "Sort the lines by their time, and leave one for each.",
+        )
+    poses = np.tile(np.eye(4), (len(rows), 1, 1))
+    poses[:, :3, 3] = rows[:, 1:4]
+    for place, quaternion in enumerate(rows[:, 4:], 1):
+        length = float(np.abs(quaternion).max())  # first, before a square can overflow
+        length = float(np.linalg.norm(quaternion)) if length < 2 else length
+        if abs(length - 1) > ROTATION_TOLERANCE:
+            raise InputError(
+                path,
+                f"pose {place} has a quaternion of length {length:.3g}, not 1",
+                "Write the file again: time x y z qx qy qz qw.",
+            )
+        poses[place - 1, :3, :3] = rotation_of(quaternion)
+    return Trajectory(poses, times, path)
+
+
+def _motions(path: Path, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Homogeneous transformations, float64 (T, 4, 4), of their upper three rows, (T, 12)."""
+    motions = np.zeros((len(rows), 4, 4))
+    motions[:, :3] = rows.reshape(-1, 3, 4)
+    motions[:, 3, 3] = 1
+    for place, motion in enumerate(motions, 1):
+        try:
+            Extrinsics(motion)
+        except ValueError as error:
+            raise InputError(
+                path, f"pose {place} is not rigid ({error})", "Write the file again."
+            ) from error
+    return motions
+
+
+def _lidar_to_camera(path: Path) -> NDArray[np.float64]:
+    """The motion that a calibration names Tr, float64 (4, 4)."""
+    for place, line in enumerate(read_lines(path), 1):
+        name, _, numbers = line.partition(":")
+        if name.strip() == LIDAR_TO_CAMERA:
+            row = finite_numbers(path, place, numbers.split(), KITTI)
+            motion: NDArray[np.float64] = _motions(path, np.array([row]))[0]
+            return motion
+    raise InputError(
+        path,
+        f"has no line {LIDAR_TO_CAMERA}, which takes the LiDAR's points to the camera",
+        "Add it, or move the file away if the poses beside it are the LiDAR's own.",
+    )

@@ -1,0 +1,184 @@
+"""What a file's own columns say of returns: which is the first of its ray, and which follow."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.scan import LARGEST_COORDINATE, Scan
+
+# Returns nearer to each other than this are of one surface, metres: the sensor split its echo.
+# Source: tier4/nebula, `dual_return_distance_threshold`.
+LEAST_APART = 0.1
+
+# What drivers call the number of a return within its ray, and how many the ray has.
+NUMBER_NAMES = ("return_number", "return_id", "return_index", "echo")
+COUNT_NAMES = ("number_of_returns", "return_count", "num_returns")
+
+# Types of returns in dual mode, those in front and those behind: first or last of the two, each
+# either the weaker or the stronger one. Two numberings are about, which these pairs tell apart.
+# Source: tier4/nebula, `ReturnType`; autowarefoundation/autoware.universe, `ReturnType`.
+NEBULA = ((4, 9), (5, 10))
+NEBULA_TELLS = frozenset({9, 10})
+AUTOWARE = ((3, 5), (4, 6))
+AUTOWARE_LARGEST = 7
+
+
+@dataclass(frozen=True, eq=False)
+class StatedReturns:
+    """What one or two columns say of the returns of a scan.
+
+    Attributes:
+        column: Name of the column.
+        number: The same for returns that are not of one ray together; of two returns of one ray,
+            each has its own, int64 (N,); -1 for the only return of a ray.
+        nearer: Where it says that a return of the same ray lies behind, bool (N,).
+        farther: Where it says that a return of the same ray lies in front, bool (N,).
+        other_range: Range of the other return, where that is no row of its own, float32 (N,),
+            metres; NaN where it is one or there is none.
+    """
+
+    column: str
+    number: NDArray[np.int64]
+    nearer: NDArray[np.bool_]
+    farther: NDArray[np.bool_]
+    other_range: NDArray[np.float32]
+
+
+def stated_returns(scan: Scan) -> StatedReturns | None:
+    """What a scan's columns say of its returns.
+
+    A column by which no ray has two says nothing: writers fill in 1 where they do not know.
+
+    Args:
+        scan: The scan. Known are ``return_number`` (or ``return_id``, ``return_index``, ``echo``)
+            with or without ``number_of_returns``, counted from the sensor outwards; ``bit_fields``,
+            in which LAS has both; ``return_type`` of Nebula and Autoware; bits 4 and 5 of Livox's
+            ``tag``; and ``range2`` beside ``range``, by which Ouster states a second return in the
+            row of the first.
+
+    Returns:
+        None where no column tells.
+    """
+    columns = {
+        name.lower(): column
+        for name, column in scan.fields.items()
+        if column.ndim == 1 and column.dtype.kind in "iuf"
+    }
+    return next((stated for read in _READERS if (stated := read(scan, columns))), None)
+
+
+Columns = Mapping[str, NDArray[Any]]
+
+
+def _of_numbers(scan: Scan, columns: Columns) -> StatedReturns | None:
+    name = next((name for name in NUMBER_NAMES if name in columns), None)
+    if name is None:
+        return None
+    number = _whole(columns[name])
+    count = next((_whole(columns[title]) for title in COUNT_NAMES if title in columns), None)
+    if count is None:
+        return _counted(scan, name, number)
+    return _of_so_many(scan, name, number, count)
+
+
+def _of_las_bits(scan: Scan, columns: Columns) -> StatedReturns | None:
+    bits = columns.get("bit_fields")
+    if bits is None or bits.dtype != np.uint8:
+        return None
+    # Point formats 6 to 10 have four bits for each number, and flags in a byte of their own; 0 to 5
+    # have three. Source: ASPRS, LAS Specification 1.4.
+    width = 4 if "classification_flags" in columns else 3
+    ones = (1 << width) - 1
+    number, count = bits & ones, bits >> width & ones
+    return _of_so_many(scan, "bit_fields", number.astype(np.int64), count.astype(np.int64))
+
+
+def _of_so_many(
+    scan: Scan, name: str, number: NDArray[np.int64], count: NDArray[np.int64]
+) -> StatedReturns | None:
+    """What numbers from 1 say where the number of returns of each ray is known."""
+    several = scan.valid & (count > 1) & (number >= 1) & (number <= count)
+    if not several.any():
+        return None
+    return StatedReturns(
+        name,
+        np.where(several, number, -1),
+        several & (number < count),
+        several & (number > 1),
+        _nowhere(scan),
+    )
+
+
+def _of_types(scan: Scan, columns: Columns) -> StatedReturns | None:
+    if "return_type" not in columns:
+        return None
+    kind = _whole(columns["return_type"])
+    present = set(np.unique(kind[scan.valid]).tolist())
+    if present & NEBULA_TELLS:
+        front, behind = NEBULA
+    elif max(present, default=0) <= AUTOWARE_LARGEST and (present >= {3, 6} or present >= {4, 5}):
+        front, behind = AUTOWARE
+    else:
+        return None
+    nearer, farther = scan.valid & np.isin(kind, front), scan.valid & np.isin(kind, behind)
+    number = np.where(nearer, 1, np.where(farther, 2, -1))
+    return StatedReturns("return_type", number, nearer, farther, _nowhere(scan))
+
+
+def _of_tags(scan: Scan, columns: Columns) -> StatedReturns | None:
+    if "tag" not in columns or columns["tag"].dtype.kind not in "iu":
+        return None
+    return _counted(scan, "tag", _whole(columns["tag"]) >> 4 & 3)
+
+
+def _of_second_ranges(scan: Scan, columns: Columns) -> StatedReturns | None:
+    if not {"range", "range2"} <= columns.keys():
+        return None
+    first, second = (columns[name].astype(np.float64) for name in ("range", "range2"))
+    both = scan.valid & (first > 0) & (second > 0) & np.isfinite(first) & np.isfinite(second)
+    if not both.any():
+        return None
+    # Whatever the unit of the columns is, the coordinates are in metres.
+    other = np.zeros(len(scan))
+    with np.errstate(over="ignore"):
+        other[both] = scan.range[both] * (second[both] / first[both])
+    both &= other <= LARGEST_COORDINATE
+    nearer = both & (other - scan.range >= LEAST_APART)
+    farther = both & (scan.range - other >= LEAST_APART)
+    other_range = np.where(nearer | farther, other, np.nan).astype(np.float32)
+    return StatedReturns("range2", np.full(len(scan), -1), nearer, farther, other_range)
+
+
+def _counted(scan: Scan, name: str, number: NDArray[np.int64]) -> StatedReturns | None:
+    """What numbers from 0 or from 1 say where nobody says how many returns a ray has.
+
+    The first return may be the only one of its ray: whether it is, its direction has to tell.
+    """
+    numbers = number[scan.valid]
+    if not len(numbers) or numbers.min() == numbers.max():
+        return None
+    farther = scan.valid & (number > numbers.min())
+    return StatedReturns(name, number, np.zeros(len(scan), bool), farther, _nowhere(scan))
+
+
+def _whole(column: NDArray[Any]) -> NDArray[np.int64]:
+    """A column as whole numbers; what is none is -1."""
+    if column.dtype.kind != "f":
+        return column.astype(np.int64)
+    return np.where(np.abs(column) < 2**31, column, -1).astype(np.int64)
+
+
+def _nowhere(scan: Scan) -> NDArray[np.float32]:
+    return np.full(len(scan), np.nan, np.float32)
+
+
+_READERS: tuple[Callable[[Scan, Columns], StatedReturns | None], ...] = (
+    _of_numbers,
+    _of_las_bits,
+    _of_types,
+    _of_tags,
+    _of_second_ranges,
+)

@@ -1,0 +1,220 @@
+"""``derain odometry``: scans in, poses out, with a warning for each that is not to be trusted."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from derain.cli.main import main
+from derain.evaluation.hard_cases import scene
+from derain.files import write_scan
+from derain.odometry.registration import shift_of
+from derain.scan import Scan
+from derain.sources.folders import named_frames
+from derain.sources.trajectory import read_trajectory
+
+STEP = np.array([0.9, 0.05, 0.0])
+
+RunOdometry = Callable[..., Any]
+
+
+def place(seed: int, points: int = 6000) -> np.ndarray:
+    """A hall of three walls across one another, seen by new points each time, (N, 3)."""
+    generator = np.random.default_rng(seed)
+    inside = generator.uniform(-1, 1, (points, 2))
+    ground = np.c_[20 * inside, np.full(points, -1.8)]
+    wall = np.c_[20 * inside[:, 0], np.full(points, 12), 3 * inside[:, 1]]
+    across = np.c_[np.full(points, 15), 12 * inside[:, 0], 3 * inside[:, 1]]
+    cloud = np.concatenate([ground, wall, across])
+    return cloud + generator.normal(0, 0.02, cloud.shape)
+
+
+def write_recording(folder: Path, scans: int, step: np.ndarray = STEP) -> Path:
+    """Scans of the hall, each of them a step further on."""
+    for number in range(scans):
+        points = Scan.of(np.c_[place(number) - number * step, np.ones(18_000)])
+        write_scan(folder / f"{number:06d}.bin", points)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_recording(tmp_path_factory.mktemp("hall") / "hall/velodyne", 4)
+
+
+@pytest.fixture
+def recording(made: Path, tmp_path: Path) -> Path:
+    """The folder of a recording's scans, in a folder of its own."""
+    folder = tmp_path / "hall" / "velodyne"
+    folder.mkdir(parents=True)
+    for scan in made.iterdir():
+        (folder / scan.name).symlink_to(scan)
+    return folder
+
+
+def test_poses_are_written_and_found_beside_the_scans(run_derain, recording: Path) -> None:
+    out = recording.parent / "poses.txt"
+    outcome = run_derain("odometry", recording, "--out", out)
+    assert (outcome.code, outcome.err) == (0, "")
+    *told, summary = outcome.out.splitlines()
+    assert [line.split(": ")[0] for line in told] == [
+        str(path) for path in sorted(recording.iterdir())
+    ]
+    assert re.search(r"0\.90 m, 0\.\d\d deg, residual 0\.0\d\d m, \d\d% matched", told[2])
+    assert re.search(
+        r"4 scans, path 2\.7 m, 0\.90 m a scan; residual median 0\.0\d+ m, worst", summary
+    )
+    assert summary.endswith("; 0 not to be trusted")
+    for number, frame in enumerate(named_frames([recording])):
+        np.testing.assert_allclose(frame.pose[:3, 3], number * STEP, atol=0.05)
+    assert {path.name for path in recording.parent.iterdir()} == {"velodyne", "poses.txt"}
+
+
+def test_json_is_an_object_a_scan(run_derain, recording: Path, tmp_path: Path) -> None:
+    outcome = run_derain("odometry", recording, "--out", tmp_path / "poses.txt", "--json")
+    facts = [json.loads(line) for line in outcome.out.splitlines()]
+    assert [each["trusted"] for each in facts] == 4 * [True]
+    assert facts[0]["metres"] == 0
+    assert facts[1]["metres"] == pytest.approx(0.9, abs=0.03)
+    assert facts[1].keys() == {
+        *("scan", "metres", "degrees", "residual", "matched", "trusted", "reason"),
+        "milliseconds",
+    }
+    assert "path 2.7 m" in outcome.err
+
+
+def test_poses_by_time_need_times(run_derain, recording: Path, tmp_path: Path) -> None:
+    out = tmp_path / "drive.tum"
+    outcome = run_derain("odometry", recording, "--out", out, "--format", "tum")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "nothing says when it was taken" in outcome.err
+    assert not out.exists()
+    (recording.parent / "times.txt").write_text("5.0\n5.1\n5.2\n5.3\n")
+    outcome = run_derain("odometry", recording, "--out", out, "--format", "tum")
+    assert outcome.code == 0
+    assert "9.0 m/s" in outcome.out
+    found = read_trajectory(out)
+    np.testing.assert_allclose(found.times, (5, 5.1, 5.2, 5.3))
+    np.testing.assert_allclose(found.poses[3, :3, 3], 3 * STEP, atol=0.05)
+
+
+def test_one_scan_has_the_identity_and_a_note(run_derain, recording: Path, tmp_path: Path) -> None:
+    out = tmp_path / "poses.txt"
+    outcome = run_derain("odometry", recording / "000000.bin", "--out", out)
+    assert outcome.code == 0
+    assert "1 scan alone tells of no motion" in outcome.out
+    np.testing.assert_array_equal(read_trajectory(out).poses, np.eye(4)[None])
+
+
+def test_scans_that_fail_are_named_and_the_rest_is_done(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    (recording / "000001.bin").unlink()
+    (recording / "000001.bin").write_bytes(b"damaged")
+    (recording / "000004.bin").symlink_to(recording / "000000.bin")
+    out = tmp_path / "poses.txt"
+    outcome = run_derain("odometry", recording, "--out", out)
+    assert outcome.code == 2
+    damaged, after, back, end = outcome.err.splitlines()
+    assert damaged.startswith(f"derain: {recording / '000001.bin'}: ")
+    assert after.startswith(f"derain: warning: {recording / '000002.bin'}: not to be trusted: the ")
+    assert "000004.bin: not to be trusted: " in back
+    assert "out of order or far apart" in back
+    assert end == "derain: 3 of 5 scans could not be registered"
+    assert "3 not to be trusted" in outcome.out.splitlines()[-1]
+    poses = read_trajectory(out).poses
+    assert len(poses) == 5
+    np.testing.assert_allclose(np.linalg.inv(poses[2])[:3] @ poses[3][:, 3], STEP, atol=0.03)
+
+
+def test_nothing_is_written_where_nothing_is_known(run_derain, tmp_path: Path) -> None:
+    for number in range(3):
+        scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
+    outcome = run_derain("odometry", tmp_path, "--out", tmp_path / "out/poses.txt")
+    assert outcome.code == 2
+    assert "was not written: no two scans of the recording could be laid upon one another" in (
+        outcome.err
+    )
+    assert not list((tmp_path / "out").iterdir())
+
+
+def test_several_recordings_are_a_folder_of_files(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    other = write_recording(tmp_path / "other/velodyne", 2, -STEP)
+    outcome = run_derain("odometry", recording, other, "--out", tmp_path / "poses")
+    assert outcome.code == 0, outcome.err
+    assert {path.name for path in (tmp_path / "poses").iterdir()} == {"hall.txt", "other.txt"}
+    found = read_trajectory(tmp_path / "poses/other.txt").poses
+    np.testing.assert_allclose(found[1, :3, 3], -STEP, atol=0.05)
+    namesake = write_recording(tmp_path / "other/hall/velodyne", 1)
+    outcome = run_derain("odometry", recording, namesake, "--out", tmp_path / "twice")
+    assert outcome.code == 2
+    assert "another recording is called hall too" in outcome.err
+    assert not (tmp_path / "twice/hall.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("poses.txt", "holds poses that came with the scans"),
+        ("velodyne/poses.txt", "holds poses that came with the scans"),
+        ("times.txt", "came with the scans"),
+        ("calib.txt", "came with the scans"),
+        ("velodyne/000001.bin", "is one of the scans or their labels"),
+        ("velodyne", "is not a file that can be replaced"),
+    ],
+)
+def test_what_came_with_the_scans_is_not_overwritten(
+    run_derain, recording: Path, name: str, reason: str
+) -> None:
+    out = recording.parent / name
+    if not out.exists():
+        out.write_text("precious")
+    before = out.read_bytes() if out.is_file() else None
+    outcome = run_derain("odometry", recording, "--out", out)
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert reason in outcome.err
+    assert before is None or out.read_bytes() == before
+
+
+def test_poses_are_replaced_on_request_alone(run_derain, recording: Path) -> None:
+    out = recording.parent / "poses.txt"
+    out.write_text("damaged")
+    assert run_derain("odometry", recording, "--out", out).code == 2
+    outcome = run_derain("odometry", recording, "--out", out, "--replace")
+    assert outcome.code == 0, outcome.err
+    assert len(read_trajectory(out)) == 4
+
+
+def test_poses_that_would_be_taken_for_a_cameras_are_warned_of(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    (recording.parent / "calib.txt").write_text("Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n")
+    outcome = run_derain("odometry", recording, "--out", tmp_path / "away.txt")
+    assert "holds poses of the LiDAR; beside" in outcome.err
+    outcome = run_derain("odometry", recording, "--out", recording.parent / "poses.txt")
+    assert (outcome.code, outcome.err) == (0, "")
+    last = named_frames([recording])[3]
+    np.testing.assert_allclose(last.pose[:3, 3], 3 * STEP, atol=0.05)
+
+
+def test_a_damaged_record_of_times_ends_it_before_the_work(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    (recording.parent / "times.txt").write_text("0\nsoon\n2\n3\n")
+    outcome = run_derain("odometry", recording, "--out", tmp_path / "poses.txt")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "times.txt: line 2 is not 1 number" in outcome.err
+
+
+def test_the_command_is_the_same_on_any_number_of_threads(recording: Path, tmp_path: Path) -> None:
+    for threads in ("1", "2"):
+        main(["odometry", str(recording), "--out", str(tmp_path / threads), "--threads", threads])
+    assert (tmp_path / "1").read_bytes() == (tmp_path / "2").read_bytes()
+    assert shift_of(read_trajectory(tmp_path / "1").poses[3]) > 2

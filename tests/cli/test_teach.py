@@ -1,0 +1,149 @@
+"""``derain teach``: what it prints, what it warns of, and what is trained on what it wrote."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from window_method import Between
+
+from derain.evaluation.hard_cases import scene
+from derain.files.labels import read_labels, write_labels
+from derain.methods.registry import METHODS
+from derain.teaching.manifest import Manifest
+
+POINTS = 200
+
+
+@pytest.fixture(autouse=True)
+def between(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Enters a method of windows."""
+    monkeypatch.setattr(METHODS, "_members", {**METHODS, "between": Between})
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    """Six scans with labels of WADS, of which every tenth point is snow."""
+    folder = tmp_path / "drive/velodyne"
+    folder.mkdir(parents=True)
+    for number in range(6):
+        scene(POINTS, number).tofile(folder / f"{number:06d}.bin")
+        truth = np.where(np.arange(POINTS) % 10, 10, 110)
+        write_labels(folder.parent / f"labels/{number:06d}.label", truth)
+    return folder
+
+
+def test_it_tells_of_every_scan_and_of_all(run_derain, drive: Path, tmp_path: Path) -> None:
+    out = tmp_path / "taught"
+    outcome = run_derain("teach", "between", drive, "--out", out, "--set", "rain_below=7")
+    assert outcome.code == 0, outcome.err
+    lines = outcome.out.splitlines()
+    assert [line.split(":")[0] for line in lines[:6]] == [
+        str(drive / f"{number:06d}.bin") for number in range(6)
+    ]
+    assert "100.0% not known" in lines[0]
+    labels = read_labels(out / "labels/000002.label", POINTS)
+    for id_, name in ((0, "not rain"), (1, "rain"), (255, "not known")):
+        assert f" {(labels == id_).mean():.1%} {name}" in lines[2]
+    assert lines[6] == "6 scans"
+    assert lines[7].split() == ["range", "points", "not", "rain", "rain", "not", "known"]
+    assert lines[-1].split()[:2] == ["all", "1,200"]
+    assert "for the record" not in outcome.out
+    assert "no point of it is known" in outcome.err
+    manifest = Manifest.read(out)
+    assert manifest.teacher == {"method": "between", "rain_below": 7, "sure_within": 30.0}
+    assert [scan.part for scan in manifest.scans] == ["train"] * 3 + ["validation"]
+    assert "2 of 6 scans are left out: of them nothing is known" in outcome.err
+
+
+def test_truth_is_measured_for_the_record_where_a_card_explains_it(
+    run_derain, drive: Path, tmp_path: Path
+) -> None:
+    outcome = run_derain("teach", "dror", drive, "--out", tmp_path / "out", "--card", "wads")
+    assert outcome.code == 0, outcome.err
+    told = outcome.out.split("for the record only, beside WADS's own labels of 6 scans")[1]
+    lines = [line.split() for line in told.splitlines()]
+    assert ["class", "points", "called", "rain", "of", "those", "it", "is", "sure", "of"] in lines
+    assert any(line[:2] == ["car", "1,080"] for line in lines)
+    assert any(line[:3] == ["falling-snow", "(rain)", "120"] for line in lines)
+
+
+def test_garbage_truth_is_told_and_hinders_nothing(run_derain, drive: Path, tmp_path: Path) -> None:
+    (drive.parent / "labels/000003.label").write_bytes(b"garbage")
+    outcome = run_derain("teach", "dror", drive, "--out", tmp_path / "out", "--card", "wads")
+    assert outcome.code == 0
+    assert "not measured" in outcome.err
+    assert "labels of 5 scans" in outcome.out
+    assert len(Manifest.read(tmp_path / "out").scans) == 6
+
+
+def test_objects_are_printed_where_asked_for(run_derain, drive: Path, tmp_path: Path) -> None:
+    outcome = run_derain("teach", "dror", drive, "--out", tmp_path / "out", "--json")
+    facts = [json.loads(line) for line in outcome.out.splitlines()]
+    assert [Path(item["scan"]).stem for item in facts] == [f"{n:06d}" for n in range(6)]
+    assert all(item["points"] == POINTS and item["not_known"] == 0 for item in facts)
+    assert "6 scans" in outcome.err
+
+
+def test_scans_that_cannot_be_read_are_passed_over(run_derain, drive: Path, tmp_path: Path) -> None:
+    (drive / "000002.bin").write_bytes(b"12345")
+    outcome = run_derain("teach", "between", drive, "--out", tmp_path / "out")
+    assert outcome.code == 2
+    assert outcome.err.splitlines()[-1] == (
+        "derain: 1 of 6 scans could not be judged, and have no labels"
+    )
+    assert [scan.number for scan in Manifest.read(tmp_path / "out").scans] == [4]
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--set", "rain_below=0"], "no rain was found"),
+        (["--set", "sure_within=0"], "of no point it is known whether it is rain"),
+        (["--set", "reach=1"], "it has no parameter reach"),
+        (["--poses", "none.txt"], "none.txt"),
+    ],
+)
+def test_what_is_wrong_is_told(
+    run_derain, drive: Path, tmp_path: Path, options: list[str], told: str
+) -> None:
+    outcome = run_derain("teach", "between", drive, "--out", tmp_path / "out", *options)
+    assert told in outcome.err
+    assert (tmp_path / "out").exists() == ("no rain" in told)
+
+
+def test_two_scans_are_all_for_training(run_derain, drive: Path, tmp_path: Path) -> None:
+    for number in range(2, 6):
+        (drive / f"{number:06d}.bin").unlink()
+    outcome = run_derain("teach", "dror", drive, "--out", tmp_path / "out")
+    assert outcome.code == 0
+    assert "no scan is held out" in outcome.err
+    outcome = run_derain("teach", "between", drive, "--out", tmp_path / "windows")
+    assert outcome.code == 2
+    assert "2 scans in its recording" in outcome.err
+
+
+def test_scans_out_of_order_are_warned_of(run_derain, drive: Path, tmp_path: Path) -> None:
+    (drive / "times.txt").write_text("0\n0.1\n0.3\n0.2\n0.4\n9\n")
+    outcome = run_derain("teach", "between", drive, "--out", tmp_path / "out")
+    assert outcome.code == 0
+    assert "000003.bin: not later than the scan before it" in outcome.err
+    assert "000005.bin: more than 1 s after the scan before it" in outcome.err
+    assert "not later" not in run_derain("teach", "dror", drive, "--out", tmp_path / "o").err
+
+
+def test_the_cleaned_recording_has_its_best_guesses(
+    run_derain, drive: Path, tmp_path: Path
+) -> None:
+    outcome = run_derain("run", "between", drive, "--out", tmp_path / "out", "--poses", "standing")
+    assert outcome.code == 0, outcome.err
+    points = scene(POINTS, 1)
+    rain = points[:, 3] < 20
+    np.testing.assert_array_equal(read_labels(tmp_path / "out/000001.label", POINTS), rain)
+    far = (np.linalg.norm(points[:, :3], axis=1) >= 30).mean()
+    assert f"({rain.mean():.1%}), {far:.1%} not known, " in outcome.out.splitlines()[1]
+    outcome = run_derain("run", "between", drive, "--out", tmp_path / "out", "--json")
+    facts = json.loads(outcome.out.splitlines()[0])
+    assert (facts["rain"], facts["not_known"]) == (int((scene(POINTS)[:, 3] < 20).sum()), POINTS)
+    outcome = run_derain("run", "dror", drive, "--out", tmp_path / "out", "--json")
+    assert json.loads(outcome.out.splitlines()[0])["not_known"] is None

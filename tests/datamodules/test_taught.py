@@ -1,0 +1,132 @@
+"""Scans that a teacher has labelled are trained on and measured by what it is sure of."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from window_method import Between
+
+from derain.datamodules.base import Loading, ScanDataModule
+from derain.datamodules.labelled import card_of, labelled_scans
+from derain.datamodules.taught import Taught
+from derain.errors import InputError
+from derain.evaluation.baselines import no_points
+from derain.evaluation.hard_cases import scene
+from derain.evaluation.scores import score
+from derain.files.labels import write_labels
+from derain.filters import DROR, FilterDerainer
+from derain.sources.folders import named_frames
+from derain.sources.training_record import SCANS
+from derain.teaching.manifest import CARD, TAUGHT_MANIFEST
+from derain.teaching.teach import teach
+
+POINTS = 200
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """Two taught sequences, whose own labels are garbage; of their ends nothing is known."""
+    for name, scans in (("00", 7), ("01", 5)):
+        for number in range(scans):
+            folder = tmp_path / f"drives/sequences/{name}/velodyne"
+            folder.mkdir(parents=True, exist_ok=True)
+            scene(POINTS, number).tofile(folder / f"{number:06d}.bin")
+            (folder.parent / "labels").mkdir(exist_ok=True)
+            (folder.parent / f"labels/{number:06d}.label").write_bytes(b"garbage")
+    source = named_frames([tmp_path / "drives"], labelled=True).map(
+        lambda frame: frame.with_intensity_times(2.0)
+    )
+    teach(Between(), source, tmp_path / "taught")
+    return tmp_path / "taught"
+
+
+def keys(data: ScanDataModule, part: str) -> list[str]:
+    return [frame.key for frame in data.source(part)]
+
+
+def test_the_ends_of_sequences_are_held_out(root: Path) -> None:
+    data = Taught(str(root))
+    assert keys(data, "train") == [
+        *(f"00/velodyne/{number:06d}" for number in range(1, 5)),
+        *(f"01/velodyne/{number:06d}" for number in range(1, 3)),
+    ]
+    for part in ("validation", "test", "predict"):
+        assert keys(data, part) == ["00/velodyne/000005", "01/velodyne/000003"]
+
+
+def test_scans_are_read_with_the_teachers_labels_and_as_it_saw_them(root: Path) -> None:
+    data = Taught(str(root))
+    frames = data.frames("train")
+    scan = data.read(frames[1])
+    teacher = Between()
+    answers = [teacher.push(frame.without_labels()) for frame in frames[:3]]
+    assert answers[2] is not None
+    assert scan.label is not None
+    assert scan.intensity is not None
+    np.testing.assert_array_equal(scan.intensity, 2 * scene(POINTS, 2)[:, 3])
+    (known, rain) = (answers[2].answered, answers[2].rain)
+    np.testing.assert_array_equal(data.card.unknown_of(scan), ~known)
+    np.testing.assert_array_equal(data.card.rain_of(scan), known & rain)
+
+
+def test_statistics_and_the_record_are_of_the_training_scans(root: Path) -> None:
+    data = Taught(str(root))
+    data.complete_card()
+    scans = [data.read(frame) for frame in data.frames("train")]
+    known = [~data.card.unknown_of(scan) for scan in scans]
+    rain = sum(int(data.card.rain_of(scan).sum()) for scan in scans)
+    assert data.card.rain_share == pytest.approx(rain / sum(map(np.count_nonzero, known)))
+    prints = {frame.fingerprint() for frame in data.source("train")}
+    assert data.training_record() == {SCANS: tuple(sorted(prints))}
+
+
+def test_no_target_is_given_for_points_that_are_not_known(root: Path, connect) -> None:
+    data = connect(Taught(str(root), Loading(batch_size=1)))
+    for batch, frame in zip(data.val_dataloader(), data.frames("validation"), strict=True):
+        known = ~data.card.unknown_of(data.read(frame))
+        assert 0 < known.sum() < POINTS
+        assert int((batch.target >= 0).sum()) == known.sum()
+
+
+def test_commands_that_measure_know_the_folder(root: Path) -> None:
+    card = card_of([root], None)
+    assert card.name.endswith("taught by between")
+    data = labelled_scans([root], card, Loading())
+    assert isinstance(data, Taught)
+    with pytest.raises(InputError, match="is a data set, of which no part can be taken"):
+        labelled_scans([root, root], card, Loading())
+
+
+def test_scores_are_agreement_with_the_teacher(root: Path, tmp_path: Path) -> None:
+    source = named_frames([tmp_path / "drives"])
+    dror = FilterDerainer(DROR(), 1)
+    teach(dror, source, tmp_path / "by_dror")
+    data = labelled_scans([tmp_path / "by_dror"], card_of([tmp_path / "by_dror"], None), Loading())
+    scans = [data.read_measured(frame) for frame in data.frames("test")]
+    itself, nothing = score([dror, no_points], scans, data.card)
+    assert itself.pooled.true_positive > 0
+    assert (itself.pooled.iou, nothing.pooled.iou) == (1, 0)
+
+
+def test_what_is_no_such_folder_is_refused(root: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=TAUGHT_MANIFEST):
+        Taught(str(tmp_path))
+    (root / CARD).unlink()
+    with pytest.raises(InputError, match=CARD):
+        Taught(str(root))
+
+
+def test_labels_that_are_gone_are_told(root: Path) -> None:
+    (root / "labels/00/velodyne/000001.label").unlink()
+    with pytest.raises(InputError, match=r"000001\.bin: its labels are not at"):
+        Taught(str(root)).frames("train")
+
+
+def test_without_a_held_out_scan_there_is_none_to_measure(tmp_path: Path) -> None:
+    scene(POINTS).tofile(tmp_path / "0.bin")
+    write_labels(tmp_path / "0.label", np.zeros(POINTS, int))
+    teach(FilterDerainer(DROR(), 1), named_frames([tmp_path / "0.bin"]), tmp_path / "taught")
+    data = Taught(str(tmp_path / "taught"))
+    assert keys(data, "train") == ["0"]
+    with pytest.raises(InputError, match="no scan is held out, so that there is none for test"):
+        data.source("test")

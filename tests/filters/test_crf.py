@@ -1,0 +1,237 @@
+"""The filter of conditional random fields against its formulas, point by point; and its bounds."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.filters import CRF, FilterDerainer
+from derain.filters.airborne import RainBounds, fit_rain_bounds
+from derain.filters.ground import find_ground
+from derain.scan import Scan
+
+# Nearer than this to a limit, rounding may decide.
+UNCLEAR = 1e-9
+
+
+class Reference:
+    """The formulas as they stand in the paper's program, in plain loops over all pairs.
+
+    Args:
+        points: Distinct x, y, z and intensity, float32 (M, 4).
+        neighbours: Size of a neighbourhood.
+
+    Attributes:
+        is_clear: Whether no verdict hangs on rounding, or on which of two equals comes first.
+    """
+
+    def __init__(self, points: NDArray[np.float32], neighbours: int) -> None:
+        self.xyz, self.intensity = points[:, :3].astype(np.float64), points[:, 3]
+        self.range = np.linalg.norm(self.xyz, axis=1)
+        apart = np.linalg.norm(self.xyz[:, None] - self.xyz[None], axis=2)
+        self.near = np.argsort(apart, axis=1)[:, : neighbours + 1]
+        self.apart = np.take_along_axis(apart, self.near, axis=1)
+        # Of equally near points either may be the neighbour.
+        self.is_clear = not (np.diff(self.apart, axis=1) < UNCLEAR).any()
+        self.near = self.near[:, :neighbours]
+        self.apart = self.apart[:, :neighbours].astype(np.float32).astype(np.float64)
+
+    def scatter(self, row: int) -> float:
+        values = np.linalg.eigvalsh(np.cov(self.xyz[self.near[row]].T, bias=True))
+        return max(values[0], 0) / values.sum() if values.sum() > 0 else 0
+
+    def published(self) -> NDArray[np.bool_]:
+        candidate = (self.intensity <= 2) & (self.range <= 30) & (self.xyz[:, 2] >= -1.8)
+        feature = {
+            row: (1 + self.scatter(row))
+            * (5 + self.apart[row].mean() / (0.1 + self.range[row]))
+            / (1 + max(self.intensity[row].astype(np.float64), 0))
+            for row in np.flatnonzero(candidate).tolist()
+        }
+        spread = max(feature.values(), default=0) - min(feature.values(), default=0)
+        if not spread > UNCLEAR:
+            return np.zeros(len(self.xyz), bool)
+        least = min(feature.values())
+        return self.decided({row: 2 * (f - least) / spread - 1 for row, f in feature.items()})
+
+    def fitted(self, candidate: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        feature = {
+            row: (1 + self.scatter(row))
+            * (5 + min(self.apart[row].mean() / (0.1 + self.range[row]), 1))
+            for row in np.flatnonzero(candidate).tolist()
+        }
+        return self.decided({row: 2 * (f - 5 / 3) / (8 - 5 / 3) - 1 for row, f in feature.items()})
+
+    def decided(self, feature: dict[int, float]) -> NDArray[np.bool_]:
+        """Judges the candidates in the order of azimuth."""
+        azimuth = np.arctan2(self.xyz[:, 1] + 0.0, self.xyz[:, 0])
+        self.is_clear &= len(np.unique(azimuth)) == len(azimuth)
+        for value in feature.values():
+            self.is_clear &= min(abs(value - 0.6), abs(value + 0.4)) > UNCLEAR
+        rain = np.zeros(len(self.xyz), bool)
+        decision: dict[int, float] = {}
+        for row in range(len(self.xyz)):
+            value = feature.get(row, -1.0)
+            if not -0.4 < value <= 0.6:
+                decision[row], rain[row] = (2.0, True) if value > 0.6 else (-2.0, False)
+        for row in sorted(set(feature) - set(decision), key=lambda row: azimuth[row]):
+            total = feature[row]
+            for other, apart in zip(self.near[row, 1:], self.apart[row, 1:], strict=True):
+                total += decision.get(int(other), feature.get(int(other), -1.0)) / (0.01 + apart)
+            self.is_clear &= abs(total) > UNCLEAR
+            rain[row], decision[row] = total > 0, 2.0 if total > 0 else -2.0
+        return rain
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(2, 12), st.floats(0.3, 30))
+def test_the_published_variant_does_what_its_formulas_say(
+    seed: int, points: int, neighbours: int, size: float
+) -> None:
+    generator = np.random.default_rng(seed)
+    place = generator.normal(size=(points, 3)) * [size, size, 1]
+    intensity = generator.choice([0, 0, 1, 1.5, 2, 2.5, 9], points)
+    cloud = np.column_stack([place, intensity]).astype(np.float32)
+    reference = Reference(cloud, neighbours)
+    expected = reference.published()
+    assume(reference.is_clear)
+    np.testing.assert_array_equal(FilterDerainer(CRF(neighbours, "published"), 1)(cloud), expected)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_fitted_variant_does_the_same_within_its_own_bounds(seed: int) -> None:
+    scan = Scan.of(scene(1200, seed))
+    ground = find_ground(scan.xyz)
+    assert ground is not None
+    reference = Reference(scene(1200, seed), 8)
+
+    def around(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        return reference.near[rows], reference.apart[rows].astype(np.float32)
+
+    above = ground.is_below(scan.xyz)
+    bounds = fit_rain_bounds(reference.xyz, reference.intensity, above, around, 3.0, 2.0)
+    assert bounds is not None
+    assert not bounds.is_bright
+    assert 3 < bounds.intensity < 6  # drops have 0 to 4, the wall at least 20
+    candidate = above & bounds.hold(reference.intensity, reference.range)
+    expected = reference.fitted(candidate)
+    assert reference.is_clear
+    assert 0.01 < expected.mean() < 0.12
+    np.testing.assert_array_equal(FilterDerainer(CRF(), 1)(scan), expected)
+
+
+@pytest.mark.parametrize("variant", ["fitted", "published"])
+def test_the_order_of_the_rows_does_not_matter_to_either_variant(variant: str) -> None:
+    derainer = FilterDerainer(CRF(variant=variant))
+    points = np.concatenate([scene(), scene(4000, 1) * np.array([-1, 1, 1, 1], np.float32)])
+    rain = derainer(points)
+    assert rain.any()
+    for seed in range(3):
+        shuffle = np.random.default_rng(seed).permutation(len(points))
+        np.testing.assert_array_equal(derainer(points[shuffle]), rain[shuffle])
+
+
+def iou(found: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
+    return float((found & rain).sum() / (found | rain).sum())
+
+
+def drops(points: int) -> NDArray[np.bool_]:
+    """Which points of :func:`scene` are drops."""
+    return np.arange(points) >= points - points // 10
+
+
+def test_the_unit_of_intensity_does_not_matter() -> None:
+    points = scene(6000)
+    rain = FilterDerainer(CRF())(points)
+    assert iou(rain, drops(6000)) > 0.65
+    for factor in (1 / 255, 257.0):
+        scaled = points * np.array([1, 1, 1, factor], np.float32)
+        np.testing.assert_array_equal(FilterDerainer(CRF())(scaled), rain)
+
+
+def test_rain_that_is_brighter_than_all_else_is_found_as_well() -> None:
+    points = scene(6000)
+    points[:, 3] = 255 - points[:, 3]
+    assert iou(FilterDerainer(CRF())(points), drops(6000)) > 0.65
+    assert not FilterDerainer(CRF(variant="published"))(points).any()
+
+
+@pytest.mark.parametrize("degrees", [-15, 0, 8, 20])
+def test_a_sensor_may_be_tilted_and_mounted_anywhere(degrees: float) -> None:
+    points = scene(6000)
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    x, _, z = points[:, :3].T.copy()
+    points[:, 0], points[:, 2] = cosine * x + sine * z, cosine * z - sine * x
+    assert iou(FilterDerainer(CRF())(points), drops(6000)) > 0.65
+
+
+def test_without_rain_nothing_is_called_rain() -> None:
+    dry = scene(6000)[~drops(6000)]
+    assert not FilterDerainer(CRF())(dry).any()
+    dry[:, 3] = np.random.default_rng(0).uniform(0, 255, len(dry))
+    assert not FilterDerainer(CRF())(dry).any()
+
+
+def test_rain_that_is_as_bright_as_all_else_is_left_alone() -> None:
+    points = scene(6000)
+    points[:, 3] = np.random.default_rng(0).uniform(0, 255, len(points))
+    assert not FilterDerainer(CRF())(points).any()
+
+
+@pytest.mark.parametrize("variant", ["fitted", "published"])
+def test_without_intensity_nothing_is_found_and_that_is_said(variant: str) -> None:
+    scan, filter_ = Scan.of(scene()), CRF(variant=variant)
+    assert not list(filter_.oddities(scan))
+    for blind in (replace(scan, intensity=None), replace(scan, intensity=0 * scan.intensity)):
+        assert not FilterDerainer(filter_)(blind).any()
+        (odd,) = filter_.oddities(blind)
+        assert "nothing can be found without" in odd.detail
+
+
+def test_only_the_published_bound_has_a_unit() -> None:
+    scan = Scan.of(scene()).with_intensity_times(1 / 255)
+    assert not list(CRF().oddities(scan))
+    (odd,) = CRF(variant="published").oddities(scan)
+    assert odd.kind == "intensity of a smaller unit"
+
+
+@pytest.mark.parametrize(("name", "scan"), list(hard_cases(5000)))
+def test_the_published_variant_survives_hard_scans(name: str, scan: Scan) -> None:
+    with np.errstate(all="raise", under="ignore"):
+        rain = FilterDerainer(CRF(variant="published"))(scan)
+    assert rain.shape == (len(scan),)
+    assert not rain[~scan.valid].any()
+
+
+def test_another_variant_is_refused() -> None:
+    with pytest.raises(InputError, match=r"variant is 'best'\. Give one of fitted, published"):
+        CRF(variant="best")
+
+
+def test_bounds_hold_what_is_on_their_side_and_near() -> None:
+    intensity = np.array([0, 5, 9, 9], np.float32)
+    distance = np.array([3.0, 3.0, 3.0, 30.0])
+    assert RainBounds(5, False, 10).hold(intensity, distance).tolist() == [True, True, False, False]
+    assert RainBounds(5, True, 10).hold(intensity, distance).tolist() == [False, False, True, False]
+
+
+@pytest.mark.parametrize(("variant", "wanted"), [("published", 0.845), ("fitted", 0.84)])
+def test_it_finds_the_snow_of_a_real_scan(shared: Path, variant: str, wanted: float) -> None:
+    points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)
+    label = np.fromfile(shared / "data/wads/sample.label", np.uint32) & 0xFFFF
+    assert iou(FilterDerainer(CRF(variant=variant))(points), label == 110) > wanted
+
+
+@pytest.mark.parametrize(
+    "name", ["kitti_hdl64.bin", "kitti_front.bin", "pandaset_pandar64.pcd", "ouster_os1_128.npz"]
+)
+def test_it_leaves_a_dry_recording_alone(shared: Path, name: str) -> None:
+    from derain.files import read_scan
+
+    assert not FilterDerainer(CRF())(read_scan(shared / "data/clean" / name)).any()

@@ -1,0 +1,87 @@
+"""Whole recordings given to a method: every frame is answered for, in order, or passed over."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from window_method import Between
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.filters import DROR, FilterDerainer
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.judging import judgements
+from derain.sources.source import Frames
+
+
+def drive(*lengths: int) -> list[Frame]:
+    """Recordings of so many scans."""
+    return [
+        frame
+        for number, length in enumerate(lengths)
+        for frame in Frames.of_scans(
+            [Scan.of(scene(60, 10 * number + place)) for place in range(length)], str(number)
+        ).map(Frame.without_labels)
+    ]
+
+
+@pytest.mark.parametrize("lengths", [(), (1,), (2,), (5,), (1, 1, 4), (3, 0, 2)])
+@pytest.mark.parametrize("method", [Between(), FilterDerainer(DROR(), 1)])
+def test_every_frame_is_answered_for_in_its_order(
+    method: Between | FilterDerainer, lengths: tuple[int, ...]
+) -> None:
+    frames = drive(*lengths)
+    answers = list(judgements(method, frames))
+    assert [frame for frame, _, _ in answers] == frames
+    assert all(judgement.frame is frame for frame, judgement, _ in answers)
+    assert method.waiting == 0
+
+
+def test_only_frames_with_neighbours_in_their_recording_are_sure() -> None:
+    sure = [bool(known.known is not None and known.known.any()) for known in _said(4, 2, 3)]
+    assert sure == [False, True, True, False, False, False, False, True, False]
+
+
+def test_the_answered_rows_are_those_judged_and_known() -> None:
+    _, judgement, _ = _said(3)
+    assert judgement.known is not None
+    np.testing.assert_array_equal(judgement.answered, judgement.judged & judgement.known)
+    scan = judgement.scan
+    alone = FilterDerainer(DROR(), 1).judge(scan)
+    np.testing.assert_array_equal(alone.answered, alone.judged)
+
+
+def test_a_frame_that_fails_is_passed_over_and_no_window_reaches_over_it() -> None:
+    frames = drive(6)
+    broken = frames[2]
+    told = []
+
+    @contextmanager
+    def guard(frame: Frame) -> Iterator[None]:
+        try:
+            yield
+        except InputError as error:
+            told.append((frame.key, error.reason))
+
+    class Unreadable(type(broken)):  # type: ignore[misc]
+        def read(self) -> Scan:
+            raise InputError(self.name, "it is broken", "Repair it.")
+
+    frames[2] = Unreadable(**vars(broken))
+    answers = list(judgements(Between(), frames, guard))
+    assert [frame.number for frame, _, _ in answers] == [0, 1, 3, 4, 5]
+    assert told == [(broken.key, "it is broken")]
+    sure = [judgement.known is not None and judgement.known.any() for _, judgement, _ in answers]
+    assert sure == [False, False, False, True, False]
+
+
+def test_without_a_guard_the_first_error_ends_it() -> None:
+    scan = Scan.of(scene(60)[:, :3])
+    with pytest.raises(InputError, match="it has no intensity"):
+        list(judgements(Between(), Frames.of_scans([scan] * 3)))
+
+
+def _said(*lengths: int) -> list:
+    return [judgement for _, judgement, _ in judgements(Between(), drive(*lengths))]

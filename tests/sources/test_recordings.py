@@ -1,0 +1,73 @@
+"""Frames by recordings, and what of a recording does not suit a method of several scans."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from derain.evaluation.hard_cases import scene
+from derain.scan import Scan
+from derain.sources.folders import named_frames
+from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.recordings import irregularities, recordings
+from derain.views.window import Window
+
+SEVERAL = Window(1, 1)
+
+
+def frames(*seconds: float | None, sequence: str = "drive") -> list[Frame]:
+    scan = Scan.of(scene(10), name="scan")
+    return [
+        MemoryFrame(key=f"{n}", sequence=sequence, number=n, scan=scan, seconds=time)
+        for n, time in enumerate(seconds)
+    ]
+
+
+def test_a_recording_ends_where_a_frame_does_not_follow() -> None:
+    drive, other = frames(0, 1, 2, 3), frames(0, 1, sequence="other")
+    found = recordings([*drive[:2], drive[3], *other, *drive])
+    assert found == [drive[:2], drive[3:], other, drive]
+    assert recordings([]) == []
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"),
+    [
+        ((0.0, 0.1, 0.2, 0.3), []),
+        ((None, None, None), []),
+        ((0.0, 0.1, 0.2, 5.0), ["more than 1 s after the scan before it (1 scan in all)"]),
+        ((0.0, 0.2, 0.1, 0.0), ["not later than the scan before it (2 scans in all)"]),
+        ((0.0, 0.0, 9.0), ["not later", "more than 1 s"]),
+        ((0.0, 0.1), ["2 scans in its recording"]),
+        ((0.0,), ["1 scan in its recording"]),
+    ],
+)
+def test_what_does_not_suit_is_told(seconds: Sequence[float | None], told: list[str]) -> None:
+    sentences = list(irregularities(frames(*seconds), SEVERAL))
+    assert len(sentences) == len(told)
+    for sentence, part in zip(sentences, told, strict=True):
+        assert part in sentence
+
+
+def test_a_method_of_one_scan_asks_for_nothing() -> None:
+    damaged = [replace(frame, sequence="a") for frame in frames(9.0, 0.0)]
+    assert list(irregularities(damaged, Window())) == []
+
+
+def test_names_that_are_numbers_tell_the_order_where_no_times_do(tmp_path: Path) -> None:
+    for number in range(4):
+        scene(10).tofile(tmp_path / f"{number:03d}.bin")
+    inorder = [tmp_path / f"{number:03d}.bin" for number in range(4)]
+    assert list(irregularities(named_frames(inorder), SEVERAL)) == []
+    (sentence,) = irregularities(named_frames(inorder[::-1]), SEVERAL)
+    assert "002.bin: not later than the scan before it (3 scans in all)" in sentence
+
+
+def test_damaged_times_are_told_and_no_more(tmp_path: Path) -> None:
+    for number in range(3):
+        scene(10).tofile(tmp_path / f"{number}.bin")
+    (tmp_path / "times.txt").write_text("soon\n")
+    (sentence,) = irregularities(named_frames([tmp_path]), SEVERAL)
+    assert "its times are not known" in sentence
+    assert "line 1 is not 1 number" in sentence

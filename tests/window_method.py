@@ -1,0 +1,89 @@
+"""A method that sees the scans before and after one, for tests of what takes any method."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.methods.recording_method import RecordingMethod
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
+from derain.sources.recent_frames import FrameInWindow, RecentFrames
+from derain.system.parameters import made_of
+from derain.system.stopwatch import Stopwatch
+from derain.views.oddities import Oddity
+from derain.views.window import Window
+
+
+@dataclass(frozen=True)
+class Dimmer:
+    """What the method below calls rain, and where it is sure of it."""
+
+    rain_below: float = 20.0
+    sure_within: float = 30.0
+
+
+class Between(RecordingMethod):
+    """Calls dim points rain; it is sure of near ones, where scans are before and after.
+
+    Attributes:
+        poses: Poses of the scans that it has judged, with those around them.
+    """
+
+    HELP: ClassVar[str] = "rain is what is dim between two scans"
+
+    def __init__(self, dimmer: Dimmer = Dimmer(), threads: int = 0) -> None:
+        self.dimmer = dimmer
+        self.threads = threads
+        self.poses: list[Any] = []
+        self._recent = RecentFrames(self.window)
+
+    @classmethod
+    def with_parameters(cls, parameters: Mapping[str, Any], threads: int) -> Self:
+        return cls(made_of(Dimmer, "between", parameters), threads)
+
+    @property
+    def window(self) -> Window:
+        return Window(1, 1)
+
+    @property
+    def waiting(self) -> int:
+        return self._recent.waiting
+
+    def starts_anew(self, frame: Frame) -> bool:
+        return self.waiting > 0 and self._recent.starts_anew(frame)
+
+    def push(
+        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> Judgement | None:
+        assert isinstance(frame, Frame)
+        assert not frame.has_labels
+        with (stopwatch or Stopwatch()).stage("read"):
+            ready = self._recent.take(frame, frame.read())
+        return None if ready is None else self._judged(ready)
+
+    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
+        while self.waiting:
+            yield self._judged(self._recent.give())
+        self._recent = RecentFrames(self.window)
+
+    def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
+        if judgement.known is not None and not judgement.known.any():
+            yield Oddity("nothing known", "no point of it is known")
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"method": "between", **asdict(self.dimmer)}
+
+    def _judged(self, ready: FrameInWindow) -> Judgement:
+        scan = ready.scans.scan
+        if scan.intensity is None:
+            raise InputError(ready.frame.name, "it has no intensity", "Give another scan.")
+        self.poses.append(ready.scans.judged.pose)
+        rain = scan.valid & (scan.intensity < self.dimmer.rain_below)
+        whole = bool(ready.scans.before and ready.scans.after)
+        known = (scan.range < self.dimmer.sure_within) & whole
+        return Judgement(rain.astype(np.float32), rain, scan.valid, scan, ready.frame, known)
