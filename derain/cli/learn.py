@@ -16,7 +16,10 @@ from derain.cli.training.lightning_silence import no_news
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.files.atomic import replacing
+from derain.odometry.posed import ODOMETRY
+from derain.odometry.recordings import recordings_of
 from derain.sources.folders import named_frames
+from derain.sources.records import POSES
 from derain.sources.source import Source
 from derain.teaching.held_out import FEWEST_SCANS
 from derain.teaching.manifest import TAUGHT_MANIFEST, Manifest
@@ -30,7 +33,7 @@ known; a network learns that, is exported as one ONNX file and proved; and a rep
 trust it. Every step is a command of derain, printed before it runs.
 
   derain learn recording/ --out model.onnx
-  derain learn recording/ --out model.onnx --standing          the sensor stood still
+  derain learn recording/ --out model.onnx --poses standing    the sensor stood still
   derain learn recording/ --out model.onnx --model salsanext --blind
   derain learn recording/ --out model.onnx --teacher crf       no motion needed; dim rain only
   derain run model.onnx more_scans/ --out cleaned              what it is for
@@ -63,8 +66,8 @@ class Lesson:
         work: Folder of all else that is written.
         model: Name of the network.
         teacher: Name of the teacher, or the file of a model.
-        poses: File of the sensor's poses, where there is one.
-        standing: Whether the sensor stood still.
+        poses: Where the sensor was, as ``--poses`` says it; None for what lies beside the scans,
+            and for odometry where nothing does.
         blind: Whether the network is not to see intensities.
         columns: Names of the columns of files that do not name them.
         fit: Further options of the training.
@@ -76,8 +79,7 @@ class Lesson:
     work: Path
     model: str = STUDENTS[0]
     teacher: str = PERSISTENCE
-    poses: Path | None = None
-    standing: bool = False
+    poses: str | None = None
     blind: bool = False
     columns: Sequence[str] = DEFAULT_COLUMNS
     fit: Sequence[str] = ()
@@ -97,13 +99,13 @@ class Lesson:
         """Whether the teacher asks where the sensor was, and nobody says so.
 
         Args:
-            source: The scans. Of several recordings, poses have to lie beside them.
+            source: The scans.
 
         Raises:
             InputError: A record of poses that is damaged or does not fit the scans.
         """
-        told = self.standing or self.poses is not None or source[0].pose is not None
-        return self.teacher == PERSISTENCE and not told and len(self.recordings) == 1
+        told = self.poses is not None or all(frame.pose is not None for frame in source)
+        return self.teacher == PERSISTENCE and (self.poses == ODOMETRY or not told)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -146,7 +148,6 @@ def main(arguments: argparse.Namespace) -> int:
             model=arguments.model,
             teacher=arguments.teacher,
             poses=arguments.poses,
-            standing=arguments.standing,
             blind=arguments.blind,
             columns=arguments.columns,
             fit=epochs,
@@ -227,10 +228,12 @@ def _teach(narrator: Narrator, lesson: Lesson, source: Source) -> None:
     scans, columns = [*map(str, lesson.recordings)], ("--columns", ",".join(lesson.columns))
     poses = lesson.poses
     if lesson.needs_odometry(source):
-        poses = lesson.work / "poses.txt"
-        command = ("odometry", *scans, "--out", str(poses), *columns)
-        narrator.step(*command, result=last_line, leaves=poses)
-    where = ("--standing",) if lesson.standing else ("--poses", str(poses)) if poses else ()
+        found = lesson.work / (POSES if len(recordings_of(source)) == 1 else "poses")
+        command = ("odometry", *scans, "--out", str(found), *columns)
+        narrator.step(*command, result=last_line, leaves=found)
+        # Where it failed, a file does not say; the teacher, who asks itself, leaves a gap there.
+        poses = ODOMETRY if narrator.failed else str(found)
+    where = () if poses is None else ("--poses", poses)
     narrator.step(
         *("teach", lesson.teacher, *scans, "--out", str(lesson.taught), *where, *columns),
         result=lambda _: f"{len(Manifest.read(lesson.taught).scans):,} scans labelled",

@@ -13,6 +13,7 @@ from derain.errors import InputError
 from derain.evaluation.answers import Answers, AnswersOfScan
 from derain.export.runtime import Derainer
 from derain.files.atomic import replacing
+from derain.odometry.posed import STANDING
 from derain.pictures.answers import answers_figure, removed_figure, teacher_figure
 from derain.pictures.scan_pictures import before_after_figure, save
 from derain.sources.frame import Frame
@@ -59,7 +60,7 @@ class LearningReport:
                 AnswersOfScan(frame.key, frame.key in kept_back, self._answers(frame))
                 for frame in tqdm(sorted(frames, key=_in_time), "counting", disable=None)
             ],
-            stood=lesson.standing,
+            stood=lesson.poses == STANDING,
             sees_intensity=not lesson.blind,
         )
 

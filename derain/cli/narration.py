@@ -78,6 +78,7 @@ class Narrator:
     Attributes:
         log: That file.
         commands: The commands so far, as they are typed.
+        failed: Whether the last command could not do all.
         warned: What the commands warned of, line by line, as far as derain's own.
 
     Raises:
@@ -88,6 +89,7 @@ class Narrator:
         self._run = run
         self.log = log
         self.commands: list[str] = []
+        self.failed = False
         self.warned: list[str] = []
         self._begun = time.monotonic()
         refuse_unwritable(log)
@@ -101,7 +103,7 @@ class Narrator:
         Args:
             command: Its arguments.
             result: Makes the line that is printed as its result, of what it printed itself.
-            leaves: A file that it leaves where it could not do all, but what could be done; None
+            leaves: What it leaves where it could not do all, but what could be done; None
                 where there is no such thing.
 
         Returns:
@@ -123,8 +125,9 @@ class Narrator:
             redirect_stderr(warned),
         ):
             code = self._run(list(command))
+        self.failed = code != 0
         self.warned += [line for line in warned.said if line.startswith(OF_DERAIN)]
-        if code and not (leaves and leaves.is_file()):
+        if code and not (leaves and leaves.exists()):
             print(*warned.said[-1:], f"All it said: {self.log}", sep="\n", file=sys.stderr)
             raise SystemExit(code)
         print(f"  {_clock(time.monotonic() - begun)}  {result(printed)}", flush=True)

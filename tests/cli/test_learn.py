@@ -165,9 +165,10 @@ def test_the_student_is_what_was_asked_for(
     ("teacher", "recordings", "options", "asked"),
     [
         ("persistence", 1, (), True),
-        ("persistence", 1, ("--standing",), False),
+        ("persistence", 1, ("--poses", "standing"), False),
+        ("persistence", 1, ("--poses", "odometry"), True),
         ("persistence", 1, ("--poses", "poses.txt"), False),
-        ("persistence", 2, (), False),
+        ("persistence", 2, (), True),
         ("dror", 1, (), False),
     ],
 )
