@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.filters.scatter import scatter_through_space
+from derain.views.scatter import scatter_through_space
 
 # Neighbourhoods of some points, given by their rows: rows of points int64 (Q, k), the point itself
 # first, and distances in metres, float32 (Q, k).

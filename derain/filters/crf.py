@@ -16,7 +16,6 @@ from derain.filters.ground import find_ground
 from derain.filters.point_filter import PointFilter, RainAndJudged, Span
 from derain.filters.random_field import decide_in_turn
 from derain.filters.registry import FILTERS
-from derain.filters.scatter import scatter_through_space
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
@@ -25,6 +24,7 @@ from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
 from derain.views.neighbours import Neighbourhoods
 from derain.views.oddities import Oddity, intensity_of_another_scale, missing_intensity
+from derain.views.scatter import scatter_through_space
 
 Variant = Literal["fitted", "published"]
 
@@ -48,7 +48,7 @@ class CRF(PointFilter):
 
     over its neighbourhood, itself included; d are the distances, and s is 0 where the points lie in
     a plane and 1/3 where they are scattered alike in all directions
-    (:func:`derain.filters.scatter.scatter_through_space`). F is scaled to -1..1; above 0.6 the
+    (:func:`derain.views.scatter.scatter_through_space`). F is scaled to -1..1; above 0.6 the
     point is rain, up to -0.4 it is not, and between them
     :func:`derain.filters.random_field.decide_in_turn` says, in the order of azimuth from behind the
     sensor once around it. That is the order of files which a spinning sensor wrote, by which the

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
-from derain.filters.scatter import scatter_through_space
+from derain.views.scatter import scatter_through_space
 
 clouds = hnp.arrays(
     np.float64, st.tuples(st.integers(1, 12), st.just(3)), elements=st.floats(-50, 50, width=32)
