@@ -19,7 +19,7 @@ ENOUGH_KNOWN = 0.7
 ENOUGH_AGREEMENT = 0.7
 ENOUGH_RAIN = 1000
 MORE_THAN_TAUGHT = 1.5
-LEAST_SHARE = 0.005
+MORE_BY = 0.005
 
 ALWAYS = """\
 - The held-out scans are of the same drive as those it learnt from. Of another sensor, another
@@ -168,7 +168,7 @@ def _doubts_of_student(learnt: Learnt) -> Iterator[str]:
     for name, band in coarse_bands(says).items():
         _, rain_share, unknown = band.shares
         perhaps = rain_share + unknown
-        if band.removed > max(MORE_THAN_TAUGHT * perhaps, perhaps + LEAST_SHARE):
+        if band.removed > max(MORE_THAN_TAUGHT * perhaps, perhaps + MORE_BY):
             yield (
                 f"At {name} it removes {band.removed:.1%} of the points, where the teacher saw "
                 f"{rain_share:.1%} of rain and did not know of {unknown:.1%}."

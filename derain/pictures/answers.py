@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator, PercentFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
@@ -27,8 +27,14 @@ from derain.pictures.scan_pictures import OUTCOMES, draw_from_above
 from derain.scan import Scan
 
 # Told apart by colour-blind eyes and in grey.
-OF_ANSWERS = ("#c9ced6", "#1f77b4", "#f2c14e")
+OF_ANSWERS = {RAIN: "#1f77b4", NOT_KNOWN: "#f2c14e"}
 STUDENT = "#111827"
+
+# How far from the sensor a picture shows what rain there is, at least, and where there is none.
+LEAST_REACH, FAR = 10.0, 40.0
+
+# Shares are drawn on an axis that reaches so far, at least.
+LEAST_TOP = 0.01
 
 # Where the last band, which is open, is drawn to, metres.
 LAST_EDGE = FINE_EDGES[-1] + FINE_EDGES[1]
@@ -41,7 +47,7 @@ FEWEST_POINTS = 100
 
 
 def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
-    """How sure the teacher was: shares of its answers by scan and by range.
+    """How sure the teacher was: what it calls rain and does not know, by scan and by range.
 
     Args:
         scans: The scans, in time order, one or more.
@@ -49,7 +55,7 @@ def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
     """
     figure = Figure(figsize=(12, 4.6), layout="constrained")
     figure.suptitle(title)
-    by_scan, by_range = figure.subplots(1, 2, width_ratios=(3, 2), sharey=True)
+    by_scan, by_range = figure.subplots(1, 2, width_ratios=(3, 2))
     _draw_by_scan(by_scan, scans)
     bands = coarse_bands(total([scan.answers for scan in scans]))
     filled = {name: answers for name, answers in bands.items() if answers.points}
@@ -61,6 +67,7 @@ def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
         loc="outside lower center",
         ncols=len(TEACHERS_ANSWERS),
         frameon=False,
+        title="the rest: not rain",
     )
     return figure
 
@@ -101,11 +108,8 @@ def removed_figure(held_out: Answers, title: str) -> Figure:
     axes.set_xlabel(f"range / m (the last band: {FINE_EDGES[-1]} m and more)")
     axes.set_ylabel("share of the points at that range")
     axes.set_xlim(0, LAST_EDGE)
-    top = np.nanmax(np.fmax(student, rain), initial=0)
-    axes.set_ylim(0, min(1.0, max(1.15 * top, 0.01)))
-    axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+    _scale(axes, float(np.nanmax(np.fmax(student, rain), initial=0)))
     axes.legend(frameon=False)
-    axes.spines[["top", "right"]].set_visible(False)
     return figure
 
 
@@ -139,13 +143,15 @@ def answers_figure(
         "not known to the teacher, or rain to it alone": LEFT,
         "rain to the student alone": LOST,
     }
-    figure = Figure(figsize=(16, 5.9), layout="constrained")
+    figure = Figure(figsize=(16, 5.7), layout="constrained")
     figure.suptitle(title)
     row = figure.subplots(1, 3, sharex=True, sharey=True)
     for axes, (name, outcome) in zip(row, panels.items(), strict=True):
         axes.set_title(name)
         draw_from_above(axes, scan, outcome)
         axes.set_xlabel("right / m")
+    half = _reach(scan, called_rain | (answer == RAIN))
+    row[0].set(xlim=(-1.2 * half, 1.2 * half), ylim=(-half, half))
     row[0].set_ylabel("forward / m")
     colours = list(OUTCOMES.values())
     figure.legend(
@@ -157,16 +163,29 @@ def answers_figure(
     return figure
 
 
+def _reach(scan: Scan, rain: NDArray[np.bool_]) -> float:
+    """How far from the sensor most of the rain is, metres, with something around it."""
+    ranges = scan.range[rain & scan.valid]
+    return max(LEAST_REACH, 1.3 * float(np.percentile(ranges, 95))) if len(ranges) else FAR
+
+
 def _draw_by_scan(axes: Axes, scans: Sequence[AnswersOfScan]) -> None:
     """Bars in time order, those of held-out scans on a ground of their own."""
     _draw_shares(axes, np.arange(len(scans)), [scan.answers for scan in scans], width=1.0)
     kept_back = [place for place, scan in enumerate(scans) if scan.held_out]
     if kept_back:
         axes.axvline(kept_back[0] - 0.5, color=STUDENT, linestyle=":")
-        axes.text(kept_back[0] - 0.4, 0.97, "held out", color=STUDENT, va="top", fontsize=9)
+        axes.annotate(
+            "held out",
+            (kept_back[0] - 0.5, 1),
+            (4, -2),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            color=STUDENT,
+            va="top",
+            fontsize=9,
+        )
     axes.set_xlim(-0.5, len(scans) - 0.5)
-    axes.set_ylim(0, 1)
-    axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("scan, in time order")
     axes.set_ylabel("share of the points")
@@ -176,10 +195,10 @@ def _draw_by_scan(axes: Axes, scans: Sequence[AnswersOfScan]) -> None:
 def _draw_shares(
     axes: Axes, places: NDArray[np.int64], answers: Sequence[Answers], width: float
 ) -> None:
-    """Stacked bars: rain below, then what is not known, then the rest."""
+    """Stacked bars: rain, and on it what is not known; what is left to 1 is not rain."""
     shares = np.array([one.shares for one in answers]).reshape(-1, len(TEACHERS_ANSWERS))
     bottom = np.zeros(len(answers))
-    for answer in (RAIN, NOT_KNOWN, NOT_RAIN):
+    for answer in (RAIN, NOT_KNOWN):
         axes.bar(
             places,
             shares[:, answer],
@@ -189,6 +208,13 @@ def _draw_shares(
             label=TEACHERS_ANSWERS[answer],
         )
         bottom = bottom + shares[:, answer]
+    _scale(axes, float(bottom.max(initial=0)))
+
+
+def _scale(axes: Axes, largest: float) -> None:
+    """Shares from 0 to a little above the largest, as per cent."""
+    axes.set_ylim(0, min(1.0, max(1.15 * largest, LEAST_TOP)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:.3g} %"))
     axes.spines[["top", "right"]].set_visible(False)
 
 
