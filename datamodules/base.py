@@ -58,6 +58,14 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
             InputError: Missing folders or scans.
         """
 
+    def shown(self, part: Part) -> Source:
+        """The scans that a loader of a part goes through once: by default, each of them once.
+
+        Raises:
+            InputError: Missing folders or scans.
+        """
+        return self.source(part)
+
     def frames(self, part: Part) -> Source:
         """The scans of a part of the data, in order, each with the labels that are read there.
 
@@ -141,7 +149,7 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
         processes, process = 1, 0
         if self.trainer is not None:
             processes, process = self.trainer.world_size, self.trainer.global_rank
-        return scan_loader(self.source(part), part, self.task, self.loading, processes, process)
+        return scan_loader(self.shown(part), part, self.task, self.loading, processes, process)
 
     @property
     def _reader(self) -> FrameReader:

@@ -5,8 +5,11 @@ from pathlib import Path
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading, Part, ScanDataModule
 from derain.errors import InputError
-from derain.sources.source import Source
+from derain.sources.source import Frames, Source
 from derain.teaching.manifest import CARD, HELD_OUT_PART, TRAINING_PART, Manifest
+
+# Scans of an epoch of training: as many steps as the rates of learning are chosen for.
+FEWEST_SHOWN = 16
 
 
 class Taught(ScanDataModule):
@@ -56,3 +59,16 @@ class Taught(ScanDataModule):
                 "Teach a sequence of three scans or more.",
             )
         return frames
+
+    def shown(self, part: Part) -> Source:
+        """The scans of a part; to train on, each of a short recording several times an epoch.
+
+        Augmentation changes it in another way each time. An epoch of a few scans would be too short
+        to choose by.
+
+        Raises:
+            InputError: No scan was held out.
+        """
+        source = self.source(part)
+        times = -(-FEWEST_SHOWN // len(source)) if part == "train" else 1
+        return Frames([*source] * times)

@@ -46,7 +46,8 @@ class SupervisedModule(DerainingModule):
     def take(self, task: Task) -> None:
         """Takes over what was agreed with the data, and weighs the classes by their shares there.
 
-        Of a network that judges candidates alone, they are the shares among them.
+        Of a network that judges candidates alone, they are the shares among them. How far the rarer
+        class counts for more is what ``balance`` says.
 
         Raises:
             InputError: A Spec of another network.
@@ -55,7 +56,8 @@ class SupervisedModule(DerainingModule):
         candidates = self.spec.candidates
         share = self.card.rain_share if candidates is None else candidates.rain_share
         if share is not None:
-            self.class_weight.copy_(class_weights([1 - share, share]))
+            weights = class_weights([1 - share, share])
+            self.class_weight.copy_(weights ** self.hparams.get("balance", 1.0))
 
     def candidates_for(self, card: DataCard, scans: Sequence[Scan]) -> Candidates | None:
         """Bounds that hold as much of the training scans' rain as ``candidates`` asks for.

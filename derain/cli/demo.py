@@ -1,13 +1,13 @@
 """``derain demo``: every step from scans to a deployed model, on simulated rain."""
 
 import argparse
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from derain.cli.arguments import count
-from derain.cli.narration import Narrator, Transcript
+from derain.cli.narration import Narrator
+from derain.cli.results import first_line, iou_on, last_line, proof_of
 
 SUMMARY = "the whole story on simulated rain, in about six minutes"
 
@@ -83,8 +83,8 @@ def tell(story: Story) -> None:
     narrator = Narrator(derain, out / "log.txt")
     print(f"Simulated rain, from streets to a table. Everything goes to {out}/\n")
     data, tuned = out / "simulated", out / "dsor.yaml"
-    narrator.step("simulate", "--out", str(data), *story.streets, result=_last_line)
-    narrator.step("tune", "dsor", "--data", str(data), "--out", str(tuned), result=_first_line)
+    narrator.step("simulate", "--out", str(data), *story.streets, result=last_line)
+    narrator.step("tune", "dsor", "--data", str(data), "--out", str(tuned), result=first_line)
     scan = _rainiest(data)
     narrator.step(
         *("view", str(scan), "--card", "simulated", "--methods", "dror", f"dsor, tuned={tuned}"),
@@ -117,12 +117,12 @@ def _network(narrator: Narrator, story: Story, title: str, scan: Path) -> None:
         *("fit", "--config", f"{name}_simulated.yaml", "--data.root", str(out / "simulated")),
         *("--data.make", "false", "--trainer.logger.save_dir", str(out / "runs")),
         *("--checkpoint.dirpath", str(out), "--checkpoint.filename", name, *story.fit),
-        result=lambda printed: f"{title} trained{_last_score(printed)}",
+        result=lambda printed: f"{title} trained{iou_on(printed, 'streets kept back')}",
     )
     model = checkpoint.with_suffix(".onnx")
     narrator.step(
         *("export", str(checkpoint), "--out", str(model), "--scan", str(scan)),
-        result=lambda printed: f"{model.stat().st_size:,} bytes; {_proof(printed)}",
+        result=lambda printed: f"{model.stat().st_size:,} bytes; {proof_of(printed)}",
     )
 
 
@@ -134,7 +134,7 @@ def _clean(narrator: Narrator, out: Path, title: str, scan: Path) -> None:
 
     model, picture = out / f"{DEMO_NETWORKS[title]}.onnx", out / "before_after.png"
     narrator.step(
-        *("run", str(model), str(scan.parent), "--out", str(out / "cleaned")), result=_last_line
+        *("run", str(model), str(scan.parent), "--out", str(out / "cleaned")), result=last_line
     )
     before = frame_of(scan).read()
     heading = f"Simulated rain, cleaned by {title}"
@@ -150,26 +150,6 @@ def _rainiest(data: Path) -> Path:
     rates = rain_rates([data], None)
     frames = Simulated(str(data), make=False).frames("test")
     return Path(max(frames, key=lambda frame: (rates[frame.sequence], frame.key)).name)
-
-
-def _first_line(printed: Transcript) -> str:
-    return printed.said[0]
-
-
-def _last_line(printed: Transcript) -> str:
-    return printed.said[-1]
-
-
-def _last_score(printed: Transcript) -> str:
-    """IoU on the validation scans, as the progress bar of the last epoch shows it."""
-    found = re.search(r"val_iou=([\d.]+)", printed.bar)
-    return f": IoU {found[1]} on streets kept back" if found else ""
-
-
-def _proof(printed: Transcript) -> str:
-    """The line of the export's proof that says how much the model differs from PyTorch."""
-    proof = next(line for line in printed.said if "largest logit difference" in line)
-    return f"beside PyTorch {proof.partition(': ')[2]}"
 
 
 def _narrowed(lines: Sequence[str]) -> list[str]:

@@ -16,6 +16,7 @@ from derain.cli import (
     fuse,
     import_weights,
     info,
+    learn,
     odometry,
     run,
     simulate,
@@ -50,6 +51,7 @@ COMMANDS: dict[str, ModuleType] = {
     "annotate": annotate,
     "teach": teach,
     "fuse": fuse,
+    "learn": learn,
     "odometry": odometry,
     "demo": demo,
 }

@@ -16,6 +16,9 @@ from derain.cli.outputs import refuse_unwritable
 # Seconds between reports of how far a command has come: on a terminal (True), and in a file.
 PERIODS = {True: 0.5, False: 15.0}
 
+# How a warning or an error of derain's begins.
+OF_DERAIN = "derain: "
+
 # A progress bar of Lightning or tqdm: what is counted, and the share that is done.
 _BAR = re.compile(r"(?P<what>[^|\r\n]*?):?\s*(?P<share>\d+%)?\|.*\|\s*\d+/")
 _MOVES_OF_CURSOR = re.compile(r"\x1b\[[A-Z]")
@@ -72,23 +75,36 @@ class Narrator:
         run: Runs a command of derain, and returns its exit code.
         log: File that everything the commands print goes to.
 
+    Attributes:
+        log: That file.
+        commands: The commands so far, as they are typed.
+        failed: Whether the last command could not do all.
+        warned: What the commands warned of, line by line, as far as derain's own.
+
     Raises:
         InputError: The file cannot be written.
     """
 
     def __init__(self, run: Callable[[list[str]], int], log: Path) -> None:
         self._run = run
-        self._log = log
+        self.log = log
+        self.commands: list[str] = []
+        self.failed = False
+        self.warned: list[str] = []
         self._begun = time.monotonic()
         refuse_unwritable(log)
         log.write_text("", "utf-8")
 
-    def step(self, *command: str, result: Callable[[Transcript], str]) -> list[str]:
+    def step(
+        self, *command: str, result: Callable[[Transcript], str], leaves: Path | None = None
+    ) -> list[str]:
         """Runs one command.
 
         Args:
             command: Its arguments.
             result: Makes the line that is printed as its result, of what it printed itself.
+            leaves: What it leaves where it could not do all, but what could be done; None
+                where there is no such thing.
 
         Returns:
             The lines that it printed.
@@ -96,20 +112,23 @@ class Narrator:
         Raises:
             SystemExit: It failed, and the reason has been printed.
         """
-        line = f"$ derain {shlex.join(command)}"
+        self.commands.append(f"derain {shlex.join(command)}")
+        line = f"$ {self.commands[-1]}"
         print(line, flush=True)
         begun = time.monotonic()
-        with self._log.open("a", encoding="utf-8") as file:
+        with self.log.open("a", encoding="utf-8") as file:
             file.write(f"\n{line}\n")
-        printed, warned = Transcript(self._log), Transcript(self._log)
+        printed, warned = Transcript(self.log), Transcript(self.log)
         with (
             _told_how_far((printed, warned), begun),
             redirect_stdout(printed),
             redirect_stderr(warned),
         ):
             code = self._run(list(command))
-        if code:
-            print(*warned.said[-1:], f"All it said: {self._log}", sep="\n", file=sys.stderr)
+        self.failed = code != 0
+        self.warned += [line for line in warned.said if line.startswith(OF_DERAIN)]
+        if code and not (leaves and leaves.exists()):
+            print(*warned.said[-1:], f"All it said: {self.log}", sep="\n", file=sys.stderr)
             raise SystemExit(code)
         print(f"  {_clock(time.monotonic() - begun)}  {result(printed)}", flush=True)
         return printed.said

@@ -49,6 +49,9 @@ class OutDet(SupervisedModule, Published):
         candidates: Share of the training scans' rain that must lie within a few bounds (range,
             height, intensity), outside which no point is judged, nor is any rain, such as 0.999.
             As published, None: all are judged.
+        balance: How far the rarer class counts for more: 1 by the inverse of its share, as
+            published; 0 not at all, as suits labels with errors, whose few points called rain by
+            mistake would count for many.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 
     Source: sporsho/3D_OutDet, train_wads.py.
@@ -69,6 +72,7 @@ class OutDet(SupervisedModule, Published):
         decay: float = 0.1,
         threshold: float = 0.5,
         candidates: float | None = None,
+        balance: float = 1.0,
         spec: dict[str, Any] | None = None,
     ) -> None:
         super().__init__(channels)

@@ -81,6 +81,9 @@ class SalsaNextModule(SupervisedModule):
         threshold: A point is rain where its probability is greater.
         candidates: Share of the training scans' rain that must lie within a few bounds (range,
             height, intensity), outside which nothing is learnt from or called rain; None for none.
+        balance: How far the rarer class counts for more: 1 by the inverse of its share, as
+            published; 0 not at all, as suits labels with errors, whose few points called rain by
+            mistake would count for many.
         spec: Set by derain when it saves a checkpoint; leave it out otherwise.
 
     Source: TiagoCortinhal/SalsaNext, salsanext.yml, trainer.py, warmupLR.py.
@@ -104,6 +107,7 @@ class SalsaNextModule(SupervisedModule):
         published_loss: bool = False,
         threshold: float = 0.5,
         candidates: float | None = None,
+        balance: float = 1.0,
         spec: dict[str, Any] | None = None,
     ) -> None:
         super().__init__(channels)

@@ -1,5 +1,6 @@
 """Scans that a teacher has labelled are trained on and measured by what it is sure of."""
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -130,3 +131,18 @@ def test_without_a_held_out_scan_there_is_none_to_measure(tmp_path: Path) -> Non
     assert keys(data, "train") == ["0"]
     with pytest.raises(InputError, match="no scan is held out, so that there is none for test"):
         data.source("test")
+
+
+def test_an_epoch_of_a_short_recording_shows_each_scan_as_often_as_any_other(
+    root: Path, connect
+) -> None:
+    data = connect(Taught(str(root)))
+    loader = data.train_dataloader()
+    shown = [sample.cells for sample in loader]
+    assert len(shown) == 18  # the six scans, three times: sixteen or more
+    assert len(data.val_dataloader()) == 2
+    counted = Counter(frame.key for frame in loader.dataset.frames)
+    assert counted == dict.fromkeys(keys(data, "train"), 3)
+    # Not three times the same: augmentation changes each in another way.
+    first, again = (loader.dataset[place].scan.xyz for place in (0, 6))
+    assert not np.array_equal(first, again)

@@ -14,9 +14,12 @@ from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.runtime import Derainer
 from derain.files import read_scan
+from derain.filters import DROR, FilterDerainer
 from derain.models.checkpoint import load_model
 from derain.scan import Scan
+from derain.sources.folders import named_frames
 from derain.system.open3d_import import import_open3d
+from derain.teaching.teach import teach
 
 WriteScan = Callable[..., None]
 
@@ -64,9 +67,22 @@ def small_track(root: Path, write_labelled: WriteScan) -> tuple[list[str], Path]
     return options, root / "sequences/003/lidar_radar_pcd"
 
 
+def taught_scenes(root: Path, write_labelled: WriteScan) -> tuple[list[str], Path]:
+    """Three scenes that a filter has taught; the last is held out."""
+    drive = root.with_name("drive")
+    for number in range(3):
+        write_labelled(drive / f"velodyne/{number}.bin", drive / f"labels/{number}.label", 1)
+    teach(FilterDerainer(DROR()), named_frames([drive / "velodyne"]), root)
+    held_out = root.with_name("held_out")
+    held_out.mkdir()
+    (held_out / "2.bin").symlink_to((drive / "velodyne/2.bin").absolute())
+    return [], held_out
+
+
 DATA_SETS: dict[str, Prepare] = {
     "rehearse3d": in_sequences("lidar_radar_pcd", "lidar_radar_labels", rain=3),
     "simulated": small_track,
+    "taught": taught_scenes,
     "wads": in_sequences("velodyne", "labels", rain=110),
     "wads36": sequence_36,
 }
@@ -85,6 +101,7 @@ PREPARATIONS = {
     f"{network}_{data}.yaml": prepare
     for network in ("lisnownet", "outdet", "salsanext_lite", "salsanext")
     for data, prepare in DATA_SETS.items()
+    if (network, data) != ("lisnownet", "taught")  # it needs no teacher
 }
 
 

@@ -1,0 +1,253 @@
+"""``derain learn``: a derainer for a sensor, from an unlabelled recording of it."""
+
+import argparse
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from derain.cli.arguments import count
+from derain.cli.narration import Narrator
+from derain.cli.outputs import refuse_unwritable, say
+from derain.cli.pose_options import add_poses
+from derain.cli.results import last_line, proof_of
+from derain.cli.scan_options import add_columns
+from derain.cli.training.lightning_silence import no_news
+from derain.errors import InputError
+from derain.files import DEFAULT_COLUMNS
+from derain.files.atomic import replacing
+from derain.odometry.posed import ODOMETRY
+from derain.odometry.recordings import recordings_of
+from derain.sources.folders import named_frames
+from derain.sources.records import POSES
+from derain.sources.source import Source
+from derain.teaching.held_out import FEWEST_SCANS
+from derain.teaching.manifest import TAUGHT_MANIFEST, Manifest
+
+SUMMARY = "a derainer from an unlabelled recording, in about ten minutes"
+
+DESCRIPTION = """\
+Learns to take the rain out of a sensor's scans from a recording of it that nobody labelled:
+consecutive scans in a folder. A teacher says of each point whether it is rain, not rain, or not
+known; a network learns that, is exported as one ONNX file and proved; and a report says how far to
+trust it. Every step is a command of derain, printed before it runs.
+
+  derain learn recording/ --out model.onnx
+  derain learn recording/ --out model.onnx --poses standing    the sensor stood still
+  derain learn recording/ --out model.onnx --model salsanext --blind
+  derain learn recording/ --out model.onnx --teacher crf       no motion needed; dim rain only
+  derain run model.onnx more_scans/ --out cleaned              what it is for
+
+The teacher is persistence by default, which judges a point by the scans before and after: solid
+things are where they were, drops are not. Labels that lie beside the scans are not read; with
+--card, they measure the finished model, for the record. Labels, runs and report go to a folder
+beside the model, which a second run clears.
+"""
+
+# Networks that learn from labels, and the beginning of their configurations' names.
+STUDENTS = ("outdet", "salsanext", "salsanext_lite")
+
+# What a network sees of a point where it is blind to intensity.
+BLIND = {"outdet": "[x,y,z]", "salsanext": "[range,x,y,z]", "salsanext_lite": "[range,x,y,z]"}
+
+PERSISTENCE = "persistence"
+
+# By this file a folder is known for one that a second run may clear.
+MARK = "learning.txt"
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """What is learnt from what.
+
+    Attributes:
+        recordings: Folders of consecutive scans.
+        out: The ONNX file.
+        work: Folder of all else that is written.
+        model: Name of the network.
+        teacher: Name of the teacher, or the file of a model.
+        poses: Where the sensor was, as ``--poses`` says it; None for what lies beside the scans,
+            and for odometry where nothing does.
+        blind: Whether the network is not to see intensities.
+        columns: Names of the columns of files that do not name them.
+        fit: Further options of the training.
+        card: Data card of labels that measure the finished model; None measures nothing.
+    """
+
+    recordings: Sequence[Path]
+    out: Path
+    work: Path
+    model: str = STUDENTS[0]
+    teacher: str = PERSISTENCE
+    poses: str | None = None
+    blind: bool = False
+    columns: Sequence[str] = DEFAULT_COLUMNS
+    fit: Sequence[str] = ()
+    card: str | None = None
+
+    @property
+    def taught(self) -> Path:
+        """Folder of the teacher's labels."""
+        return self.work / "taught"
+
+    @property
+    def checkpoint(self) -> Path:
+        """Checkpoint of the student, the best by its agreement with the teacher."""
+        return self.work / "student.ckpt"
+
+    def needs_odometry(self, source: Source) -> bool:
+        """Whether the teacher asks where the sensor was, and nobody says so.
+
+        Args:
+            source: The scans.
+
+        Raises:
+            InputError: A record of poses that is damaged or does not fit the scans.
+        """
+        told = self.poses is not None or all(frame.pose is not None for frame in source)
+        return self.teacher == PERSISTENCE and (self.poses == ODOMETRY or not told)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the command's arguments."""
+    parser.add_argument(
+        "recording", nargs="+", type=Path, help="folders of consecutive scans, in time order"
+    )
+    parser.add_argument("--out", type=Path, required=True, help="the ONNX file to write")
+    parser.add_argument("--model", choices=STUDENTS, default=STUDENTS[0], help="(default: outdet)")
+    parser.add_argument(
+        "--teacher",
+        default=PERSISTENCE,
+        metavar="METHOD",
+        help="what labels the scans: persistence, a filter such as crf, or a model (.onnx)",
+    )
+    add_poses(parser)
+    parser.add_argument("--epochs", type=count, help="passes over the scans (default: by model)")
+    parser.add_argument(
+        "--blind",
+        action="store_true",
+        help="learn without intensity: for sensors of other units, or where it says nothing",
+    )
+    parser.add_argument("--work", type=Path, help="folder for all else (default: beside the model)")
+    parser.add_argument(
+        "--card", help="measure the finished model by the labels beside the scans, which this "
+        "data card explains, for the record",
+    )  # fmt: skip
+    add_columns(parser)
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Runs the command."""
+    out: Path = arguments.out
+    epochs = ("--trainer.max_epochs", str(arguments.epochs)) if arguments.epochs else ()
+    learn(
+        Lesson(
+            recordings=arguments.recording,
+            out=out,
+            work=arguments.work or out.with_name(f"{out.stem}_learning"),
+            model=arguments.model,
+            teacher=arguments.teacher,
+            poses=arguments.poses,
+            blind=arguments.blind,
+            columns=arguments.columns,
+            fit=epochs,
+            card=arguments.card,
+        )
+    )
+    return 0
+
+
+def learn(lesson: Lesson) -> None:
+    """Runs every step, and prints its result.
+
+    Raises:
+        InputError: Too few scans, a folder that holds something else, or nothing to be learnt.
+        SystemExit: A step failed.
+    """
+    from derain.cli.learning_report import LearningReport
+    from derain.cli.main import main as derain
+
+    source = named_frames(lesson.recordings, lesson.columns)
+    _refuse_too_few(lesson, source)
+    refuse_unwritable(lesson.out)
+    _clear(lesson.work)
+    narrator = Narrator(derain, lesson.work / "log.txt")
+    say(f"{len(source):,} scans to learn from. All but the model goes to {lesson.work}/")
+    if not lesson.blind and source[0].read().intensity is None:
+        say("They have no intensities: the network learns without.")
+        lesson = replace(lesson, blind=True)
+    _teach(narrator, lesson, source)
+    report = LearningReport(lesson, narrator)
+    report.write()  # what the teacher says is worth reading, whatever comes after
+    report.refuse_clean()
+    with no_news():  # which would stand between the lines of ours
+        _fit(narrator, lesson)
+    narrator.step(
+        *("export", str(lesson.checkpoint), "--out", str(lesson.out)),
+        *("--scan", report.held_out[0].name, "--columns", ",".join(lesson.columns)),
+        result=lambda printed: f"{lesson.out.stat().st_size:,} bytes; {proof_of(printed)}",
+    )
+    report.ask_the_student()
+    report.write()
+    say(f"\n{report.summary}\n\nReport: {report.path}")
+    say(f"What the model is for: derain run {lesson.out} SCANS --out cleaned")
+    say(f"Done in {narrator.elapsed}; what the commands said: {narrator.log}")
+
+
+def _refuse_too_few(lesson: Lesson, source: Source) -> None:
+    """Refuses a recording in which nothing can be held out."""
+    if len(source) < FEWEST_SCANS:
+        raise InputError(
+            lesson.recordings[0],
+            f"{len(source)} scan{'s' * (len(source) > 1)}: too few to learn from some and choose "
+            "by others",
+            f"Record {FEWEST_SCANS} or more, one right after the other; twenty teach a good deal.",
+        )
+
+
+def _clear(work: Path) -> None:
+    """Makes the folder of all but the model anew.
+
+    Raises:
+        InputError: It holds something that no earlier run has written.
+    """
+    mark = work / MARK
+    if work.is_dir() and any(work.iterdir()) and not mark.is_file():
+        raise InputError(
+            work, "holds something other than what an earlier run left", "Give another --work."
+        )
+    refuse_unwritable(mark)
+    for left in work.iterdir():
+        shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
+    with replacing(mark) as temporary:
+        temporary.write_text("Written by derain learn, which clears this folder.\n", "utf-8")
+
+
+def _teach(narrator: Narrator, lesson: Lesson, source: Source) -> None:
+    """Finds out where the sensor was, if need be, and has the scans labelled."""
+    scans, columns = [*map(str, lesson.recordings)], ("--columns", ",".join(lesson.columns))
+    poses = lesson.poses
+    if lesson.needs_odometry(source):
+        found = lesson.work / (POSES if len(recordings_of(source)) == 1 else "poses")
+        command = ("odometry", *scans, "--out", str(found), *columns)
+        narrator.step(*command, result=last_line, leaves=found)
+        # Where it failed, a file does not say; the teacher, who asks itself, leaves a gap there.
+        poses = ODOMETRY if narrator.failed else str(found)
+    where = () if poses is None else ("--poses", poses)
+    narrator.step(
+        *("teach", lesson.teacher, *scans, "--out", str(lesson.taught), *where, *columns),
+        result=lambda _: f"{len(Manifest.read(lesson.taught).scans):,} scans labelled",
+        leaves=lesson.taught / TAUGHT_MANIFEST,
+    )
+
+
+def _fit(narrator: Narrator, lesson: Lesson) -> None:
+    """Trains the student, and keeps the epoch that agrees best with the teacher."""
+    blind = ("--model.channels", BLIND[lesson.model]) if lesson.blind else ()
+    narrator.step(
+        *("fit", "--config", f"{lesson.model}_taught.yaml", "--data.root", str(lesson.taught)),
+        *("--trainer.logger.save_dir", str(lesson.work / "runs")),
+        *("--checkpoint.dirpath", str(lesson.work)),
+        *("--checkpoint.filename", lesson.checkpoint.stem, *blind, *lesson.fit),
+        result=lambda _: "the student has learnt",
+    )

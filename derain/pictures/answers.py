@@ -1,0 +1,225 @@
+"""Pictures of what a teacher says of points, and of what its student removes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+from numpy.typing import NDArray
+
+from derain.cards.card import DataCard
+from derain.evaluation.answers import (
+    FINE_EDGES,
+    NOT_KNOWN,
+    NOT_RAIN,
+    RAIN,
+    TEACHERS_ANSWERS,
+    Answers,
+    AnswersOfScan,
+    answer_of,
+    coarse_bands,
+    total,
+)
+from derain.evaluation.counts import ratio
+from derain.pictures.scan_pictures import OUTCOMES, draw_from_above
+from derain.scan import Scan
+
+# Told apart by colour-blind eyes and in grey.
+OF_ANSWERS = {RAIN: "#1f77b4", NOT_KNOWN: "#f2c14e"}
+STUDENT = "#111827"
+
+# How far from the sensor a picture shows what rain there is, at least, and where there is none.
+LEAST_REACH, FAR = 10.0, 40.0
+
+# Shares are drawn on an axis that reaches so far, at least.
+LEAST_TOP = 0.01
+
+# Where the last band, which is open, is drawn to, metres.
+LAST_EDGE = FINE_EDGES[-1] + FINE_EDGES[1]
+
+# Colours of the pictures of scans, as numbers of ``OUTCOMES``.
+KEPT, REMOVED, LEFT, LOST = range(len(OUTCOMES))
+
+# Points in a band of range from which a share is drawn: of fewer it is a matter of chance.
+FEWEST_POINTS = 100
+
+
+def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
+    """How sure the teacher was: what it calls rain and does not know, by scan and by range.
+
+    Args:
+        scans: The scans, in time order, one or more.
+        title: Heading.
+    """
+    figure = Figure(figsize=(12, 4.6), layout="constrained")
+    figure.suptitle(title)
+    by_scan, by_range = figure.subplots(1, 2, width_ratios=(3, 2))
+    _draw_by_scan(by_scan, scans)
+    bands = coarse_bands(total([scan.answers for scan in scans]))
+    filled = {name: answers for name, answers in bands.items() if answers.points}
+    _draw_shares(by_range, np.arange(len(filled)), list(filled.values()), width=0.8)
+    by_range.set_xticks(range(len(filled)), list(filled))
+    by_range.set_title("by range, all scans", fontsize=10)
+    figure.legend(
+        *by_range.get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=len(TEACHERS_ANSWERS),
+        frameon=False,
+        title="the rest: not rain",
+    )
+    return figure
+
+
+def removed_figure(held_out: Answers, title: str) -> Figure:
+    """Share removed by range on the held-out scans, beside what the teacher says there.
+
+    Args:
+        held_out: The answers of all held-out scans.
+        title: Heading.
+    """
+    figure = Figure(figsize=(9, 4.6), layout="constrained")
+    axes = figure.add_subplot()
+    axes.set_title(title)
+    points = held_out.table.sum(axis=(1, 2))
+    answers = held_out.table.sum(axis=2)
+    drawn = points >= FEWEST_POINTS
+    rain = _shares(answers[:, RAIN], points, drawn)
+    perhaps = _shares(answers[:, RAIN] + answers[:, NOT_KNOWN], points, drawn)
+    student = _shares(held_out.table[..., 1].sum(axis=1), points, drawn)
+    edges = [*FINE_EDGES, LAST_EDGE]
+    axes.stairs(rain, edges, fill=True, color=OF_ANSWERS[RAIN], alpha=0.35)
+    axes.stairs(
+        perhaps,
+        edges,
+        baseline=rain,
+        fill=True,
+        color=OF_ANSWERS[NOT_KNOWN],
+        alpha=0.45,
+        label="teacher: not known",
+    )
+    axes.stairs(
+        rain, edges, baseline=None, color=OF_ANSWERS[RAIN], linewidth=1.5, label="teacher: rain"
+    )
+    axes.stairs(
+        student, edges, baseline=None, color=STUDENT, linewidth=2.2, label="student: removed"
+    )
+    axes.set_xlabel(f"range / m (the last band: {FINE_EDGES[-1]} m and more)")
+    axes.set_ylabel("share of the points at that range")
+    axes.set_xlim(0, LAST_EDGE)
+    _scale(axes, float(np.nanmax(np.fmax(student, rain), initial=0)))
+    axes.legend(frameon=False)
+    return figure
+
+
+def answers_figure(
+    scan: Scan, card: DataCard, called_rain: NDArray[np.bool_], title: str
+) -> Figure:
+    """What a teacher says of a scan, what its student does, and where they differ; from above.
+
+    Args:
+        scan: A scan with the teacher's labels.
+        card: Data card of these labels.
+        called_rain: What the student calls rain, bool (N,).
+        title: Heading.
+
+    Raises:
+        InputError: A scan without labels.
+    """
+    answer = answer_of(scan, card)
+    differs = np.select(
+        [called_rain & (answer == NOT_RAIN), ~called_rain & (answer == RAIN)],
+        [LOST, LEFT],
+        default=KEPT,
+    )
+    panels = {
+        "teacher": np.choose(answer, [KEPT, REMOVED, LEFT]),
+        "student": np.where(called_rain, REMOVED, KEPT),
+        "where they differ": differs,
+    }
+    meanings = {
+        "rain": REMOVED,
+        "not known to the teacher, or rain to it alone": LEFT,
+        "rain to the student alone": LOST,
+    }
+    figure = Figure(figsize=(16, 5.7), layout="constrained")
+    figure.suptitle(title)
+    row = figure.subplots(1, 3, sharex=True, sharey=True)
+    for axes, (name, outcome) in zip(row, panels.items(), strict=True):
+        axes.set_title(name)
+        draw_from_above(axes, scan, outcome)
+        axes.set_xlabel("right / m")
+    half = _reach(scan, called_rain | (answer == RAIN))
+    row[0].set(xlim=(-1.2 * half, 1.2 * half), ylim=(-half, half))
+    row[0].set_ylabel("forward / m")
+    colours = list(OUTCOMES.values())
+    figure.legend(
+        handles=[Patch(color=colours[number], label=name) for name, number in meanings.items()],
+        loc="outside lower center",
+        ncols=len(meanings),
+        frameon=False,
+    )
+    return figure
+
+
+def _reach(scan: Scan, rain: NDArray[np.bool_]) -> float:
+    """How far from the sensor most of the rain is, metres, with something around it."""
+    ranges = scan.range[rain & scan.valid]
+    return max(LEAST_REACH, 1.3 * float(np.percentile(ranges, 95))) if len(ranges) else FAR
+
+
+def _draw_by_scan(axes: Axes, scans: Sequence[AnswersOfScan]) -> None:
+    """Bars in time order, those of held-out scans on a ground of their own."""
+    _draw_shares(axes, np.arange(len(scans)), [scan.answers for scan in scans], width=1.0)
+    kept_back = [place for place, scan in enumerate(scans) if scan.held_out]
+    if kept_back:
+        axes.axvline(kept_back[0] - 0.5, color=STUDENT, linestyle=":")
+        axes.annotate(
+            "held out",
+            (kept_back[0] - 0.5, 1),
+            (4, -2),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            color=STUDENT,
+            va="top",
+            fontsize=9,
+        )
+    axes.set_xlim(-0.5, len(scans) - 0.5)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("scan, in time order")
+    axes.set_ylabel("share of the points")
+    axes.set_title("by scan", fontsize=10)
+
+
+def _draw_shares(
+    axes: Axes, places: NDArray[np.int64], answers: Sequence[Answers], width: float
+) -> None:
+    """Stacked bars: rain, and on it what is not known; what is left to 1 is not rain."""
+    shares = np.array([one.shares for one in answers]).reshape(-1, len(TEACHERS_ANSWERS))
+    bottom = np.zeros(len(answers))
+    for answer in (RAIN, NOT_KNOWN):
+        axes.bar(
+            places,
+            shares[:, answer],
+            width,
+            bottom,
+            color=OF_ANSWERS[answer],
+            label=TEACHERS_ANSWERS[answer],
+        )
+        bottom = bottom + shares[:, answer]
+    _scale(axes, float(bottom.max(initial=0)))
+
+
+def _scale(axes: Axes, largest: float) -> None:
+    """Shares from 0 to a little above the largest, as per cent."""
+    axes.set_ylim(0, min(1.0, max(1.15 * largest, LEAST_TOP)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:.3g} %"))
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _shares(
+    part: NDArray[np.int64], whole: NDArray[np.int64], drawn: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """What each part is of its whole; NaN where it is not drawn."""
+    return np.where(drawn, ratio(part, whole, undefined=0), np.nan)

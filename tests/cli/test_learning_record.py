@@ -1,0 +1,62 @@
+"""A finished model is measured by labels beside its scans, where a user asks for that."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.cards.card import load_card
+from derain.cli.learning_record import record_of
+from derain.datamodules.taught import Taught
+from derain.evaluation.counts import Counts
+from derain.evaluation.hard_cases import scene
+from derain.files.labels import write_labels
+from derain.filters import DROR, FilterDerainer
+from derain.scan import Scan
+from derain.sources.folders import named_frames
+from derain.teaching.teach import teach
+
+DROPS = np.arange(300) >= 270
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Taught:
+    """A drive of three scans that a filter has taught."""
+    drive = tmp_path / "drive/velodyne"
+    drive.mkdir(parents=True)
+    for number in range(3):
+        scene(300, seed=number).tofile(drive / f"{number}.bin")
+    teach(FilterDerainer(DROR()), named_frames([drive]), tmp_path / "taught")
+    return Taught(str(tmp_path / "taught"))
+
+
+def student(scan: Scan) -> np.ndarray:
+    """Finds every drop, and takes ten points of the road for some."""
+    return DROPS | (np.arange(len(scan)) < 10)
+
+
+def label(tmp_path: Path, rain: int) -> None:
+    write_labels(tmp_path / "drive/labels/2.label", np.where(DROPS, rain, 0))
+
+
+def test_teacher_and_student_are_measured_by_the_labels(data: Taught, tmp_path: Path) -> None:
+    label(tmp_path, rain=110)
+    frames = data.frames("validation")
+    text = record_of(frames, data.card, "wads", student)
+    (scan,) = map(data.read, frames)
+    taught = Counts.of(data.card.rain_of(scan), DROPS)
+    rows = {line.split("|")[1].strip(): line for line in text.splitlines() if "|" in line}
+    assert f"{taught.precision:.3f} | {taught.recall:.3f}" in rows["teacher"]
+    assert f"{taught.iou:.3f}" in rows["teacher, where it is sure"]
+    assert "0.750 | 1.000 | 0.857 | 0.750" in rows["student"]
+    assert rows["falling-snow (rain)"].split("|")[2].strip() == "30"
+    assert "100.00%" in rows["falling-snow (rain)"]
+    solid = load_card("wads").classes[0]
+    assert f"{10 / 270:.2%}" in rows[solid]
+
+
+@pytest.mark.parametrize("card", ["wads", "no_such_card"])
+def test_labels_that_cannot_be_used_are_told(data: Taught, tmp_path: Path, card: str) -> None:
+    label(tmp_path, rain=65535)
+    text = record_of(data.frames("validation"), data.card, card, student)
+    assert text.startswith("Nothing could be measured: ")

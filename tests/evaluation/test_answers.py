@@ -1,0 +1,95 @@
+"""Answers of teacher and student are counted point by point."""
+
+import numpy as np
+import pytest
+
+from derain.cards.card import DataCard
+from derain.evaluation.answers import (
+    COARSE_EDGES,
+    FINE_EDGES,
+    NOT_KNOWN,
+    NOT_RAIN,
+    RAIN,
+    Answers,
+    answer_of,
+    coarse_bands,
+    total,
+)
+from derain.evaluation.counts import Counts
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.scan import Scan
+
+HARD_CASES = dict(hard_cases(largest=2000))
+
+
+@pytest.fixture
+def asked(scans: list[Scan]) -> list[tuple[Scan, np.ndarray]]:
+    """Labelled scans, with rows that cannot be judged, and what a student calls rain in them."""
+    rng = np.random.default_rng(0)
+    for scan in scans:
+        scan.xyz[::50] = np.nan
+        scan.xyz[7] = (300, 0, 0)
+    return [(scan, rng.random(len(scan)) < 0.3) for scan in scans]
+
+
+def test_every_point_that_can_be_judged_is_counted_once(
+    asked: list[tuple[Scan, np.ndarray]], card: DataCard
+) -> None:
+    answers = total([Answers.of(scan, card, called) for scan, called in asked])
+    expected = np.zeros_like(answers.table)
+    for scan, called in asked:
+        answer = answer_of(scan, card)
+        for row in np.flatnonzero(scan.valid):
+            band = max(i for i, edge in enumerate(FINE_EDGES) if scan.range[row] >= edge)
+            expected[band, answer[row], int(called[row])] += 1
+    np.testing.assert_array_equal(answers.table, expected)
+    assert answers.points == sum(scan.valid.sum() for scan, _ in asked)
+
+
+def test_shares_and_agreement_are_those_of_the_points(
+    asked: list[tuple[Scan, np.ndarray]], card: DataCard
+) -> None:
+    scan, called = asked[0]
+    answers = Answers.of(scan, card, called)
+    valid, answer = scan.valid, answer_of(scan, card)
+    for number in (NOT_RAIN, RAIN, NOT_KNOWN):
+        assert answers.shares[number] == pytest.approx((answer[valid] == number).mean())
+    assert answers.removed == pytest.approx(called[valid].mean())
+    sure = valid & (answer != NOT_KNOWN)
+    assert answers.agreement == Counts.of(called[sure], answer[sure] == RAIN)
+    assert answers.rain_among_known == pytest.approx((answer[sure] == RAIN).mean())
+
+
+def test_wide_bands_hold_all_points_by_their_range(
+    asked: list[tuple[Scan, np.ndarray]], card: DataCard
+) -> None:
+    scan, called = asked[0]
+    bands = coarse_bands(Answers.of(scan, card, called))
+    assert list(bands) == ["0-10 m", "10-20 m", "20-40 m", "40-80 m", "80+ m"]
+    ranges = scan.range[scan.valid]
+    for band, (start, end) in zip(
+        bands.values(), zip(COARSE_EDGES, (*COARSE_EDGES[1:], np.inf), strict=True), strict=True
+    ):
+        assert band.points == ((ranges >= start) & (ranges < end)).sum()
+
+
+def test_a_student_that_was_not_asked_calls_nothing_rain(scans: list[Scan], card: DataCard) -> None:
+    answers = Answers.of(scans[0], card)
+    assert answers.removed == 0
+    assert answers.points == 300
+
+
+def test_of_no_points_no_share_is_known(card: DataCard) -> None:
+    empty = Scan.of(scene(0)).with_label(np.zeros(0, np.int64))
+    for answers in (Answers.none(), Answers.of(empty, card), total([])):
+        assert (answers.points, answers.removed, answers.rain_among_known) == (0, 0, 0)
+        assert not answers.shares.any()
+        assert answers.agreement == Counts()
+
+
+@pytest.mark.parametrize(
+    ("name", "scan"), hard_cases(largest=2000), ids=lambda case: str(case)[:40]
+)
+def test_hard_scans_are_counted_too(name: str, scan: Scan, card: DataCard) -> None:
+    labelled = scan.with_label(np.resize([0, 3, 9], len(scan)))
+    assert Answers.of(labelled, card).points == scan.valid.sum()
