@@ -17,8 +17,8 @@ from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.files.atomic import replacing
 from derain.odometry.posed import ODOMETRY
-from derain.odometry.recordings import recordings_of
 from derain.sources.folders import named_frames
+from derain.sources.recordings import recordings_of
 from derain.sources.records import POSES
 from derain.sources.source import Source
 from derain.teaching.held_out import FEWEST_SCANS
