@@ -22,7 +22,7 @@ NEIGHBOURS = 9
 NEAREST = 0.01
 
 # Of so many points, evenly spread over a scan, the step of its rays is the median.
-MOST_ASKED = 5000
+MOST_RAYS = 5000
 
 # To its third nearest neighbour a ray has a step or two, whichever of the two axes steps finer; the
 # nearest may be the other return of the same ray.
@@ -73,7 +73,7 @@ class ScanPoints:
     @cached_property
     def step(self) -> float:
         """Angle between neighbouring rays of the scan, radians; 0 of fewer rays than that takes."""
-        some = slice(None, None, max(1, len(self) // MOST_ASKED))
+        some = slice(None, None, max(1, len(self) // MOST_RAYS))
         if len(self) <= OF_STEP:
             return 0.0
         _, chords = self.rays_near(self._directions[some], OF_STEP + 1)
@@ -120,4 +120,5 @@ def range_of(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
         xyz: Coordinates, float64 (M, 3), metres.
     """
     x, y, z = np.ascontiguousarray(xyz.T)
-    return np.maximum(np.sqrt(x * x + y * y + z * z), NEAREST)
+    reach: NDArray[np.float64] = np.maximum(np.sqrt(x * x + y * y + z * z), NEAREST)
+    return reach
