@@ -11,6 +11,7 @@ from derain.datamodules.in_memory import InMemory as InMemory
 from derain.datamodules.rehearse3d import Rehearse3D as Rehearse3D
 from derain.datamodules.sequences import Sequences as Sequences
 from derain.datamodules.simulated import Simulated as Simulated
+from derain.datamodules.taught import Taught as Taught
 from derain.datamodules.wads import Wads as Wads
 from derain.errors import InputError as InputError
 from derain.export.bench.bench import bench as bench
@@ -24,6 +25,7 @@ from derain.filters import ROR as ROR
 from derain.filters import SOR as SOR
 from derain.filters import SSR as SSR
 from derain.filters import FilterDerainer as FilterDerainer
+from derain.methods.persistence import PersistenceDerainer as PersistenceDerainer
 from derain.models.checkpoint import load_model as load_model
 from derain.models.lisnownet import LiSnowNet as LiSnowNet
 from derain.models.lisnownet import LiSnowNetwork as LiSnowNetwork
@@ -33,6 +35,7 @@ from derain.models.salsanext import SalsaNext as SalsaNext
 from derain.models.salsanext import SalsaNextNetwork as SalsaNextNetwork
 from derain.models.salsanext_lite import SalsaNextLite as SalsaNextLite
 from derain.models.salsanext_lite import SalsaNextLiteNetwork as SalsaNextLiteNetwork
+from derain.odometry.odometry import Odometry as Odometry
 from derain.scan import Scan as Scan
 from derain.sources.folders import named_frames as named_frames
 from derain.sources.source import Frames as Frames
