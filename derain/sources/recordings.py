@@ -52,7 +52,7 @@ def _of_steps(recording: Sequence[Frame]) -> Iterator[str]:
     try:
         times = [frame.time for frame in recording]
     except InputError as error:  # the method may well do without
-        yield f"its times are not known: {error}"
+        yield f"{recording[0].name}: when it was taken is not known: {error}"
         return
     steps = [
         (after, _step(before, after, *seconds))
