@@ -22,7 +22,7 @@ from derain.system.stopwatch import Stopwatch
 from derain.views.oddities import Oddity, outside_view
 from derain.views.probability import probability_of_rain
 from derain.views.view import SeenScan, View
-from derain.views.window import Window
+from derain.views.window import PlacedScan, Window
 
 __all__ = ["METADATA_KEY", "Derainer", "Judgement"]
 
@@ -180,7 +180,7 @@ class Derainer(Method):
         if not isinstance(frame, Frame):
             number = self._recent.next_number
             frame = MemoryFrame(key=f"{number:06d}", number=number, scan=scan)
-        ready = self._recent.take(frame, scan)
+        ready = self._recent.take(frame, PlacedScan(scan, frame.time, frame.pose))
         return None if ready is None else self._judged_in_window(ready, stopwatch)
 
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:

@@ -16,7 +16,7 @@ from derain.sources.recent_frames import FrameInWindow, RecentFrames
 from derain.system.parameters import made_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.oddities import Oddity
-from derain.views.window import Window
+from derain.views.window import PlacedScan, Window
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,8 @@ class Between(RecordingMethod):
         assert isinstance(frame, Frame)
         assert not frame.has_labels
         with (stopwatch or Stopwatch()).stage("read"):
-            ready = self._recent.take(frame, frame.read())
+            placed = PlacedScan(frame.read(), frame.time, frame.pose)
+            ready = self._recent.take(frame, placed)
         return None if ready is None else self._judged(ready)
 
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:

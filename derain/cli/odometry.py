@@ -5,10 +5,12 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 
 import numpy as np
+from tqdm import tqdm
 
 from derain.cli.arguments import add_threads
 from derain.cli.outputs import say, tell
@@ -118,7 +120,11 @@ def main(arguments: argparse.Namespace) -> int:
     found = [_register(frame, scans, odometry, arguments.json) for frame in scans]
     for recording, file, seconds in zip(recordings, files, times, strict=True):
         of_recording, found = found[: len(recording)], found[len(recording) :]
-        _write(file, of_recording, seconds if arguments.format == "tum" else None)
+        try:
+            _write(file, of_recording, seconds if arguments.format == "tum" else None)
+        except InputError as error:  # the other recordings are none the worse for it
+            tqdm.write(f"derain: {error}", sys.stderr)
+            continue
         summary = _summary(file, of_recording, recording, seconds)
         say(summary, sys.stderr if arguments.json else None)
     return scans.exit_code("{scans} could not be registered")
@@ -180,17 +186,18 @@ def _summary(
     path = sum(each.distance for each in moves)
     lasted = times[-1] - times[0] if times else 0.0
     speed = f", {path / lasted:.1f} m/s" if lasted > 0 else ""
-    residuals = {
-        each.residual: frame.key
+    residuals = [
+        (each.residual, frame.key)
         for each, frame in zip(moves, recording[1:], strict=True)
         if not math.isnan(each.residual)
-    }
-    worst = max(residuals, default=math.nan)
+    ]
+    worst, of_scan = max(residuals, default=(math.nan, "none"))
+    usual = median([residual for residual, _ in residuals] or [math.nan])
     failed = sum(not each.trusted for each in registrations)
     return (
         f"{file}: {len(registrations):,} scans, path {path:.1f} m, {path / len(moves):.2f} m a scan"
-        f"{speed}; residual median {median(residuals or [math.nan]):.3f} m, worst {worst:.3f} m "
-        f"({residuals.get(worst, 'none')}); {failed:,} not to be trusted"
+        f"{speed}; residual median {usual:.3f} m, worst {worst:.3f} m "
+        f"({of_scan}); {failed:,} not to be trusted"
     )
 
 
@@ -198,6 +205,8 @@ def _times(recording: Sequence[Frame], form: str) -> list[float]:
     """When the scans of a recording were taken, seconds; empty where not all of it is known."""
     times = [time for frame in recording if (time := frame.time) is not None]
     if len(times) == len(recording):
+        if form == "tum":
+            _refuse_times_that_turn_back(times, recording)
         return times
     if form == "tum":
         lacking = next(frame for frame in recording if frame.time is None)
@@ -207,3 +216,15 @@ def _times(recording: Sequence[Frame], form: str) -> list[float]:
             "Write a times.txt beside the scans, a line of seconds each, or take --format kitti.",
         )
     return []
+
+
+def _refuse_times_that_turn_back(times: Sequence[float], recording: Sequence[Frame]) -> None:
+    """Refuses times by which poses could not be found again: they have to ascend."""
+    for (earlier, later), frame in zip(pairwise(times), recording[1:], strict=True):
+        if later <= earlier:
+            raise InputError(
+                frame.name,
+                f"was taken at {later:.3f} s, the scan before it at {earlier:.3f} s, and lines of "
+                "TUM's form go by ascending time",
+                "Name the scans in the order that they were taken in, or take --format kitti.",
+            )

@@ -2,8 +2,13 @@
 
 import argparse
 
+from tqdm import tqdm
+
 from derain.odometry.posed import ODOMETRY, STANDING, with_poses
+from derain.odometry.registration import Registration
+from derain.sources.frame import Frame
 from derain.sources.source import Source
+from derain.system.notices import Notices
 
 
 def add_poses(parser: argparse._ActionsContainer) -> None:
@@ -21,11 +26,22 @@ def placed(source: Source, arguments: argparse.Namespace) -> Source:
     """The same frames, where the option says that they were taken.
 
     Without it they are as they were: a method that needs poses takes those beside the scans, or
-    finds them as it goes.
+    finds them as it goes. Where odometry fails, that is warned of.
 
     Raises:
         InputError: Poses that cannot be read or do not fit the scans.
     """
     if arguments.poses is None:
         return source
-    return with_poses(source, arguments.poses, arguments.threads)
+    if arguments.poses != ODOMETRY:
+        return with_poses(source, arguments.poses)
+    notices = Notices()
+    with tqdm(total=len(source), desc=ODOMETRY, unit="scan", disable=None) as bar:
+
+        def tell(frame: Frame, registration: Registration) -> None:
+            notices.tell(frame.name, registration.oddities())
+            bar.update()
+
+        posed = with_poses(source, ODOMETRY, arguments.threads, tell)
+    notices.tell_how_many_more()
+    return posed

@@ -26,7 +26,7 @@ from derain.system.cores import usable_cores
 from derain.system.parameters import made_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.oddities import Oddity
-from derain.views.window import Window, WindowOfScans
+from derain.views.window import PlacedScan, Window, WindowOfScans
 
 # Scans kept at a time are bounded: each takes some 30 MB with its neighbours and rays.
 MOST_SCANS = 50
@@ -89,9 +89,9 @@ class PersistenceDerainer(RecordingMethod):
     in its own scan, and a drop does not. So neither intensity nor anything that is learnt from
     labels is needed; see :mod:`derain.persistence`.
 
-    Poses are those of the frames. Where a frame has none they are found as it goes, and where that
-    fails, no evidence is taken across the gap. A scan without any other is judged by itself, and
-    nothing of it is known for sure.
+    Poses are those of the frames. Where a frame has none, or the record of it is damaged, they are
+    found as it goes, and where that fails, no evidence is taken across the gap. A scan without any
+    other is judged by itself, and nothing of it is known for sure.
 
     Example:
         >>> scans = [derain.read_scan("scan.bin")] * 3  # a wall, and drops that stay where they are
@@ -155,7 +155,7 @@ class PersistenceDerainer(RecordingMethod):
             pose, stretch = self._place(frame, scan)
         with stopwatch.stage("view"):
             self._placed[scan] = _Placed(ScanPoints.of(scan, self.threads), pose, stretch)
-        ready = self._recent.take(frame, scan)
+        ready = self._recent.take(frame, PlacedScan(scan))
         return None if ready is None else self._judged(ready, stopwatch)
 
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
@@ -170,8 +170,7 @@ class PersistenceDerainer(RecordingMethod):
 
     def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
         """What is odd about a scan: nothing known of it, or no pose that could be trusted."""
-        if reason := self._doubts.get(judgement.scan):
-            yield Oddity("its place is not known", f"where it was taken is not known: {reason}")
+        yield from self._doubts.get(judgement.scan, ())
         if judgement.known is not None and not judgement.known.any() and judgement.judged.any():
             yield Oddity(
                 "nothing is known for sure",
@@ -186,13 +185,13 @@ class PersistenceDerainer(RecordingMethod):
         self._recent = RecentFrames(self.window)
         self._odometry = FrameOdometry(self.threads)
         self._placed: WeakKeyDictionary[Scan, _Placed] = WeakKeyDictionary()
-        self._doubts: WeakKeyDictionary[Scan, str] = WeakKeyDictionary()
+        self._doubts: WeakKeyDictionary[Scan, list[Oddity]] = WeakKeyDictionary()
         self._stretch = 0
         self._poses_are_told: bool | None = None  # not before the first frame
 
     def _place(self, frame: Frame, scan: Scan) -> tuple[NDArray[np.float64], int]:
         """Where a frame was taken, and in which stretch of its recording."""
-        pose = frame.pose
+        pose = self._told_pose(frame, scan)
         told = pose is not None
         if self._poses_are_told not in (None, told) or self._recent.starts_anew(frame):
             self._stretch += 1  # another world
@@ -200,10 +199,19 @@ class PersistenceDerainer(RecordingMethod):
         if pose is not None:
             return pose, self._stretch
         registration = self._odometry.take(frame, scan)
+        self._doubts.setdefault(scan, []).extend(registration.oddities())
         if not registration.trusted:
             self._stretch += 1
-            self._doubts[scan] = registration.reason
         return registration.pose, self._stretch
+
+    def _told_pose(self, frame: Frame, scan: Scan) -> NDArray[np.float64] | None:
+        """The pose that is told with a frame; None without one, and of a record that is damaged."""
+        try:
+            return frame.pose
+        except InputError as error:
+            detail = f"its pose is not known, and is sought from the scans: {error}"
+            self._doubts[scan] = [Oddity("its pose is sought from the scans", detail)]
+            return None
 
     def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
         scan = ready.scans.scan

@@ -77,14 +77,11 @@ def by_odometry(source: Sequence[Frame], threads: int = 0, told: Told | None = N
         The frames, those of each recording in the frame of its first scan. One that cannot be read
         or registered is where the sensor would be if it had gone on as it did, and neither follows
         the one before it nor is followed by the one after.
-
-    Raises:
-        InputError: A record of times that is damaged.
     """
     odometry = FrameOdometry(threads)
     posed: list[Frame] = []
+    gaps = 0  # of all recordings: two parts of one must not close up to one another
     for recording in recordings_of(source):
-        gaps = 0
         for frame in recording:
             registration = odometry.take(frame, _scan_of(frame))
             if told is not None:
@@ -125,11 +122,12 @@ def from_file(source: Sequence[Frame], path: Path) -> Frames:
 
 def _poses(recording: Sequence[Frame], trajectory: Trajectory) -> Iterator[NDArray[np.float64]]:
     """The pose of each frame."""
-    times = [time for frame in recording if (time := frame.time) is not None]
     names = [Path(frame.name).name for frame in recording]
-    if len(times) == len(recording) and trajectory.is_by_time(times):
-        yield from map(trajectory.at, times, names)
-        return
+    if trajectory.times is not None:  # else the scans' own are not asked for, damaged or not
+        times = [time for frame in recording if (time := frame.time) is not None]
+        if len(times) == len(recording) and trajectory.is_by_time(times):
+            yield from map(trajectory.at, times, names)
+            return
     for place, name in enumerate(names):
         record, lines = Path(trajectory.name), len(trajectory)
         yield trajectory.poses[line_of(record, lines, name, place, len(recording))]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from derain.errors import InputError
 from derain.odometry.odometry import Odometry
 from derain.odometry.registration import Registration
 from derain.scan import Scan
@@ -33,10 +34,7 @@ class FrameOdometry:
         Returns:
             Where it was taken, in the frame of the first scan of its recording. Besides what
             :class:`~derain.odometry.odometry.Odometry` says, it is not trusted where the frame was
-            taken before the one that it follows.
-
-        Raises:
-            InputError: A record of times that is damaged.
+            taken before the one that it follows, as far as their times are known.
         """
         before, self._before = self._before, frame
         if before is None or not frame.follows(before):
@@ -51,7 +49,15 @@ class FrameOdometry:
 
 def _too_late(frame: Frame, before: Frame) -> str | None:
     """Says so where a frame was taken before the one that it follows."""
-    time, earlier = frame.time, before.time
+    time, earlier = _time_of(frame), _time_of(before)
     if time is None or earlier is None or time > earlier:
         return None
     return f"it was taken at {time:.3f} s, the scan before at {earlier:.3f} s: out of order"
+
+
+def _time_of(frame: Frame) -> float | None:
+    """When it was taken; None where a record of that is damaged, which odometry can do without."""
+    try:
+        return frame.time
+    except InputError:
+        return None

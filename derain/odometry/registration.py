@@ -1,9 +1,12 @@
 """What is known of the motion between two scans, and whether it is to be trusted."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from derain.views.oddities import Oddity
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +42,12 @@ class Registration:
     def turn(self) -> float:
         """By how much it turned, degrees, whatever about."""
         return turn_of(self.motion)
+
+    def oddities(self) -> Iterator[Oddity]:
+        """Says so where it is not to be trusted."""
+        if not self.trusted:
+            detail = f"where it was taken is not known: {self.reason}"
+            yield Oddity("its place is not known", detail)
 
 
 def shift_of(motion: NDArray[np.float64]) -> float:

@@ -120,5 +120,5 @@ def range_of(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
         xyz: Coordinates, float64 (M, 3), metres.
     """
     x, y, z = np.ascontiguousarray(xyz.T)
-    reach: NDArray[np.float64] = np.maximum(np.sqrt(x * x + y * y + z * z), NEAREST)
-    return reach
+    distance: NDArray[np.float64] = np.maximum(np.sqrt(x * x + y * y + z * z), NEAREST)
+    return distance

@@ -58,11 +58,11 @@ def ask_rays(points: ScanPoints, other: ScanPoints, to_other: NDArray[np.float64
     Returns:
         What they say; nothing where no ray is near.
     """
+    if not len(other):
+        return RayEvidence(np.zeros(len(points)), np.zeros(len(points)))
     places = points.xyz @ to_other[:3, :3].T + to_other[:3, 3]
     reach = range_of(places)
     rays, angles = other.rays_near(places / reach[:, None], RAYS)
-    if not len(other):
-        return RayEvidence(np.zeros(len(points)), np.zeros(len(points)))
     asked = angles <= max(np.radians(WITHIN), WITHIN_STEPS * points.step)
     behind = other.range.take(rays) - reach[:, None]
     at, through = (offset + slope * reach[:, None] for offset, slope in (ENDS_AT, WENT_THROUGH))

@@ -3,7 +3,6 @@
 from collections import deque
 from dataclasses import dataclass
 
-from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.views.window import PlacedScan, Window, WindowOfScans
 
@@ -50,20 +49,16 @@ class RecentFrames:
         """Whether a frame does not follow those that were taken."""
         return bool(self._kept) and not frame.follows(self._kept[-1][0])
 
-    def take(self, frame: Frame, scan: Scan) -> FrameInWindow | None:
+    def take(self, frame: Frame, placed: PlacedScan) -> FrameInWindow | None:
         """Takes the next frame; where it starts anew, those still waiting are let go of.
 
         Args:
             frame: The frame.
-            scan: Its scan.
+            placed: Its scan, and when and where it was taken as far as anyone asks for that.
 
         Returns:
             The frame that has all its window by now, if there is one.
-
-        Raises:
-            InputError: A record of times or poses that is damaged.
         """
-        placed = PlacedScan(scan, frame.time, frame.pose)
         if self.starts_anew(frame):
             self._kept.clear()
             self._given = 0

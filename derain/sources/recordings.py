@@ -37,13 +37,16 @@ def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
     """
     if window.is_one_scan:
         return
-    for recording in recordings_of(frames):
-        if len(recording) <= window.before + window.after:
-            yield (
-                f"{recording[0].name}: {_scans(len(recording))} in its recording, where each is "
-                f"judged by {window.before} before and {window.after} after it: without them less "
-                "is known"
-            )
+    recordings = recordings_of(frames)
+    short = [each for each in recordings if len(each) <= window.before + window.after]
+    if short:
+        others = f" ({len(short):,} recordings are as short)" if len(short) > 1 else ""
+        yield (
+            f"{short[0][0].name}: {_scans(len(short[0]))} in its recording{others}, where each is "
+            f"judged by {window.before} before and {window.after} after it: without them less is "
+            "known"
+        )
+    for recording in recordings:
         yield from _of_steps(recording)
 
 
@@ -52,7 +55,7 @@ def _of_steps(recording: Sequence[Frame]) -> Iterator[str]:
     try:
         times = [frame.time for frame in recording]
     except InputError as error:  # the method may well do without
-        yield f"its times are not known: {error}"
+        yield f"{recording[0].name}: when it was taken is not known: {error}"
         return
     steps = [
         (after, _step(before, after, *seconds))

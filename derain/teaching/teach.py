@@ -171,6 +171,8 @@ def _unfinished(out: Path) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)  # left behind by a run that was killed
         folder.mkdir(parents=True)
         yield folder
+    except BrokenPipeError:  # of the terminal, not of the folder: nobody reads what is told
+        raise
     except OSError as error:
         raise InputError(
             out,

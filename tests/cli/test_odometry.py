@@ -218,3 +218,33 @@ def test_the_command_is_the_same_on_any_number_of_threads(recording: Path, tmp_p
         main(["odometry", str(recording), "--out", str(tmp_path / threads), "--threads", threads])
     assert (tmp_path / "1").read_bytes() == (tmp_path / "2").read_bytes()
     assert shift_of(read_trajectory(tmp_path / "1").poses[3]) > 2
+
+
+def test_a_recording_that_fails_takes_no_other_with_it(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    for number in range(3):
+        write_scan(tmp_path / f"apart/velodyne/{number}.bin", Scan.of(scene(300, seed=number)))
+    outcome = run_derain(
+        "odometry", tmp_path / "apart/velodyne", recording, "--out", tmp_path / "poses"
+    )
+    assert outcome.code == 2
+    assert "apart.txt: was not written" in outcome.err
+    assert "hall.txt: 4 scans" in outcome.out
+    assert [path.name for path in (tmp_path / "poses").iterdir()] == ["hall.txt"]
+
+
+def test_poses_by_time_need_times_that_ascend(run_derain, recording: Path, tmp_path: Path) -> None:
+    (recording.parent / "times.txt").write_text("5.0\n5.1\n5.1\n5.3\n")
+    out = tmp_path / "drive.tum"
+    outcome = run_derain("odometry", recording, "--out", out, "--format", "tum")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "000002.bin: was taken at 5.100 s, the scan before it at 5.100 s" in outcome.err
+    assert not out.exists()
+
+
+def test_scans_that_lie_alike_count_one_by_one(run_derain, recording: Path, tmp_path: Path) -> None:
+    for number in range(4, 8):  # a sensor that sees the same again and again
+        (recording / f"{number:06d}.bin").symlink_to(recording / "000003.bin")
+    outcome = run_derain("odometry", recording, "--out", tmp_path / "poses.txt")
+    assert "residual median 0.000 m, worst 0.0" in outcome.out

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.export.methods import load_method
+from derain.files import write_scan
 from derain.methods.persistence import Persistence, PersistenceDerainer
 from derain.scan import Scan
 from derain.sources.folders import named_frames
@@ -144,6 +145,22 @@ def test_a_registration_that_fails_is_told_of() -> None:
     last = next(method.flush())
     assert last.scan.name == "nonsense"
     assert "where it was taken is not known" in next(method.oddities(last)).detail
+
+
+def test_damaged_records_are_done_without(tmp_path: Path) -> None:
+    for number, frame in enumerate(drive(3)):
+        write_scan(tmp_path / f"yard/scan_{number}.pcd", frame.scan)
+    frames = named_frames([tmp_path / "yard"])
+    method = PersistenceDerainer(threads=2)
+    plain = [judgement for _, judgement, _ in judgements(method, frames)]
+    (tmp_path / "yard/poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")  # one line for three
+    (tmp_path / "yard/times.txt").write_text("soon\n")
+    for (_, judgement, _), expected in zip(
+        judgements(method, named_frames([tmp_path / "yard"])), plain, strict=True
+    ):
+        assert (judgement.probability == expected.probability).all()
+        (oddity,) = method.oddities(judgement)
+        assert "has 1 lines for 3 scans, and none for scan_" in oddity.detail
 
 
 def test_the_order_of_rows_changes_nothing() -> None:

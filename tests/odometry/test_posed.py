@@ -180,3 +180,20 @@ def test_a_record_that_is_damaged_is_told_and_not_passed_over(
     (tmp_path / "a/poses.txt").write_text("damaged")
     with pytest.raises(InputError, match="line 1 is not 12 numbers"):
         with_poses(named_frames([tmp_path / "a"]))
+
+
+def test_gaps_of_one_part_do_not_close_up_to_the_next(drive: Frames) -> None:
+    blind = [replace(frame, scan=Scan.of(np.zeros((0, 3)))) for frame in drive[:3]]
+    later = replace(drive[3], number=5)  # two scans of the sequence are missing before it
+    posed = with_poses([*blind, later], "odometry")
+    assert not any(after.follows(before) for before, after in pairwise(posed))
+
+
+def test_poses_that_go_by_lines_ask_for_no_times(drive: Frames, tmp_path: Path) -> None:
+    for number, frame in enumerate(drive[:2]):
+        write_scan(tmp_path / f"a/{number}.pcd", frame.read())
+    (tmp_path / "a/times.txt").write_text("soon")
+    (tmp_path / "mine.txt").write_text(lines([4, 5]))
+    frames = named_frames([tmp_path / "a"])
+    assert x_of(with_poses(frames, tmp_path / "mine.txt")) == [4, 5]
+    assert with_poses(frames, "odometry")[1].pose[0, 3] == pytest.approx(1.3, abs=0.05)
