@@ -24,7 +24,7 @@ from derain.sources.sink import Sink
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import left_out, much_removed
+from derain.views.oddities import far_off, left_out, much_removed
 
 SUMMARY = "clean scans on a CPU, without torch"
 
@@ -148,7 +148,12 @@ class _Cleaning:
         scan, rain = judgement.scan, judgement.rain
         valid, removed = int(scan.valid.sum()), int(rain.sum())
         share_removed = removed / max(valid, 1)
-        odd = [*self.method.oddities(judgement), *much_removed(share_removed), *left_out(scan)]
+        odd = [
+            *self.method.oddities(judgement),
+            *far_off(scan),
+            *much_removed(share_removed),
+            *left_out(scan),
+        ]
         self.notices.tell(frame.name, odd)
         if share_removed > self.arguments.most_removed:
             raise InputError(

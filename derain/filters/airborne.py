@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.views.morton import evenly
 from derain.views.scatter import scatter_through_space
 
 # Neighbourhoods of some points, given by their rows: rows of points int64 (Q, k), the point itself
 # first, and distances in metres, float32 (Q, k).
 Around = Callable[[NDArray[np.int64]], tuple[NDArray[np.int64], NDArray[np.float32]]]
 
-# Points whose neighbourhoods are looked at, evenly along the curve that they are on.
+# Points whose neighbourhoods are looked at.
 SAMPLE = 4096
 
 # Beyond, no LiDAR is known to see rain or snow, metres.
@@ -94,8 +95,8 @@ def fit_rain_bounds(
         from the rest in nothing.
     """
     distance = np.sqrt(np.square(xyz).sum(axis=1))
-    rows = np.flatnonzero(may_be & (distance < FARTHEST_RAIN) & ~np.isnan(intensity))
-    rows = rows[:: -(-len(rows) // SAMPLE) or 1]
+    may_tell = may_be & (distance < FARTHEST_RAIN) & ~np.isnan(intensity)
+    rows = evenly(np.flatnonzero(may_tell), SAMPLE)
     if len(rows) < FEWEST_AIRBORNE:
         return None
     distance, intensity = distance[rows], intensity[rows]

@@ -37,6 +37,10 @@ BESIDE_RANGE = 0.1
 LEAST_FEATURE, LARGEST_FEATURE = 5 / 3, 8.0
 
 
+# Fewer points are always in a plane, and nothing would ever be seen to be in the air.
+FEWEST_NEIGHBOURS = 4
+
+
 @FILTERS.add("crf")
 @dataclass(frozen=True)
 class CRF(PointFilter):
@@ -75,7 +79,8 @@ class CRF(PointFilter):
         (20, True)
 
     Attributes:
-        neighbours: Size of a neighbourhood, the point itself included.
+        neighbours: Size of a neighbourhood, the point itself included; of variant ``fitted`` at
+            least 4.
         variant: ``fitted`` or ``published``.
         vote: What a neighbour that is judged says, beside features from -1 to 1.
         sparseness: Of variant ``fitted``: how many times as far as usual, for its range, the
@@ -88,7 +93,8 @@ class CRF(PointFilter):
         FULL_SCALE: Of the intensities that variant ``published`` is for.
 
     Raises:
-        InputError: Another variant, and as of :class:`derain.filters.PointFilter`.
+        InputError: Another variant, fewer neighbours than it needs, and as of
+            :class:`derain.filters.PointFilter`.
 
     Source: W. Wang et al., "Snow Removal for LiDAR Point Clouds With Spatio-Temporal Conditional
         Random Fields", RA-L 2023, and its constants at github.com/dut-mdmu/CRFOR. The order
@@ -97,7 +103,7 @@ class CRF(PointFilter):
 
     HELP: ClassVar[str] = "rain is near, above the ground, as bright as drops are, and beside rain"
     SPACE: ClassVar[Mapping[str, Span]] = {
-        "neighbours": (4, 12),  # fewer points are always in a plane
+        "neighbours": (FEWEST_NEIGHBOURS, 12),
         "vote": (0.1, 20.0),
         "sparseness": (1.5, 10.0),
         "reach": (0.5, 5.0),
@@ -120,6 +126,12 @@ class CRF(PointFilter):
                 self.name,
                 f"variant is {shown(self.variant)}",
                 f"Give one of {', '.join(get_args(Variant))}.",
+            )
+        if self.variant == "fitted" and self.neighbours < FEWEST_NEIGHBOURS:
+            raise InputError(
+                self.name,
+                f"neighbours is {self.neighbours}, and so few points always lie in a plane",
+                f"Give {FEWEST_NEIGHBOURS} or more.",
             )
 
     def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
@@ -192,7 +204,7 @@ class CRF(PointFilter):
             is_near = (distance <= self.range) & (xyz[:, 2] >= -self.sensor_height)
             return is_near & (intensity <= self.intensity)
         ground = find_ground(xyz)
-        above = np.ones(len(xyz), bool) if ground is None else ground.is_below(xyz)
+        above = np.ones(len(xyz), bool) if ground is None else ground.stands_out(xyz)
         bounds = fit_rain_bounds(xyz, intensity, above, around, self.sparseness, self.reach)
         if bounds is None:
             return np.zeros(len(xyz), bool)

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.views.morton import evenly
+
 # Within so many metres a road is flat, and beyond the first of them lies no longer the vehicle.
 NEAREST, FARTHEST = 1.5, 30.0
 
@@ -17,7 +19,7 @@ STEEPEST_ROAD = 28.0
 # many metres are asked, where a plane between two slopes is off by no more than a step of height.
 STEP_OF_SLOPE, STEP_OF_HEIGHT, FARTHEST_ASKED = 2.0, 0.25, 15.0
 
-# Points that low ones are sought among, evenly along the curve that they are on.
+# Points that low ones are sought among.
 SAMPLE = 4096
 
 # One point is taken of each square of this side, metres: near ground is seen in many more points
@@ -67,7 +69,7 @@ class Ground:
         height: NDArray[np.float64] = z - (self.slope_x * x + self.slope_y * y + self.offset)
         return height
 
-    def is_below(self, xyz: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
+    def stands_out(self, xyz: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
         """True for points that stand out of the ground, bool (M,).
 
         Args:
@@ -115,8 +117,7 @@ def _low_points(xyz: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     x, y, z = xyz.T
     squared = x * x + y * y
     around = (squared > NEAREST**2) & (squared < FARTHEST**2) & (np.abs(z) < FARTHEST)
-    rows = np.flatnonzero(around)
-    points = xyz[rows[:: -(-len(rows) // SAMPLE) or 1]].astype(np.float64)
+    points = xyz[evenly(np.flatnonzero(around), SAMPLE)].astype(np.float64)
     column, line = np.floor(points[:, :2].T / SQUARE).astype(np.int64)
     square = column * int(4 * FARTHEST / SQUARE) + line
     order = np.lexsort((*points.T, square))

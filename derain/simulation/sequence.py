@@ -147,7 +147,8 @@ def _write_times(folder: Path, times: NDArray[np.float64]) -> None:
 
 def _write_poses(folder: Path, poses: Sequence[NDArray[np.float64]]) -> None:
     """Writes poses in KITTI's form, as seen from the first of them."""
-    rows = [(np.linalg.inv(poses[0]) @ pose)[:3].ravel() for pose in poses]
+    to_first = np.linalg.inv(poses[0])
+    rows = [(to_first @ pose)[:3].ravel() for pose in poses]
     with replacing(folder / POSES) as temporary:
         np.savetxt(temporary, np.round(rows, 9) + 0.0, "%.9f")  # 0.0 takes the sign from -0
 

@@ -104,7 +104,7 @@ def filled_values(
         stand_in: What stands in for a value that is missing, by channel; 0 if not named.
 
     Returns:
-        float32 (M, C), finite.
+        float32 (M, C), each channel in its own unit; finite where the stand-ins are.
     """
     of_all = np.empty((len(scan), len(channels)), np.float32)
     for number, name in enumerate(channels):

@@ -127,3 +127,16 @@ def _steps(points: NDArray[np.float32]) -> NDArray[np.bool_]:
     x, y, z = points.T
     result: NDArray[np.bool_] = (x[1:] != x[:-1]) | (y[1:] != y[:-1]) | (z[1:] != z[:-1])
     return result
+
+
+def evenly(rows: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+    """Some of the rows, evenly along them: of points along a curve, some of every place.
+
+    Args:
+        rows: Row numbers, int64 (N,).
+        most: How many there may be at most, above 0.
+
+    Returns:
+        Every n-th row from the first on, with the least n that gives no more than ``most``.
+    """
+    return rows[:: max(-(-len(rows) // most), 1)]

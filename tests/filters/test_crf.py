@@ -114,7 +114,7 @@ def test_the_fitted_variant_does_the_same_within_its_own_bounds(seed: int) -> No
     def around(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
         return reference.near[rows], reference.apart[rows].astype(np.float32)
 
-    above = ground.is_below(scan.xyz)
+    above = ground.stands_out(scan.xyz)
     bounds = fit_rain_bounds(reference.xyz, reference.intensity, above, around, 3.0, 2.0)
     assert bounds is not None
     assert not bounds.is_bright
@@ -212,6 +212,12 @@ def test_the_published_variant_survives_hard_scans(name: str, scan: Scan) -> Non
 def test_another_variant_is_refused() -> None:
     with pytest.raises(InputError, match=r"variant is 'best'\. Give one of fitted, published"):
         CRF(variant="best")
+
+
+def test_neighbourhoods_that_always_lie_in_a_plane_are_refused_where_that_is_what_tells() -> None:
+    with pytest.raises(InputError, match=r"neighbours is 3, .* in a plane\. Give 4 or more"):
+        CRF(neighbours=3)
+    assert CRF(neighbours=2, variant="published").neighbours == 2
 
 
 def test_bounds_hold_what_is_on_their_side_and_near() -> None:
