@@ -47,6 +47,7 @@ def test_a_good_lesson_raises_no_doubt_but_that_of_units() -> None:
     ("learnt", "says"),
     [
         (lesson(answers(100_000, 50)), "Hardly any rain was found (0.05%"),
+        (lesson(answers(100_000, 500)), "Little rain was found (0.50%"),
         (lesson(GOOD, scans=8), "4 scans to learn from are few"),
         (lesson(answers(5_000, 1_000, 4_000)), "sure of 60% of the points only"),
         (lesson(GOOD, stood=True), "The sensor stood"),
