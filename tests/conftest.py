@@ -14,6 +14,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 import numpy as np
 import pytest
 from filelock import FileLock
+from hypothesis import settings
 
 from derain.cli.main import main
 from derain.evaluation.hard_cases import scene
@@ -30,6 +31,10 @@ if TYPE_CHECKING:
     from derain.models.salsanext import SalsaNextModule
 
 REPOSITORY = Path(__file__).resolve().parent.parent
+
+# No test asserts a time, of which a busy machine takes any.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session")
