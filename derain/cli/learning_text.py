@@ -9,8 +9,8 @@ from derain.evaluation.counts import Counts
 from derain.evaluation.text_tables import markdown_table
 
 # Shares of the points that a teacher is sure of. Less than a thousandth of a scan is what a few
-# moving things make of clean air. Of simulated dry streets persistence calls up to .7 % rain, leaves
-# and boughs (BENCHMARK.md): so little is believed, but not without a word.
+# moving things make of clean air. Of simulated dry streets persistence calls up to .7 % rain, the
+# leaves and boughs (BENCHMARK.md): so little is believed, but not without a word.
 LEAST_RAIN = 0.001
 DOUBTFUL_RAIN = 0.01
 
