@@ -128,7 +128,9 @@ class Narrator:
         self.failed = code != 0
         self.warned += [line for line in warned.said if line.startswith(OF_DERAIN)]
         if code and not (leaves and leaves.exists()):
-            print(*warned.said[-1:], f"All it said: {self.log}", sep="\n", file=sys.stderr)
+            # A traceback, or what is printed last of anything else, has no such line.
+            errors = [line for line in warned.said if _is_error(line)] or warned.said[-1:]
+            print(*errors, f"All it said: {self.log}", sep="\n", file=sys.stderr)
             raise SystemExit(code)
         print(f"  {_clock(time.monotonic() - begun)}  {result(printed)}", flush=True)
         return printed.said
@@ -166,6 +168,11 @@ def _told_how_far(transcripts: Sequence[Transcript], begun: float) -> Iterator[N
         if live:
             out.write("\r\x1b[K")
             out.flush()
+
+
+def _is_error(line: str) -> bool:
+    """Whether a line says why a command failed, not only what it warns of."""
+    return line.startswith(OF_DERAIN) and not line.startswith(f"{OF_DERAIN}warning: ")
 
 
 def _clock(seconds: float) -> str:

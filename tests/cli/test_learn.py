@@ -120,6 +120,19 @@ def test_what_cannot_be_learnt_from_is_told_and_leaves_no_model(
     assert not Path("model.onnx").exists()
 
 
+def test_scans_that_nothing_connects_are_refused_with_the_reason(run_derain) -> None:
+    recording = Path("drives")
+    recording.mkdir()
+    for number in range(3):
+        places = np.random.default_rng(number).uniform(-40, 40, (3000, 3)).astype(np.float32)
+        np.column_stack([places, places[:, :1] * 0]).tofile(recording / f"{number:06d}.bin")
+    outcome = run_derain("learn", recording, "--out", "model.onnx")
+    assert outcome.code == 2
+    assert "no two scans of the recording could be laid upon one another" in outcome.err
+    assert "3 scans could not be registered" in outcome.err
+    assert not Path("model.onnx").exists()
+
+
 def test_a_clean_recording_is_refused_with_a_report_of_it(
     run_derain, write: WriteRecording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
