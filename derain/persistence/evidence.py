@@ -2,7 +2,7 @@
 
 Both are weighed as witnesses who do not know of each other: log-odds of each alone, added. Their
 weights are fitted to simulated drives (``benchmarks/persistence_weights.py``), whose truth is
-known; no label of a real scan had a part in it, and neither has intensity.
+known: no label of a real scan had a part in them. Intensity is not asked for.
 """
 
 import numpy as np
