@@ -23,7 +23,7 @@ from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
 from derain.fusion.extrinsics import read_extrinsics
 from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MANIFEST, rates_of_sequences, read_manifest
-from derain.simulation.sensor import load_sensor, packaged_sensors
+from derain.simulation.sensor_file import load_sensor, packaged_sensors
 from derain.teaching.manifest import LABELS, TAUGHT_PARTS, Manifest
 
 SCENE = """

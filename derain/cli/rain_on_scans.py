@@ -14,7 +14,8 @@ from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.recorded import rain_on_scan
-from derain.simulation.sensor import Sensor, load_sensor
+from derain.simulation.sensor import Sensor
+from derain.simulation.sensor_file import load_sensor
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.sink import FolderSink

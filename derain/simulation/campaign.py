@@ -15,7 +15,8 @@ from derain.simulation.drive import Drive
 from derain.simulation.manifest import MAKER, RAIN_RATE
 from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain
-from derain.simulation.sensor import Sensor, load_sensor
+from derain.simulation.sensor import SELDOM_STATED, Sensor
+from derain.simulation.sensor_file import load_sensor
 
 # Two of five sequences are clean, as are 39 % of REHEARSE-3D's. How often each rain rate occurs in
 # it is not published. The first sequence has rain, because it may be the only one to train on.
@@ -129,6 +130,10 @@ class Campaign:
         campaign = asdict(replace(self, sensor=self.lidar))
         if self.drive is None:
             del campaign["drive"]  # as in the manifests of before there were drives
+        usual = asdict(Sensor())
+        for name in SELDOM_STATED - {"row_inclinations"}:  # likewise
+            if campaign["sensor"][name] == usual[name]:
+                del campaign["sensor"][name]
         content = {
             "made_by": MAKER,
             "version": __version__,

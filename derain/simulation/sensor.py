@@ -1,18 +1,18 @@
 """A scanning LiDAR: where its beams point, what it can detect, and how it measures."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal, get_args, get_type_hints
+from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files.documents import Entry, shown
-from derain.files.packaged import packaged, packaged_or_own
+from derain.files.documents import shown
 from derain.scan import Scan
+from derain.simulation.defects import Defects
+from derain.simulation.returns import Returns as Returns
+from derain.simulation.scan_pattern import rosette, tilt_matrix, unit_vectors
 from derain.views.spherical_grid import FULL_CIRCLE
 
 FULL_SCALE_INTENSITY = 255.0
@@ -20,44 +20,25 @@ FULL_SCALE_INTENSITY = 255.0
 # Sensors of today have a tenth of it; the rays of so many take 200 MB.
 MOST_BEAMS = 2**22
 
+# Prisms of today turn some hundred times a second.
+MOST_TURNS = 1e6
+
 # Standard deviation of what a detector adds to every intensity, a modelling choice: one count.
 DARK_NOISE = 1.0
+
+# Attributes that most sensors have as they are by default: documents may leave them out.
+SELDOM_STATED = frozenset(
+    {
+        *("row_inclinations", "row_azimuths", "pattern", "prism_turns", "tilt"),
+        *("range_noise_growth", "weak_range_noise", "encoder_noise", "defects"),
+    }
+)
 
 # What a sensor reports of a beam that several things return.
 ReturnMode = Literal["strongest", "last", "dual"]
 
-
-@dataclass(frozen=True, eq=False)
-class Returns:
-    """What comes back to the sensor, ordered by beam.
-
-    Every beam has a row, also one that nothing returned; a sensor of dual returns may give it two,
-    the strongest first.
-
-    Attributes:
-        range: Where the beam ends, as a distance from the sensor, float64 (N,), metres; the maximum
-            range where nothing returned.
-        reflectivity: Apparent reflectivity, float64 (N,), in 0..1: what a surface across the whole
-            beam and facing the sensor would need to return as much through clear air. 0 where
-            nothing returned.
-        label: TrackClass of what was hit, int64 (N,); 0 where nothing returned.
-        beam: Row of the beam in :meth:`Sensor.beams`, int64 (N,), ascending.
-    """
-
-    range: NDArray[np.float64]
-    reflectivity: NDArray[np.float64]
-    label: NDArray[np.int64]
-    beam: NDArray[np.int64]
-
-    @property
-    def returned(self) -> NDArray[np.bool_]:
-        """True where something returned, bool (N,)."""
-        return self.reflectivity > 0
-
-    @property
-    def power(self) -> NDArray[np.float64]:
-        """Received power, float64 (N,), m⁻²: that of reflectivity 1 at 1 m is 1."""
-        return self.reflectivity / self.range**2
+# How the shots of a scan follow each other.
+Pattern = Literal["grid", "rosette"]
 
 
 @dataclass(frozen=True)
@@ -75,6 +56,14 @@ class Sensor:
         rows: Beams per column.
         row_inclinations: Inclination of every row from top to bottom, degrees, where they are not
             evenly spaced; else empty.
+        row_azimuths: How far every row points to the left of its columns, degrees, where they are
+            not one above the other; else empty.
+        pattern: ``grid``, or ``rosette``: two prisms deflect the beams over the ellipse that fits
+            into the field of view. Then a row is what one laser sees, in the order of time;
+            ``row_inclinations`` is by how much it points above the others, and without them all
+            lasers fire along one curve in turn.
+        prism_turns: How often each prism of a rosette turns during a scan, negative the other way.
+        tilt: Roll and pitch of the sensor where it is mounted, degrees; positive pitch looks down.
         minimum_range: What is nearer is not seen, metres.
         maximum_range: What is farther is not seen, metres.
         aperture: Width of a beam where it leaves the sensor, metres.
@@ -82,11 +71,16 @@ class Sensor:
         detection_threshold: Weakest power that counts as a return, m⁻² (see Returns.power). The
             default sees a tenth of a perfect reflector at 160 m.
         range_noise: Standard deviation of a measured distance, metres.
+        range_noise_growth: Another that grows with distance, metres per metre.
+        weak_range_noise: Another for returns at the detection threshold, metres; it falls with the
+            square root of power, as where counted photons tell the distance.
+        encoder_noise: Standard deviation of the azimuth that is measured of a column, degrees.
         intensity_noise: Standard deviation of a measured intensity, relative to it.
         mounting_height: Height above the road, metres.
         returns: What is reported of a beam that several things return: ``strongest``, ``last``
             (the farthest of those detected), or ``dual`` (both, where they differ).
         frame_rate: Scans per second, Hz.
+        defects: What else is wrong with its scans.
 
     Raises:
         InputError: A value that no sensor can have.
@@ -97,16 +91,24 @@ class Sensor:
     columns: int = 400
     rows: int = 64
     row_inclinations: tuple[float, ...] = ()
+    row_azimuths: tuple[float, ...] = ()
+    pattern: Pattern = "grid"
+    prism_turns: tuple[float, float] = (12.16, -7.77)
+    tilt: tuple[float, float] = (0.0, 0.0)
     minimum_range: float = 1.0
     maximum_range: float = 120.0
     aperture: float = 0.0
     beam_divergence: float = 1.5e-3
     detection_threshold: float = 4e-6
     range_noise: float = 0.02
+    range_noise_growth: float = 0.0
+    weak_range_noise: float = 0.0
+    encoder_noise: float = 0.0
     intensity_noise: float = 0.15
     mounting_height: float = 1.3
     returns: ReturnMode = "strongest"
     frame_rate: float = 10.0
+    defects: Defects = field(default_factory=Defects)
 
     def __post_init__(self) -> None:
         (right, left), (lowest, highest) = self.azimuth, self.inclination
@@ -117,12 +119,20 @@ class Sensor:
             "rows": isinstance(self.rows, int) and 1 <= self.rows * self.columns <= MOST_BEAMS,
             "row_inclinations": len(self.row_inclinations) in (0, self.rows)
             and all(-90 <= inclination <= 90 for inclination in self.row_inclinations),
+            "row_azimuths": len(self.row_azimuths) in (0, self.rows)
+            and all(abs(azimuth) <= FULL_CIRCLE for azimuth in self.row_azimuths),
+            "pattern": self.pattern in get_args(Pattern),
+            "prism_turns": all(abs(turns) <= MOST_TURNS for turns in self.prism_turns),
+            "tilt": all(abs(angle) <= 90 for angle in self.tilt),
             "minimum_range": self.minimum_range > 0,
             "maximum_range": self.minimum_range < self.maximum_range < math.inf,
             "aperture": 0 <= self.aperture < math.inf,
             "beam_divergence": 0 < self.beam_divergence < math.pi,
             "detection_threshold": 0 < self.detection_threshold < math.inf,
             "range_noise": 0 <= self.range_noise < math.inf,
+            "range_noise_growth": 0 <= self.range_noise_growth < math.inf,
+            "weak_range_noise": 0 <= self.weak_range_noise < math.inf,
+            "encoder_noise": 0 <= self.encoder_noise < FULL_CIRCLE,
             "intensity_noise": 0 <= self.intensity_noise < math.inf,
             "mounting_height": 0 <= self.mounting_height < math.inf,
             "returns": self.returns in get_args(ReturnMode),
@@ -135,19 +145,36 @@ class Sensor:
                 )
 
     def beams(self) -> NDArray[np.float64]:
-        """Unit vectors along the beams, float64 (rows · columns, 3), sensor frame.
+        """Unit vectors along the beams, float64 (rows · columns, 3), frame of the level sensor.
 
-        Row-major, from the highest row and from the left.
+        Row-major; in a grid from the highest row and from the left. The frame has the place and
+        the heading of the sensor's own, in which it reports its scans, but is not tilted.
         """
-        right, left = self.azimuth
-        closed = left - right == FULL_CIRCLE
-        columns = np.linspace(left, right, self.columns, endpoint=not closed)
-        rows = self.row_inclinations or np.linspace(*self.inclination[::-1], self.rows)
-        azimuth, inclination = np.radians(columns)[None, :], np.radians(rows)[:, None]
-        x = np.cos(inclination) * np.cos(azimuth)
-        y = np.cos(inclination) * np.sin(azimuth)
-        z = np.broadcast_to(np.sin(inclination), x.shape)
-        return np.stack([x, y, z], axis=-1).reshape(-1, 3)
+        own = unit_vectors(*self._angles())
+        return own @ self.mounting[:3, :3].T if any(self.tilt) else own
+
+    @property
+    def mounting(self) -> NDArray[np.float64]:
+        """Turns points of a scan into the frame of the level sensor, float64 (4, 4)."""
+        return tilt_matrix(*self.tilt)
+
+    def _angles(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Azimuth and inclination of the beams in the sensor's own frame, degrees.
+
+        Both can be broadcast to (rows, columns).
+        """
+        if self.pattern == "rosette":
+            field, shape = (self.azimuth, self.inclination), (self.rows, self.columns)
+            azimuth, rows = rosette(field, shape, self.prism_turns, self.row_inclinations)
+        else:
+            right, left = self.azimuth
+            closed = left - right == FULL_CIRCLE
+            azimuth = np.linspace(left, right, self.columns, endpoint=not closed)[None, :]
+            table = self.row_inclinations or np.linspace(*self.inclination[::-1], self.rows)
+            rows = np.array(table)[:, None]
+        if self.row_azimuths:
+            azimuth = azimuth + np.array(self.row_azimuths)[:, None]
+        return azimuth, rows
 
     def beam_times(self) -> NDArray[np.float64]:
         """When each beam is sent, float64 (rows · columns,), seconds after the scan begins.
@@ -181,21 +208,52 @@ class Sensor:
             generator: Source of the noise.
 
         Returns:
-            A scan of what returned, with intensity in 0..255 and labels.
+            A scan of what returned, with intensity in 0..255 and labels, in the sensor's own frame.
         """
-        seen = returns.returned
-        distance = self.measured_range(returns.range[seen], generator)
-        return Scan(
-            (self.beams()[returns.beam[seen]] * distance[:, None]).astype(np.float32),
-            self.measured_intensity(returns.reflectivity[seen], generator).astype(np.float32),
-            returns.label[seen],
+        dual = self.returns == "dual"
+        returns = self.defects.at_borders(returns, self.columns, dual=dual, generator=generator)
+        seen = returns.take(np.flatnonzero(self._received(returns, generator)))
+        distance = self.measured_range(seen.range, generator, seen.power)
+        intensity = self.measured_intensity(seen.reflectivity, generator)
+        direction = self._measured_directions(seen.beam, generator)
+        scan = Scan(
+            (direction * self.defects.stepped(distance)[:, None]).astype(np.float32),
+            intensity.astype(np.float32),
+            seen.label,
         )
+        return scan.take(self.defects.reported(seen.beam, generator))
+
+    def _received(self, returns: Returns, generator: np.random.Generator) -> NDArray[np.bool_]:
+        received = self.defects.received(returns, (self.rows, self.columns), generator)
+        return received & returns.returned
+
+    def _measured_directions(
+        self, beam: NDArray[np.int64], generator: np.random.Generator
+    ) -> NDArray[np.float64]:
+        """Unit vectors in the sensor's own frame, float64 (N, 3), as the encoder tells them."""
+        azimuth, inclination = self._angles()
+        if self.encoder_noise:
+            azimuth = azimuth + generator.normal(0, self.encoder_noise, self.columns)
+        return unit_vectors(azimuth, inclination)[beam]
 
     def measured_range(
-        self, range: NDArray[np.float64], generator: np.random.Generator
+        self,
+        range: NDArray[np.float64],
+        generator: np.random.Generator,
+        power: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
-        """Distances in metres, float64 (N,), with the noise of the measurement."""
-        return range + generator.normal(0, self.range_noise, len(range))
+        """Distances in metres, float64 (N,), with the noise of the measurement.
+
+        Args:
+            range: True distances, float64 (N,), metres.
+            generator: Source of the noise.
+            power: Received power, float64 (N,), m⁻²; without it no return is weak.
+        """
+        deviation = np.hypot(self.range_noise, self.range_noise_growth * range)
+        if power is not None and self.weak_range_noise:
+            excess = np.maximum(power / self.detection_threshold, 1)
+            deviation = np.hypot(deviation, self.weak_range_noise / np.sqrt(excess))
+        return range + generator.normal(0, deviation)
 
     def measured_intensity(
         self, reflectivity: NDArray[np.float64], generator: np.random.Generator
@@ -212,47 +270,3 @@ class Sensor:
         offset = generator.normal(0, DARK_NOISE, len(reflectivity))
         intensity = FULL_SCALE_INTENSITY * reflectivity * gain + offset
         return np.clip(intensity, 0, FULL_SCALE_INTENSITY)
-
-
-def packaged_sensors() -> dict[str, Path]:
-    """Files of the sensors that come with derain, by name."""
-    return packaged("derain.simulation", "sensors")
-
-
-def load_sensor(name: str | Path) -> Sensor:
-    """Reads a sensor.
-
-    Args:
-        name: Name of a packaged sensor, or a YAML file with attributes of :class:`Sensor`; those
-            that it leaves out have their defaults.
-
-    Raises:
-        InputError: No such sensor, or a file that does not describe one.
-    """
-    path = packaged_or_own(name, packaged_sensors(), "sensor")
-    values = Entry.of_yaml(path).record(_PARSERS)
-    try:
-        return Sensor(**values)
-    except InputError as error:
-        raise InputError(
-            path, f"{error.subject}: {error.reason}", "Take a packaged one as a pattern."
-        ) from error
-
-
-def _span(entry: Entry) -> tuple[float, ...]:
-    return entry.numbers(2)
-
-
-def _beams(entry: Entry) -> int:
-    return entry.whole(1, MOST_BEAMS)
-
-
-# What reads the attributes of a sensor, by their type.
-_PARSERS_BY_TYPE: dict[Any, Callable[[Entry], Any]] = {
-    tuple[float, float]: _span,
-    tuple[float, ...]: Entry.numbers,
-    int: _beams,
-    float: Entry.number,
-    ReturnMode: Entry.text,
-}
-_PARSERS = {name: _PARSERS_BY_TYPE[kind] for name, kind in get_type_hints(Sensor).items()}

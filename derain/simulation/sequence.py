@@ -20,6 +20,7 @@ rain.
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -79,7 +80,7 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
     for kind in (FOLDERS.lidar, FOLDERS.scans, FOLDERS.labels, "weather"):
         _write_times(folder / kind, times)
     if scene.course is not None:
-        poses = [scene.course.pose(time, sensor) for time in times]
+        poses = [scene.course.pose(time, sensor) @ sensor.mounting for time in times]
         for kind in (FOLDERS.lidar, FOLDERS.scans):
             _write_poses(folder / kind, poses)
 
@@ -87,9 +88,13 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
 def _write_mounting(folder: Path, radar: Radar, sensor: Sensor) -> Extrinsics:
     """Writes where the radar is, as seen from the LiDAR: right above or below it."""
     pose = dict.fromkeys(POSE, 0.0) | {"z": radar.mounting_height - sensor.mounting_height}
+    mounting, written = Extrinsics.of_pose(**pose), dict[str, Any](pose)
+    if any(sensor.tilt):
+        mounting = Extrinsics(sensor.mounting.T @ mounting.matrix)
+        written = {"matrix": mounting.matrix.tolist()}
     with replacing(folder / "extrinsics.yaml") as temporary:
-        temporary.write_text(yaml.safe_dump(pose, sort_keys=False), "utf-8")
-    return Extrinsics.of_pose(**pose)
+        temporary.write_text(yaml.safe_dump(written, sort_keys=False), "utf-8")
+    return mounting
 
 
 def _record_radar(

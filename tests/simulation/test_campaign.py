@@ -10,7 +10,8 @@ from derain.errors import InputError
 from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, partition
 from derain.simulation.drive import Drive
 from derain.simulation.radar import Radar
-from derain.simulation.sensor import Sensor, load_sensor
+from derain.simulation.sensor import Sensor
+from derain.simulation.sensor_file import load_sensor
 
 
 def test_the_split_covers_every_sequence_once() -> None:

@@ -1,0 +1,184 @@
+"""What sensors and their drivers do to a scan besides noise: losses, copies, steps, mixed points.
+
+Nothing here makes rain of what is none or the other way round: every return keeps its label, and a
+point between two surfaces gets that of the nearer one.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.documents import shown
+from derain.simulation.classes import TrackClass, parted
+from derain.simulation.returns import Returns
+
+# Parts of a scan that are lost together: sensors send a scan in 75 (Ouster) to 180 (Velodyne)
+# packets, of which a network drops some in a row.
+SECTORS = 60
+
+# Two neighbouring returns nearer together than this are of one surface, metres.
+SMALLEST_GAP = 0.3
+
+
+@dataclass(frozen=True)
+class Defects:
+    """What is wrong with the scans of a sensor; the default is nothing.
+
+    Attributes:
+        dropped: Share of the returns that are lost, each by itself.
+        dropped_rows: Share of the rows of beams that are lost, anew in each scan.
+        dropped_sectors: Share of the sectors, all columns sent in a sixtieth of a scan, that are
+            lost, anew in each scan.
+        mixed: Share of the beams at the border of two surfaces that see both. Where these are no
+            farther apart than ``merging``, one point comes back from anywhere in between; else a
+            sensor of dual returns reports both. The border is between a beam and the next of its
+            row, as beams are smeared along the row.
+        merging: Distance of two surfaces within which a sensor takes them for one, metres.
+        range_step: Distances are multiples of it, metres; 0 for any distance.
+        copies: Share of the beams with a single return that report it twice: two rows of the scan
+            are the same. A dual sensor whose two returns are one does so with all.
+
+    Raises:
+        InputError: A value that is impossible.
+    """
+
+    dropped: float = 0.0
+    dropped_rows: float = 0.0
+    dropped_sectors: float = 0.0
+    mixed: float = 0.0
+    merging: float = 2.0
+    range_step: float = 0.0
+    copies: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("dropped", "dropped_rows", "dropped_sectors", "mixed", "copies"):
+            self._check(name, 0 <= getattr(self, name) <= 1, "Give a share of 0 to 1.")
+        for name in ("merging", "range_step"):
+            possible = 0 <= getattr(self, name) < math.inf
+            self._check(name, possible, "Give metres, 0 or more.")
+
+    def _check(self, name: str, possible: bool, remedy: str) -> None:
+        if not possible:
+            reason = f"{shown(getattr(self, name))} is impossible"
+            raise InputError(f"defects: {name}", reason, remedy)
+
+    def at_borders(
+        self, returns: Returns, columns: int, *, dual: bool, generator: np.random.Generator
+    ) -> Returns:
+        """Lets beams at the border of two surfaces return both, or what lies in between.
+
+        Args:
+            returns: What the sensor detects.
+            columns: Beams per row of the sensor.
+            dual: Whether it reports two returns of a beam.
+            generator: Random generator.
+
+        Returns:
+            The same with other ranges, and with second rows of beams that return both.
+        """
+        if not self.mixed:
+            return returns
+        row, beside = _borders(returns, columns)
+        chosen = generator.random(len(row)) < self.mixed
+        row, beside = row[chosen], beside[chosen]
+        share = generator.random(len(row))  # of the light that goes past the beam's own surface
+        apart = np.abs(returns.range[beside] - returns.range[row]) > self.merging
+        merged = _merged(returns, row[~apart], beside[~apart], share[~apart])
+        if not dual:
+            return merged
+        return _with_both(merged, row[apart], returns.take(beside[apart]), share[apart])
+
+    def received(
+        self, returns: Returns, shape: tuple[int, int], generator: np.random.Generator
+    ) -> NDArray[np.bool_]:
+        """Which returns are not lost, bool (N,).
+
+        Args:
+            returns: What the sensor detects.
+            shape: Rows of the sensor and beams per row.
+            generator: Random generator.
+        """
+        rows, columns = shape
+        received = np.ones(len(returns.beam), bool)
+        if self.dropped:
+            received &= generator.random(len(received)) >= self.dropped
+        if self.dropped_rows:
+            alive = generator.random(rows) >= self.dropped_rows
+            received &= alive[returns.beam // columns]
+        if self.dropped_sectors:
+            arrived = generator.random(SECTORS) >= self.dropped_sectors
+            received &= arrived[returns.beam % columns * SECTORS // columns]
+        return received
+
+    def stepped(self, range: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances in metres, float64 (N,), rounded to the step of the sensor."""
+        return np.round(range / self.range_step) * self.range_step if self.range_step else range
+
+    def reported(
+        self, beam: NDArray[np.int64], generator: np.random.Generator
+    ) -> NDArray[np.int64]:
+        """Rows of a scan with its copies, int64 (M,): a row that is reported twice comes twice.
+
+        Args:
+            beam: Beam of every row of the scan, int64 (N,), ascending.
+            generator: Random generator.
+        """
+        if not self.copies:
+            return np.arange(len(beam))
+        single = _single(beam) & (generator.random(len(beam)) < self.copies)
+        return np.repeat(np.arange(len(beam)), 1 + single)
+
+
+def _single(beam: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether each row is the only one of its beam, bool (N,), beams ascending."""
+    another = beam[1:] == beam[:-1]
+    return ~(np.append(another, False) | np.append(False, another)) if len(beam) else another
+
+
+def _borders(returns: Returns, columns: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows of the beams at a border, int64 (B,), and of the next beam in each one's row.
+
+    Both beams return one thing, which is not rain: what a drop shares a beam with is for the
+    simulation of rain to say.
+    """
+    kind, _ = parted(returns.label)
+    surface = returns.returned & (kind != TrackClass.RAIN) & _single(returns.beam)
+    next_in_row = (np.diff(returns.beam) == 1) & (returns.beam[1:] % columns != 0)
+    gap = np.abs(np.diff(returns.range)) > SMALLEST_GAP
+    row = np.flatnonzero(next_in_row & gap & surface[:-1] & surface[1:])
+    return row, row + 1
+
+
+def _merged(
+    returns: Returns,
+    row: NDArray[np.int64],
+    beside: NDArray[np.int64],
+    share: NDArray[np.float64],
+) -> Returns:
+    """Moves rows towards the range of the beams beside them by a share of the way."""
+    nearer = np.where(returns.range[row] <= returns.range[beside], row, beside)
+    columns = returns.range.copy(), returns.reflectivity.copy(), returns.label.copy()
+    for column in columns[:2]:
+        column[row] += share * (column[beside] - column[row])
+    columns[2][row] = returns.label[nearer]
+    return Returns(*columns, returns.beam)
+
+
+def _with_both(
+    returns: Returns, row: NDArray[np.int64], second: Returns, share: NDArray[np.float64]
+) -> Returns:
+    """Gives the beams of some rows a second return, with a share of what it would be by itself."""
+    reflectivity = np.concatenate([returns.reflectivity, share * second.reflectivity])
+    reflectivity[row] *= 1 - share
+    joined = Returns(
+        np.concatenate([returns.range, second.range]),
+        reflectivity,
+        np.concatenate([returns.label, second.label]),
+        np.concatenate([returns.beam, returns.beam[row]]),
+    )
+    added = len(returns.beam) + np.arange(len(row))
+    weaker = joined.power[added] <= joined.power[row]  # and so comes after the other
+    return joined.take(np.insert(np.arange(len(returns.beam)), row + weaker, added))

@@ -1,0 +1,135 @@
+"""Draws sensors, so that what learns from their scans has met any."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from derain.simulation.defects import Defects
+from derain.simulation.row_table import draw_row_azimuths, draw_row_table
+from derain.simulation.sensor import Sensor
+from derain.simulation.spans import DefectSpans, SensorSpans, draw, draw_kind
+from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
+
+# Defects that only some sensors have.
+DEFECTS = ("dropped", "dropped_rows", "dropped_sectors", "mixed", "range_step", "copies")
+
+# The slower prism of a rosette turns the other way, at so many times the speed of the faster one:
+# .64 in the Livox Mid-40.
+PRISM_RATIO = (0.4, 0.8)
+
+# Lasers of a rosette.
+LASERS = (1, 4, 6)
+
+
+def draw_sensor(spans: SensorSpans, generator: np.random.Generator) -> Sensor:
+    """Draws a sensor with its defects.
+
+    Args:
+        spans: What is drawn from.
+        generator: Random generator.
+
+    Raises:
+        InputError: The spans allow for what no sensor can be, and it was drawn.
+    """
+    patterns = {"spinning": _spinning, "front": _front, "rosette": _rosette}
+    pattern = patterns[draw_kind(spans.kinds, generator)](spans, generator)
+    roll, pitch = (draw(spans, "tilt", generator) * generator.choice([-1, 1]) for _ in range(2))
+    if generator.random() < spans.head_down:
+        pitch += draw(spans, "head_down_pitch", generator)
+    returns: Any = draw_kind(spans.returns, generator)
+    drawn = {name: draw(spans, name, generator) for name in DRAWN_EVENLY}
+    return Sensor(
+        **pattern,
+        **drawn,
+        tilt=(roll, pitch),
+        returns=returns,
+        defects=draw_defects(spans.defects, generator, dual=returns == "dual"),
+    )
+
+
+def draw_defects(spans: DefectSpans, generator: np.random.Generator, *, dual: bool) -> Defects:
+    """Draws what is wrong with the scans of a sensor.
+
+    Args:
+        spans: What is drawn from.
+        generator: Random generator.
+        dual: Whether the sensor reports two returns of a beam. Half of those that do report the
+            two of every beam, be they the same.
+    """
+    some = generator.random() >= spans.none
+    values = {name: draw(spans, name, generator) for name in DEFECTS}
+    has = {name: some and generator.random() < spans.each for name in DEFECTS}
+    if dual:
+        values["copies"], has["copies"] = 1.0, generator.random() < 0.5
+    return Defects(
+        **{name: value for name, value in values.items() if has[name]},
+        merging=draw(spans, "merging", generator),
+    )
+
+
+# Attributes of any sensor that are drawn from the span of their name.
+DRAWN_EVENLY = (
+    *("minimum_range", "maximum_range", "aperture", "beam_divergence", "detection_threshold"),
+    *("range_noise", "range_noise_growth", "weak_range_noise", "encoder_noise"),
+    *("intensity_noise", "mounting_height", "frame_rate"),
+)
+
+
+def _spinning(spans: SensorSpans, generator: np.random.Generator) -> dict[str, Any]:
+    rows = int(generator.choice(spans.spinning_rows))
+    height = min(draw(spans, "spinning_field", generator) for _ in range(2))
+    centre = draw(spans, "spinning_centre", generator)
+    inclination = max(centre - height / 2, -90.0), min(centre + height / 2, 90.0)
+    even = generator.random() >= spans.uneven
+    turned = draw(spans, "row_azimuth", generator)
+    step = draw(spans, "azimuth_step", generator)
+    return {
+        "azimuth": ALL_AROUND,
+        "inclination": inclination,
+        "rows": rows,
+        "columns": _columns(FULL_CIRCLE, step, rows, spans),
+        "row_inclinations": draw_row_table(inclination, rows, generator, even=even),
+        "row_azimuths": draw_row_azimuths(rows, turned, generator),
+    }
+
+
+def _front(spans: SensorSpans, generator: np.random.Generator) -> dict[str, Any]:
+    rows = int(generator.choice(spans.front_rows))
+    width, height = (draw(spans, name, generator) for name in ("front_width", "front_height"))
+    centre = draw(spans, "spinning_centre", generator) / 2
+    return {
+        "azimuth": (-width / 2, width / 2),
+        "inclination": (centre - height / 2, centre + height / 2),
+        "rows": rows,
+        "columns": _columns(width, draw(spans, "front_step", generator), rows, spans),
+    }
+
+
+def _rosette(spans: SensorSpans, generator: np.random.Generator) -> dict[str, Any]:
+    radius = draw(spans, "rosette_width", generator) / 2
+    lasers = int(generator.choice(LASERS))
+    beams = min(round(draw(spans, "rosette_beams", generator)), spans.most_beams)
+    turns = draw(spans, "prism_turns", generator)
+    return {
+        "pattern": "rosette",
+        "azimuth": (-radius, radius),
+        "inclination": (-radius, radius),
+        "rows": lasers,
+        "columns": max(beams // lasers, 1),
+        "prism_turns": (turns, -turns * generator.uniform(*PRISM_RATIO)),
+        "row_inclinations": _laser_offsets(lasers, generator),
+    }
+
+
+def _laser_offsets(lasers: int, generator: np.random.Generator) -> tuple[float, ...]:
+    """Inclinations of a rosette's lasers off their common direction, degrees; none for half."""
+    if lasers == 1 or generator.random() < 0.5:
+        return ()
+    step = generator.uniform(0.1, 0.5)
+    return tuple((step * (np.arange(lasers) - (lasers - 1) / 2)).tolist())
+
+
+def _columns(width: float, step: float, rows: int, spans: SensorSpans) -> int:
+    """Columns of a field so wide, in degrees, so many degrees apart."""
+    return max(min(math.ceil(width / step), spans.most_beams // rows), 1)

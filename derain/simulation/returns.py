@@ -1,0 +1,44 @@
+"""What comes back to a sensor along its beams."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Returns:
+    """What comes back to the sensor, ordered by beam.
+
+    Every beam has a row, also one that nothing returned; a sensor of dual returns may give it two,
+    the strongest first.
+
+    Attributes:
+        range: Where the beam ends, as a distance from the sensor, float64 (N,), metres; the maximum
+            range where nothing returned.
+        reflectivity: Apparent reflectivity, float64 (N,), in 0..1: what a surface across the whole
+            beam and facing the sensor would need to return as much through clear air. 0 where
+            nothing returned.
+        label: TrackClass of what was hit, int64 (N,); 0 where nothing returned.
+        beam: Row of the beam in :meth:`derain.simulation.sensor.Sensor.beams`, int64 (N,),
+            ascending.
+    """
+
+    range: NDArray[np.float64]
+    reflectivity: NDArray[np.float64]
+    label: NDArray[np.int64]
+    beam: NDArray[np.int64]
+
+    @property
+    def returned(self) -> NDArray[np.bool_]:
+        """True where something returned, bool (N,)."""
+        return self.reflectivity > 0
+
+    @property
+    def power(self) -> NDArray[np.float64]:
+        """Received power, float64 (N,), m⁻²: that of reflectivity 1 at 1 m is 1."""
+        return self.reflectivity / self.range**2
+
+    def take(self, rows: NDArray[np.int64]) -> "Returns":
+        """Some of the rows, by their numbers, int64 (M,)."""
+        return Returns(self.range[rows], self.reflectivity[rows], self.label[rows], self.beam[rows])
