@@ -102,16 +102,15 @@ class Defects:
             generator: Random generator.
         """
         rows, columns = shape
-        received = np.ones(len(returns.beam), bool)
+        lost = np.zeros(len(returns.beam), bool)
         if self.dropped:
-            received &= generator.random(len(received)) >= self.dropped
+            lost |= generator.random(len(lost)) < self.dropped
         if self.dropped_rows:
-            alive = generator.random(rows) >= self.dropped_rows
-            received &= alive[returns.beam // columns]
+            lost |= (generator.random(rows) < self.dropped_rows)[returns.beam // columns]
         if self.dropped_sectors:
-            arrived = generator.random(SECTORS) >= self.dropped_sectors
-            received &= arrived[returns.beam % columns * SECTORS // columns]
-        return received
+            sector = returns.beam % columns * SECTORS // columns
+            lost |= (generator.random(SECTORS) < self.dropped_sectors)[sector]
+        return np.logical_not(lost)
 
     def stepped(self, range: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances in metres, float64 (N,), rounded to the step of the sensor."""

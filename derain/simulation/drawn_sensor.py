@@ -38,7 +38,7 @@ def draw_sensor(spans: SensorSpans, generator: np.random.Generator) -> Sensor:
     if generator.random() < spans.head_down:
         pitch += draw(spans, "head_down_pitch", generator)
     returns: Any = draw_kind(spans.returns, generator)
-    drawn = {name: draw(spans, name, generator) for name in DRAWN_EVENLY}
+    drawn: dict[str, Any] = {name: draw(spans, name, generator) for name in DRAWN_EVENLY}
     return Sensor(
         **pattern,
         **drawn,

@@ -46,8 +46,8 @@ def rosette(
     Returns:
         Azimuth and inclination, degrees, float64 (lasers, shots) each.
 
-    Source: Livox Mid-40, for the principle (Brazeal et al. 2021, "A rigorous observation model for
-    the Risley prism-based Livox Mid-40 lidar sensor"); to first order in the deflections.
+    Source: Brazeal et al. 2021, "A rigorous observation model for the Risley prism-based Livox
+    Mid-40 lidar sensor", here to the first order in the deflections.
     """
     lasers, shots = shape
     delay = np.zeros(lasers) if offsets else np.arange(lasers) / lasers
@@ -55,11 +55,9 @@ def rosette(
     first, second = (2 * np.pi * turn * share for turn in turns)
     (right, left), (lowest, highest) = field
     azimuth = (left + right) / 2 + (left - right) / 4 * (np.cos(first) + np.cos(second))
-    inclination = (highest + lowest) / 2
-    inclination = inclination + (highest - lowest) / 4 * (np.sin(first) + np.sin(second))
-    if offsets:
-        inclination = inclination + np.array(offsets)[:, None]
-    return azimuth, inclination
+    swing = (highest - lowest) / 4 * (np.sin(first) + np.sin(second))
+    middle = (highest + lowest) / 2 + (np.array(offsets)[:, None] if offsets else 0.0)
+    return azimuth, middle + swing
 
 
 def tilt_matrix(roll: float, pitch: float) -> NDArray[np.float64]:

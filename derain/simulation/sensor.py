@@ -62,7 +62,9 @@ class Sensor:
             into the field of view. Then a row is what one laser sees, in the order of time;
             ``row_inclinations`` is by how much it points above the others, and without them all
             lasers fire along one curve in turn.
-        prism_turns: How often each prism of a rosette turns during a scan, negative the other way.
+        prism_turns: How often each prism of a rosette turns during a scan, negative the other way;
+            every scan begins with the same position of both. Those of the Livox Mid-40, which turn
+            7,294 and −4,664 times a minute, at ten scans a second.
         tilt: Roll and pitch of the sensor where it is mounted, degrees; positive pitch looks down.
         minimum_range: What is nearer is not seen, metres.
         maximum_range: What is farther is not seen, metres.
