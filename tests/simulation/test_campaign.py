@@ -8,6 +8,7 @@ import pytest
 
 from derain.errors import InputError
 from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, partition
+from derain.simulation.defects import Defects
 from derain.simulation.drive import Drive
 from derain.simulation.radar import Radar
 from derain.simulation.sensor import Sensor
@@ -101,3 +102,12 @@ def test_of_one_or_two_sequences_none_is_held_out(sequences: int) -> None:
     campaign = Campaign(*partition(sequences))
     assert campaign.split == {"train": campaign.names, "validation": [], "test": []}
     assert len(campaign.names) == sequences
+
+
+def test_what_few_sensors_have_is_described_where_one_has_it() -> None:
+    usual = Campaign().description["campaign"]["sensor"]
+    tilted = Campaign(sensor=Sensor(tilt=(0, 5), defects=Defects(copies=1)))
+    described = tilted.description["campaign"]["sensor"]
+    assert set(described) - set(usual) == {"tilt", "defects"}
+    assert described["tilt"] == [0, 5]
+    assert described["defects"]["copies"] == 1

@@ -1,6 +1,7 @@
 """One sequence: the folders of REHEARSE-3D, and how LiDAR, radar and weather belong together."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -16,12 +17,14 @@ from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
 from derain.simulation.drive import Drive
 from derain.simulation.radar import Radar
+from derain.simulation.sensor_file import load_sensor
 from derain.simulation.sequence import write_sequence
 from derain.sources.folders import named_frames
 
 FACILITY = {"scans": 3, "sensor": "mems_64", "layout": "facility", "rain_rates": (25.0,)}
 OF_LIDAR = {"innoviz", "lidar_radar_pcd", "lidar_radar_labels", "weather"}
 OF_RADAR = {"radar_pcd", "ext_radar"}
+EXTRINSICS = "extrinsics.yaml"
 
 
 def table(path: Path) -> dict[str, list[str]]:
@@ -50,7 +53,7 @@ def without_radar(open3d: ModuleType, tmp_path_factory: pytest.TempPathFactory) 
 
 
 def test_the_folders_and_files_are_those_of_rehearse_3d(folder: Path) -> None:
-    assert {file.name for file in folder.iterdir()} == OF_LIDAR | OF_RADAR | {"extrinsics.yaml"}
+    assert {file.name for file in folder.iterdir()} == OF_LIDAR | OF_RADAR | {EXTRINSICS}
     suffixes = {"lidar_radar_labels": "label", "weather": "csv", "ext_radar": "csv"}
     for kind in OF_LIDAR | OF_RADAR:
         frames = table(folder / kind / "metadata.csv")["frame"]
@@ -79,7 +82,7 @@ def test_each_sensor_keeps_its_own_time(folder: Path) -> None:
 def test_a_merged_cloud_is_the_scan_and_the_radar_frame_nearest_in_time(folder: Path) -> None:
     lidar = np.array(table(folder / "innoviz/metadata.csv")["timestamp"], float)
     radar = np.array(table(folder / "radar_pcd/metadata.csv")["timestamp"], float)
-    mounting = read_extrinsics(folder / "extrinsics.yaml")
+    mounting = read_extrinsics(folder / EXTRINSICS)
     for number, time in enumerate(lidar):
         merged = points(folder / f"lidar_radar_pcd/{number:06d}.bin")
         scan = points(folder / f"innoviz/{number:06d}.bin")
@@ -213,3 +216,31 @@ def test_a_drive_is_written_the_same_again(drive: Path, open3d: ModuleType, tmp_
 
 def test_one_that_stands_where_nothing_moves_has_no_poses(without_radar: Path) -> None:
     assert not list(without_radar.rglob("poses.txt"))
+
+
+def test_the_radar_stands_above_a_tilted_sensor_as_above_a_level_one(
+    folder: Path, tmp_path: Path
+) -> None:
+    tilted = replace(load_sensor("mems_64"), tilt=(4.0, 12.0))
+    extrinsics = read_extrinsics(written(tmp_path, sensor=tilted, radar=Radar()) / EXTRINSICS)
+    level = read_extrinsics(folder / EXTRINSICS)
+    frame = points(folder / "radar_pcd/000000.bin")[:, :3]
+    turned = extrinsics(frame) @ tilted.mounting[:3, :3].T
+    assert np.allclose(turned, level(frame), atol=1e-4)
+
+
+def test_poses_of_a_tilted_sensor_are_those_of_a_level_one_in_its_own_frame(
+    open3d: ModuleType, tmp_path: Path
+) -> None:
+    level = load_sensor("mems_64")
+    tilted = replace(level, tilt=(3.0, 10.0))
+    drive = {"layout": "street", "rain_rates": (0.0,), "drive": Drive(10.0)}
+    poses = [
+        np.loadtxt(written(tmp_path / name, sensor=sensor, **drive) / "innoviz/poses.txt")
+        for name, sensor in (("level", level), ("tilted", tilted))
+    ]
+    of_level, of_tilted = (np.eye(4) + np.zeros((len(pose), 1, 1)) for pose in poses)
+    of_level[:, :3], of_tilted[:, :3] = (pose.reshape(-1, 3, 4) for pose in poses)
+    own = tilted.mounting.T @ of_level @ tilted.mounting
+    assert np.allclose(of_tilted, own, atol=1e-8)
+    assert np.linalg.norm(own[2, :3, 3]) == pytest.approx(2, abs=0.2)
