@@ -7,9 +7,7 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.sensor import ReturnMode, Returns, Sensor
 
 
-def detected_surfaces(
-    clear: Returns, transmission: NDArray[np.float64], sensor: Sensor
-) -> Returns:
+def detected_surfaces(clear: Returns, transmission: NDArray[np.float64], sensor: Sensor) -> Returns:
     """What the sensor would see of the surfaces if there were no particles in front of them.
 
     Args:
