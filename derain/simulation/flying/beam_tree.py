@@ -14,6 +14,9 @@ with sleeping_threads():
 FIRST_LOOK = 6
 GROWTH = 5
 
+# Pairs of a particle and a beam that are looked at in one go: 64 MB of them.
+PAIRS_AT_ONCE = 2**22
+
 
 @dataclass(frozen=True, eq=False)
 class Meetings:
@@ -58,22 +61,32 @@ class BeamTree:
         """
         found, count = [], FIRST_LOOK
         rows = np.arange(len(place))
-        far = np.linalg.norm(place, axis=1)
         while len(rows):
             count = min(count, self._beams)
-            # One thread, so that beams at the same distance come in the same order every time.
-            beam, squared = self._tree.batch_knn_search(
-                place[rows] / far[rows, None], count, num_threads=1
-            )
-            offset = np.sqrt(squared) * far[rows, None]
-            close = offset < within[rows, None]
-            whole = ~close[:, -1] | (count == self._beams)
-            row, column = np.nonzero(close & whole[:, None])
-            found.append(
-                Meetings(rows[row], beam[row, column].astype(np.int64), offset[row, column])
-            )
-            rows, count = rows[~whole], GROWTH * count
+            more = []
+            for start in range(0, len(rows), at_once := max(PAIRS_AT_ONCE // count, 1)):
+                part = rows[start : start + at_once]
+                offset, beam = self._nearest(place[part], count)
+                close = offset < within[part, None]
+                whole = ~close[:, -1] | (count == self._beams)
+                row, column = np.nonzero(close & whole[:, None])
+                found.append(Meetings(part[row], beam[row, column], offset[row, column]))
+                more.append(part[~whole])
+            rows, count = np.concatenate(more), GROWTH * count
         return _joined(found)
+
+    def nearest(self, place: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The beam whose axis passes each place nearest, int64 (P,)."""
+        return self._nearest(place, 1)[1][:, 0]
+
+    def _nearest(
+        self, place: NDArray[np.float64], count: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Offsets and rows of the nearest beams, nearest first, float64 and int64 (P, count)."""
+        far = np.linalg.norm(place, axis=1, keepdims=True)
+        # One thread, so that beams at the same distance come in the same order every time.
+        beam, squared = self._tree.batch_knn_search(place / far, count, num_threads=1)
+        return np.sqrt(squared) * far, beam.astype(np.int64)
 
 
 def covered_share(

@@ -76,9 +76,9 @@ def draw_particles(
 ) -> tuple[Particles, Meetings]:
     """Draws particles of an even density that beams meet where they may be.
 
-    For each beam they are drawn as if it were alone. A particle within m beams is so drawn m times
-    as often as it should be, and is kept with probability 1/m. What is kept is the Poisson process
-    of the space that the beams fill together.
+    For each beam they are drawn as if it were alone; a particle within several beams so comes up
+    for each of them. It is kept only for the nearest of those whose stretches it is on. What is
+    kept is the Poisson process of the space that the beams fill together.
 
     Args:
         number: Particles per cubic metre.
@@ -90,21 +90,38 @@ def draw_particles(
     Returns:
         The particles that would be seen in the middle of a beam, and all beams that meet them in
         front of the surfaces.
-
-    Source: Lewis and Shedler 1979, "Simulation of nonhomogeneous Poisson processes by thinning".
     """
-    drawn = _drawn_beam_by_beam(number, sizes, stretch, beams, generator)
-    distance = drawn.range
-    within = (beams.optics.width(distance) + drawn.diameter) / 2
-    meetings = beams.tree.meetings(drawn.place, within)
-    where = _inside(stretch, meetings, distance)
-    could_be_drawn = np.bincount(meetings.particle[where], minlength=len(distance))
-    kept = generator.random(len(distance)) * could_be_drawn < 1
-    # One at the very edge of its beam may, after rounding, be in none.
-    kept &= could_be_drawn > 0
-    meetings = meetings.take(kept[meetings.particle] & _inside(beams.stretch, meetings, distance))
-    row = np.cumsum(kept) - 1
-    return drawn.take(kept), Meetings(row[meetings.particle], meetings.beam, meetings.offset)
+    drawn, drawn_for = _drawn_beam_by_beam(number, sizes, stretch, beams, generator)
+    particles = drawn.take(_by_nearest(drawn, drawn_for, stretch, beams))
+    meetings = _meetings(particles, beams)
+    return particles, meetings.take(_inside(beams.stretch, meetings, particles.range))
+
+
+def _by_nearest(
+    drawn: Particles, drawn_for: NDArray[np.int64], stretch: Stretch, beams: OpenBeams
+) -> NDArray[np.bool_]:
+    """Which particles were drawn for the nearest of the beams that they could be drawn for."""
+    if not len(drawn_for):
+        return np.empty(0, np.bool_)
+    distance, nearest = drawn.range, beams.tree.nearest(drawn.place)
+    kept = nearest == drawn_for
+    # Where the nearest of all could not draw it, such as behind a surface, another one counts.
+    ended = (distance < stretch.near[nearest]) | (distance > stretch.far[nearest])
+    unsettled = np.flatnonzero(ended & ~kept)
+    rest = Particles(drawn.place[unsettled], drawn.diameter[unsettled])
+    meetings = _meetings(rest, beams)
+    meetings = meetings.take(_inside(stretch, meetings, rest.range))
+    # From the farthest to the nearest: of several beams the last assigned stays.
+    outwards = np.argsort(-meetings.offset, kind="stable")
+    best = drawn_for[unsettled].copy()
+    best[meetings.particle[outwards]] = meetings.beam[outwards]
+    kept[unsettled] = best == drawn_for[unsettled]
+    return kept
+
+
+def _meetings(particles: Particles, beams: OpenBeams) -> Meetings:
+    within = (beams.optics.width(particles.range) + particles.diameter) / 2
+    return beams.tree.meetings(particles.place, within)
 
 
 def _inside(
@@ -121,8 +138,8 @@ def _drawn_beam_by_beam(
     stretch: Stretch,
     beams: OpenBeams,
     generator: np.random.Generator,
-) -> Particles:
-    """Particles that each beam meets in its stretch, as if there were no other beams."""
+) -> tuple[Particles, NDArray[np.int64]]:
+    """Particles that each beam meets in its stretch, as if there were no other; and its row."""
     optics, used = beams.optics, stretch.far > stretch.near
     slices = Slices(float(stretch.near[used].min(initial=optics.farthest)), optics, sizes)
     beam, distance, diameter, bound = [], [], [], []
@@ -135,7 +152,7 @@ def _drawn_beam_by_beam(
             diameter.append(slices.draw_diameters(row, count, generator))
             bound.append(np.full(count, slices.width[row]))
     if not beam:
-        return Particles(np.empty((0, 3)), np.empty(0))
+        return Particles(np.empty((0, 3)), np.empty(0)), np.empty(0, np.int64)
     rows, along, size = np.concatenate(beam), np.concatenate(distance), np.concatenate(diameter)
     # Uniform in the disc of the slice's far end, of which the beam has less where it is narrower.
     offset = np.sqrt(generator.random(len(rows))) * (np.concatenate(bound) + size) / 2
@@ -146,9 +163,10 @@ def _drawn_beam_by_beam(
         & (along <= stretch.far[rows])
         & (size >= optics.smallest_visible(along))
     )
-    axis = beams.directions[rows[inside]]
+    rows = rows[inside]
+    axis = beams.directions[rows]
     across = _across(axis, turn[inside]) * offset[inside, None]
-    return Particles(along[inside, None] * axis + across, size[inside])
+    return Particles(along[inside, None] * axis + across, size[inside]), rows
 
 
 def _across(beams: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.float64]:

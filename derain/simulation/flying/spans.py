@@ -59,7 +59,16 @@ KINDS = {
         haze_chance=0.3,
     ),
     "fog": Kind(weight=0.5, number=(0.0, 0.0), haze_chance=1.0),
-    "spray": Kind(weight=0.5, number=(0.0, 0.0), plume_chance=1.0, haze_chance=0.3),
+    "spray": Kind(
+        weight=0.5,
+        number=(0.0, 0.0),
+        diameter=(0.3, 1.0),
+        reach_chance=1.0,
+        reach=(8.0, 60.0),
+        plume_chance=1.0,
+        plume_number=(30.0, 3000.0),
+        haze_chance=0.3,
+    ),
 }
 
 
