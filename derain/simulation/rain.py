@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.simulation.classes import TrackClass
+from derain.simulation.detection import detected_surfaces, joined, reported
 from derain.simulation.drops import (
     draw_drops,
     drop_reflectivity,
@@ -41,37 +42,9 @@ def rain_on_beams(
         where the last return is not the strongest.
     """
     transmission = Transmission(rain, sensor.maximum_range)
-    solid = _detected_surfaces(clear, transmission(beams, clear.range), sensor)
+    solid = detected_surfaces(clear, transmission(beams, clear.range), sensor)
     drops = _visible_drops(clear.range, beams, rain, sensor, transmission, generator)
-    candidates = _joined(solid, drops)
-    # A surface ends its beam: where it is seen, it is the last return.
-    distance = np.where(candidates.returned, candidates.range, 0)
-    match sensor.returns:
-        case "strongest":
-            chosen = _greatest(candidates.power, candidates.beam)
-        case "last":
-            chosen = _greatest(distance, candidates.beam)
-        case "dual":
-            strongest = _greatest(candidates.power, candidates.beam)
-            last = _greatest(distance, candidates.beam)
-            both = np.stack([strongest, last], axis=1)
-            chosen = both[np.stack([np.ones_like(last, bool), last != strongest], axis=1)]
-    return _taken(candidates, chosen)
-
-
-def _detected_surfaces(
-    clear: Returns, transmission: NDArray[np.float64], sensor: Sensor
-) -> Returns:
-    """What the sensor would see of the surfaces if there were no drops in front of them."""
-    reflectivity = clear.reflectivity * transmission
-    strong = reflectivity >= sensor.detection_threshold * clear.range**2
-    seen = strong & (clear.range >= sensor.minimum_range)
-    return Returns(
-        np.where(seen, clear.range, sensor.maximum_range),
-        np.where(seen, reflectivity, 0),
-        np.where(seen, clear.label, TrackClass.BACKGROUND),
-        clear.beam,
-    )
+    return reported(joined(solid, drops), sensor.returns)
 
 
 def _visible_drops(
@@ -93,26 +66,3 @@ def _visible_drops(
     seen = reflectivity >= sensor.detection_threshold * drops.range**2
     label = np.full(np.count_nonzero(seen), TrackClass.RAIN, np.int64)
     return Returns(drops.range[seen], reflectivity[seen], label, drops.beam[seen])
-
-
-def _joined(first: Returns, second: Returns) -> Returns:
-    return Returns(
-        np.concatenate([first.range, second.range]),
-        np.concatenate([first.reflectivity, second.reflectivity]),
-        np.concatenate([first.label, second.label]),
-        np.concatenate([first.beam, second.beam]),
-    )
-
-
-def _greatest(value: NDArray[np.float64], beam: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Row of the greatest value of every beam, int64 (N,), where each of N beams has one."""
-    ascending = np.argsort(value, kind="stable")
-    row = np.empty(beam.max(initial=-1) + 1, np.int64)
-    row[beam[ascending]] = ascending  # of several rows the last assigned stays
-    return row
-
-
-def _taken(returns: Returns, rows: NDArray[np.int64]) -> Returns:
-    return Returns(
-        returns.range[rows], returns.reflectivity[rows], returns.label[rows], returns.beam[rows]
-    )

@@ -1,0 +1,77 @@
+"""What a sensor reports of all that its beams meet."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation.classes import TrackClass
+from derain.simulation.sensor import ReturnMode, Returns, Sensor
+
+
+def detected_surfaces(clear: Returns, transmission: NDArray[np.float64], sensor: Sensor) -> Returns:
+    """What the sensor would see of the surfaces if there were no particles in front of them.
+
+    Args:
+        clear: What each beam would return through clear air to a perfect detector.
+        transmission: Share of the light that survives the way there and back, float64 (N,).
+        sensor: The sensor.
+    """
+    reflectivity = clear.reflectivity * transmission
+    strong = reflectivity >= sensor.detection_threshold * clear.range**2
+    seen = strong & (clear.range >= sensor.minimum_range)
+    return Returns(
+        np.where(seen, clear.range, sensor.maximum_range),
+        np.where(seen, reflectivity, 0),
+        np.where(seen, clear.label, TrackClass.BACKGROUND),
+        clear.beam,
+    )
+
+
+def joined(*parts: Returns) -> Returns:
+    """All that several calls have found, in their order."""
+    return Returns(
+        np.concatenate([part.range for part in parts]),
+        np.concatenate([part.reflectivity for part in parts]),
+        np.concatenate([part.label for part in parts]),
+        np.concatenate([part.beam for part in parts]),
+    )
+
+
+def reported(candidates: Returns, returns: ReturnMode) -> Returns:
+    """What the sensor reports of all that it could detect.
+
+    Args:
+        candidates: At least one row for every beam; of a beam that nothing returned one without
+            reflectivity. In any order.
+        returns: What the sensor reports of a beam that several things return.
+
+    Returns:
+        One row for each beam, in their order; of a sensor with dual returns a second one where the
+        last return is not the strongest.
+    """
+    # A surface ends its beam: where it is seen, it is the last return.
+    distance = np.where(candidates.returned, candidates.range, 0)
+    match returns:
+        case "strongest":
+            chosen = _greatest(candidates.power, candidates.beam)
+        case "last":
+            chosen = _greatest(distance, candidates.beam)
+        case "dual":
+            strongest = _greatest(candidates.power, candidates.beam)
+            last = _greatest(distance, candidates.beam)
+            both = np.stack([strongest, last], axis=1)
+            chosen = both[np.stack([np.ones_like(last, bool), last != strongest], axis=1)]
+    return _taken(candidates, chosen)
+
+
+def _greatest(value: NDArray[np.float64], beam: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Row of the greatest value of every beam, int64 (N,), where each of N beams has one."""
+    ascending = np.argsort(value, kind="stable")
+    row = np.empty(beam.max(initial=-1) + 1, np.int64)
+    row[beam[ascending]] = ascending  # of several rows the last assigned stays
+    return row
+
+
+def _taken(returns: Returns, rows: NDArray[np.int64]) -> Returns:
+    return Returns(
+        returns.range[rows], returns.reflectivity[rows], returns.label[rows], returns.beam[rows]
+    )
