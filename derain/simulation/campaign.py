@@ -3,7 +3,7 @@
 import json
 from dataclasses import asdict, dataclass, field, replace
 from itertools import cycle
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from derain import __version__
 from derain.errors import InputError
 from derain.files.documents import shown
 from derain.simulation.drive import Drive
+from derain.simulation.layouts import LAYOUTS
 from derain.simulation.manifest import MAKER, RAIN_RATE
 from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain
@@ -45,14 +46,15 @@ class Campaign:
         rain_rates: Rain rates in mm/h that the sequences take in turn; 0 is clean.
         seed: Seed of everything drawn.
         sensor: The LiDAR, or the name of a packaged sensor file, or of one of the user's.
-        layout: ``street``, a random street in even rain, or ``facility``, a test track under
-            sprinklers.
+        layout: One of :data:`LAYOUTS`: ``facility``, a test track under sprinklers, or a random
+            place in even rain.
         radar: The radar; None leaves it out, and with it the folders of its scans.
         drive: What moves, in a street and without a radar; None stands where nothing does.
 
     Raises:
         InputError: Too few or too many sequences or scans, a negative seed, no rain rate or an
-            impossible one, or a drive that is too long, in a facility or with a radar.
+            impossible one, an unknown layout, or a drive that is too long, elsewhere than in a
+            street or with a radar.
     """
 
     train: int = 16
@@ -62,7 +64,7 @@ class Campaign:
     rain_rates: tuple[float, ...] = (0.0, 10.0, 25.0, 50.0)
     seed: int = 0
     sensor: Sensor | str = field(default_factory=Sensor)
-    layout: Literal["street", "facility"] = "street"
+    layout: str = "street"
     radar: Radar | None = None
     drive: Drive | None = None
 
@@ -80,6 +82,9 @@ class Campaign:
             raise InputError("rain rate", "none is given", "Give one or more, in mm/h.")
         for rate in self.rain_rates:
             UniformRain(rate)
+        if self.layout not in LAYOUTS:
+            known = ", ".join(LAYOUTS)
+            raise InputError("layout", f"'{self.layout}' is unknown", f"Take one of {known}.")
         if self.drive is not None:
             self._check(self.drive)
 

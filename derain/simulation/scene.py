@@ -12,8 +12,7 @@ from derain.simulation.campaign import Campaign
 from derain.simulation.classes import packed
 from derain.simulation.course import Course
 from derain.simulation.drive import Drive
-from derain.simulation.facility import lay_out_facility
-from derain.simulation.layout import lay_out_track
+from derain.simulation.layouts import LAYOUTS
 from derain.simulation.objects import Surface
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
 from derain.simulation.sensor import Returns, Sensor
@@ -21,8 +20,6 @@ from derain.simulation.street import Street, lay_out_street
 from derain.simulation.track import Track
 from derain.simulation.traffic import MovingThing, draw_traffic
 from derain.simulation.weather import Weather, draw_wind
-
-LAYOUTS = {"street": lay_out_track, "facility": lay_out_facility}
 
 
 @dataclass(frozen=True, eq=False)

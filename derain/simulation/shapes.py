@@ -96,3 +96,91 @@ def inside_ellipsoid(
     direction = generator.normal(size=(count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     return direction * np.cbrt(generator.random((count, 1))) * radii
+
+
+def sheet(corners: NDArray[np.float64]) -> Triangles:
+    """A surface through a grid of corners, two triangles for each of its cells.
+
+    Args:
+        corners: Float64 (M, N, 3), metres.
+    """
+    first, second = corners[:-1, :-1], corners[1:, :-1]
+    third, fourth = corners[1:, 1:], corners[:-1, 1:]
+    halves = np.stack([first, second, third, first, third, fourth], axis=2)
+    return halves.reshape(-1, 3, 3)
+
+
+def rods(
+    starts: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    radius: NDArray[np.float64] | float,
+    taper: float = 1.0,
+    sides: int = 3,
+) -> Triangles:
+    """Thin straight rods without caps.
+
+    Args:
+        starts: Where each begins, (R, 3), metres.
+        ends: Where each ends, somewhere else, (R, 3), metres.
+        radius: From axis to edge at its start, of each, (R,), or of all, metres.
+        taper: Radius at the end over that at the start.
+        sides: Sides of each.
+    """
+    first, second = across(ends - starts)
+    angle = np.arange(sides) * (2 * np.pi / sides)
+    ring = np.cos(angle)[:, None] * first[:, None] + np.sin(angle)[:, None] * second[:, None]
+    ring *= np.broadcast_to(radius, len(starts))[:, None, None]
+    lower, upper = starts[:, None] + ring, ends[:, None] + taper * ring
+    next_lower, next_upper = np.roll(lower, -1, axis=1), np.roll(upper, -1, axis=1)
+    halves = np.stack([lower, next_lower, next_upper, lower, next_upper, upper], axis=2)
+    return halves.reshape(-1, 3, 3)
+
+
+def blades(
+    starts: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    width: NDArray[np.float64] | float,
+    generator: np.random.Generator,
+) -> Triangles:
+    """One flat triangle from each start, where it is wide, to a point: a blade of grass, a twig.
+
+    Args:
+        starts: Where each begins, (B, 3), metres.
+        ends: Where each ends, somewhere else, (B, 3), metres.
+        width: At the start, of each, (B,), or of all, metres.
+        generator: Turns each about its length.
+    """
+    first, second = across(ends - starts)
+    angle = generator.uniform(0, np.pi, (len(starts), 1))
+    half = np.broadcast_to(width, len(starts))[:, None] / 2
+    aside = half * (np.cos(angle) * first + np.sin(angle) * second)
+    return np.stack([starts - aside, starts + aside, ends], axis=1)
+
+
+def across(along: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Two unit vectors at right angles to each vector and to each other, (R, 3) both.
+
+    Args:
+        along: Vectors other than 0, (R, 3).
+    """
+    upright = np.abs(along[:, 2]) > 0.9 * np.linalg.norm(along, axis=1)
+    other = np.where(upright[:, None], (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    first = np.cross(along, other)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(along, first)
+    second /= np.linalg.norm(second, axis=1, keepdims=True)
+    return first, second
+
+
+def nearest_to_axis(triangles: Triangles) -> NDArray[np.float64]:
+    """The x and y, (2, T), where each triangle, seen from above, is nearest to the z axis.
+
+    That is a corner or a place on an edge; that the axis goes through a triangle does not count.
+    """
+    first = triangles[..., :2]
+    edge = np.roll(first, -1, axis=1) - first
+    length = np.maximum((edge * edge).sum(axis=-1), np.finfo(float).tiny)
+    share = np.clip(-(first * edge).sum(axis=-1) / length, 0, 1)
+    places = first + share[..., None] * edge
+    nearest = (places * places).sum(axis=-1).argmin(axis=1)
+    return places[np.arange(len(places)), nearest].T

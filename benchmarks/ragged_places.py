@@ -1,0 +1,122 @@
+"""How ragged clean scans are: the share of their points that look like drops, and how they lie.
+
+    python benchmarks/ragged_places.py --seeds 3 ../shared/data/clean/*
+
+A point looks like a drop where ``derain.persistence.evidence.of_surroundings`` says so, which was
+fitted to simulated drives: by the distance of its neighbours in steps of the rays, by how they are
+scattered, and by its range. Nothing in any of these scans is a drop. For every real scan, and for
+every place as sensors see it: the share between 0 and 10 m, 10 and 30, beyond, and in all, in per
+cent; and the quantiles of the neighbours' distance, in steps. Of places the share of each class
+that looks like a drop, too.
+"""
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.files import read_scan
+from derain.persistence.evidence import of_surroundings
+from derain.persistence.points import ScanPoints
+from derain.persistence.surroundings import FEWEST_STEPS, USUAL_STEPS, describe
+from derain.scan import Scan
+from derain.simulation.classes import TrackClass
+from derain.simulation.layouts import LAYOUTS
+from derain.simulation.rain import rain_on_beams
+from derain.simulation.rain_field import UniformRain
+from derain.simulation.sensor import Sensor, load_sensor
+from derain.system.cores import usable_cores
+
+BANDS = ((0.0, 10.0), (10.0, 30.0), (30.0, np.inf), (0.0, np.inf))
+QUANTILES = (0.5, 0.9, 0.99, 0.999)
+
+
+@dataclass(frozen=True)
+class Look:
+    """How the distinct points of scans look, each array (M,).
+
+    Attributes:
+        like_a_drop: Whether each looks like one.
+        apart: Mean distance of its neighbours, steps of the sensor's rays.
+        range: Distance from the sensor, metres.
+        label: Class, 0 where it is not known.
+    """
+
+    like_a_drop: NDArray[np.bool_]
+    apart: NDArray[np.float64]
+    range: NDArray[np.float64]
+    label: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, scan: Scan) -> "Look":
+        """How the points of one scan look."""
+        points = ScanPoints.of(scan, usable_cores())
+        label = np.zeros(len(points), np.int64)
+        if scan.label is not None:
+            label[points.inverse] = scan.label
+        apart = np.exp(describe(points)[:, 1] + USUAL_STEPS) - FEWEST_STEPS
+        return cls(of_surroundings(points) > 0, apart, points.range, label)
+
+    def __str__(self) -> str:
+        """One row of the table."""
+        shares = [
+            100 * self.like_a_drop[(self.range >= near) & (self.range < far)].mean()
+            for near, far in BANDS
+            if ((self.range >= near) & (self.range < far)).any()
+        ]
+        steps = np.quantile(self.apart, QUANTILES)
+        return " ".join(
+            [*(f"{share:6.3f}" for share in shares), "|", *(f"{x:6.1f}" for x in steps)]
+        )
+
+    def by_class(self) -> str:
+        """Share that looks like a drop of each class, in per cent, and its number of points."""
+        kinds = [(kind, self.label == kind) for kind in TrackClass if (self.label == kind).any()]
+        return ", ".join(
+            f"{kind.name.lower()} {100 * self.like_a_drop[mine].mean():.2f} of {mine.sum():,}"
+            for kind, mine in kinds
+        )
+
+
+def main() -> None:
+    """Prints the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("scans", nargs="*", type=Path, help="clean real scans")
+    parser.add_argument("--seeds", type=int, default=3, help="places of each kind")
+    parser.add_argument("--places", nargs="*", default=list(LAYOUTS), choices=list(LAYOUTS))
+    arguments = parser.parse_args()
+    print(" " * 32, *(f"{near:.0f}+" for near, _ in BANDS), "|", *QUANTILES)
+    for path in arguments.scans:
+        print(f"{path.name:32}", Look.of(read_scan(path)))
+    for name, sensor in _sensors():
+        for place in arguments.places:
+            looks = list(_seen(place, sensor, arguments.seeds))
+            look = Look(*(np.concatenate([getattr(each, x) for each in looks]) for x in FIELDS))
+            print(f"{place + ' ' + name:32}", look)
+            print("   ", look.by_class())
+
+
+FIELDS = tuple(Look.__dataclass_fields__)
+
+
+def _sensors() -> Iterator[tuple[str, Sensor]]:
+    spinning = load_sensor("spinning_64")
+    yield "spinning_64", spinning
+    coarse = replace(spinning, rows=16, row_inclinations=(), inclination=(-15.0, 15.0))
+    yield "of 16 rows", replace(coarse, columns=1800)
+
+
+def _seen(place: str, sensor: Sensor, seeds: int) -> Iterator[Look]:
+    """How the points look that a sensor sees of places of one kind through clear air."""
+    for seed in range(seeds):
+        generator = np.random.default_rng(seed)
+        clear = LAYOUTS[place](generator).cast(sensor)
+        seen = rain_on_beams(clear, sensor.beams(), UniformRain(0), sensor, generator)
+        yield Look.of(sensor.measure(seen, generator))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,146 @@
+"""A car park: rows of cars with windows, people among them, trolleys, bollards, lamps, hedges."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation import objects
+from derain.simulation.objects import Surface
+from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
+from derain.simulation.places.crowd import mixed, ragged_things
+from derain.simulation.places.relief import Relief, ground_mesh
+from derain.simulation.places.standing import (
+    assembled,
+    free_places,
+    lined_up,
+    put,
+    shared,
+    strewn,
+)
+from derain.simulation.shapes import placed
+from derain.simulation.track import Track
+
+# Rows of lots on either side of lanes, metres: how long a lot is, how wide, and a lane.
+LOT_LENGTH, LOT_WIDTH, LANE = 5.2, 2.6, 6.5
+
+# How far the car park reaches, metres along x and y.
+REACH = 38.0
+
+
+def lay_out_car_park(generator: np.random.Generator) -> Track:
+    """Lays out a car park.
+
+    The sensor stands in a lane between rows of cars whose windows let most rays through. People,
+    children among them, walk from 2 m on; trolleys, bollards, lamps and young trees stand between,
+    snow or gravel is heaped up, hedges, fences and a house's front close it off.
+    """
+    winter = generator.random() < 0.35
+    aside = generator.uniform(-0.2, 0.2) * LANE
+    standing = [
+        *_rows(aside, generator),
+        *_people(aside, generator),
+        *_between(aside, winter, generator),
+        *_edge(winter, generator),
+        *ragged_things(
+            generator, lambda x, y: np.hypot(x, y) > 12, count=(3, 10), leafy=not winter
+        ),
+    ]
+    uneven = Relief.draw(generator.uniform(0.01, 0.12), generator)
+    return assembled(_ground(winter, generator), standing, uneven, generator)
+
+
+def _ground(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+    surface = [relief.ASPHALT, relief.COBBLES, relief.TRACK][generator.choice(3, p=[0.6, 0.3, 0.1])]
+    beyond = relief.SNOW if winter and generator.random() < 0.5 else relief.MEADOW
+
+    def kind_at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+        return np.where(np.maximum(np.abs(x), np.abs(y)) < REACH, 0, 1)
+
+    yield from ground_mesh([surface, beyond], kind_at, generator)
+
+
+def _rows(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """Cars in their lots, nose first or last, those far off of few triangles."""
+    full = generator.uniform(0.3, 0.9)
+    near_lane = aside + LANE / 2 + LOT_LENGTH / 2
+    rows = [near_lane, near_lane + LOT_LENGTH + 0.3, near_lane + 2 * LOT_LENGTH + LANE + 0.3]
+    rows += [2 * aside - y for y in rows]
+    for y in rows:
+        for x in np.arange(-REACH + 4, REACH - 4, LOT_WIDTH):
+            if generator.random() < full and np.hypot(x, y) > 4.5:
+                near = np.hypot(x, y) < 25
+                make = vehicles.glazed_car if near else objects.car
+                heading = np.pi / 2 * generator.choice([-1, 1]) + generator.normal(0, 0.04)
+                nudged = x + generator.normal(0, 0.12), y + generator.normal(0, 0.25)
+                yield from put(make(generator), *nudged, heading)
+
+
+def _people(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """People in the lane and between cars, and a few who cycle."""
+
+    def in_a_lane(x: float, y: float) -> bool:
+        return abs(x) < REACH and abs(y - aside) < LANE / 2 + 0.8
+
+    makes = shared([(people.person, 8), (people.cyclist, 1)], 16, generator)
+    count = int(generator.integers(6, 16))
+    yield from strewn(makes, free_places(count, (2.2, 35), 0.9, generator, in_a_lane), generator)
+
+
+def _between(aside: float, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+    """What stands along the lane and where lots meet."""
+    small = shared(
+        [(frames.trolley, 2), (frames.bollard, 2), (frames.thin_pole, 2), (_sapling, 1)],
+        int(generator.integers(8, 25)),
+        generator,
+    )
+
+    def at_its_edge(x: float, y: float) -> bool:
+        return abs(x) < REACH and abs(abs(y - aside) - LANE / 2 - 0.3) < 0.5
+
+    yield from strewn(
+        mixed(small, generator),
+        free_places(len(small), (2.2, 35), 0.5, generator, at_its_edge),
+        generator,
+    )
+    for x in np.arange(-REACH, REACH, generator.uniform(10, 20)):
+        y = aside + LANE / 2 + LOT_LENGTH + 0.15
+        yield from put(_young_tree(winter, generator), float(x), y)
+    if winter:
+        bank = heaps.bank(generator.uniform(4, 12), generator, snow=True)
+        yield bank.placed(generator.uniform(3, 20), aside - LANE / 2 - 1)
+
+
+def _edge(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+    """What closes the car park off: on each of four sides a hedge, a fence, or houses."""
+    makes = [threads.chain_link, frames.railing, _nets, walls.facade]
+    makes.append(_brushes if winter else plants.hedge)
+    for quarter in range(4):
+        make = makes[generator.integers(len(makes))]
+        piece = 19.0 if make is walls.facade else 9.5
+        for surface in lined_up(
+            make, lambda x: np.full(np.shape(x), REACH), (-REACH, REACH), piece, generator, 0.15
+        ):
+            yield surface.placed(0, 0, quarter * np.pi / 2)
+
+
+def _nets(length: float, generator: np.random.Generator) -> Surface:
+    return threads.net(length, generator.uniform(1.5, 5), generator)
+
+
+def _brushes(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+    for x in np.arange(0, length, 1.0):
+        yield from put(plants.brushwood(generator.uniform(0.8, 2), generator), float(x), 0)
+
+
+def _sapling(generator: np.random.Generator) -> Iterable[Surface]:
+    """A sapling tied to its stake."""
+    yield frames.thin_pole(generator)
+    crown = generator.uniform(0.2, 0.6, 3)
+    leaves = plants.bush((crown[0], crown[1], crown[2]), generator)
+    shift = placed(leaves.triangles, 0.1, 0) + np.array([0, 0, generator.uniform(0.8, 1.8)])
+    yield Surface(shift, leaves.label, leaves.reflectivity)
+
+
+def _young_tree(winter: bool, generator: np.random.Generator) -> Iterable[Surface]:
+    return [plants.bare_tree(generator)] if winter else plants.crowned_tree(generator)

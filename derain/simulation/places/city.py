@@ -1,0 +1,150 @@
+"""A city street: houses with windows, parked cars and bicycles, people, trees, scaffolds, cables."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation import objects
+from derain.simulation.objects import Surface
+from derain.simulation.places import frames, people, plants, relief, threads, vehicles, walls
+from derain.simulation.places.crowd import mixed, ragged_things, users
+from derain.simulation.places.drawing import along
+from derain.simulation.places.relief import Relief, ground_mesh
+from derain.simulation.places.standing import assembled, free_places, lined_up, put, shared, strewn
+from derain.simulation.track import Track
+
+SIGHT = (-60.0, 85.0)
+
+
+@dataclass(frozen=True)
+class Section:
+    """The section across a street, metres to the left of the sensor.
+
+    Attributes:
+        kerbs: Where the roadway ends, on the right and on the left; parked cars included.
+        fronts: Where the houses begin.
+    """
+
+    kerbs: tuple[float, float]
+    fronts: tuple[float, float]
+
+    @classmethod
+    def draw(cls, generator: np.random.Generator) -> "Section":
+        """Draws a street of 8 to 14 m between pavements of 2 to 9 m."""
+        kerbs = -generator.uniform(3.3, 5), generator.uniform(4.5, 9)
+        right, left = generator.uniform(2, 9, 2)
+        return cls(kerbs, (kerbs[0] - right, kerbs[1] + left))
+
+    def on_a_pavement(self, x: float, y: float) -> bool:
+        """Whether a place is between a kerb and the houses."""
+        right = self.fronts[0] + 0.6 < y < self.kerbs[0] - 0.2
+        return right or self.kerbs[1] + 0.2 < y < self.fronts[1] - 0.6
+
+
+def lay_out_city(generator: np.random.Generator) -> Track:
+    """Lays out a city street.
+
+    Rough fronts with windows that rays go into, balconies, pipes and ivy; parked cars and bicycles;
+    people on the pavements and across the road from 2 m on; trees, lamps, bollards, railings,
+    scaffolds with nets, cables above.
+    """
+    section, winter = Section.draw(generator), generator.random() < 0.4
+    standing = [
+        *_houses(section, generator),
+        *_parked(section, generator),
+        *users(
+            generator,
+            lambda x, y: section.kerbs[0] + 2.5 < y < section.kerbs[1] - 2.5,
+            walkers=(2, 8),
+            cars=(1, 5),
+        ),
+        *_people(section, generator),
+        *_furniture(section, winter, generator),
+        *_works(section, generator),
+        *ragged_things(generator, section.on_a_pavement, count=(2, 12), leafy=not winter),
+    ]
+    uneven = Relief.draw(generator.uniform(0.01, 0.1), generator)
+    ground = _ground(section, generator)
+    return assembled(ground, standing, uneven, generator, _cables(section, generator))
+
+
+def _ground(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+    surface = relief.COBBLES if generator.random() < 0.25 else relief.ASPHALT
+
+    def kind_at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+        return np.where((y > section.kerbs[0]) & (y < section.kerbs[1]), 0, 1)
+
+    yield from ground_mesh([surface, relief.PAVING], kind_at, generator)
+
+
+def _houses(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+    make: Callable[[float, np.random.Generator], Iterable[Surface]] = walls.facade
+    for side, front in zip((-1, 1), section.fronts, strict=True):
+        gaps, piece = generator.uniform(0, 0.3), generator.uniform(9, 18)
+        turned = -1 if side < 0 else 1
+        for house in lined_up(
+            make, lambda x: np.full(np.shape(x), abs(front)), SIGHT, piece, generator, gaps
+        ):
+            # Houses are seen from the street: those on the right are those on the left, turned.
+            yield house if turned > 0 else house.placed(SIGHT[0] + SIGHT[1], 0, np.pi)
+    far = walls.facade(30, generator)
+    yield from put(far, SIGHT[1], 15, -np.pi / 2)
+
+
+def _parked(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+    for kerb, side in zip(section.kerbs, (-1, 1), strict=True):
+        full = generator.uniform(0.1, 0.9)
+        for x in along(*SIGHT, (5.8, 7.5), generator):
+            y = kerb - side * 1.1 + generator.normal(0, 0.08)
+            if generator.random() < full and np.hypot(x, y) > 3.9:
+                make = vehicles.glazed_car if abs(x) < 30 else objects.car
+                heading = generator.normal(0, 0.03) + np.pi * generator.integers(2)
+                yield from put(make(generator), x, y, heading)
+
+
+def _people(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+    makes = shared([(people.person, 8), (people.cyclist, 2)], 18, generator)
+    count = int(generator.integers(4, 18))
+    places = free_places(count, (2.5, 55), 0.8, generator, section.on_a_pavement)
+    yield from strewn(makes, places, generator)
+
+
+def _furniture(section: Section, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+    """Trees, lamps, signs, bollards and railings along the kerbs; bushes in tubs."""
+    for kerb, side in zip(section.kerbs, (-1, 1), strict=True):
+        for x in along(*SIGHT, (6, 30), generator):
+            tree = [plants.bare_tree(generator)] if winter else plants.crowned_tree(generator)
+            yield from put(tree, x, kerb + side * generator.uniform(0.5, 1))
+        makes = shared([(frames.thin_pole, 3), (frames.bollard, 2)], 40, generator)
+        for make, x in zip(mixed(makes, generator), along(*SIGHT, (1, 7), generator), strict=False):
+            yield from put(make(generator), x, kerb + side * 0.35)
+        if generator.random() < 0.4:
+            begin = generator.uniform(2, 20)
+            rail = frames.railing(generator.uniform(3, 12), generator)
+            yield rail.placed(begin, kerb + side * 0.4)
+
+
+def _works(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+    """A scaffold before a house, with or without a net."""
+    if generator.random() < 0.5:
+        side = int(generator.integers(2))
+        length, x = generator.uniform(6, 15), generator.uniform(-5, 25)
+        y = section.fronts[side] - (1.4 if side else -0.2)
+        yield from put(frames.scaffold(length, generator), x, y)
+        if generator.random() < 0.7:
+            veil = threads.net(length, generator.uniform(3, 6), generator)
+            yield veil.placed(x, y - 0.15 if side else y + 1.3)
+
+
+def _cables(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+    """Cables from house to house, with lamps on them, and a tram's along the street."""
+    if generator.random() < 0.6:
+        height = generator.uniform(5, 7)
+        for x in along(*SIGHT, (12, 30), generator):
+            ends = [np.array([x, y, height + 0.5]) for y in section.fronts]
+            yield threads.cable(ends[0], ends[1], 0.4, (0.006, 0.02), generator)
+        for y in generator.uniform(-2, 4, generator.integers(0, 3)):
+            ends = [np.array([x, y, height]) for x in SIGHT]
+            yield threads.cable(ends[0], ends[1], 0.3, (0.008, 0.02), generator)

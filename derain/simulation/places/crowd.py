@@ -1,0 +1,126 @@
+"""Who and what is everywhere: people and vehicles near the sensor and far, ragged things."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from derain.simulation import objects
+from derain.simulation.objects import Surface
+from derain.simulation.places import frames, heaps, people, plants, threads, vehicles
+from derain.simulation.places.drawing import Span
+from derain.simulation.places.standing import Allowed, Make, anywhere, free_places, shared, strewn
+
+# How far from the sensor they are, metres.
+NEAR_AND_FAR = (2.2, 70.0)
+
+
+def users(
+    generator: np.random.Generator,
+    allowed: Allowed = anywhere,
+    *,
+    walkers: Span = (6, 16),
+    cyclists: Span = (1, 5),
+    cars: Span = (2, 7),
+) -> Iterator[Surface]:
+    """People, cyclists and vehicles.
+
+    Args:
+        generator: Random generator.
+        allowed: Where they may be.
+        walkers: Fewest people on foot, and one more than the most.
+        cyclists: The same of cyclists.
+        cars: The same of vehicles, of which few are lorries.
+    """
+    wheeled = shared(
+        [(vehicles.glazed_car, 8), (objects.car, 2), (vehicles.lorry, 1)],
+        int(generator.integers(*cars)),
+        generator,
+    )
+    on_foot = shared(
+        [(people.person, 9), (objects.pedestrian, 1)],
+        int(generator.integers(*walkers)),
+        generator,
+    )
+    bikes = shared(
+        [(people.cyclist, 9), (objects.bike, 1)], int(generator.integers(*cyclists)), generator
+    )
+    far, near = NEAR_AND_FAR[1], NEAR_AND_FAR[0]
+    parked = free_places(len(wheeled), (4.5, far), 8.0, generator, allowed)
+
+    def beside_them(x: float, y: float) -> bool:
+        return allowed(x, y) and all(np.hypot(x - a, y - b) > 3.2 for a, b in parked)
+
+    others = free_places(len(on_foot) + len(bikes), (near, far), 1.0, generator, beside_them)
+    yield from strewn(wheeled, parked, generator)
+    yield from strewn(mixed([*on_foot, *bikes], generator), others, generator)
+
+
+def ragged_things(
+    generator: np.random.Generator,
+    allowed: Allowed = anywhere,
+    *,
+    count: Span = (10, 30),
+    leafy: bool = True,
+) -> Iterator[Surface]:
+    """Bushes, brushwood, nets, pieces of fence, poles, grass, rubble, near the sensor and far.
+
+    Args:
+        generator: Random generator.
+        allowed: Where they may be.
+        count: Fewest, and one more than the most.
+        leafy: Whether plants have leaves.
+    """
+    makes = shared(
+        [
+            (_bush if leafy else _brushwood, 4),
+            (_brushwood, 4),
+            (_net, 1.5),
+            (_chain_link, 1),
+            (_railing, 1),
+            (frames.thin_pole, 4),
+            (_tufts, 3),
+            (_rubble, 1),
+            (plants.crowned_tree if leafy else plants.bare_tree, 1.5),
+            (plants.bare_tree, 1),
+        ],
+        int(generator.integers(*count)),
+        generator,
+    )
+    places = free_places(len(makes), (2.5, 60.0), 0.6, generator, allowed)
+    yield from strewn(makes, places, generator)
+
+
+def mixed(makes: Iterable[Make], generator: np.random.Generator) -> list[Make]:
+    """Makers of things in another order."""
+    ordered = list(makes)
+    return [ordered[which] for which in generator.permutation(len(ordered))]
+
+
+def _bush(generator: np.random.Generator) -> Surface:
+    length, width, height = generator.uniform(0.2, 1.5, 3)
+    return plants.bush((length, width, height), generator)
+
+
+def _brushwood(generator: np.random.Generator) -> Surface:
+    return plants.brushwood(generator.uniform(0.4, 2.5), generator)
+
+
+def _net(generator: np.random.Generator) -> Surface:
+    return threads.net(generator.uniform(1.5, 8), generator.uniform(1, 3.5), generator)
+
+
+def _chain_link(generator: np.random.Generator) -> Iterable[Surface]:
+    return threads.chain_link(generator.uniform(2, 10), generator)
+
+
+def _railing(generator: np.random.Generator) -> Surface:
+    return frames.railing(generator.uniform(1, 5), generator)
+
+
+def _tufts(generator: np.random.Generator) -> Surface:
+    spread = generator.uniform(0.3, 2.5)
+    return plants.grass(generator.normal(0, spread, (generator.integers(5, 60), 2)), generator)
+
+
+def _rubble(generator: np.random.Generator) -> Surface:
+    return heaps.rubble(generator.uniform(0.4, 2), generator)

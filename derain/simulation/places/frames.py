@@ -1,0 +1,132 @@
+"""Open-work: gates, railings, scaffolds, lattice masts, guard rails, trolleys, thin poles."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from derain.simulation import shapes
+from derain.simulation.classes import TrackClass
+from derain.simulation.objects import Surface
+from derain.simulation.places.drawing import evenly_in_logarithm
+from derain.simulation.shapes import Triangles
+
+REFLECTIVITY = (0.03, 0.7)
+
+Point = tuple[float, float, float]
+
+
+def bars(ends: Iterable[tuple[Point, Point]], radius: float, sides: int = 4) -> Triangles:
+    """Bars of one thickness from place to place, metres."""
+    both = np.array(list(ends), np.float64)
+    return shapes.rods(both[:, 0], both[:, 1], radius, sides=sides)
+
+
+def thin_pole(generator: np.random.Generator) -> Surface:
+    """A pole of 5 mm to 6 cm, leaning or not, some with a sign or a lamp on it."""
+    height, radius = generator.uniform(0.6, 6), evenly_in_logarithm((0.005, 0.06), generator)
+    foot, lean = (0.0, 0.0, 0.0), generator.normal(0, 0.03, 2) * height
+    parts = [bars([(foot, (lean[0], lean[1], height))], radius, sides=6)]
+    if generator.random() < 0.3:
+        side = generator.uniform(0.2, 0.8)
+        plate = shapes.box(0.02, side, height - side, height)
+        parts.append(shapes.placed(plate, lean[0], lean[1], generator.uniform(0, np.pi)))
+    return made(parts, generator)
+
+
+def railing(length: float, generator: np.random.Generator) -> Surface:
+    """A railing or gate of bars along x, from x = 0 on."""
+    height, bottom = generator.uniform(0.8, 2.2), generator.uniform(0.05, 0.25)
+    radius = evenly_in_logarithm((0.006, 0.03), generator)
+    x = np.arange(0, length, generator.uniform(0.08, 0.25))
+    upright = [((at, 0, bottom), (at, 0, height)) for at in x]
+    level = [((0, 0, z), (length, 0, z)) for z in (bottom, height)]
+    braces = [((0, 0, bottom), (min(length, 3.0), 0, height))] if generator.random() < 0.4 else []
+    return made([bars(upright, radius), bars([*level, *braces], 1.8 * radius)], generator)
+
+
+def scaffold(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """Tubes and boards along x, from x = 0 on, two or three storeys high."""
+    storeys, depth = generator.integers(1, 4), generator.uniform(0.7, 1.2)
+    step, storey, radius = generator.uniform(1.8, 2.6), 2.0, generator.uniform(0.02, 0.035)
+    x = np.arange(0, length + 0.1, step)
+    top = storeys * storey + 1
+    tubes = [((at, y, 0), (at, y, top)) for at in x for y in (0, depth)]
+    for level in range(1, storeys + 1):
+        z = level * storey
+        tubes += [((0, y, z + up), (x[-1], y, z + up)) for y in (0, depth) for up in (0, 1)]
+        tubes += [((at, 0, z), (at, depth, z)) for at in x]
+        tubes += [
+            ((at, 0, z - storey), (at + step, 0, z)) for at in x[:-1] if generator.random() < 0.4
+        ]
+    yield made([bars(tubes, radius)], generator)
+    boards = [
+        shapes.placed(shapes.box(x[-1], depth, z, z + 0.05), x[-1] / 2, depth / 2)
+        for z in storey * np.arange(1, storeys + 1)
+        if generator.random() < 0.8 and x[-1] > 0
+    ]
+    if boards:
+        yield made(boards, generator)
+
+
+def lattice(start: Point, end: Point, width: float, generator: np.random.Generator) -> Surface:
+    """A square lattice girder or mast between two places.
+
+    Args:
+        start: Middle of one end, metres.
+        end: Middle of the other.
+        width: Across it, metres.
+        generator: Random generator.
+    """
+    first, last = np.array([start]), np.array([end])
+    aside, up = (vector[0] * width / 2 for vector in shapes.across(last - first))
+    edges = [i * aside + j * up for i, j in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    bays = max(2, int(np.linalg.norm(last - first) / width))
+    knots = first + np.linspace(0, 1, bays + 1)[:, None] * (last - first)
+    wood = [shapes.rods(knots[:1] + edge, knots[-1:] + edge, 0.05) for edge in edges]
+    for one, other in zip(edges, edges[1:] + edges[:1], strict=True):
+        wood.append(shapes.rods(knots[:-1] + one, knots[1:] + other, 0.025))
+    return made(wood, generator)
+
+
+def guard_rail(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """A steel guard rail along x, from x = 0 on: a band on posts."""
+    profile = np.array([[0, 0.45], [0.05, 0.52], [0, 0.6], [0.05, 0.68], [0, 0.75]])
+    x = np.linspace(0, length, max(2, int(length / 4)))
+    band = np.stack(
+        [
+            np.column_stack([x, np.full_like(x, y), np.full_like(x, z)])
+            + generator.normal(0, 0.01, (len(x), 3))
+            for y, z in profile
+        ]
+    )
+    posts = [((at, 0.08, 0), (at, 0.08, 0.7)) for at in np.arange(0, length, 2.0)]
+    yield made([shapes.sheet(band), bars(posts, 0.05)], generator)
+
+
+def trolley(generator: np.random.Generator) -> Surface:
+    """A shopping trolley: a basket of wire, a handle, wheels."""
+    length, width, low, high = 0.9, 0.55, 0.4, 0.95
+    radius, half = evenly_in_logarithm((0.003, 0.01), generator), width / 2
+    wires = [((x, y, low), (x, y, high)) for x in np.arange(0, length, 0.12) for y in (-half, half)]
+    wires += [((x, -half, low), (x, half, low)) for x in np.arange(0, length, 0.12)]
+    wires += [
+        ((0, y, z), (length, y, z)) for y in (-half, half) for z in np.arange(low, high, 0.13)
+    ]
+    frame = [((0, y, 0.1), (length, y, 0.15)) for y in (-half, half)]
+    frame += [((0, y, 0.1), (-0.15, y, 1.0)) for y in (-half, half)]
+    frame += [((-0.15, -half, 1.0), (-0.15, half, 1.0))]
+    return made([bars(wires, radius), bars(frame, 0.018)], generator)
+
+
+def bollard(generator: np.random.Generator) -> Surface:
+    """A bollard, a cone's height or a man's waist."""
+    return made(
+        [shapes.cylinder(generator.uniform(0.03, 0.12), 0, generator.uniform(0.4, 1.1))], generator
+    )
+
+
+def made(parts: list[Triangles], generator: np.random.Generator) -> Surface:
+    """Parts of one material as a surface."""
+    return Surface(
+        np.concatenate(parts), TrackClass.BACKGROUND, evenly_in_logarithm(REFLECTIVITY, generator)
+    )

@@ -1,0 +1,151 @@
+"""A motorway: guard rails, gantries, noise walls, lorries, thin poles, embankments with scrub."""
+
+from collections.abc import Callable, Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation import objects, shapes
+from derain.simulation.objects import Surface
+from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
+from derain.simulation.places.crowd import ragged_things
+from derain.simulation.places.drawing import along
+from derain.simulation.places.relief import Relief, ground_mesh
+from derain.simulation.places.standing import Make, assembled, free_places, lined_up, put, strewn
+from derain.simulation.track import Track
+
+SIGHT = (-80.0, 115.0)
+LANE = 3.75
+
+
+def lay_out_motorway(generator: np.random.Generator) -> Track:
+    """Lays out a motorway.
+
+    Two carriageways of two to four lanes with guard rails, cars and lorries in the lanes; gantries
+    of lattice above, delineators and signs beside, noise walls, fences or scrub further out, and at
+    times a breakdown: people and cones on the hard shoulder beside the sensor.
+    """
+    lanes = int(generator.integers(2, 5))
+    own = int(generator.integers(lanes))
+    left = (lanes - own - 0.5) * LANE + 0.8  # where the sensor's carriageway ends
+    right = -(own + 0.5) * LANE - 2.5
+    other = left + 3 + lanes * LANE
+    standing = [
+        *_rails((right - 0.5, left + 0.8, other + 1), generator),
+        *_driving(lanes, own, left + 3, generator),
+        *_breakdown(right, generator),
+        *_beside((right, other), generator),
+        *_embankments((right - 3, other + 3), generator),
+        *ragged_things(generator, lambda x, y: not right - 1 < y < other + 1.5, count=(5, 15)),
+    ]
+    uneven = Relief.draw(generator.uniform(0.02, 0.15), generator)
+    over = _gantries((right - 1, other + 1), generator)
+    return assembled(_ground(right, other, generator), standing, uneven, generator, over)
+
+
+def _ground(right: float, left: float, generator: np.random.Generator) -> Iterator[Surface]:
+    verge = [relief.MEADOW, relief.GRAVEL, relief.SNOW][generator.choice(3, p=[0.6, 0.25, 0.15])]
+
+    def kind_at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+        return np.where((y > right) & (y < left), 0, 1)
+
+    yield from ground_mesh([relief.ASPHALT, verge], kind_at, generator)
+
+
+def _rails(lines: tuple[float, ...], generator: np.random.Generator) -> Iterator[Surface]:
+    for y in lines:
+        make: Callable[[float, np.random.Generator], Iterable[Surface]] = (
+            frames.guard_rail if generator.random() < 0.7 else _cable_barrier
+        )
+        yield from lined_up(make, _straight(y), SIGHT, 16, generator, gaps=0.05)
+
+
+def _cable_barrier(length: float, generator: np.random.Generator) -> Iterable[Surface]:
+    return threads.wire_fence(length, generator)
+
+
+def _driving(
+    lanes: int, own: int, median: float, generator: np.random.Generator
+) -> Iterator[Surface]:
+    """Cars and lorries in every lane, in the sensor's own at a distance."""
+    for lane in range(2 * lanes):
+        own_carriageway = lane < lanes
+        y = (lane - own) * LANE if own_carriageway else median + (lane - lanes + 0.5) * LANE
+        for x in along(*SIGHT, (14, 70), generator):
+            if lane == own and abs(x) < 12:
+                continue
+            slow = lane in (0, 2 * lanes - 1)
+            make: Make = vehicles.lorry if generator.random() < 0.15 + 0.45 * slow else _car(x)
+            heading = 0 if own_carriageway else np.pi
+            yield from put(make(generator), x, y + generator.normal(0, 0.2), heading)
+
+
+def _car(x: float) -> Make:
+    return vehicles.glazed_car if abs(x) < 35 else objects.car
+
+
+def _breakdown(right: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """On the hard shoulder and behind the rail: somebody who waits, workers, cones, a car."""
+
+    def on_the_shoulder(x: float, y: float) -> bool:
+        return right - 2.5 < y < right + 2.3 and x < 60
+
+    makes = [people.person] * generator.integers(2, 8) + [frames.bollard] * generator.integers(0, 8)
+    places = free_places(len(makes), (2.3, 60), 1.2, generator, on_the_shoulder)
+    yield from strewn(makes, places, generator)
+
+
+def _beside(edges: tuple[float, float], generator: np.random.Generator) -> Iterator[Surface]:
+    """Delineators, signs, emergency telephones and lamps."""
+    for y, side in zip(edges, (-1, 1), strict=True):
+        for x in along(*SIGHT, (4, 25), generator):
+            yield from put(frames.thin_pole(generator), x, y + side * generator.uniform(0.8, 3))
+
+
+def _gantries(edges: tuple[float, float], generator: np.random.Generator) -> Iterator[Surface]:
+    """Girders of lattice across the road, with signs; now and then cables."""
+    for x in along(12, 110, (25, 80), generator):
+        height = generator.uniform(5.5, 7.5)
+        right, left = edges[0] - 0.5, edges[1] + 0.5
+        yield frames.lattice((x, right, height), (x, left, height), 0.9, generator)
+        for y in (right, left):
+            yield frames.lattice((x, y, 0), (x, y, height + 0.4), 0.5, generator)
+        for y in generator.uniform(right + 2, left - 2, generator.integers(1, 4)):
+            plate = shapes.raised(shapes.box(0.1, generator.uniform(1.5, 3.5), 0, 2), height - 1)
+            yield frames.made([shapes.placed(plate, x - 0.6, float(y))], generator)
+    if generator.random() < 0.5:
+        x, height = generator.uniform(5, 60), generator.uniform(9, 16)
+        for lift in range(generator.integers(1, 5)):
+            ends = [np.array([x + 2 * lift, y, height + 0.6 * lift]) for y in (-60.0, 60.0)]
+            yield threads.cable(ends[0], ends[1], generator.uniform(1, 3), (0.02, 0.06), generator)
+
+
+def _embankments(edges: tuple[float, float], generator: np.random.Generator) -> Iterator[Surface]:
+    """Beyond the road: a noise wall, a fence and scrub, or a bank with trees."""
+    for y, side in zip(edges, (-1, 1), strict=True):
+        kind = generator.choice(["wall", "fence", "bank"])
+        away = y + side * generator.uniform(0.5, 4)
+        if kind == "wall":
+            yield from lined_up(_noise_wall, _straight(away), SIGHT, 13, generator, gaps=0.05)
+        elif kind == "fence":
+            yield from lined_up(threads.chain_link, _straight(away), SIGHT, 13, generator, 0.1)
+        else:
+            yield from lined_up(heaps.bank, _straight(away + 2 * side), SIGHT, 10, generator)
+        for x in along(*SIGHT, (5, 18), generator):
+            place = x, away + side * generator.uniform(1, 12)
+            bare = generator.random() < 0.4
+            tree = [plants.bare_tree(generator)] if bare else plants.crowned_tree(generator)
+            yield from put(tree, *place)
+        for x in along(*SIGHT, (2, 12), generator):
+            scrub = plants.brushwood(generator.uniform(0.5, 2.5), generator)
+            yield from put(scrub, x, away + side * generator.uniform(0.5, 6))
+
+
+def _noise_wall(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+    height = generator.uniform(2, 5)
+    yield walls.rough_wall(length, height, generator)
+    yield frames.made([frames.bars([((0, -0.1, 0), (0, -0.1, height + 0.1))], 0.12)], generator)
+
+
+def _straight(y: float) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    return lambda x: np.full(np.shape(x), y)

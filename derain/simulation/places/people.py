@@ -1,0 +1,148 @@
+"""People as a sensor meets them: striding, with arms and what they carry, children too; cyclists."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation import shapes
+from derain.simulation.classes import TrackClass
+from derain.simulation.objects import Surface
+from derain.simulation.places.drawing import evenly_in_logarithm
+from derain.simulation.shapes import Triangles
+
+# Of cloth, which in the near infrared is anything from black to white.
+REFLECTIVITY = (0.03, 0.7)
+
+Places = NDArray[np.float64]
+
+
+def person(generator: np.random.Generator) -> Surface:
+    """Somebody of 0.9 to 1.95 m who stands or strides along x, perhaps with something in hand."""
+    height = generator.uniform(0.9, 1.95)
+    parts = [_body(height, generator)]
+    carried = generator.choice(["nothing", "bag", "umbrella", "pushchair", "stick", "dog"])
+    if carried != "nothing" and height > 1.4:
+        parts.append(CARRIED[carried](height, generator))
+    return _clothed(parts, TrackClass.PEDESTRIAN, generator)
+
+
+def cyclist(generator: np.random.Generator) -> Surface:
+    """A bicycle along x of thin tubes and spokes, mostly with its rider."""
+    parts = [_wheel(x, generator) for x in (-0.52, 0.52)]
+    frame = [
+        ((-0.52, 0, 0.34), (-0.1, 0, 0.3)),
+        ((-0.1, 0, 0.3), (-0.2, 0, 0.85)),
+        ((-0.2, 0, 0.75), (0.4, 0, 0.8)),
+        ((-0.1, 0, 0.3), (0.4, 0, 0.75)),
+        ((0.4, 0, 0.95), (0.52, 0, 0.34)),
+        ((0.4, -0.28, 1.0), (0.4, 0.28, 1.0)),
+        ((-0.52, 0, 0.34), (-0.2, 0, 0.75)),
+    ]
+    parts.append(_limbs(frame, generator.uniform(0.014, 0.03)))
+    if generator.random() < 0.75:
+        rider = [((-0.2, y, 0.95), (0.1, y, 0.75)) for y in (-0.1, 0.1)]
+        rider += [((0.1, y, 0.75), (-0.1, y, 0.3 + 0.2 * (y > 0))) for y in (-0.1, 0.1)]
+        parts.append(_limbs(rider, 0.07))
+        parts.append(_limbs([((-0.2, 0, 0.9), (0.12, 0, 1.45))], 0.16))
+        parts.append(_limbs([((0.1, y, 1.4), (0.4, y, 1.02)) for y in (-0.18, 0.18)], 0.045))
+        parts.append(shapes.placed(shapes.cylinder(0.1, 1.52, 1.76), 0.18, 0))
+    return _clothed(parts, TrackClass.BIKE, generator)
+
+
+def _body(height: float, generator: np.random.Generator) -> Triangles:
+    """Legs, trunk, arms and head, whose proportions are a child's or an adult's."""
+    hip, shoulder = 0.48 * height, 0.82 * height
+    girth, stride = generator.uniform(0.75, 1.25), generator.uniform(0, 0.22) * height
+    broad = 0.11 * height * girth
+    legs, arms = [], []
+    for side, ahead in ((-1, stride), (1, -stride)):
+        knee = 0.5 * ahead + 0.04, side * 0.05 * height, 0.26 * height
+        legs += [((0, side * 0.05 * height, hip), knee), (knee, (ahead, knee[1], 0.02))]
+        swing, lift = generator.normal(-ahead, 0.15 * height), generator.uniform(0.4, 0.75)
+        elbow = 0.5 * swing, side * (broad + 0.04), 0.64 * height
+        hand = swing, side * (broad + generator.uniform(0, 0.12)), lift * height
+        arms += [((0, side * broad, shoulder), elbow), (elbow, hand)]
+    trunk = shapes.cylinder(1.0, hip - 0.03, shoulder) * (0.075 * height, broad, 1)
+    head = shapes.cylinder(generator.uniform(0.08, 0.11), 0.85 * height, height)
+    limbs = [_limbs(legs, 0.045 * height * girth), _limbs(arms, 0.025 * height * girth)]
+    return np.concatenate([*limbs, trunk, head])
+
+
+def _bag(height: float, generator: np.random.Generator) -> Triangles:
+    bottom = generator.uniform(0.15, 0.3) * height
+    bag = shapes.box(0.3, 0.1, bottom, bottom + 0.35)
+    return shapes.placed(bag, 0, -0.15 * height)
+
+
+def _umbrella(height: float, generator: np.random.Generator) -> Triangles:
+    radius, top = generator.uniform(0.35, 0.6), height + generator.uniform(0.1, 0.3)
+    angle, out = np.linspace(0, 2 * np.pi, 9), np.linspace(0, 1, 4)[:, None]
+    dome = np.stack(
+        np.broadcast_arrays(
+            0.2 + radius * out * np.cos(angle), radius * out * np.sin(angle), top - 0.25 * out**2
+        ),
+        axis=-1,
+    )
+    stick = _limbs([((0.2, 0, 0.6 * height), (0.2, 0, top))], 0.01)
+    return np.concatenate([shapes.sheet(dome), stick])
+
+
+def _pushchair(height: float, generator: np.random.Generator) -> Triangles:
+    ahead = generator.uniform(0.5, 0.7)
+    seat = shapes.placed(shapes.box(0.5, 0.4, 0.35, 0.7), ahead + 0.25, 0)
+    tubes = [((ahead - 0.35, y, 1.0), (ahead + 0.5, y, 0.1)) for y in (-0.22, 0.22)]
+    tubes += [((ahead, y, 0.1), (ahead + 0.2, y, 0.7)) for y in (-0.22, 0.22)]
+    return np.concatenate([seat, _limbs(tubes, 0.015)])
+
+
+def _stick(height: float, generator: np.random.Generator) -> Triangles:
+    """A walking stick, a spade or a pole on a shoulder."""
+    reach = generator.uniform(0.5, 1.2) * height
+    lean = generator.normal(0, 0.5)
+    foot = 0.2, 0.15 * height, 0.02
+    return _limbs([(foot, (0.2 + lean * reach, 0.15 * height, 0.03 + reach))], 0.015)
+
+
+def _dog(height: float, generator: np.random.Generator) -> Triangles:
+    size, x = generator.uniform(0.25, 0.7), generator.uniform(0.6, 1.5)
+    body = [((x, 0, 0.75 * size), (x + size, 0, 0.75 * size))]
+    legs = [
+        ((x + a * size, b * size, 0.7 * size), (x + a * size, b * size, 0))
+        for a in (0, 1)
+        for b in (-0.12, 0.12)
+    ]
+    head = [((x + size, 0, 0.8 * size), (x + 1.35 * size, 0, size))]
+    leash = [((0.1, 0.15, 0.5 * height), (x + size, 0, 0.85 * size))]
+    parts = (body, 0.16 * size), (legs, 0.05 * size), (head, 0.1 * size), (leash, 0.006)
+    return np.concatenate([_limbs(ends, radius) for ends, radius in parts])
+
+
+CARRIED = {
+    "bag": _bag,
+    "umbrella": _umbrella,
+    "pushchair": _pushchair,
+    "stick": _stick,
+    "dog": _dog,
+}
+
+
+def _wheel(x: float, generator: np.random.Generator) -> Triangles:
+    angle = np.linspace(0, 2 * np.pi, 17)
+    rim = np.column_stack([x + 0.34 * np.cos(angle), 0 * angle, 0.34 + 0.34 * np.sin(angle)])
+    hub = np.broadcast_to((x, 0.0, 0.34), (len(angle), 3))
+    width = evenly_in_logarithm((0.002, 0.006), generator)
+    return np.concatenate(
+        [shapes.rods(rim[:-1], rim[1:], 0.02), shapes.rods(hub[:-1], rim[:-1], width)]
+    )
+
+
+def _limbs(ends: list[tuple[tuple[float, ...], tuple[float, ...]]], radius: float) -> Triangles:
+    both = np.array(ends, np.float64)
+    return shapes.rods(both[:, 0], both[:, 1], radius, taper=0.75, sides=6)
+
+
+def _clothed(parts: list[Triangles], label: TrackClass, generator: np.random.Generator) -> Surface:
+    """Every part of a reflectivity of its own."""
+    reflectivity = [
+        np.full(len(part), evenly_in_logarithm(REFLECTIVITY, generator)) for part in parts
+    ]
+    return Surface(np.concatenate(parts), label, np.concatenate(reflectivity))

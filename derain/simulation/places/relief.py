@@ -1,0 +1,147 @@
+"""Ground that is nowhere flat: hills and hollows, and bumps down to the size of a stone."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation import shapes
+from derain.simulation.classes import TrackClass
+from derain.simulation.objects import Surface
+from derain.simulation.places.drawing import Span, evenly_in_logarithm, many_evenly_in_logarithm
+
+WAVES = 12
+WAVELENGTHS = (2.5, 60.0)
+
+# The mesh of the ground: rings of corners, each so many, from the first radius to the last, metres.
+CORNERS = 400
+RINGS = 100
+RADII = (0.6, 130.0)
+
+# Share of its reflectivity that wet ground keeps.
+WET = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Relief:
+    """The height of the ground, a sum of waves.
+
+    Attributes:
+        waves: Wave vectors, float32 (W, 2), radians per metre.
+        amplitudes: Float32 (W,), metres.
+        phases: Float32 (W,), radians.
+    """
+
+    waves: NDArray[np.float32]
+    amplitudes: NDArray[np.float32]
+    phases: NDArray[np.float32]
+
+    @classmethod
+    def draw(cls, height: float, generator: np.random.Generator) -> "Relief":
+        """Draws a relief.
+
+        Args:
+            height: Standard deviation of the height, metres. Long waves are higher than short ones.
+            generator: Random generator.
+        """
+        length = many_evenly_in_logarithm(WAVELENGTHS, WAVES, generator)
+        direction = generator.uniform(0, 2 * np.pi, WAVES)
+        waves = 2 * np.pi / length * np.stack([np.cos(direction), np.sin(direction)])
+        amplitudes = height * np.sqrt(2) * length / np.linalg.norm(length)
+        phases = generator.uniform(0, 2 * np.pi, WAVES)
+        return cls(*(part.astype(np.float32) for part in (waves.T, amplitudes, phases)))
+
+    def __call__(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Heights at some places, metres, float64, shaped as they are; 0 under the sensor."""
+        height = np.zeros(np.shape(x), np.float32)
+        at_x, at_y = np.asarray(x, np.float32), np.asarray(y, np.float32)
+        for (a, b), amplitude, phase in zip(self.waves, self.amplitudes, self.phases, strict=True):
+            height += amplitude * (np.sin(a * at_x + b * at_y + phase) - np.sin(phase))
+        return height.astype(np.float64)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A kind of ground.
+
+    Attributes:
+        label: Its class.
+        bumps: Standard deviation of the height of each corner of its mesh, metres.
+        reflectivity: Between which its reflectivity is.
+        wet: Share of it that is wet.
+        furrow: Depth of its furrows, metres, a metre or less apart; 0 has none.
+    """
+
+    label: TrackClass
+    bumps: Span
+    reflectivity: Span
+    wet: float = 0.0
+    furrow: float = 0.0
+
+
+ASPHALT = Ground(TrackClass.ROAD, (0.001, 0.008), (0.05, 0.25), wet=0.15)
+COBBLES = Ground(TrackClass.ROAD, (0.008, 0.025), (0.08, 0.3), wet=0.1)
+TRACK = Ground(TrackClass.ROAD, (0.015, 0.05), (0.1, 0.4), wet=0.1)
+PAVING = Ground(TrackClass.BACKGROUND, (0.002, 0.012), (0.1, 0.4), wet=0.1)
+MEADOW = Ground(TrackClass.BACKGROUND, (0.02, 0.1), (0.1, 0.5))
+GRAVEL = Ground(TrackClass.BACKGROUND, (0.01, 0.05), (0.1, 0.4))
+FIELD = Ground(TrackClass.BACKGROUND, (0.04, 0.12), (0.05, 0.3), wet=0.1, furrow=0.15)
+SNOW = Ground(TrackClass.BACKGROUND, (0.01, 0.08), (0.3, 0.9))
+CONCRETE = Ground(TrackClass.ROAD, (0.001, 0.006), (0.1, 0.4), wet=0.1)
+
+
+def ground_mesh(
+    kinds: Sequence[Ground],
+    kind_at: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.int64]],
+    generator: np.random.Generator,
+) -> Iterator[Surface]:
+    """The ground about the sensor, finest near it, on a plane but for its bumps.
+
+    Args:
+        kinds: What it is made of.
+        kind_at: Which of them is where, by x and y in metres, int64 as they are shaped.
+        generator: Random generator.
+    """
+    corners = _rings()
+    kind = kind_at(corners[..., 0], corners[..., 1])
+    bumps = np.array([evenly_in_logarithm(each.bumps, generator) for each in kinds])
+    furrow = np.array([each.furrow * generator.uniform(0.3, 1) for each in kinds])
+    corners[..., 2] = bumps[kind] * generator.normal(size=kind.shape)
+    corners[..., 2] += furrow[kind] * _furrows(corners, generator)
+    corners[:, -1, 2] = corners[:, 0, 2]  # each ring closes
+    triangles = shapes.sheet(corners)
+    kind = np.repeat(kind[:-1, :-1].ravel(), 2)
+    wetness = Relief.draw(1, generator)(*triangles.mean(axis=1)[:, :2].T)
+    for number, each in enumerate(kinds):
+        mine = kind == number
+        if mine.any():
+            yield _patch(each, triangles[mine], wetness[mine], generator)
+
+
+def _patch(
+    kind: Ground,
+    triangles: shapes.Triangles,
+    wetness: NDArray[np.float64],
+    generator: np.random.Generator,
+) -> Surface:
+    """All ground of a kind: uneven in reflectivity from spot to spot, dark where it is wet."""
+    usual = evenly_in_logarithm(kind.reflectivity, generator)
+    spots = usual * np.exp(generator.normal(0, 0.2, len(triangles)))
+    spots[wetness > np.quantile(wetness, 1 - kind.wet)] *= WET
+    return Surface(triangles, kind.label, np.clip(spots, 0.003, 1))
+
+
+def _rings() -> NDArray[np.float64]:
+    """Corners on rings, float64 (RINGS + 1, CORNERS + 1, 3); the first ring is a point."""
+    radius = np.concatenate([[0.0], np.geomspace(*RADII, RINGS)])[:, None]
+    angle = np.linspace(0, 2 * np.pi, CORNERS + 1)
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    return np.stack([x, y, np.zeros_like(x)], axis=-1)
+
+
+def _furrows(corners: NDArray[np.float64], generator: np.random.Generator) -> NDArray[np.float64]:
+    direction = generator.uniform(0, np.pi)
+    over = corners[..., 0] * np.cos(direction) + corners[..., 1] * np.sin(direction)
+    furrows: NDArray[np.float64] = np.sin(2 * np.pi / generator.uniform(0.4, 1) * over)
+    return furrows

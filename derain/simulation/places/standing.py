@@ -1,0 +1,160 @@
+"""Where things stand: near the sensor and far from it, beside each other, along lines."""
+
+from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation import shapes
+from derain.simulation.objects import Surface
+from derain.simulation.places.drawing import Span, evenly_in_logarithm
+from derain.simulation.places.relief import Relief
+from derain.simulation.track import Track
+
+# Whether something may stand at an x and a y.
+Allowed = Callable[[float, float], bool]
+
+# Something made at the origin, of one surface or of several.
+Make = Callable[[np.random.Generator], Surface | Iterable[Surface]]
+
+# A line on the ground: its y at each x.
+Line = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+# What stands in a place is farther from the sensor's axis, metres. Only the ground reaches it.
+CLEARANCE = 1.6
+
+# Half of the things are within so many degrees of straight ahead, where every sensor looks.
+AHEAD = 55.0
+
+TRIES = 30
+
+
+def anywhere(x: float, y: float) -> bool:
+    """Allows every place."""
+    return True
+
+
+def free_places(
+    count: int,
+    distances: Span,
+    apart: float,
+    generator: np.random.Generator,
+    allowed: Allowed = anywhere,
+) -> list[tuple[float, float]]:
+    """Places about the sensor, as many within each doubling of the distance.
+
+    Args:
+        count: How many; fewer where there is no room for them.
+        distances: Nearest and farthest, metres.
+        apart: Least distance between two of them, metres.
+        generator: Random generator.
+        allowed: Where one may be.
+    """
+    taken: list[tuple[float, float]] = []
+    for number in range(count):
+        for _ in range(TRIES):
+            distance = evenly_in_logarithm(distances, generator)
+            limit = AHEAD if number % 2 else 180.0
+            azimuth = np.radians(generator.uniform(-limit, limit))
+            x, y = float(distance * np.cos(azimuth)), float(distance * np.sin(azimuth))
+            if allowed(x, y) and all(np.hypot(x - a, y - b) > apart for a, b in taken):
+                taken.append((x, y))
+                break
+    return taken
+
+
+def strewn(
+    makes: Iterable[Make],
+    places: Iterable[tuple[float, float]],
+    generator: np.random.Generator,
+) -> Iterator[Surface]:
+    """One thing at each place, turned at random.
+
+    Args:
+        makes: What makes each of them; what has no place is left out.
+        places: Where, metres.
+        generator: Random generator.
+    """
+    for make, (x, y) in zip(makes, places, strict=False):
+        heading = generator.uniform(-np.pi, np.pi)
+        yield from put(make(generator), x, y, heading)
+
+
+def put(
+    things: Surface | Iterable[Surface], x: float, y: float, heading: float = 0.0
+) -> Iterator[Surface]:
+    """A thing turned by a heading in radians, then moved to (x, y)."""
+    for surface in [things] if isinstance(things, Surface) else things:
+        yield surface.placed(x, y, heading)
+
+
+def lined_up(
+    make: Callable[[float, np.random.Generator], Surface | Iterable[Surface]],
+    line: Line,
+    x: Span,
+    piece: float,
+    generator: np.random.Generator,
+    gaps: float = 0.0,
+) -> Iterator[Surface]:
+    """Pieces of a hedge, a fence or a wall, end to end along a line.
+
+    Args:
+        make: Makes a piece along x from the origin on, by its length in metres.
+        line: Where.
+        x: From where to where, metres.
+        piece: Length of a piece, metres.
+        generator: Random generator.
+        gaps: Share of the pieces that is missing.
+    """
+    ends = np.arange(*x, piece)
+    for (before, after), (left, right) in zip(pairwise(ends), pairwise(line(ends)), strict=True):
+        if generator.random() >= gaps:
+            length = float(np.hypot(after - before, right - left))
+            heading = float(np.arctan2(right - left, after - before))
+            yield from put(make(length, generator), float(before), float(left), heading)
+
+
+def shared(
+    options: Iterable[tuple[Make, float]], count: int, generator: np.random.Generator
+) -> list[Make]:
+    """So many of several makers of things, each as often as its share of the sum says."""
+    makes, shares = zip(*options, strict=True)
+    chosen = generator.choice(len(makes), count, p=np.array(shares) / np.sum(shares))
+    return [makes[which] for which in chosen]
+
+
+def assembled(
+    ground: Iterable[Surface],
+    standing: Iterable[Surface],
+    relief: Relief,
+    generator: np.random.Generator,
+    over: Iterable[Surface] = (),
+) -> Track:
+    """A track of what is laid out on a plane: cleared about the sensor, on uneven ground, tilted.
+
+    Args:
+        ground: The ground.
+        standing: What stands on it.
+        relief: How uneven it is.
+        generator: Random generator.
+        over: What may be right above the sensor: a ceiling, cables.
+    """
+    lower, upper = Track.of(ground), _cleared(Track.of(standing))
+    tracks = [lower, upper, *(Track.of([surface]) for surface in over)]
+    triangles, reflectivity, label = (
+        np.concatenate([getattr(track, part) for track in tracks])
+        for part in ("triangles", "reflectivity", "label")
+    )
+    x, y, z = np.moveaxis(triangles.astype(np.float64), -1, 0)
+    uneven = np.stack([x, y, z + relief(x, y)], axis=-1)
+    turned = shapes.placed(uneven, 0, 0, generator.uniform(-0.15, 0.15))
+    tilted = shapes.sloped(turned, *generator.uniform(-0.02, 0.02, 2))
+    return Track(tilted.astype(np.float32), reflectivity, label)
+
+
+def _cleared(track: Track) -> Track:
+    """A track without those of its triangles that are too near to the sensor's axis."""
+    x, y = shapes.nearest_to_axis(track.triangles)
+    far = np.hypot(x, y) > CLEARANCE
+    return Track(track.triangles[far], track.reflectivity[far], track.label[far])

@@ -1,0 +1,132 @@
+"""Vehicles with windows that rays go through, and with what is behind them: seats, a driver."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation import shapes
+from derain.simulation.classes import TrackClass
+from derain.simulation.objects import Surface
+from derain.simulation.places.drawing import evenly_in_logarithm
+from derain.simulation.places.frames import bars
+from derain.simulation.places.glass import pane
+from derain.simulation.shapes import Triangles
+
+PAINT = (0.02, 0.7)
+GLASS = (0.01, 0.15)
+CLOTH = (0.05, 0.5)
+RUBBER = (0.02, 0.1)
+
+
+def glazed_car(generator: np.random.Generator) -> Iterator[Surface]:
+    """A car along x, from a small one to a van: body, pillars, roof, windows, seats, mirrors."""
+    length, width = generator.uniform(3.4, 5.4), generator.uniform(1.6, 2.0)
+    sill, roof = generator.uniform(0.8, 1.1), generator.uniform(1.4, 2.1)
+    clearance = generator.uniform(0.15, 0.3)
+    body = shapes.box(length, width, clearance, sill)
+    cabin = _cabin(length, width, sill, roof, generator)
+    pillars = shapes.rods(cabin[0], cabin[1], 0.04, sides=4)
+    top = shapes.sheet(np.stack([cabin[1][[0, 1]], cabin[1][[3, 2]]]))
+    mirrors = [
+        shapes.placed(shapes.box(0.08, 0.2, sill, sill + 0.16), 0.2 * length, side * (width / 2))
+        for side in (-1, 1)
+    ]
+    antenna = bars([((-0.2 * length, 0, roof), (-0.3 * length, 0, roof + 0.4))], 0.005)
+    painted = np.concatenate([body, pillars, top, *mirrors, antenna])
+    yield _part(painted, PAINT, generator)
+    yield _part(np.concatenate(_panes(cabin, generator)), GLASS, generator)
+    yield _part(_seats(length, width, sill, generator), CLOTH, generator)
+    yield _part(_wheels(0.31 * length, width), RUBBER, generator)
+
+
+def lorry(generator: np.random.Generator) -> Iterator[Surface]:
+    """A lorry along x: a cab with windows, a box with a wavy tarpaulin, an open chassis."""
+    length, width, top = generator.uniform(5, 13), 2.5, generator.uniform(2.8, 4.0)
+    cab = shapes.placed(shapes.box(1.8, 2.4, 0.5, 1.6), length / 2 + 1.1, 0)
+    roof = shapes.placed(shapes.box(1.8, 2.4, 2.5, 2.6), length / 2 + 1.1, 0)
+    foot = np.array([[-0.9, -1.2, 1.6], [0.9, -1.2, 1.6], [0.9, 1.2, 1.6], [-0.9, 1.2, 1.6]])
+    foot += (length / 2 + 1.1, 0, 0)
+    head = shapes.raised(foot, 0.9)
+    pillars = shapes.rods(foot, head, 0.05, sides=4)
+    yield _part(np.concatenate([cab, roof, pillars]), PAINT, generator)
+    yield _part(np.concatenate(_panes((foot, head), generator)), GLASS, generator)
+    sides = [_tarpaulin(length, y, top, generator) for y in (-width / 2, width / 2)]
+    ends = [
+        shapes.placed(shapes.box(0.05, width, 1.1, top), x, 0) for x in (-length / 2, length / 2)
+    ]
+    bed = shapes.box(length, width, 1.0, 1.15)
+    lid = shapes.box(length, width, top, top + 0.03)
+    yield _part(np.concatenate([*sides, *ends, bed, lid]), PAINT, generator)
+    frame = [((-length / 2, y, 0.8), (length / 2, y, 0.8)) for y in (-0.4, 0.4)]
+    frame += [((-0.2 * length, y, 0.55), (0.2 * length, y, 0.55)) for y in (-1.2, 1.2)]
+    frame += [((-length / 2, -1.1, 0.5), (-length / 2, 1.1, 0.5))]
+    yield _part(bars(frame, 0.06), RUBBER, generator)
+    yield _part(_wheels(0.4 * length, width, 0.5), RUBBER, generator)
+
+
+def _cabin(
+    length: float, width: float, sill: float, roof: float, generator: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower and upper ends of the four pillars, from the right at the rear on, (4, 3) both."""
+    rear, front = -generator.uniform(0.3, 0.49), generator.uniform(0.18, 0.32)
+    half, lean = 0.46 * width, generator.uniform(0.03, 0.16)
+    foot = np.array([[rear, -1, sill], [front, -1, sill], [front, 1, sill], [rear, 1, sill]])
+    head = foot + np.array([[0.4, 0.1, 0], [-1, 0.1, 0], [-1, -0.1, 0], [0.4, -0.1, 0]]) * lean
+    head[:, 2] = roof
+    return foot * (length, half, 1), head * (length, half, 1)
+
+
+def _panes(
+    cabin: tuple[NDArray[np.float64], NDArray[np.float64]], generator: np.random.Generator
+) -> list[Triangles]:
+    """A pane on every side of a cabin; one of them may be open."""
+    foot, head = cabin
+    sides = [np.stack([foot[i], foot[j], head[j], head[i]]) for i, j in ((0, 1), (1, 2), (2, 3))]
+    sides.append(np.stack([foot[3], foot[0], head[0], head[3]]))
+    return [pane(side, generator) for side in sides]
+
+
+def _seats(length: float, width: float, sill: float, generator: np.random.Generator) -> Triangles:
+    """Backs and headrests, a wheel to steer, and perhaps who sits there."""
+    parts = []
+    for x in (0.02 * length, -0.2 * length):
+        for y in (-0.22 * width, 0.22 * width):
+            parts.append(shapes.placed(shapes.box(0.1, 0.45, 0.5, sill + 0.05), x, y))
+            parts.append(shapes.placed(shapes.box(0.07, 0.2, sill + 0.1, sill + 0.28), x, y))
+            if generator.random() < 0.25:
+                parts.append(shapes.placed(shapes.cylinder(0.17, 0.5, sill + 0.12), x + 0.2, y))
+                head = shapes.cylinder(0.09, sill + 0.15, sill + 0.38)
+                parts.append(shapes.placed(head, x + 0.2, y))
+    x, y = 0.14 * length, 0.22 * width
+    parts.append(bars([((x, y - 0.18, sill), (x, y + 0.18, sill + 0.02))], 0.02))
+    return np.concatenate(parts)
+
+
+def _wheels(axle: float, width: float, radius: float = 0.32) -> Triangles:
+    wheel = shapes.raised(shapes.on_its_side(shapes.cylinder(radius, -0.1, 0.1)), radius)
+    places = [(x, y) for x in (-axle, axle) for y in (-0.5 * width + 0.08, 0.5 * width - 0.08)]
+    return np.concatenate([shapes.placed(wheel, x, y) for x, y in places])
+
+
+def _tarpaulin(length: float, y: float, top: float, generator: np.random.Generator) -> Triangles:
+    x = np.linspace(-length / 2, length / 2, int(length / 0.15))
+    z = np.linspace(1.15, top, 6)
+    corners = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)[:, 0]
+    corners[..., 1] += generator.uniform(0, 0.04) * np.sin(generator.uniform(2, 12) * x)[:, None]
+    return shapes.sheet(corners)
+
+
+def _part(
+    triangles: Triangles, reflectivity: tuple[float, float], generator: np.random.Generator
+) -> Surface:
+    return Surface(triangles, TrackClass.CAR, evenly_in_logarithm(reflectivity, generator))
+
+
+def joined(surfaces: Iterator[Surface]) -> Surface:
+    """Surfaces of one class as one of them."""
+    parts = list(surfaces)
+    reflectivity = [np.broadcast_to(part.reflectivity, len(part.triangles)) for part in parts]
+    triangles = np.concatenate([part.triangles for part in parts])
+    return replace(parts[0], triangles=triangles, reflectivity=np.concatenate(reflectivity))

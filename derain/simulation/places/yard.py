@@ -1,0 +1,104 @@
+"""A yard or building site, all of ragged things: nets, scaffolds, rubble, scrub, mesh, logs."""
+
+from collections.abc import Callable, Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation.objects import Surface
+from derain.simulation.places import frames, heaps, plants, relief, threads, walls
+from derain.simulation.places.crowd import ragged_things, users
+from derain.simulation.places.relief import Relief, ground_mesh
+from derain.simulation.places.standing import (
+    CLEARANCE,
+    anywhere,
+    assembled,
+    free_places,
+    lined_up,
+    put,
+    strewn,
+)
+from derain.simulation.track import Track
+
+# Made piece by piece along a line, by the length of a piece.
+Piece = Callable[[float, np.random.Generator], Surface | Iterable[Surface]]
+
+
+def lay_out_yard(generator: np.random.Generator) -> Track:
+    """Lays out a yard.
+
+    Nothing in it is smooth. On rough ground heaps of rubble, earth, snow and logs, scaffolds with
+    torn nets, fences of mesh and wire, scrub and brambles up to the sensor, tufts of grass, cables
+    strung above; people, bicycles and vehicles among them, from 2 m on.
+    """
+    winter = generator.random() < 0.4
+    standing = [
+        *users(generator, walkers=(5, 14), cars=(1, 6)),
+        *_heaps(winter, generator),
+        *_lines(winter, generator),
+        *_grass(generator),
+        *ragged_things(generator, anywhere, count=(25, 60), leafy=not winter),
+    ]
+    uneven = Relief.draw(generator.uniform(0.05, 0.4), generator)
+    return assembled(_ground(winter, generator), standing, uneven, generator, _cables(generator))
+
+
+def _ground(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+    kinds = [relief.GRAVEL, relief.TRACK, relief.SNOW if winter else relief.MEADOW, relief.FIELD]
+    chosen = [kinds[which] for which in generator.permutation(len(kinds))[:2]]
+    patches = Relief.draw(1, generator)
+
+    def kind_at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+        return (patches(x, y) > 0).astype(np.int64)
+
+    yield from ground_mesh(chosen, kind_at, generator)
+
+
+def _heaps(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+    def mound(drawn: np.random.Generator) -> Surface:
+        return heaps.bank(drawn.uniform(2, 8), drawn, snow=winter and drawn.random() < 0.7)
+
+    def stones(drawn: np.random.Generator) -> Surface:
+        return heaps.rubble(drawn.uniform(0.5, 2.5), drawn)
+
+    makes = [mound] * 4 + [stones] * 6 + [heaps.logs] * 3
+    places = free_places(int(generator.integers(4, 14)), (4, 40), 3, generator)
+    ordered = [makes[which] for which in generator.permutation(len(makes))]
+    yield from strewn(ordered, places, generator)
+
+
+def _lines(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+    """Fences, nets, scaffolds, hedges and walls, each a line somewhere, turned anyhow."""
+    kinds: list[Piece] = [
+        threads.chain_link,
+        threads.wire_fence,
+        frames.railing,
+        frames.scaffold,
+        lambda length, drawn: threads.net(length, drawn.uniform(1, 5), drawn),
+        lambda length, drawn: walls.rough_wall(length, drawn.uniform(0.5, 4), drawn),
+    ]
+    kinds.append(threads.chain_link if winter else plants.hedge)
+    for x, y in free_places(int(generator.integers(4, 10)), (5, 45), 4, generator):
+        make = kinds[generator.integers(len(kinds))]
+        piece = generator.uniform(4, 9)
+        reach = (0.0, piece * generator.integers(1, 4) + 0.1)
+        line = lined_up(make, lambda at: np.zeros_like(at), reach, piece, generator, 0.1)
+        # Across the way from the sensor to its beginning, so that it does not lead to the sensor.
+        across = np.arctan2(y, x) + np.pi / 2 + generator.normal(0, 0.5)
+        yield from put(line, x, y, across)
+
+
+def _grass(generator: np.random.Generator) -> Iterator[Surface]:
+    for _ in range(generator.integers(1, 4)):
+        count = int(generator.integers(100, 900))
+        distance = CLEARANCE + generator.exponential(generator.uniform(3, 9), count)
+        angle = generator.uniform(0, 2 * np.pi, count)
+        places = distance[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+        yield plants.grass(places, generator)
+
+
+def _cables(generator: np.random.Generator) -> Iterator[Surface]:
+    for _ in range(generator.integers(0, 6)):
+        height, x = generator.uniform(3, 7), generator.uniform(-10, 30)
+        start, end = np.array([x, -25, height]), np.array([x + generator.normal(0, 15), 25, height])
+        yield threads.cable(start, end, generator.uniform(0.2, 1), (0.004, 0.03), generator)
