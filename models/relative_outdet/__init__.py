@@ -1,0 +1,6 @@
+"""3D-OutDet made relative: neighbours seen in steps of the sensor's rays."""
+
+from derain.models.relative_outdet.module import RelativeOutDet
+from derain.models.relative_outdet.network import RelativeOutDetNetwork
+
+__all__ = ["RelativeOutDet", "RelativeOutDetNetwork"]

@@ -1,0 +1,105 @@
+"""The network: a neighbourhood, what the scan holds at its range, the neighbours' opinions."""
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from derain.models.relative_outdet.steps import HARDLY_ANY, NUMBERS, in_steps
+
+# Slope of every activation below 0.
+SLOPE = 0.1
+
+# Shells around the sensor in which what a scan holds is averaged: logarithms of their ranges over
+# 10 m, which are 1.7 to 90 m, and how far each reaches into the next.
+SHELLS = (-1.8, 2.2, 9)
+REACH = 0.35
+
+
+class RelativeOutDetNetwork(nn.Module):
+    """The network, from points of one scan to logits.
+
+    As 3D-OutDet it looks at each point's neighbours, and then at what it made of theirs. Between
+    the two it is told what the scan holds at the range of the point: an isolated return is likelier
+    a drop where there are many.
+
+    Example:
+        >>> network = RelativeOutDetNetwork(neighbours=4).eval()
+        >>> points, distances = torch.rand(6, 3), torch.rand(6, 4)
+        >>> neighbours = torch.arange(6)[:, None] * torch.ones(1, 4, dtype=torch.int64)
+        >>> network(points, distances, neighbours).shape
+        torch.Size([6, 2])
+
+    Args:
+        neighbours: k, the size of a neighbourhood, the point itself included.
+        width: Features of a point.
+        of_neighbour: Features of each neighbour, of where it is.
+        opinion: What a point tells those that it is a neighbour of.
+        context: Features of a shell.
+    """
+
+    centres: Tensor
+
+    def __init__(
+        self,
+        neighbours: int = 9,
+        width: int = 32,
+        of_neighbour: int = 8,
+        opinion: int = 12,
+        context: int = 16,
+    ) -> None:
+        super().__init__()
+        self.neighbour = nn.Linear(NUMBERS, of_neighbour)
+        self.neighbourhood = nn.Linear((neighbours - 1) * of_neighbour + 1, width)
+        self.to_context = nn.Linear(width, context)
+        self.from_context = nn.Linear(2 * context, width)
+        self.to_opinion = nn.Linear(width, opinion)
+        self.opinions = nn.Linear(neighbours * opinion + width, width)
+        self.head = nn.Linear(width, 1)
+        self.register_buffer("centres", torch.linspace(*SHELLS), persistent=False)
+
+    def forward(
+        self,
+        points: Tensor,
+        distances: Tensor,
+        neighbours: Tensor,
+        candidates: Tensor | None = None,
+    ) -> Tensor:
+        """Scores every point of a scan, or every candidate.
+
+        Args:
+            points: x, y, z in metres, in the sensor's frame, float (M, 3).
+            distances: Distances to the neighbours in metres, float (F, k).
+            neighbours: The point itself, then its neighbours, as rows of ``points``, int64 (F, k).
+            candidates: Neighbourhoods of the points around each candidate, as rows of
+                ``neighbours``, the first being its own, int64 (J, k). None where all M points are
+                judged: F = J = M.
+
+        Returns:
+            Logits of "not rain" and "rain", float (J, 2).
+        """
+        seen, far = in_steps(points, distances, neighbours)
+        around = _active(self.neighbour(seen)).flatten(1)
+        features = _active(self.neighbourhood(torch.cat([around, far[:, None]], dim=1)))
+        features = features + self._context(features, far)
+        if candidates is None:
+            candidates, own = neighbours, features
+        else:
+            own = functional.embedding(candidates[:, 0], features)
+        heard = functional.embedding(candidates, _active(self.to_opinion(features))).flatten(1)
+        own = own + _active(self.opinions(torch.cat([heard, own], dim=1)))
+        rain = self.head(own)
+        return torch.cat([torch.zeros_like(rain), rain], dim=1)
+
+    def _context(self, features: Tensor, far: Tensor) -> Tensor:
+        """What the scan holds at the range of each point, and in all."""
+        share = torch.softmax(-(((far[:, None] - self.centres) / REACH) ** 2), dim=1)
+        said = _active(self.to_context(features))
+        of_shell = share.T @ said / (share.sum(dim=0)[:, None] + HARDLY_ANY)
+        of_all = said.sum(dim=0) / (said.shape[0] + HARDLY_ANY)
+        of_all = of_all.expand(said.shape[0], -1)
+        result: Tensor = self.from_context(torch.cat([share @ of_shell, of_all], dim=1))
+        return result
+
+
+def _active(features: Tensor) -> Tensor:
+    return functional.leaky_relu(features, SLOPE)

@@ -1,0 +1,85 @@
+"""Neighbourhoods in steps of the sensor's rays: nothing that differs between sensors."""
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+# Nothing is measured nearer than this, metres, nor right above the sensor; both keep every
+# division finite.
+NEAREST = 0.05
+NEAREST_TO_AXIS = 0.01
+
+# To its third nearest neighbour a ray has a step or two, whichever of the two axes steps finer; the
+# nearest may be the other return of the same ray.
+OF_STEP = 3
+
+# Radians; no sensor's rays lie closer.
+LEAST_STEP = 1e-4
+
+# What is added before logarithms, and to sums that are divided by: as good as nothing of a scan,
+# and all there is of an empty one.
+FEWEST_STEPS = 1e-2
+HARDLY_ANY = 1e-3
+
+# Ranges are logarithms over this one, metres.
+USUAL_RANGE = 10.0
+
+# However far a neighbour is, no number that says so is greater.
+MOST = 10.0
+
+# How many numbers say where a neighbour is.
+NUMBERS = 4
+
+
+def in_steps(points: Tensor, distances: Tensor, neighbours: Tensor) -> tuple[Tensor, Tensor]:
+    """Where each point's neighbours are, seen along its ray and across it.
+
+    A step is the angle between neighbouring rays, estimated from the scan itself: the harmonic mean
+    of the angles between its points and their third neighbours, in which the few that have none
+    near count for nothing. Across a point's ray it is as long as the step at the point's range.
+
+    Args:
+        points: x, y, z in metres, in the sensor's frame, float (M, 3).
+        distances: Distances to the neighbours, metres, float (F, k).
+        neighbours: The point itself, then its neighbours, as rows of ``points``, int64 (F, k).
+
+    Returns:
+        Of each neighbour but the point itself, in steps: the logarithm of its distance; and as
+        inverse hyperbolic sines how much farther it is from the sensor, how far aside it is, on
+        whichever side, and how far up; float (F, k - 1, 4). And the logarithms of the points'
+        ranges over 10 m, float (F,).
+    """
+    own = functional.embedding(neighbours[:, 0], points)
+    x, y, z = own.unbind(1)
+    level = (x * x + y * y).sqrt().clamp_min(NEAREST_TO_AXIS)
+    distance = (x * x + y * y + z * z).sqrt().clamp_min(NEAREST)
+    offset = functional.embedding(neighbours[:, 1:], points) - own[:, None]
+    ahead, left, up = offset.unbind(2)
+    outwards = (x[:, None] * ahead + y[:, None] * left) / level[:, None]
+    aside = (x[:, None] * left - y[:, None] * ahead) / level[:, None]
+    risen = (level[:, None] * up - z[:, None] * outwards) / distance[:, None]
+    farther = _range_of(own[:, None] + offset) - distance[:, None]
+    step = _step(aside, risen, distance)
+    length = (distance * step)[:, None]
+    seen = torch.stack(
+        [
+            torch.log(distances[:, 1:] / length + FEWEST_STEPS),
+            torch.asinh(farther / length),
+            torch.asinh(aside.abs() / length),
+            torch.asinh(risen / length),
+        ],
+        dim=2,
+    )
+    return seen.clamp(-MOST, MOST), torch.log(distance / USUAL_RANGE)
+
+
+def _range_of(places: Tensor) -> Tensor:
+    return places.square().sum(dim=2).sqrt().clamp_min(NEAREST)
+
+
+def _step(aside: Tensor, risen: Tensor, distance: Tensor) -> Tensor:
+    """The angle between neighbouring rays, radians, float ()."""
+    across = (aside[:, OF_STEP - 1].square() + risen[:, OF_STEP - 1].square()).sqrt()
+    angle = (across / distance).clamp_min(LEAST_STEP)
+    count = angle.shape[0] + HARDLY_ANY
+    return count / ((1 / angle).sum() + HARDLY_ANY)
