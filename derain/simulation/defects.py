@@ -110,7 +110,8 @@ class Defects:
         if self.dropped_sectors:
             sector = returns.beam % columns * SECTORS // columns
             lost |= (generator.random(SECTORS) < self.dropped_sectors)[sector]
-        return np.logical_not(lost)
+        received: NDArray[np.bool_] = ~lost
+        return received
 
     def stepped(self, range: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances in metres, float64 (N,), rounded to the step of the sensor."""

@@ -210,7 +210,7 @@ def _check_spans(spans: Any, subject: str) -> None:
     for name, kind in get_type_hints(type(spans)).items():
         if kind == Span:
             low, high = getattr(spans, name)
-            if not -math.inf < low <= high < math.inf:
+            if not (low <= high and math.isfinite(high - low)):
                 raise _impossible(subject, spans, name, "Give two numbers, the lower one first.")
 
 
