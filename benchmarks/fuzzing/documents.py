@@ -22,8 +22,12 @@ from derain.files.frame_times import read_frame_times
 from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
 from derain.fusion.extrinsics import read_extrinsics
 from derain.simulation.campaign import Campaign
+from derain.simulation.drawn_sensor import draw_sensor
 from derain.simulation.manifest import MANIFEST, rates_of_sequences, read_manifest
+from derain.simulation.returns import Returns
+from derain.simulation.sensor import Sensor
 from derain.simulation.sensor_file import load_sensor, packaged_sensors
+from derain.simulation.spans import SensorSpans
 from derain.teaching.manifest import LABELS, TAUGHT_PARTS, Manifest
 
 SCENE = """
@@ -66,6 +70,31 @@ scans:
 - {key: '000000', scan: ../drive/000000.bin, sequence: drive, number: 0, part: train}
 - {key: a/000001, scan: /drives/000001.bin, sequence: drive, number: 1, part: validation}
 """
+SENSOR = """\
+pattern: rosette
+rows: 2
+columns: 50
+row_inclinations: [0.2, -0.2]
+row_azimuths: [1.5, -1.5]
+prism_turns: [12.5, -7.5]
+tilt: [1.5, -12.0]
+range_noise_growth: 1.0e-3
+weak_range_noise: 0.05
+encoder_noise: 0.02
+returns: dual
+defects: {dropped: 0.1, dropped_rows: 0.1, dropped_sectors: 0.1, mixed: 0.5, merging: 2.0,
+  range_step: 0.004, copies: 0.5}
+"""
+SPANS = """\
+kinds: {spinning: 2, front: 1, rosette: 0.5}
+returns: {strongest: 1, dual: 1}
+spinning_rows: [16, 32]
+spinning_field: [20, 60]
+azimuth_step: [0.5, 1.0]
+most_beams: 20000
+tilt: [0, 3]
+defects: {none: 0.2, dropped: [0.0, 0.3], merging: [0.5, 2.0]}
+"""
 TIMES = "frame,timestamp,other\n000000,1.5,a\n000001.bin,1.6,b\n000002,1.7,\n"
 WEATHER = "time,rain_rate_mm_h,wind\n0,25.0,1\n1,nan,1\n2,10,2\n"
 
@@ -84,7 +113,8 @@ def readers() -> list[Reader]:
         _of_yaml("extrinsics", _read_extrinsics, EXTRINSICS),
         _of_yaml("parameters", _read_parameters, filters),
         _of_yaml("rates", _read_rates, ['"005": 25\n"010": 10.5\n']),
-        _of_yaml("sensor", _read_sensor, sensors),
+        _of_yaml("sensor", _read_sensor, [*sensors, SENSOR]),
+        _of_yaml("spans", _read_spans, [SPANS]),
         _of_yaml("taught", _read_taught, [TAUGHT]),
         Reader(
             "manifest",
@@ -179,7 +209,22 @@ def _read_sensor(path: Path) -> None:
     numbers = np.hstack(astuple(sensor)[:3])
     assert np.isfinite(numbers).all(), numbers
     if sensor.rows * sensor.columns < 10**5:
-        assert np.isfinite(sensor.beams()).all()
+        _measure(sensor)
+
+
+def _read_spans(path: Path) -> None:
+    sensor = draw_sensor(SensorSpans.of(Entry.of_yaml(path)), np.random.default_rng(0))
+    if sensor.rows * sensor.columns < 10**5:
+        _measure(sensor)
+
+
+def _measure(sensor: Sensor) -> None:
+    beams = len(sensor.beams())
+    range_ = np.linspace(sensor.minimum_range, sensor.maximum_range, beams)
+    returns = Returns(range_, np.full(beams, 0.5), np.zeros(beams, np.int64), np.arange(beams))
+    scan = sensor.measure(returns, np.random.default_rng(0))
+    assert np.isfinite(sensor.beams()).all()
+    assert not np.isnan(scan.xyz).any()
 
 
 def _read_manifest(path: Path) -> None:

@@ -110,7 +110,7 @@ class Defects:
         if self.dropped_sectors:
             sector = returns.beam % columns * SECTORS // columns
             lost |= (generator.random(SECTORS) < self.dropped_sectors)[sector]
-        return np.logical_not(lost)
+        return np.asarray(~lost, np.bool_)
 
     def stepped(self, range: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances in metres, float64 (N,), rounded to the step of the sensor."""

@@ -132,4 +132,4 @@ def _laser_offsets(lasers: int, generator: np.random.Generator) -> tuple[float, 
 
 def _columns(width: float, step: float, rows: int, spans: SensorSpans) -> int:
     """Columns of a field so wide, in degrees, so many degrees apart."""
-    return max(min(math.ceil(width / step), spans.most_beams // rows), 1)
+    return max(math.ceil(min(width / step, spans.most_beams // rows)), 1)

@@ -45,8 +45,8 @@ class DefectSpans:
     dropped: Span = (0.0, 0.3)
     dropped_rows: Span = (0.0, 0.05)
     dropped_sectors: Span = (0.0, 0.05)
-    mixed: Span = (0.1, 0.6)
-    merging: Span = (0.5, 3.0)
+    mixed: Span = (0.02, 0.5)
+    merging: Span = (0.2, 2.0)
     range_step: Span = (0.002, 0.02)
     copies: Span = (0.0, 0.0)
 
@@ -210,7 +210,7 @@ def _check_spans(spans: Any, subject: str) -> None:
     for name, kind in get_type_hints(type(spans)).items():
         if kind == Span:
             low, high = getattr(spans, name)
-            if not -math.inf < low <= high < math.inf:
+            if not (low <= high and math.isfinite(high - low)):
                 raise _impossible(subject, spans, name, "Give two numbers, the lower one first.")
 
 

@@ -70,6 +70,13 @@ def test_columns_are_as_far_apart_as_stated_or_farther_where_beams_would_be_too_
             assert step <= high or (sensor.columns + 1) * sensor.rows > SPANS.most_beams
 
 
+def test_columns_that_no_sensor_could_have_are_as_many_as_may_be() -> None:
+    spans = SensorSpans(
+        kinds={"spinning": 1.0}, spinning_rows=(16,), azimuth_step=(5e-324, 5e-324), most_beams=8000
+    )
+    assert draw_sensor(spans, np.random.default_rng(0)).columns == 500
+
+
 def test_one_kind_alone_can_be_drawn() -> None:
     spans = SensorSpans(kinds={"rosette": 1.0})
     assert all(

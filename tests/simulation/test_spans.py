@@ -32,6 +32,7 @@ def test_a_document_states_what_differs_from_the_defaults(tmp_path: Path) -> Non
     [
         ("tilt: [3, 1]", "tilt"),
         ("tilt: 3", "tilt"),
+        ("tilt: [-1.0e+308, 1.0e+308]", "tilt"),
         ("minimum_range: [0, 1]", "minimum_range"),
         ("detection_threshold: [-1, 1]", "detection_threshold"),
         ("kinds: {round: 1}", "kinds"),
