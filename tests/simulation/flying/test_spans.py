@@ -24,6 +24,7 @@ def test_every_number_is_within_its_span_or_switched_off(seed: int, name: str) -
     kind = KINDS[name]
     drawn = kind.draw(name, np.random.default_rng(seed))
     assert drawn.kind == name
+    assert {type(getattr(drawn, one.name)) for one in fields(drawn)} == {str, int, float}
     for one in fields(kind):
         if isinstance(span := getattr(kind, one.name), tuple):
             off = one.name in ("reach", "cut_off", "drift", "haze")
