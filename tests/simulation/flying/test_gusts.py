@@ -26,6 +26,15 @@ def test_an_uneven_density_varies_smoothly_between_nothing_and_the_greatest(form
     assert (here != Gusts(form, 2.0, 2.0, 8)(PLACES)).any()
 
 
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("contrast", [0.5, 2.0])
+def test_the_mean_over_many_fields_is_that_of_gaussian_ones(
+    form: GustForm, contrast: float
+) -> None:
+    means = [Gusts(form, 2.0, contrast, seed)(PLACES[:2000]).mean() for seed in range(40)]
+    assert np.mean(means) == pytest.approx(Gusts(form, 2.0, contrast, 0).mean, rel=0.1)
+
+
 def test_wisps_fill_less_than_sheets_and_sheets_less_than_gusts() -> None:
     thick = [(Gusts(form, 2.0, 2.0, 3)(PLACES) > 0.5).mean() for form in FORMS]
     assert thick[0] > thick[1] > thick[2] > 0
