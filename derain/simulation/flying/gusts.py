@@ -53,6 +53,20 @@ class Gusts:
                 away = self._field(0, place) ** 2 + self._field(1, place) ** 2
         return THINNEST + (1 - THINNEST) * np.exp(-(self._contrast**2) * away)
 
+    @property
+    def mean(self) -> float:
+        """Mean density over the greatest, as of Gaussian fields."""
+        steepness = 1 + 2 * self._contrast**2
+        match self._form:
+            case "even":
+                return 1.0
+            case "gusts":
+                return 0.5
+            case "sheets":
+                return THINNEST + (1 - THINNEST) / math.sqrt(steepness)
+            case "filaments":
+                return THINNEST + (1 - THINNEST) / steepness
+
     def _field(self, number: int, place: NDArray[np.float64]) -> NDArray[np.float64]:
         waves = np.cos(place @ self._wave[number] + self._phase[number])
         return np.asarray(waves.sum(axis=1) * math.sqrt(2 / WAVES))

@@ -8,7 +8,7 @@ from derain.simulation.flying.gusts import Gusts
 from derain.simulation.flying.precipitation import Precipitation
 from derain.simulation.sensor import Returns, Sensor
 
-# Size of the patches, in units of unit vectors: a tenth to a half of a radian.
+# Shortest wave of the patches over the view, radians; the longest is four times it.
 PATCH = 0.15
 
 
@@ -21,18 +21,23 @@ def draw_haze(
 ) -> Returns:
     """Draws what a haze returns: of a share of the beams, exponentially distributed in distance.
 
-    The share of a beam is the mean one times e^(patches · a smooth random field over the view). How
-    strong a return is over the threshold is uniform in its logarithm. All of it is a modelling
-    choice; a surface nearer than the return takes its place.
+    The distance to the first of many weak scatterers in an even medium is exponential. Where there
+    are patches, the share of a beam follows a smooth random field over the view, whose mean is the
+    share asked for. How strong a return is over the threshold is even in its logarithm. All of it
+    is a modelling choice; what would lie behind the surface that ends the beam is left out.
 
-    Source: the exponential is the law of a first return in an even medium, as in Goodin et al.
-        2019, "Predicting the influence of rain on LIDAR in ADAS".
+    Args:
+        clear: What each beam would return through clear air.
+        beams: Unit vectors along them, float64 (N, 3), sensor frame.
+        precipitation: What flies, the haze in it.
+        sensor: The sensor.
+        generator: Random generator.
     """
     share = np.full(len(beams), precipitation.haze)
-    if precipitation.haze_patches:
+    if precipitation.haze_patches and len(beams):
         field = Gusts("gusts", PATCH, precipitation.haze_patches, precipitation.gust_seed + 1)
         patches = field(beams)
-        share *= patches / max(patches.mean(), 1e-9) if len(beams) else 1
+        share *= patches / max(patches.mean(), 1e-9)
     lit = np.flatnonzero(generator.random(len(beams)) < share)
     distance = sensor.minimum_range + generator.exponential(precipitation.haze_depth, len(lit))
     ratio = precipitation.haze_strength ** generator.random(len(lit))

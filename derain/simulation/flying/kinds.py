@@ -130,10 +130,11 @@ class Kind:
             for one in fields(self)
             if isinstance(getattr(self, one.name), tuple)
         }
-        reached, cut, uneven, drifts, sprays, hazy = generator.random(6) < (
+        chances = (
             *(self.reach_chance, self.cut_off_chance, self.gust_chance),
             *(self.drift_chance, self.plume_chance, self.haze_chance),
         )
+        reached, cut, uneven, drifts, sprays, hazy = (generator.random(6) < chances).tolist()
         form = UNEVEN[generator.integers(len(UNEVEN))]
         plumes = int(generator.integers(1, 4))
         drawn["reach"] *= reached

@@ -17,10 +17,8 @@ from derain.simulation.flying.sizes import Sizes
 from derain.simulation.flying.slices import Slices
 from derain.simulation.sensor import Returns, Sensor
 
-# Mean and largest diameter of spray, millimetres, modelling choices: finer than rain, of which it
-# is torn.
-SPRAY_DIAMETER = 0.5
-LARGEST_SPRAY = 3.0
+# Spray has a mean diameter of .5 mm and at most 3, modelling choices: it is torn from rain.
+SPRAY = Sizes.gamma(0.5, 1, 3.0)
 
 
 def meet(
@@ -34,8 +32,9 @@ def meet(
 
     Particles have a place in space: one that is wide, or lies where beams overlap, is met by
     several. Each takes the share of the light that it covers from what lies behind it, on the way
-    there and back; those that are too small to be seen take theirs evenly from all beams. A beam
-    reports the strongest or the last of all that it could detect, or both.
+    there and back. Besides, all that falls takes light evenly from all beams, as its mean density
+    does; that those which are drawn one by one count in both is a modelling choice. A beam reports
+    the strongest or the last of all that it could detect, or both.
 
     Args:
         clear: What each beam would return through clear air to a perfect detector: one row for
@@ -51,9 +50,25 @@ def meet(
     """
     falling = uncrowded(precipitation, sensor)
     sizes = _sizes(precipitation)
-    extinction = falling * sizes.extinction
+    gusts = Gusts(
+        precipitation.gust_form,
+        precipitation.gust_length,
+        precipitation.gust_contrast,
+        precipitation.gust_seed,
+    )
+    extinction = falling * gusts.mean * sizes.extinction
+    layer = GroundLayer(-sensor.mounting_height, precipitation.drift_height, gusts)
+    plumes = draw_plumes(
+        *(clear, beams, -sensor.mounting_height),
+        *(precipitation.plumes, precipitation.plume_length),
+        generator,
+    )
     met = encounter(
-        _populations(falling, sizes, clear, beams, precipitation, sensor, generator),
+        [
+            Population(falling, sizes, Air(gusts)),
+            Population(falling * precipitation.drift, sizes, layer),
+            *(Population(precipitation.plume_number, SPRAY, plume) for plume in plumes),
+        ],
         _open_beams(clear, beams, precipitation, sensor),
         precipitation.flicker,
         generator,
@@ -90,35 +105,6 @@ def _open_beams(
 ) -> OpenBeams:
     near = np.full(len(beams), sensor.minimum_range)
     return OpenBeams(beams, Stretch(near, clear.range), Optics.of(precipitation, sensor))
-
-
-def _populations(
-    falling: float,
-    sizes: Sizes,
-    clear: Returns,
-    beams: NDArray[np.float64],
-    precipitation: Precipitation,
-    sensor: Sensor,
-    generator: np.random.Generator,
-) -> list[Population]:
-    """All that flies: what falls, what drifts along the ground, and spray."""
-    gusts = Gusts(
-        precipitation.gust_form,
-        precipitation.gust_length,
-        precipitation.gust_contrast,
-        precipitation.gust_seed,
-    )
-    ground = -sensor.mounting_height
-    layer = GroundLayer(ground, precipitation.drift_height, gusts)
-    spray = Sizes.gamma(SPRAY_DIAMETER, 1, LARGEST_SPRAY)
-    plumes = draw_plumes(
-        clear, beams, ground, precipitation.plumes, precipitation.plume_length, generator
-    )
-    return [
-        Population(falling, sizes, Air(gusts)),
-        Population(falling * precipitation.drift, sizes, layer),
-        *(Population(precipitation.plume_number, spray, plume) for plume in plumes),
-    ]
 
 
 def _detected_particles(

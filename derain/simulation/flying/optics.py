@@ -39,8 +39,8 @@ class Optics:
         """How a sensor sees some precipitation.
 
         Where that states a reach, the gain is such that a particle of its mean diameter is at the
-        detection threshold there: no real sensor's response at short range is a plain square law,
-        and what is seen of snow differs more between sensors than their published data do.
+        detection threshold there. A modelling choice: how strongly a particle returns over a
+        surface, and how a sensor weighs what is near, is not published for most of them.
         """
         aperture = precipitation.spill * sensor.aperture
         spread = precipitation.spill * sensor.beam_spread

@@ -116,7 +116,7 @@ def _by_nearest(
     best = drawn_for[unsettled].copy()
     best[meetings.particle[outwards]] = meetings.beam[outwards]
     kept[unsettled] = best == drawn_for[unsettled]
-    return kept
+    return np.asarray(kept)
 
 
 def _meetings(particles: Particles, beams: OpenBeams) -> Meetings:

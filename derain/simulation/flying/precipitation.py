@@ -11,8 +11,8 @@ GustForm = Literal["even", "gusts", "sheets", "filaments"]
 
 # Diameters that are drawn at all, millimetres. What is smaller returns too little to be seen one by
 # one; the largest aggregates of snow on record are rare exceptions.
-# Source: Lawson, Stewart and Angus 1998, "Observations of the origin and evolution of extremely
-# large snowflakes", for aggregates of several centimetres.
+# Source: Lawson, Stewart and Angus 1998, "Observations and numerical simulations of the origin and
+# development of very large snowflakes", for aggregates of several centimetres.
 SMALLEST, LARGEST = 0.2, 40.0
 
 

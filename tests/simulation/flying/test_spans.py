@@ -1,0 +1,92 @@
+"""What precipitation is drawn from, and reading it."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from derain.errors import InputError
+from derain.files.documents import Entry
+from derain.simulation.flying.kinds import Kind
+from derain.simulation.flying.spans import KINDS, PrecipitationSpans, draw_precipitation
+
+
+def read(value: object) -> PrecipitationSpans:
+    return PrecipitationSpans.of(Entry(Path("world.yaml"), "precipitation", value))
+
+
+@settings(max_examples=80, deadline=None)
+@given(seed=st.integers(0, 2**32), name=st.sampled_from(sorted(KINDS)))
+def test_every_number_is_within_its_span_or_switched_off(seed: int, name: str) -> None:
+    kind = KINDS[name]
+    drawn = kind.draw(name, np.random.default_rng(seed))
+    assert drawn.kind == name
+    assert {type(getattr(drawn, one.name)) for one in fields(drawn)} == {str, int, float}
+    for one in fields(kind):
+        if isinstance(span := getattr(kind, one.name), tuple):
+            off = one.name in ("reach", "cut_off", "drift", "haze")
+            value = getattr(drawn, one.name)
+            assert span[0] <= value <= span[1] or (off and value in (0, np.inf)), one.name
+    assert drawn == kind.draw(name, np.random.default_rng(seed))
+
+
+def test_kinds_are_drawn_by_their_weights() -> None:
+    spans = read({"snow": {"weight": 3}, "rain": {"weight": 1}, "fog": {"weight": 0}})
+    generator = np.random.default_rng(1)
+    names = [draw_precipitation(spans, generator).kind for _ in range(2000)]
+    assert set(names) == {"snow", "rain"}
+    assert names.count("snow") == pytest.approx(1500, abs=4 * np.sqrt(2000 * 3 / 16))
+
+
+def test_chances_are_those_stated() -> None:
+    kind = Kind(reach_chance=0.25, cut_off_chance=1, gust_chance=0, drift_chance=0.5)
+    generator = np.random.default_rng(2)
+    drawn = [kind.draw("rain", generator) for _ in range(1000)]
+    assert sum(one.reach > 0 for one in drawn) == pytest.approx(250, abs=4 * 14)
+    assert sum(one.drift > 0 for one in drawn) == pytest.approx(500, abs=4 * 16)
+    assert all(np.isfinite(one.cut_off) for one in drawn)
+    assert all(one.gust_form == "even" for one in drawn)
+    assert all(one.plumes == 0 for one in drawn)
+
+
+def test_numbers_over_decades_are_even_in_their_logarithms() -> None:
+    kind, generator = Kind(number=(1, 10_000)), np.random.default_rng(3)
+    below = sum(kind.draw("snow", generator).number < 100 for _ in range(1000))
+    assert below == pytest.approx(500, abs=64)
+
+
+def test_what_a_document_leaves_out_stays_as_it_is() -> None:
+    spans = read({"snow": {"number": [10, 20.5], "reach_chance": 0}})
+    ((name, kind),) = spans.kinds
+    assert name == "snow"
+    assert kind.number == (10, 20.5)
+    assert kind.reach_chance == 0
+    assert kind.diameter == KINDS["snow"].diameter
+    assert dict(PrecipitationSpans().kinds) == KINDS
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ({"hail": {}}, "hail"),
+        ({"snow": {"colour": [1, 2]}}, "colour"),
+        ({"snow": {"number": [2, 1]}}, "number"),
+        ({"snow": {"number": [0, 1]}}, "number"),
+        ({"snow": {"reflectivity": [0.5, 1.5]}}, "reflectivity"),
+        ({"snow": {"largest": [4, 400]}}, "largest"),
+        ({"snow": {"spill": [0.5, 1]}}, "spill"),
+        ({"snow": {"number": 5}}, "number"),
+        ({"snow": {"haze_chance": 2}}, "haze_chance"),
+        ({"snow": {"weight": -1}}, "weight"),
+        ({"snow": {"weight": 0}}, "weight"),
+        ({}, "weight"),
+        ([1], "mapping"),
+    ],
+)
+def test_a_wrong_document_is_said_with_its_place(value: object, said: str) -> None:
+    with pytest.raises(InputError, match=r"world\.yaml") as caught:
+        read(value)
+    assert said in str(caught.value)
