@@ -96,8 +96,14 @@ def _breakdown(right: float, generator: np.random.Generator) -> Iterator[Surface
 
 
 def _beside(edges: tuple[float, float], generator: np.random.Generator) -> Iterator[Surface]:
-    """Delineators, signs, emergency telephones and lamps."""
+    """Delineators, signs, emergency telephones and lamps; weeds, and what lies on the shoulder."""
     for y, side in zip(edges, (-1, 1), strict=True):
+        count = int(generator.integers(20, 300))
+        x, out = generator.uniform(-30, 60, count), generator.exponential(1.5, count)
+        yield plants.grass(np.column_stack([x, y + side * (out - 1)]), generator)
+        for x in along(-30, 50, (5, 40), generator):
+            litter = heaps.rubble(generator.uniform(0.3, 1), generator)
+            yield from put(litter, x, y + side * generator.uniform(-1.5, 0.5))
         for x in along(*SIGHT, (4, 25), generator):
             yield from put(frames.thin_pole(generator), x, y + side * generator.uniform(0.8, 3))
 

@@ -24,7 +24,7 @@ REFLECTIVITY = (0.01, 0.6)
 LEAF = (0.005, 0.06)
 
 # How often a ray through the middle of a plant meets a leaf, and the most leaves that one has.
-COVER = (0.15, 3.0)
+COVER = (0.05, 3.0)
 MOST_LEAVES = 6000
 
 # Children of a bough, and a child's length over its parent's.
