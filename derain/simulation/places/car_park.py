@@ -16,6 +16,7 @@ from derain.simulation.places.standing import (
     lined_up,
     put,
     shared,
+    straight,
     strewn,
 )
 from derain.simulation.shapes import placed
@@ -118,9 +119,7 @@ def _edge(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
     for quarter in range(4):
         make = makes[generator.integers(len(makes))]
         piece = 19.0 if make is walls.facade else 9.5
-        for surface in lined_up(
-            make, lambda x: np.full(np.shape(x), REACH), (-REACH, REACH), piece, generator, 0.15
-        ):
+        for surface in lined_up(make, straight(REACH), (-REACH, REACH), piece, generator, 0.15):
             yield surface.placed(0, 0, quarter * np.pi / 2)
 
 

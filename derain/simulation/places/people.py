@@ -1,4 +1,4 @@
-"""People as a sensor meets them: striding, with arms and what they carry, children too; cyclists."""
+"""People as a sensor meets them: striding, with arms and what they carry, children, cyclists."""
 
 import numpy as np
 from numpy.typing import NDArray

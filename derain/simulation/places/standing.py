@@ -81,6 +81,11 @@ def strewn(
         yield from put(make(generator), x, y, heading)
 
 
+def straight(y: float) -> Line:
+    """The line along x at a y."""
+    return lambda x: np.full(np.shape(x), y)
+
+
 def put(
     things: Surface | Iterable[Surface], x: float, y: float, heading: float = 0.0
 ) -> Iterator[Surface]:
