@@ -185,4 +185,5 @@ def nearest_to_axis(triangles: Triangles) -> NDArray[np.float64]:
     share = np.clip(-(first * edge).sum(axis=-1) / length, 0, 1)
     places = first + share[..., None] * edge
     nearest = (places * places).sum(axis=-1).argmin(axis=1)
-    return places[np.arange(len(places)), nearest].T
+    there: NDArray[np.float64] = places[np.arange(len(places)), nearest].T
+    return there

@@ -78,14 +78,17 @@ def _rows(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
 
 
 def _people(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
-    """People in the lane and between cars, and a few who cycle."""
+    """People in the lanes and between cars, near and far, and a few who cycle."""
 
     def in_a_lane(x: float, y: float) -> bool:
-        return abs(x) < REACH and abs(y - aside) < LANE / 2 + 0.8
+        # The next lanes are beyond two rows.
+        across = abs(y - aside) % (LANE + 2 * LOT_LENGTH + 0.3)
+        return max(abs(x), abs(y)) < REACH and across < LANE / 2 + 0.8
 
-    makes = shared([(people.person, 8), (people.cyclist, 1)], 16, generator)
-    count = int(generator.integers(6, 16))
-    yield from strewn(makes, free_places(count, (2.2, 35), 0.9, generator, in_a_lane), generator)
+    for count, distances in ((generator.integers(6, 16), (2.2, 35)), (6, (15, 50))):
+        makes = shared([(people.person, 8), (people.cyclist, 1)], int(count), generator)
+        places = free_places(len(makes), distances, 0.9, generator, in_a_lane)
+        yield from strewn(makes, places, generator)
 
 
 def _between(aside: float, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:

@@ -64,7 +64,7 @@ def logs(generator: np.random.Generator) -> Surface:
         np.array([[x, y, z] for y, z in places]) + generator.normal(0, 0.05, (len(places), 3))
         for x in (0, length)
     ]
-    return _matter(shapes.rods(*ends, radius, sides=8), DULL, generator)
+    return _matter(shapes.rods(ends[0], ends[1], radius, sides=8), DULL, generator)
 
 
 def _matter(

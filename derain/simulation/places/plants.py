@@ -123,7 +123,7 @@ def _leaves(radii: tuple[float, float, float], generator: np.random.Generator) -
     cover = evenly_in_logarithm(COVER, generator)
     count = int(np.clip(cover * shadow / _area(size), 20, MOST_LEAVES))
     centres = shapes.inside_ellipsoid(count, radii, generator)
-    clumps = generator.integers(2, 1 + max(3, count // 15))
+    clumps = int(generator.integers(2, 1 + max(3, count // 15)))
     own = shapes.inside_ellipsoid(clumps, radii, generator)[generator.integers(clumps, size=count)]
     centres += generator.choice([0.0, 0.5, 0.85]) * (own - centres)
     return shapes.leaves(centres, size, generator)
