@@ -29,9 +29,9 @@ To train takes three or more; one is enough to look at.
 
 In the facility nothing but rain is near, as in the real one: a rule that learns places finds it. In
 the streets there are boughs and bushes between the drops. The other layouts are full of what looks
-like drops and is none: windows, nets, twigs, grass, and people near the sensor. With --speed the sensor drives along a
-street, without a radar; with --traffic others move, whether it drives or stands. Beside such scans
-lies poses.txt, and the upper 16 bits of their labels number what moves.
+like drops and is none: windows, nets, twigs, grass, and people near the sensor. With --speed the
+sensor drives along a street, without a radar; with --traffic others move, whether it drives or
+stands. Beside such scans lies poses.txt, and the upper 16 bits of their labels number what moves.
 
 The sequences take the rain rates in turn, 0 being clean. An interrupted run is taken up where it
 ended. To train on the data set:

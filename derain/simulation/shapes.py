@@ -131,7 +131,8 @@ def rods(
     ring = np.cos(angle)[:, None] * first[:, None] + np.sin(angle)[:, None] * second[:, None]
     ring *= np.broadcast_to(radius, len(starts))[:, None, None]
     lower, upper = starts[:, None] + ring, ends[:, None] + taper * ring
-    next_lower, next_upper = np.roll(lower, -1, axis=1), np.roll(upper, -1, axis=1)
+    following = (np.arange(sides) + 1) % sides
+    next_lower, next_upper = lower[:, following], upper[:, following]
     halves = np.stack([lower, next_lower, next_upper, lower, next_upper, upper], axis=2)
     return halves.reshape(-1, 3, 3)
 
@@ -163,13 +164,14 @@ def across(along: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     Args:
         along: Vectors other than 0, (R, 3).
     """
-    upright = np.abs(along[:, 2]) > 0.9 * np.linalg.norm(along, axis=1)
-    other = np.where(upright[:, None], (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    first = np.cross(along, other)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    second = np.cross(along, first)
-    second /= np.linalg.norm(second, axis=1, keepdims=True)
-    return first, second
+    x, y, z = along.T
+    length = np.sqrt(x * x + y * y + z * z)
+    upright, nothing = np.abs(z) > 0.9 * length, np.zeros_like(x)
+    # Across the z axis, or across the x axis where the vector is almost along z.
+    first = np.where(upright, [nothing, z, -y], [y, -x, nothing])
+    a, b, c = first = first / np.sqrt((first * first).sum(axis=0))
+    second = np.stack([y * c - z * b, z * a - x * c, x * b - y * a]) / length
+    return first.T, second.T
 
 
 def nearest_to_axis(triangles: Triangles) -> NDArray[np.float64]:
@@ -183,4 +185,5 @@ def nearest_to_axis(triangles: Triangles) -> NDArray[np.float64]:
     share = np.clip(-(first * edge).sum(axis=-1) / length, 0, 1)
     places = first + share[..., None] * edge
     nearest = (places * places).sum(axis=-1).argmin(axis=1)
-    return places[np.arange(len(places)), nearest].T
+    there: NDArray[np.float64] = places[np.arange(len(places)), nearest].T
+    return there

@@ -66,3 +66,34 @@ def test_leaves_stay_about_their_centres() -> None:
     leaves = shapes.leaves(centres, 0.02, np.random.default_rng(1))
     assert np.abs(leaves - centres[:, None]).max() < 0.1
     assert (leaves - centres[:, None]).std() == pytest.approx(0.02, rel=0.1)
+
+
+def test_rods_run_between_their_ends_at_their_radius() -> None:
+    starts, ends = np.random.default_rng(0).uniform(-3, 3, (2, 40, 3))
+    corners = shapes.rods(starts, ends, 0.1, sides=5).reshape(40, -1, 3)
+    along = (ends - starts) / np.linalg.norm(ends - starts, axis=1, keepdims=True)
+    offset = corners - starts[:, None]
+    beside = offset - (offset * along[:, None]).sum(-1, keepdims=True) * along[:, None]
+    assert np.linalg.norm(beside, axis=-1) == pytest.approx(0.1)
+    reach = (offset * along[:, None]).sum(-1)
+    assert reach.min(axis=1) == pytest.approx(0, abs=1e-9)
+    assert reach.max(axis=1) == pytest.approx(np.linalg.norm(ends - starts, axis=1))
+
+
+def test_a_flat_sheet_has_the_area_of_its_outline() -> None:
+    x, y = np.meshgrid(np.linspace(0, 4, 6), np.linspace(0, 3, 9), indexing="ij")
+    assert area(shapes.sheet(np.stack([x, y, 0 * x], axis=-1))) == pytest.approx(12)
+
+
+def test_blades_have_half_the_area_of_their_length_by_their_width() -> None:
+    starts, ends = np.random.default_rng(0).uniform(-3, 3, (2, 40, 3))
+    blades = shapes.blades(starts, ends, 0.02, np.random.default_rng(1))
+    assert area(blades) == pytest.approx(0.01 * np.linalg.norm(ends - starts, axis=1).sum())
+
+
+def test_the_nearest_places_to_the_axis_are_the_nearest_of_many_on_the_edges() -> None:
+    triangles = np.random.default_rng(0).uniform(-3, 3, (50, 3, 3))
+    share = np.linspace(0, 1, 2001)[:, None, None, None]
+    edges = (1 - share) * triangles + share * np.roll(triangles, -1, axis=1)
+    expected = np.hypot(edges[..., 0], edges[..., 1]).min(axis=(0, 2))
+    assert np.hypot(*shapes.nearest_to_axis(triangles)) == pytest.approx(expected, abs=2e-3)

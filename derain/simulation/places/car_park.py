@@ -16,6 +16,7 @@ from derain.simulation.places.standing import (
     lined_up,
     put,
     shared,
+    straight,
     strewn,
 )
 from derain.simulation.shapes import placed
@@ -77,14 +78,17 @@ def _rows(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
 
 
 def _people(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
-    """People in the lane and between cars, and a few who cycle."""
+    """People in the lanes and between cars, near and far, and a few who cycle."""
 
     def in_a_lane(x: float, y: float) -> bool:
-        return abs(x) < REACH and abs(y - aside) < LANE / 2 + 0.8
+        # The next lanes are beyond two rows.
+        across = abs(y - aside) % (LANE + 2 * LOT_LENGTH + 0.3)
+        return max(abs(x), abs(y)) < REACH and across < LANE / 2 + 0.8
 
-    makes = shared([(people.person, 8), (people.cyclist, 1)], 16, generator)
-    count = int(generator.integers(6, 16))
-    yield from strewn(makes, free_places(count, (2.2, 35), 0.9, generator, in_a_lane), generator)
+    for count, distances in ((generator.integers(6, 16), (2.2, 35)), (6, (15, 50))):
+        makes = shared([(people.person, 8), (people.cyclist, 1)], int(count), generator)
+        places = free_places(len(makes), distances, 0.9, generator, in_a_lane)
+        yield from strewn(makes, places, generator)
 
 
 def _between(aside: float, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
@@ -118,9 +122,7 @@ def _edge(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
     for quarter in range(4):
         make = makes[generator.integers(len(makes))]
         piece = 19.0 if make is walls.facade else 9.5
-        for surface in lined_up(
-            make, lambda x: np.full(np.shape(x), REACH), (-REACH, REACH), piece, generator, 0.15
-        ):
+        for surface in lined_up(make, straight(REACH), (-REACH, REACH), piece, generator, 0.15):
             yield surface.placed(0, 0, quarter * np.pi / 2)
 
 

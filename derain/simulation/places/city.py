@@ -1,4 +1,4 @@
-"""A city street: houses with windows, parked cars and bicycles, people, trees, scaffolds, cables."""
+"""A city street: windows, parked cars and bicycles, people, trees, scaffolds, cables."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -12,7 +12,15 @@ from derain.simulation.places import frames, people, plants, relief, threads, ve
 from derain.simulation.places.crowd import mixed, ragged_things, users
 from derain.simulation.places.drawing import along
 from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.standing import assembled, free_places, lined_up, put, shared, strewn
+from derain.simulation.places.standing import (
+    assembled,
+    free_places,
+    lined_up,
+    put,
+    shared,
+    straight,
+    strewn,
+)
 from derain.simulation.track import Track
 
 SIGHT = (-60.0, 85.0)
@@ -83,12 +91,9 @@ def _houses(section: Section, generator: np.random.Generator) -> Iterator[Surfac
     make: Callable[[float, np.random.Generator], Iterable[Surface]] = walls.facade
     for side, front in zip((-1, 1), section.fronts, strict=True):
         gaps, piece = generator.uniform(0, 0.3), generator.uniform(9, 18)
-        turned = -1 if side < 0 else 1
-        for house in lined_up(
-            make, lambda x: np.full(np.shape(x), abs(front)), SIGHT, piece, generator, gaps
-        ):
+        for house in lined_up(make, straight(abs(front)), SIGHT, piece, generator, gaps):
             # Houses are seen from the street: those on the right are those on the left, turned.
-            yield house if turned > 0 else house.placed(SIGHT[0] + SIGHT[1], 0, np.pi)
+            yield house if side > 0 else house.placed(SIGHT[0] + SIGHT[1], 0, np.pi)
     far = walls.facade(30, generator)
     yield from put(far, SIGHT[1], 15, -np.pi / 2)
 

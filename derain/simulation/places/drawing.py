@@ -15,7 +15,8 @@ def many_evenly_in_logarithm(
     span: Span, count: int, generator: np.random.Generator
 ) -> NDArray[np.float64]:
     """As :func:`evenly_in_logarithm`, so many numbers, float64 (count,)."""
-    return np.exp(generator.uniform(*np.log(span), count))
+    low, high = np.log(span)
+    return np.asarray(np.exp(generator.uniform(low, high, count)))
 
 
 def along(begin: float, end: float, spacing: Span, generator: np.random.Generator) -> list[float]:

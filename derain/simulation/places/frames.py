@@ -48,9 +48,9 @@ def scaffold(length: float, generator: np.random.Generator) -> Iterator[Surface]
     """Tubes and boards along x, from x = 0 on, two or three storeys high."""
     storeys, depth = generator.integers(1, 4), generator.uniform(0.7, 1.2)
     step, storey, radius = generator.uniform(1.8, 2.6), 2.0, generator.uniform(0.02, 0.035)
-    x = np.arange(0, length + 0.1, step)
+    x = step * np.arange(max(2, 1 + int(length / step)))  # one bay at least
     top = storeys * storey + 1
-    tubes = [((at, y, 0), (at, y, top)) for at in x for y in (0, depth)]
+    tubes: list[tuple[Point, Point]] = [((at, y, 0), (at, y, top)) for at in x for y in (0, depth)]
     for level in range(1, storeys + 1):
         z = level * storey
         tubes += [((0, y, z + up), (x[-1], y, z + up)) for y in (0, depth) for up in (0, 1)]
@@ -62,7 +62,7 @@ def scaffold(length: float, generator: np.random.Generator) -> Iterator[Surface]
     boards = [
         shapes.placed(shapes.box(x[-1], depth, z, z + 0.05), x[-1] / 2, depth / 2)
         for z in storey * np.arange(1, storeys + 1)
-        if generator.random() < 0.8 and x[-1] > 0
+        if generator.random() < 0.8
     ]
     if boards:
         yield made(boards, generator)
@@ -112,7 +112,7 @@ def trolley(generator: np.random.Generator) -> Surface:
     wires += [
         ((0, y, z), (length, y, z)) for y in (-half, half) for z in np.arange(low, high, 0.13)
     ]
-    frame = [((0, y, 0.1), (length, y, 0.15)) for y in (-half, half)]
+    frame: list[tuple[Point, Point]] = [((0, y, 0.1), (length, y, 0.15)) for y in (-half, half)]
     frame += [((0, y, 0.1), (-0.15, y, 1.0)) for y in (-half, half)]
     frame += [((-0.15, -half, 1.0), (-0.15, half, 1.0))]
     return made([bars(wires, radius), bars(frame, 0.018)], generator)

@@ -18,12 +18,13 @@ from derain.simulation.places.standing import (
     lined_up,
     put,
     shared,
+    straight,
     strewn,
 )
 from derain.simulation.track import Track
 
 # What is above the sensor is higher than this, metres: sensors on a car's roof fit in.
-LOWEST_CEILING = 2.7
+LOWEST_CEILING = 2.9
 
 
 @dataclass(frozen=True)
@@ -72,11 +73,11 @@ def lay_out_garage(generator: np.random.Generator) -> Track:
         *_parked(hall, generator),
         *_about(hall, generator),
         *_cages(hall, generator),
+        *_under_the_ceiling(hall, generator),
     ]
-    over = [_ceiling(hall, generator), *_under_the_ceiling(hall, generator)]
     floor = ground_mesh([relief.CONCRETE], lambda x, y: np.zeros(np.shape(x), np.int64), generator)
     uneven = Relief.draw(generator.uniform(0.003, 0.03), generator)
-    return assembled(floor, standing, uneven, generator, over)
+    return assembled(floor, standing, uneven, generator, [_ceiling(hall, generator)])
 
 
 def _ceiling(hall: Hall, generator: np.random.Generator) -> Surface:
@@ -106,10 +107,9 @@ def _under_the_ceiling(hall: Hall, generator: np.random.Generator) -> Iterator[S
         yield frames.made([shapes.placed(lamp, x, y, generator.uniform(0, np.pi))], generator)
     for _ in range(generator.integers(0, 8)):
         x, y = generator.uniform(*hall.x), generator.uniform(*hall.y)
-        if np.hypot(x, y) > 3:
-            start = np.array([x, y, top])
-            end = start + (generator.uniform(-2, 2), generator.uniform(-2, 2), 0)
-            yield threads.cable(start, end, generator.uniform(0.1, 0.9), (0.004, 0.03), generator)
+        start = np.array([x, y, top])
+        end = start + generator.uniform((-2, -2, 0), (2, 2, 0))
+        yield threads.cable(start, end, generator.uniform(0.1, 0.9), (0.004, 0.03), generator)
 
 
 def _pillars(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
@@ -178,7 +178,7 @@ def _cages(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
     for x, y in free_places(int(generator.integers(2, 6)), (2.5, 20), 2.5, generator, hall.holds):
         make = kinds[generator.integers(len(kinds))]
         reach = min(generator.uniform(1.5, 7), hall.x[1] - x)
-        pieces = lined_up(make, lambda at: np.zeros_like(at), (0, reach + 0.1), reach, generator)
+        pieces = lined_up(make, straight(0), (0, reach + 0.1), reach, generator)
         yield from put(pieces, x, y)
 
 

@@ -7,7 +7,6 @@ behind, as it does through real glass; where it meets one it returns weakly, by 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.simulation import shapes
 from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.shapes import Triangles
 
@@ -27,11 +26,23 @@ def pane(corners: NDArray[np.float64], generator: np.random.Generator) -> Triang
     """
     sides = np.linalg.norm(corners[[1, 3]] - corners[0], axis=1)
     cell = max(CELL, float(np.sqrt(sides.prod() / MOST_CELLS)))
-    u, v = (np.linspace(0, 1, 2 + int(side / cell))[..., None] for side in sides)
-    u, v = u[:, None], v[None]
+    wide, high = (1 + int(side / cell) for side in sides)
+    share = evenly_in_logarithm(RETURNING, generator)
+    # A pane is never nothing at all.
+    there = generator.permutation(wide * high)[: 1 + generator.binomial(wide * high - 1, share)]
+    column, row = there % wide, there // wide
+    u, v = ((edge / count)[:, None] for edge, count in ((column, wide), (row, high)))
+    at = [
+        _between(corners, u + i / wide, v + j / high) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))
+    ]
+    return np.stack([at[i] for i in (0, 1, 2, 0, 2, 3)], axis=1).reshape(-1, 3, 3)
+
+
+def _between(
+    corners: NDArray[np.float64], u: NDArray[np.float64], v: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Places by their shares of the way from the first corner to the second and to the fourth."""
     first, second, third, fourth = corners
-    grid = (1 - u) * (1 - v) * first + u * (1 - v) * second + u * v * third + (1 - u) * v * fourth
-    cells = shapes.sheet(grid).reshape(-1, 2, 3, 3)
-    there = generator.random(len(cells)) < evenly_in_logarithm(RETURNING, generator)
-    there[0] = True  # a pane is never nothing at all
-    return cells[there].reshape(-1, 3, 3)
+    lower: NDArray[np.float64] = (1 - u) * first + u * second
+    upper: NDArray[np.float64] = (1 - u) * fourth + u * third
+    return (1 - v) * lower + v * upper

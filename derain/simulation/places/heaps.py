@@ -34,14 +34,14 @@ def bank(length: float, generator: np.random.Generator, *, snow: bool = False) -
 
 
 def rubble(radius: float, generator: np.random.Generator) -> Surface:
-    """Stones, bricks and clods on a heap, of some centimetres to half a metre.
+    """Stones, bricks and clods on a heap, of some centimetres to some decimetres.
 
     Args:
         radius: Of the heap, metres.
         generator: Random generator.
     """
     count = int(generator.integers(100, 900))
-    size = many_evenly_in_logarithm((0.02, 0.3), count, generator)
+    size = many_evenly_in_logarithm((0.015, 0.15), count, generator)
     place = generator.normal(0, 0.45 * radius, (count, 2))
     height = 0.5 * radius * np.exp(-2 * (place / radius) ** 2).prod(axis=1)
     middle = np.column_stack([place, height * generator.uniform(0.7, 1, count)])
@@ -64,7 +64,7 @@ def logs(generator: np.random.Generator) -> Surface:
         np.array([[x, y, z] for y, z in places]) + generator.normal(0, 0.05, (len(places), 3))
         for x in (0, length)
     ]
-    return _matter(shapes.rods(*ends, radius, sides=8), DULL, generator)
+    return _matter(shapes.rods(ends[0], ends[1], radius, sides=8), DULL, generator)
 
 
 def _matter(

@@ -11,7 +11,15 @@ from derain.simulation.places import frames, heaps, people, plants, relief, thre
 from derain.simulation.places.crowd import ragged_things
 from derain.simulation.places.drawing import along
 from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.standing import Make, assembled, free_places, lined_up, put, strewn
+from derain.simulation.places.standing import (
+    Make,
+    assembled,
+    free_places,
+    lined_up,
+    put,
+    straight,
+    strewn,
+)
 from derain.simulation.track import Track
 
 SIGHT = (-80.0, 115.0)
@@ -57,7 +65,7 @@ def _rails(lines: tuple[float, ...], generator: np.random.Generator) -> Iterator
         make: Callable[[float, np.random.Generator], Iterable[Surface]] = (
             frames.guard_rail if generator.random() < 0.7 else _cable_barrier
         )
-        yield from lined_up(make, _straight(y), SIGHT, 16, generator, gaps=0.05)
+        yield from lined_up(make, straight(y), SIGHT, 16, generator, gaps=0.05)
 
 
 def _cable_barrier(length: float, generator: np.random.Generator) -> Iterable[Surface]:
@@ -96,8 +104,14 @@ def _breakdown(right: float, generator: np.random.Generator) -> Iterator[Surface
 
 
 def _beside(edges: tuple[float, float], generator: np.random.Generator) -> Iterator[Surface]:
-    """Delineators, signs, emergency telephones and lamps."""
+    """Delineators, signs, emergency telephones and lamps; weeds, and what lies on the shoulder."""
     for y, side in zip(edges, (-1, 1), strict=True):
+        count = int(generator.integers(20, 300))
+        x, out = generator.uniform(-30, 60, count), generator.exponential(1.5, count)
+        yield plants.grass(np.column_stack([x, y + side * (out - 1)]), generator)
+        for x in along(-30, 50, (5, 40), generator):
+            litter = heaps.rubble(generator.uniform(0.3, 1), generator)
+            yield from put(litter, x, y + side * generator.uniform(-1.5, 0.5))
         for x in along(*SIGHT, (4, 25), generator):
             yield from put(frames.thin_pole(generator), x, y + side * generator.uniform(0.8, 3))
 
@@ -126,11 +140,11 @@ def _embankments(edges: tuple[float, float], generator: np.random.Generator) -> 
         kind = generator.choice(["wall", "fence", "bank"])
         away = y + side * generator.uniform(0.5, 4)
         if kind == "wall":
-            yield from lined_up(_noise_wall, _straight(away), SIGHT, 13, generator, gaps=0.05)
+            yield from lined_up(_noise_wall, straight(away), SIGHT, 13, generator, gaps=0.05)
         elif kind == "fence":
-            yield from lined_up(threads.chain_link, _straight(away), SIGHT, 13, generator, 0.1)
+            yield from lined_up(threads.chain_link, straight(away), SIGHT, 13, generator, 0.1)
         else:
-            yield from lined_up(heaps.bank, _straight(away + 2 * side), SIGHT, 10, generator)
+            yield from lined_up(heaps.bank, straight(away + 2 * side), SIGHT, 10, generator)
         for x in along(*SIGHT, (5, 18), generator):
             place = x, away + side * generator.uniform(1, 12)
             bare = generator.random() < 0.4
@@ -145,7 +159,3 @@ def _noise_wall(length: float, generator: np.random.Generator) -> Iterator[Surfa
     height = generator.uniform(2, 5)
     yield walls.rough_wall(length, height, generator)
     yield frames.made([frames.bars([((0, -0.1, 0), (0, -0.1, height + 0.1))], 0.12)], generator)
-
-
-def _straight(y: float) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    return lambda x: np.full(np.shape(x), y)

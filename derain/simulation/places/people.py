@@ -1,7 +1,8 @@
-"""People as a sensor meets them: striding, with arms and what they carry, children too; cyclists."""
+"""People as a sensor meets them: striding, with arms and what they carry, children, cyclists."""
+
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
@@ -11,8 +12,6 @@ from derain.simulation.shapes import Triangles
 
 # Of cloth, which in the near infrared is anything from black to white.
 REFLECTIVITY = (0.03, 0.7)
-
-Places = NDArray[np.float64]
 
 
 def person(generator: np.random.Generator) -> Surface:
@@ -135,7 +134,7 @@ def _wheel(x: float, generator: np.random.Generator) -> Triangles:
     )
 
 
-def _limbs(ends: list[tuple[tuple[float, ...], tuple[float, ...]]], radius: float) -> Triangles:
+def _limbs(ends: Sequence[tuple[tuple[float, ...], tuple[float, ...]]], radius: float) -> Triangles:
     both = np.array(ends, np.float64)
     return shapes.rods(both[:, 0], both[:, 1], radius, taper=0.75, sides=6)
 

@@ -24,7 +24,7 @@ REFLECTIVITY = (0.01, 0.6)
 LEAF = (0.005, 0.06)
 
 # How often a ray through the middle of a plant meets a leaf, and the most leaves that one has.
-COVER = (0.15, 3.0)
+COVER = (0.05, 3.0)
 MOST_LEAVES = 6000
 
 # Children of a bough, and a child's length over its parent's.
@@ -123,7 +123,7 @@ def _leaves(radii: tuple[float, float, float], generator: np.random.Generator) -
     cover = evenly_in_logarithm(COVER, generator)
     count = int(np.clip(cover * shadow / _area(size), 20, MOST_LEAVES))
     centres = shapes.inside_ellipsoid(count, radii, generator)
-    clumps = generator.integers(2, 1 + max(3, count // 15))
+    clumps = int(generator.integers(2, 1 + max(3, count // 15)))
     own = shapes.inside_ellipsoid(clumps, radii, generator)[generator.integers(clumps, size=count)]
     centres += generator.choice([0.0, 0.5, 0.85]) * (own - centres)
     return shapes.leaves(centres, size, generator)

@@ -81,6 +81,11 @@ def strewn(
         yield from put(make(generator), x, y, heading)
 
 
+def straight(y: float) -> Line:
+    """The line along x at a y."""
+    return lambda x: np.full(np.shape(x), y)
+
+
 def put(
     things: Surface | Iterable[Surface], x: float, y: float, heading: float = 0.0
 ) -> Iterator[Surface]:
@@ -146,15 +151,34 @@ def assembled(
         np.concatenate([getattr(track, part) for track in tracks])
         for part in ("triangles", "reflectivity", "label")
     )
-    x, y, z = np.moveaxis(triangles.astype(np.float64), -1, 0)
-    uneven = np.stack([x, y, z + relief(x, y)], axis=-1)
-    turned = shapes.placed(uneven, 0, 0, generator.uniform(-0.15, 0.15))
-    tilted = shapes.sloped(turned, *generator.uniform(-0.02, 0.02, 2))
+    corners = triangles.reshape(-1, 3).astype(np.float64)
+    corners[:, 2] += relief(corners[:, 0], corners[:, 1])
+    tilted = (corners @ _tilt(generator)).reshape(-1, 3, 3)
     return Track(tilted.astype(np.float32), reflectivity, label)
+
+
+def _tilt(generator: np.random.Generator) -> NDArray[np.float64]:
+    """Turns rows of coordinates by up to 9 degrees, and raises them by up to 2 % either way."""
+    axes = np.eye(3)[:, None]
+    turned = shapes.placed(axes, 0, 0, generator.uniform(-0.15, 0.15))
+    tilted = shapes.sloped(turned, *generator.uniform(-0.02, 0.02, 2))
+    return tilted[:, 0]
 
 
 def _cleared(track: Track) -> Track:
     """A track without those of its triangles that are too near to the sensor's axis."""
-    x, y = shapes.nearest_to_axis(track.triangles)
-    far = np.hypot(x, y) > CLEARANCE
+    lowest, greatest = _bounds(track.triangles[..., :2])
+    about = ((lowest < CLEARANCE) & (greatest > -CLEARANCE)).all(axis=1)
+    far = ~about
+    x, y = shapes.nearest_to_axis(track.triangles[about])
+    far[about] = np.hypot(x, y) > CLEARANCE
     return Track(track.triangles[far], track.reflectivity[far], track.label[far])
+
+
+def _bounds(
+    corners: NDArray[np.float32],
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Least and greatest coordinates of each triangle of corners (T, 3, 2), (T, 2) both."""
+    first, second, third = corners.transpose(1, 0, 2)
+    least = np.minimum(np.minimum(first, second), third)
+    return least, np.maximum(np.maximum(first, second), third)

@@ -51,7 +51,7 @@ def chain_link(length: float, generator: np.random.Generator) -> Iterator[Surfac
     nothing = np.zeros_like(offsets)
     rising = [np.column_stack([offsets + z, nothing, z]) for z in (low, high)]
     falling = [np.column_stack([offsets + z, nothing, height - z]) for z in (low, high)]
-    wires = [_ribbons(*ends, width) for ends in (rising, falling)]
+    wires = [_ribbons(start, end, width) for start, end in (rising, falling)]
     yield _strung(np.concatenate(wires), generator)
     yield from posts(length, height + 0.05, generator)
 

@@ -16,6 +16,7 @@ from derain.simulation.places.standing import (
     free_places,
     lined_up,
     put,
+    straight,
     strewn,
 )
 from derain.simulation.track import Track
@@ -82,7 +83,7 @@ def _lines(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
         make = kinds[generator.integers(len(kinds))]
         piece = generator.uniform(4, 9)
         reach = (0.0, piece * generator.integers(1, 4) + 0.1)
-        line = lined_up(make, lambda at: np.zeros_like(at), reach, piece, generator, 0.1)
+        line = lined_up(make, straight(0), reach, piece, generator, 0.1)
         # Across the way from the sensor to its beginning, so that it does not lead to the sensor.
         across = np.arctan2(y, x) + np.pi / 2 + generator.normal(0, 0.5)
         yield from put(line, x, y, across)
