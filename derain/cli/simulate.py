@@ -48,7 +48,9 @@ Simulated rain is easy: a score on it says nothing about real rain.
 """
 
 # The names of derain.simulation.layouts, which takes too long to import where it is not used.
-LAYOUTS = ("facility", "street", "city", "country", "car_park", "motorway", "garage", "yard")
+LAYOUTS = (
+    *("facility", "street", "city", "country", "car_park", "motorway", "garage", "yard", "room"),
+)
 
 # What only one of the two uses knows, and what it takes where nothing is said.
 OF_DATA_SETS = {

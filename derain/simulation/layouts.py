@@ -11,6 +11,7 @@ from derain.simulation.places.city import lay_out_city
 from derain.simulation.places.country import lay_out_country
 from derain.simulation.places.garage import lay_out_garage
 from derain.simulation.places.motorway import lay_out_motorway
+from derain.simulation.places.room import lay_out_room
 from derain.simulation.places.yard import lay_out_yard
 from derain.simulation.track import Track
 
@@ -23,6 +24,7 @@ LAYOUTS: dict[str, Callable[[np.random.Generator], Track]] = {
     "facility": lay_out_facility,
     "garage": lay_out_garage,
     "motorway": lay_out_motorway,
+    "room": lay_out_room,
     "street": lay_out_track,
     "yard": lay_out_yard,
 }

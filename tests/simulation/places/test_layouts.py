@@ -13,7 +13,8 @@ from derain.simulation.layouts import LAYOUTS
 from derain.simulation.sensor import Sensor
 from derain.simulation.track import Track
 
-PLACES = sorted(set(LAYOUTS) - {"street", "facility"})
+# A room is smaller than what is asked of the places outdoors.
+PLACES = sorted(set(LAYOUTS) - {"street", "facility", "room"})
 
 # Seen all around, up and down, from the height of a car's roof.
 SENSOR = Sensor(

@@ -1,0 +1,210 @@
+"""What is seen from 50 to 280 m away by a few beams: rows of trees, hills, corners, pylons."""
+
+import itertools
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from derain.simulation import shapes
+from derain.simulation.classes import TrackClass
+from derain.simulation.objects import Surface
+from derain.simulation.places import frames, threads
+from derain.simulation.places.drawing import (
+    evenly_in_logarithm,
+    many_evenly_in_logarithm,
+)
+from derain.simulation.shapes import Triangles
+
+# Where things stand, and where the hills begin and end, metres.
+DISTANCES = (55.0, 260.0)
+HILLS = (118.0, 290.0)
+
+# What stands reaches so far below the level of the sensor's foot: the ground there is uneven.
+DEPTH = 6.0
+
+LEAF = (0.01, 0.4)
+REFLECTIVITY = (0.03, 0.9)
+
+# Signs and plates beside roads return light whence it came: they are seen from afar.
+RETROREFLECTIVE = (0.7, 1.0)
+
+
+def lay_out_horizon(generator: np.random.Generator) -> Iterator[Surface]:
+    """Lays out what is far away, to be added to any place outdoors.
+
+    Args:
+        generator: Random generator.
+
+    Yields:
+        Surfaces in the frame of a track, all of them at least 50 m from its origin: rough, hilly
+        ground from 118 m on, and on it and nearer rows of trees full of gaps, single trees, corners
+        of buildings, poles, masts, signs, scaffolds, cables and lorries.
+    """
+    yield _hills(generator)
+    kinds: list[tuple[Callable[[float, np.random.Generator], Iterator[Surface]], int]] = [
+        (_row_of_trees, 5),
+        (_tree, 12),
+        (_building, 8),
+        (_poles, 6),
+        (_pylons, 2),
+        (_sign, 10),
+        (_vehicle, 6),
+        (_scrub, 8),
+    ]
+    for make, most in kinds:
+        for _ in range(generator.integers(0, most + 1)):
+            away = evenly_in_logarithm(DISTANCES, generator)
+            azimuth = generator.uniform(-np.pi, np.pi)
+            for surface in make(away, generator):
+                yield surface.placed(
+                    float(away * np.cos(azimuth)), float(away * np.sin(azimuth)), float(azimuth)
+                )
+
+
+def _hills(generator: np.random.Generator) -> Surface:
+    """A ring of ground that rises or falls away from the sensor, waves on waves, stones on them."""
+    angle = np.linspace(0, 2 * np.pi, 241)
+    away = np.geomspace(*HILLS, 22)[:, None]
+    share = (away - HILLS[0]) / (HILLS[1] - HILLS[0])
+    height = generator.uniform(-12, 25) * share**1.5 * np.ones_like(angle)
+    for waves in generator.integers(1, 24, 8):
+        turned = waves * angle + generator.uniform(0, 2 * np.pi) + generator.normal(0, 3) * share
+        height += generator.uniform(0, 8) / waves**0.7 * share * np.sin(turned)
+    height += evenly_in_logarithm((0.02, 0.6), generator) * generator.normal(size=height.shape)
+    height[:, -1] = height[:, 0]
+    ring = np.stack([away * np.cos(angle), away * np.sin(angle), height - 1.5], axis=-1)
+    triangles = shapes.sheet(ring)
+    reflectivity = evenly_in_logarithm((0.05, 0.5), generator) * many_evenly_in_logarithm(
+        (0.5, 1.5), len(triangles), generator
+    )
+    return Surface(triangles, TrackClass.BACKGROUND, np.clip(reflectivity, 0.01, 1))
+
+
+def _row_of_trees(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """A row or an edge of a wood across the line of sight, of crowns that differ, with gaps."""
+    half = min(generator.uniform(10, 90), 0.8 * away)
+    spacing, gaps = generator.uniform(3, 10), generator.uniform(0, 0.6)
+    depth, turned = generator.uniform(0, 6), generator.uniform(-0.4, 0.4)
+    parts = []
+    for y in np.arange(-half, half, spacing):
+        if generator.random() > gaps:
+            x = generator.normal(0, depth) + turned * y
+            if away + x > DISTANCES[0]:
+                parts.append(shapes.placed(_crown(250, generator), float(x), float(y)))
+    if parts:
+        yield _plant(np.concatenate(parts), generator)
+
+
+def _tree(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """A tree by itself, its crown sparse or dense, on a stem."""
+    yield _plant(_crown(900, generator), generator)
+
+
+def _scrub(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """Bushes and stalks by the dozen, each seen by a beam or none."""
+    count = int(evenly_in_logarithm((10, 300), generator))
+    spread = generator.uniform((1, 3), (4, 20)) / 2
+    places = np.column_stack(
+        [generator.normal(0, spread, (count, 2)), generator.uniform(-2, 2.5, count)]
+    )
+    size = evenly_in_logarithm((0.03, 0.3), generator)
+    yield _plant(
+        shapes.leaves(np.clip(places, -40, 40) + np.array([45, 0, 0]), size, generator), generator
+    )
+
+
+def _crown(most: int, generator: np.random.Generator) -> Triangles:
+    """Leaves about boughs, some clumped, over a stem."""
+    height = evenly_in_logarithm((4, 22), generator)
+    radii = height * generator.uniform(0.12, 0.3, 3)
+    count = int(evenly_in_logarithm((15, most), generator))
+    centres = shapes.inside_ellipsoid(count, (radii[0], radii[1], radii[2]), generator)
+    clumps = centres[generator.integers(count, size=max(2, count // 12))]
+    own = clumps[generator.integers(len(clumps), size=count)]
+    centres += generator.choice([0.0, 0.4, 0.8]) * (own - centres)
+    leaves = shapes.leaves(centres, evenly_in_logarithm(LEAF, generator), generator)
+    stem = shapes.rods(
+        np.array([[0.0, 0.0, -DEPTH]]), np.array([[0.0, 0.0, height - radii[2]]]), 0.02 * height
+    )
+    return np.concatenate([shapes.raised(leaves, height - radii[2]), stem])
+
+
+def _building(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """A building of one to three blocks with eaves, chimneys and aerials, its corner ahead."""
+    for _ in range(generator.integers(1, 4)):
+        length, width = generator.uniform(6, 25, 2)
+        top = evenly_in_logarithm((3, 25), generator)
+        block = shapes.box(length, width, -DEPTH, top)
+        x, y = generator.uniform(0, 12) + 16, generator.uniform(-15, 15)
+        heading = generator.uniform(-np.pi, np.pi)
+        yield _matter(shapes.placed(block, x, y, heading), generator)
+        rods = [
+            ((a, b, top), (a, b, top + generator.uniform(0.5, 4)))
+            for a, b in generator.uniform(-3, 3, (generator.integers(0, 5), 2))
+        ]
+        if rods:
+            thin = frames.bars(rods, evenly_in_logarithm((0.01, 0.3), generator))
+            yield _matter(shapes.placed(thin, x, y, heading), generator)
+
+
+def _poles(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """Lamps or poles in a line across, with arms; perhaps a cable from each to the next."""
+    count, step = int(generator.integers(1, 8)), generator.uniform(8, 30)
+    height, radius = generator.uniform(3, 12), evenly_in_logarithm((0.02, 0.2), generator)
+    ahead = generator.uniform(-0.3, 1.0)
+    y = step * (np.arange(count) - (count - 1) / 2)
+    x = np.maximum(ahead * y, DISTANCES[0] - away)
+    rods = [((a, b, -DEPTH), (a, b, height)) for a, b in zip(x, y, strict=True)]
+    rods += [((a, b, height), (a, b + 1.5, height + 0.2)) for a, b in zip(x, y, strict=True)]
+    yield _matter(frames.bars(rods, radius, 6), generator)
+    if generator.random() < 0.5:
+        heads = np.column_stack([x, y, np.full(count, height)])
+        for start, end in itertools.pairwise(heads):
+            yield threads.cable(start, end, generator.uniform(0.2, 1.5), (0.01, 0.06), generator)
+
+
+def _pylons(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """Two lattice masts with arms and the cables between them."""
+    height, apart = generator.uniform(12, 40), generator.uniform(30, 120)
+    heads = []
+    for y in (-apart / 2, apart / 2):
+        yield frames.lattice((0, y, -DEPTH), (0, y, height), generator.uniform(0.6, 2), generator)
+        arm = [((-4.0, y, height - 3), (4.0, y, height - 3))]
+        yield _matter(frames.bars(arm, 0.15), generator)
+        heads.append([(x, y, height - 3) for x in (-4.0, 0.0, 4.0)])
+    for start, end in zip(*np.array(heads), strict=True):
+        yield threads.cable(start, end, 0.03 * apart, (0.015, 0.08), generator)
+
+
+def _sign(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """A retroreflecting sign, plate or marker post, towards the sensor or turned from it."""
+    side, top = evenly_in_logarithm((0.08, 3), generator), evenly_in_logarithm((0.6, 7), generator)
+    plate = shapes.box(0.03, side, top - side, top)
+    turned = shapes.placed(plate, 0, 0, generator.normal(0, 0.6))
+    yield Surface(turned, TrackClass.BACKGROUND, generator.uniform(*RETROREFLECTIVE))
+    post = frames.bars([((0.05, 0, -DEPTH), (0.05, 0, top))], 0.04)
+    yield _matter(post, generator)
+
+
+def _vehicle(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """A car or a lorry, of which some beams meet the lamps or the edges of the roof."""
+    length, width, height = [(4.4, 1.8, 1.5), (10.0, 2.5, 3.6)][int(generator.random() < 0.3)]
+    body = shapes.box(length, width, -1.0, height)
+    heading = generator.uniform(-np.pi, np.pi)
+    yield Surface(
+        shapes.placed(body, 0, 0, heading),
+        TrackClass.CAR,
+        evenly_in_logarithm((0.02, 0.6), generator),
+    )
+
+
+def _plant(triangles: Triangles, generator: np.random.Generator) -> Surface:
+    """Leaves that return from nearly nothing to nearly all of the light."""
+    usual = evenly_in_logarithm((0.1, 0.7), generator)
+    spread = many_evenly_in_logarithm((0.3, 1.4), len(triangles), generator)
+    return Surface(triangles, TrackClass.BACKGROUND, np.minimum(usual * spread, 1))
+
+
+def _matter(triangles: Triangles, generator: np.random.Generator) -> Surface:
+    reflectivity = evenly_in_logarithm(REFLECTIVITY, generator)
+    return Surface(triangles, TrackClass.BACKGROUND, reflectivity)

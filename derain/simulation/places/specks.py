@@ -1,0 +1,55 @@
+"""What little of a surface returns when the rest mirrors the light away: dust, edges, scratches."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.simulation import shapes
+from derain.simulation.places.drawing import evenly_in_logarithm
+from derain.simulation.shapes import Triangles
+
+# Size of a speck over its distance from the sensor: it returns one ray or two.
+SIZE = (5e-4, 5e-3)
+
+
+def specks(
+    surface: Triangles, sensor: NDArray[np.float64], count: int, generator: np.random.Generator
+) -> Triangles:
+    """Small triangles on a surface, evenly or in clumps, so that few rays meet one.
+
+    Args:
+        surface: Triangles that they lie on, (T, 3, 3), metres.
+        sensor: Place of the sensor, (3,), metres. The farther a speck is, the larger it is, so that
+            a beam, which widens as well, is returned by it.
+        count: How many.
+        generator: Random generator.
+    """
+    places = on_surface(surface, count, generator)
+    # A clump is what lies nearest to one of a few places: the rest of the surface stays empty.
+    kept = generator.choice([1.0, 0.4, 0.15])
+    clumps = places[generator.integers(len(places), size=1 + count // 25)]
+    from_clumps = np.linalg.norm(places[:, None] - clumps, axis=2).min(axis=1)
+    places = places[from_clumps <= np.quantile(from_clumps, kept)]
+    size = evenly_in_logarithm(SIZE, generator) * np.linalg.norm(places - sensor, axis=1)
+    corners = generator.normal(0, 1, (len(places), 3, 3))
+    return places[:, None] + size[:, None, None] * np.clip(corners, -2, 2)
+
+
+def on_surface(
+    surface: Triangles, count: int, generator: np.random.Generator
+) -> NDArray[np.float64]:
+    """Places uniform over the area of triangles, (count, 3), metres."""
+    first, second, third = surface.transpose(1, 0, 2)
+    area = np.linalg.norm(np.cross(second - first, third - first), axis=1)
+    which = generator.choice(len(surface), count, p=area / area.sum())
+    u, v = generator.random((2, count, 1))
+    beyond = u + v > 1
+    u, v = np.where(beyond, 1 - u, u), np.where(beyond, 1 - v, v)
+    places: NDArray[np.float64] = (
+        first[which] + u * (second - first)[which] + v * (third - first)[which]
+    )
+    return places
+
+
+def plate(corners: NDArray[np.float64]) -> Triangles:
+    """A flat or twisted plate of four corners in order, (4, 3), metres."""
+    return shapes.sheet(np.stack([corners[[0, 3]], corners[[1, 2]]]))
