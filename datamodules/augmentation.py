@@ -29,6 +29,9 @@ class Augmentation:
         mirror_probability: Share of scans whose left and right change places.
         dropping_probability: Share of scans that lose points.
         dropping: The largest share of its points that such a scan loses.
+        sector_probability: Share of scans of which no more than a sector is kept, so that a batch
+            of as many points holds more scans; drawn where the sensor looks.
+        sector: Width of the sector, degrees.
 
     Source: sporsho/3D_OutDet, dataset/_point_cloud_dataset.py, for rotation, jitter and their 0.5;
         TiagoCortinhal/SalsaNext for mirroring and dropping.
@@ -40,11 +43,14 @@ class Augmentation:
     mirror_probability: float = 0.0
     dropping_probability: float = 0.0
     dropping: float = 0.5
+    sector_probability: float = 0.0
+    sector: float = 90.0
 
     @property
     def changes_anything(self) -> bool:
         """Whether any scan is changed."""
-        return max(self.jitter_probability, self.dropping_probability) > 0 or self.moves_the_sensor
+        of_points = self.jitter_probability, self.dropping_probability, self.sector_probability
+        return max(of_points) > 0 or self.moves_the_sensor
 
     @property
     def moves_the_sensor(self) -> bool:
@@ -75,8 +81,28 @@ class Augmentation:
         xyz[valid] = moved
         changed = replace(scan, xyz=xyz)
         if generator.random() < self.dropping_probability:
-            return changed.take(generator.random(len(scan)) >= generator.uniform(0, self.dropping))
+            share = generator.uniform(0, self.dropping)
+            changed = changed.take(generator.random(len(scan)) >= share)
+        if self.sector_probability and generator.random() < self.sector_probability:
+            return _sector(changed, self.sector, generator)
         return changed
+
+
+def _sector(scan: Scan, width: float, generator: np.random.Generator) -> Scan:
+    """A sector of a scan around one of its points, so that there is something in it.
+
+    Args:
+        scan: The scan.
+        width: Width of the sector, degrees.
+        generator: Draws the point.
+    """
+    valid = np.flatnonzero(scan.valid)
+    if not len(valid):
+        return scan
+    azimuth = np.degrees(np.arctan2(scan.xyz[:, 1], scan.xyz[:, 0]))
+    off = azimuth - azimuth[generator.choice(valid)]
+    off = (off + FULL_CIRCLE / 2) % FULL_CIRCLE - FULL_CIRCLE / 2
+    return scan.take(np.abs(off) <= width / 2)
 
 
 def _turn(angle: float) -> NDArray[np.float32]:

@@ -9,10 +9,63 @@ from derain.errors import InputError
 from derain.simulation.campaign import Campaign
 from derain.simulation.dataset import ensure_track
 from derain.simulation.manifest import read_manifest
+from derain.simulation.world_campaign import WorldCampaign
 from derain.sources.source import Source
+from derain.system.cores import usable_cores
 
 
-class Simulated(SequenceDataModule):
+class SimulatedDataModule(SequenceDataModule):
+    """A simulated data set, made where it is missing.
+
+    Args:
+        root: Folder of the data set.
+        campaign: What is simulated where the folder does not hold it already.
+        make: Whether it is; else what lies there is taken, whatever the campaign.
+        loading: How the scans are read and batched.
+        workers: Processes that simulate; 0 takes one per core.
+
+    Raises:
+        InputError: Nothing is to be made, and there is no simulated data set in the folder.
+    """
+
+    def __init__(
+        self,
+        root: str,
+        campaign: Campaign | WorldCampaign,
+        make: bool,
+        loading: Loading,
+        workers: int = 1,
+    ) -> None:
+        split = campaign.split if make else _split_of(Path(root))
+        card = load_card("simulated")
+        super().__init__(root, card, card.layout, split, loading)
+        self.campaign = campaign
+        self.make = make
+        self.workers = workers or usable_cores()
+
+    def prepare_data(self) -> None:
+        """Simulates the data set where it is missing.
+
+        Raises:
+            InputError: A folder that holds something else or cannot be written.
+        """
+        if self.make:
+            ensure_track(self.root, self.campaign, self.workers)
+
+    def source(self, part: Part) -> Source:
+        """The scans of a part's sequences, in order; for prediction those of the test part.
+
+        Raises:
+            InputError: A missing sequence or scan folder, or too few sequences for such a part.
+        """
+        if not self.split["test" if part == "predict" else part]:
+            raise InputError(
+                self.root, f"no sequence is for {part}", "Simulate three sequences or more."
+            )
+        return super().source(part)
+
+
+class Simulated(SimulatedDataModule):
     """A simulated data set in the layout of REHEARSE-3D: by default a small one, made at first use.
 
     Simulated rain is easy: a score on it says nothing about real rain.
@@ -40,32 +93,7 @@ class Simulated(SequenceDataModule):
         make: bool = True,
         loading: Loading = Loading(),
     ) -> None:
-        split = campaign.split if make else _split_of(Path(root))
-        card = load_card("simulated")
-        super().__init__(root, card, card.layout, split, loading)
-        self.campaign = campaign
-        self.make = make
-
-    def prepare_data(self) -> None:
-        """Simulates the data set where it is missing.
-
-        Raises:
-            InputError: A folder that holds something else or cannot be written.
-        """
-        if self.make:
-            ensure_track(self.root, self.campaign)
-
-    def source(self, part: Part) -> Source:
-        """The scans of a part's sequences, in order; for prediction those of the test part.
-
-        Raises:
-            InputError: A missing sequence or scan folder, or too few sequences for such a part.
-        """
-        if not self.split["test" if part == "predict" else part]:
-            raise InputError(
-                self.root, f"no sequence is for {part}", "Simulate three sequences or more."
-            )
-        return super().source(part)
+        super().__init__(root, campaign, make, loading)
 
 
 def _split_of(root: Path) -> dict[str, list[str]]:

@@ -13,6 +13,7 @@ from derain.datamodules.sequences import Sequences as Sequences
 from derain.datamodules.simulated import Simulated as Simulated
 from derain.datamodules.taught import Taught as Taught
 from derain.datamodules.wads import Wads as Wads
+from derain.datamodules.worlds import Worlds as Worlds
 from derain.errors import InputError as InputError
 from derain.export.bench.bench import bench as bench
 from derain.export.runtime import Derainer as Derainer

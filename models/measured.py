@@ -64,6 +64,14 @@ class MeasuredModule(lightning.LightningModule, ABC):
             inputs: What the view gives, by the names that it has for them.
         """
 
+    def logits_of(self, batch: Batch) -> Tensor:
+        """Logits of "not rain" and "rain" of every cell of a batch, float (M, 2).
+
+        By default of all its scans at once. A network in which the points of one scan would tell
+        those of another something takes them one by one.
+        """
+        return self(**batch.inputs)
+
     @abstractmethod
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
         """What the network is to make small, and what it says.
@@ -81,11 +89,11 @@ class MeasuredModule(lightning.LightningModule, ABC):
 
     def test_step(self, batch: Batch) -> None:
         """Counts the points of one batch."""
-        self._count(batch, self(**batch.inputs))
+        self._count(batch, self.logits_of(batch))
 
     def predict_step(self, batch: Batch) -> list[NDArray[np.float32]]:
         """Probability of rain for every row of every scan, a list of float32 (N,)."""
-        return self.probabilities(batch, self(**batch.inputs))
+        return self.probabilities(batch, self.logits_of(batch))
 
     def on_validation_epoch_start(self) -> None:
         """Forgets losses and scores of the last epoch, or of the sanity check."""

@@ -75,7 +75,7 @@ class SupervisedModule(DerainingModule):
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
         """Loss with its parts, and logits."""
         assert batch.target is not None  # the data modules pair these scans with labels
-        logits = self(**batch.inputs)
+        logits = self.logits_of(batch)
         loss = self.segmentation_loss(logits, batch.target)
         return {
             "loss": loss.total,

@@ -38,6 +38,13 @@ ended. To train on the data set:
 
   derain fit --config outdet_simulated.yaml --data.root facility --data.make false
 
+With --world every sequence is one scan of another place, sensor and weather, from drizzle to snow:
+what a model learns from that is to work anywhere. A YAML of one's own says what is drawn from
+(derain/simulation/worlds/world.yaml).
+
+  derain simulate --out worlds --world --sequences 500
+  derain fit --config relative_outdet_worlds.yaml --data.root worlds --data.make false
+
 With --on, lets it rain on clean scans instead, in the file's own format with every column kept, and
 writes <stem>.label (1 = rain).
 
@@ -63,6 +70,7 @@ OF_DATA_SETS = {
     "skew": False,
     "workers": usable_cores(),
 }
+OF_WORLDS = {"sequences": 10, "workers": usable_cores()}
 OF_SCANS = {"columns": DEFAULT_COLUMNS, "picture": False, "json": False}
 
 
@@ -115,6 +123,13 @@ def _add_those_of_data_sets(group: "argparse._ArgumentGroup") -> None:
         help="with a 4D radar (default: yes, but not on a drive)",
     )
     group.add_argument("--workers", type=count, help="processes (default: one per core)")
+    group.add_argument(
+        "--world",
+        nargs="?",
+        const="world",
+        metavar="YAML",
+        help="draw place, sensor and weather anew for each scan (default: the packaged world)",
+    )
 
 
 def _add_those_of_scans(group: "argparse._ArgumentGroup") -> None:
@@ -132,24 +147,30 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     if arguments.seed < 0:
         raise InputError("--seed", f"{arguments.seed} is negative", "Give 0 or more.")
-    if arguments.on is None:
-        if arguments.radar is None:
-            arguments.radar = not (arguments.speed or arguments.traffic or arguments.skew)
-        _settle(arguments, OF_DATA_SETS, foreign=OF_SCANS, other="with")
-        return _simulate(arguments)
-    from derain.cli.rain_on_scans import rain_on_scans
+    if arguments.on is not None:
+        from derain.cli.rain_on_scans import rain_on_scans
 
-    _settle(arguments, OF_SCANS, foreign=OF_DATA_SETS, other="without")
-    return rain_on_scans(arguments)
+        foreign = [*OF_DATA_SETS, "world"]
+        _settle(arguments, OF_SCANS, foreign, remedy="Leave it out, or --on.")
+        return rain_on_scans(arguments)
+    if arguments.world is not None:
+        foreign = [name for name in (*OF_DATA_SETS, *OF_SCANS) if name not in OF_WORLDS]
+        foreign += ["rain", "sensor"]  # of which a world has its own
+        _settle(arguments, OF_WORLDS, foreign, remedy="Leave it out, or --world.")
+        return _simulate_worlds(arguments)
+    if arguments.radar is None:
+        arguments.radar = not (arguments.speed or arguments.traffic or arguments.skew)
+    _settle(arguments, OF_DATA_SETS, foreign=OF_SCANS, remedy="Give --on, or leave it out.")
+    return _simulate(arguments)
 
 
 def _settle(
-    arguments: argparse.Namespace, own: Mapping[str, Any], foreign: Collection[str], other: str
+    arguments: argparse.Namespace, own: Mapping[str, Any], foreign: Collection[str], remedy: str
 ) -> None:
     """Refuses the options of the other use, and fills in what was not said."""
     for name in foreign:
         if getattr(arguments, name) is not None:
-            raise InputError(f"--{name}", f"has a meaning only {other} --on", "Leave it out.")
+            raise InputError(f"--{name}", "means nothing for what is to be made", remedy)
     for name, default in own.items():
         if getattr(arguments, name) is None:
             setattr(arguments, name, default)
@@ -173,9 +194,22 @@ def _simulate(arguments: argparse.Namespace) -> int:
         drive=Drive(*moves) if any(moves) else None,
     )
     simulate_track(arguments.out, campaign, arguments.workers)
-    scans = len(campaign.names) * campaign.scans
+    return _told(arguments.out, len(campaign.names), len(campaign.names) * campaign.scans)
+
+
+def _simulate_worlds(arguments: argparse.Namespace) -> int:
+    from derain.simulation.campaign import partition
+    from derain.simulation.dataset import simulate_track
+    from derain.simulation.world_campaign import WorldCampaign
+
+    parts = partition(arguments.sequences)
+    campaign = WorldCampaign(*parts, seed=arguments.seed, world=arguments.world)
+    simulate_track(arguments.out, campaign, arguments.workers)
+    return _told(arguments.out, len(campaign.names), len(campaign.names))
+
+
+def _told(out: Path, sequences: int, scans: int) -> int:
     say(
-        f"{arguments.out}: {len(campaign.names)} sequences, {scans:,} scans. "
-        f"What is in them: derain info {arguments.out}"
+        f"{out}: {sequences} sequences, {scans:,} scans. What is in them: derain info {out}"
     )
     return 0

@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict, dataclass, field, replace
 from itertools import cycle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -103,6 +104,28 @@ class Campaign:
             InputError: A sensor file that is missing or damaged.
         """
         return load_sensor(self.sensor) if isinstance(self.sensor, str) else self.sensor
+
+    def settled(self) -> "Campaign":
+        """The same with its sensor read.
+
+        Raises:
+            InputError: A sensor file that is missing or damaged.
+        """
+        return replace(self, sensor=self.lidar)
+
+    def write(self, folder: Path, name: str) -> None:
+        """Simulates a sequence.
+
+        Args:
+            folder: Folder to write.
+            name: Name of the sequence.
+
+        Raises:
+            InputError: A file cannot be written, or Open3D cannot be imported.
+        """
+        from derain.simulation.sequence import write_sequence  # which describes its scene by this
+
+        write_sequence(folder, self, name)
 
     @property
     def times(self) -> NDArray[np.float64]:

@@ -14,26 +14,49 @@ import sys
 from collections.abc import Generator, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager, suppress
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, Self
 
 from tqdm import tqdm
 
 from derain.errors import InputError
 from derain.files.lock import lock
 from derain.files.temporary import remove_abandoned
-from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MANIFEST, checksums, read_manifest, write_manifest
-from derain.simulation.sequence import write_sequence
 from derain.system.open3d_import import import_open3d
 from derain.system.workers import worker_pool
 
 SEQUENCES = "sequences"
 
 
-def ensure_track(root: Path, campaign: Campaign) -> None:
+class Simulation(Protocol):
+    """What is simulated, sequence by sequence."""
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the sequences, in ascending order."""
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """Everything that the files depend on, as reading it back from JSON gives it."""
+
+    def settled(self) -> Self:
+        """The same with every file that it names read.
+
+        Raises:
+            InputError: A file that is missing or damaged.
+        """
+
+    def write(self, folder: Path, name: str) -> None:
+        """Writes a sequence.
+
+        Raises:
+            InputError: A file cannot be written, or Open3D cannot be imported.
+        """
+
+
+def ensure_track(root: Path, campaign: Simulation, workers: int = 1) -> None:
     """Simulates a data set for a program's own use, unless the folder already holds this very one.
 
     If the folder holds a data set that this function made of another campaign, it is replaced. One
@@ -42,11 +65,12 @@ def ensure_track(root: Path, campaign: Campaign) -> None:
     Args:
         root: Folder of the data set.
         campaign: What is to be in it.
+        workers: Processes that share the work.
 
     Raises:
         InputError: As :func:`simulate_track`.
     """
-    campaign = replace(campaign, sensor=campaign.lidar)  # reports a wrong sensor file first
+    campaign = campaign.settled()  # reports a wrong file first
     with _alone(root):
         there = read_manifest(root)
         if there and not there.get("keep") and not _describes(there, campaign):
@@ -56,10 +80,10 @@ def ensure_track(root: Path, campaign: Campaign) -> None:
                 if (root / SEQUENCES).exists():
                     shutil.rmtree(root / SEQUENCES)
                 (root / MANIFEST).unlink()
-        _simulate(root, campaign, workers=1, keep=False)
+        _simulate(root, campaign, workers, keep=False)
 
 
-def simulate_track(root: Path, campaign: Campaign, workers: int = 1) -> None:
+def simulate_track(root: Path, campaign: Simulation, workers: int = 1) -> None:
     """Simulates a data set, or what is missing of it.
 
     Args:
@@ -71,12 +95,12 @@ def simulate_track(root: Path, campaign: Campaign, workers: int = 1) -> None:
         InputError: The folder holds something else or cannot be written, or Open3D cannot be
             imported. What was complete by then stays, and nothing half-written.
     """
-    campaign = replace(campaign, sensor=campaign.lidar)  # reports a wrong sensor file first
+    campaign = campaign.settled()  # reports a wrong file first
     with _alone(root):
         _simulate(root, campaign, workers, keep=True)
 
 
-def _simulate(root: Path, campaign: Campaign, workers: int, *, keep: bool) -> None:
+def _simulate(root: Path, campaign: Simulation, workers: int, *, keep: bool) -> None:
     """Simulates the sequences that are missing.
 
     Args:
@@ -147,11 +171,11 @@ def _writing(root: Path) -> Iterator[None]:
         ) from error
 
 
-def _describes(manifest: Mapping[str, Any], campaign: Campaign) -> bool:
+def _describes(manifest: Mapping[str, Any], campaign: Simulation) -> bool:
     return manifest.items() >= campaign.description.items()
 
 
-def _refuse_others(root: Path, there: Mapping[str, Any], campaign: Campaign) -> None:
+def _refuse_others(root: Path, there: Mapping[str, Any], campaign: Simulation) -> None:
     if there and not _describes(there, campaign):
         raise InputError(
             root,
@@ -165,7 +189,7 @@ def _refuse_others(root: Path, there: Mapping[str, Any], campaign: Campaign) -> 
 
 
 def _complete_sequences(
-    root: Path, campaign: Campaign, workers: int
+    root: Path, campaign: Simulation, workers: int
 ) -> Generator[dict[str, str], None, None]:
     """Checksums of every sequence, made where it is missing, in ascending order."""
     complete = partial(_complete_sequence, root, campaign)
@@ -191,12 +215,12 @@ def _unfinished(root: Path, name: str) -> Path:
     return root / SEQUENCES / f".{name}"
 
 
-def _complete_sequence(root: Path, campaign: Campaign, name: str) -> dict[str, str]:
+def _complete_sequence(root: Path, campaign: Simulation, name: str) -> dict[str, str]:
     folder, unfinished = root / SEQUENCES / name, _unfinished(root, name)
     if not folder.exists():
         shutil.rmtree(unfinished, ignore_errors=True)  # left behind by a run that was killed
         try:
-            write_sequence(unfinished, campaign, name)
+            campaign.write(unfinished, name)
             unfinished.rename(folder)
         finally:
             shutil.rmtree(unfinished, ignore_errors=True)

@@ -28,3 +28,6 @@ LAYOUTS: dict[str, Callable[[np.random.Generator], Track]] = {
     "street": lay_out_track,
     "yard": lay_out_yard,
 }
+
+# Those that are closed on all sides.
+INDOORS = frozenset({"garage", "room"})

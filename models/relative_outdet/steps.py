@@ -9,15 +9,18 @@ from torch.nn import functional
 NEAREST = 0.05
 NEAREST_TO_AXIS = 0.01
 
-# To its third nearest neighbour a ray has a step or two, whichever of the two axes steps finer; the
-# nearest may be the other return of the same ray.
+# To the third nearest ray among those of its neighbours a ray has a step or two, whichever of the
+# two axes steps finer; the nearest may be the other return of the same ray.
 OF_STEP = 3
+
+# Of so many points, evenly spread over a scan, the step of its rays is the median.
+MOST_RAYS = 2049
 
 # Radians; no sensor's rays lie closer.
 LEAST_STEP = 1e-4
 
-# What is added before logarithms, and to sums that are divided by: as good as nothing of a scan,
-# and all there is of an empty one.
+# What is added before logarithms, and to sums that are divided by: next to nothing, but where there
+# is nothing at all.
 FEWEST_STEPS = 1e-2
 HARDLY_ANY = 1e-3
 
@@ -34,9 +37,9 @@ NUMBERS = 4
 def in_steps(points: Tensor, distances: Tensor, neighbours: Tensor) -> tuple[Tensor, Tensor]:
     """Where each point's neighbours are, seen along its ray and across it.
 
-    A step is the angle between neighbouring rays, estimated from the scan itself: the harmonic mean
-    of the angles between its points and their third neighbours, in which the few that have none
-    near count for nothing. Across a point's ray it is as long as the step at the point's range.
+    A step is the angle between neighbouring rays, taken from the scan itself: the median of the
+    angles between its points and the third nearest among their neighbours' rays. Across a point's
+    ray it is as long as the step at the point's range.
 
     Args:
         points: x, y, z in metres, in the sensor's frame, float (M, 3).
@@ -78,8 +81,10 @@ def _range_of(places: Tensor) -> Tensor:
 
 
 def _step(aside: Tensor, risen: Tensor, distance: Tensor) -> Tensor:
-    """The angle between neighbouring rays, radians, float ()."""
-    across = (aside[:, OF_STEP - 1].square() + risen[:, OF_STEP - 1].square()).sqrt()
-    angle = (across / distance).clamp_min(LEAST_STEP)
-    count = angle.shape[0] + HARDLY_ANY
-    return count / ((1 / angle).sum() + HARDLY_ANY)
+    """The angle between neighbouring rays, radians, float (); of no points 0.1."""
+    angles = (aside.square() + risen.square()).sqrt() / distance[:, None]
+    # A row more, so that there is one to take the median of.
+    angles = torch.cat([angles, angles.new_full((1, angles.shape[1]), 0.1)])
+    some = torch.arange(MOST_RAYS, device=angles.device) * distance.shape[0] // MOST_RAYS
+    third = angles[some].topk(OF_STEP, dim=1, largest=False).values[:, -1]
+    return third.topk(MOST_RAYS // 2 + 1).values[-1].clamp_min(LEAST_STEP)

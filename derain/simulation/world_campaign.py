@@ -1,0 +1,110 @@
+"""A data set of scans that are drawn one by one, and how one of them is written."""
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from derain import __version__
+from derain.cards.card import load_card
+from derain.errors import InputError
+from derain.files import write_scan
+from derain.files.atomic import replacing
+from derain.files.documents import shown
+from derain.files.labels import write_labels
+from derain.simulation.campaign import MOST
+from derain.simulation.classes import parted
+from derain.simulation.manifest import MAKER, SPLIT_PARTS
+from derain.simulation.world import World, draw_scan, load_world
+
+# What the folders of a sequence are called.
+FOLDERS = load_card("simulated").layout
+
+# Of each sequence.
+STEM = "000000"
+DRAWN = "drawn.yaml"
+
+
+@dataclass(frozen=True)
+class WorldCampaign:
+    """What is simulated: every sequence is one scan, of another place, sensor and weather.
+
+    Attributes:
+        train: Scans to train on, at least one.
+        validation: Scans to choose a model with.
+        test: Scans to judge it on.
+        seed: Seed of everything drawn.
+        world: What they are drawn from, or the name of a packaged file of it, or of one's own.
+
+    Raises:
+        InputError: Too few or too many scans, or a negative seed.
+    """
+
+    train: int = 1000
+    validation: int = 100
+    test: int = 0
+    seed: int = 0
+    world: World | str = field(default_factory=World)
+
+    def __post_init__(self) -> None:
+        for part in SPLIT_PARTS:
+            count, least = getattr(self, part), int(part == "train")
+            if not least <= count <= MOST:
+                raise InputError(part, f"{shown(count)} scans", f"Give {least} to {MOST:,}.")
+        if self.seed < 0:
+            raise InputError("seed", f"{shown(self.seed)} is negative", "Give 0 or more.")
+
+    def settled(self) -> "WorldCampaign":
+        """The same with its world read.
+
+        Raises:
+            InputError: A file that is missing or damaged.
+        """
+        world = load_world(self.world) if isinstance(self.world, str) else self.world
+        return WorldCampaign(self.train, self.validation, self.test, self.seed, world)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the sequences, in ascending order."""
+        return [f"{number:05d}" for number in range(self.train + self.validation + self.test)]
+
+    @property
+    def split(self) -> dict[str, list[str]]:
+        """Names of the sequences of each part."""
+        ends = np.cumsum([self.train, self.validation, self.test])
+        parts = zip(SPLIT_PARTS, [0, *ends[:-1]], ends, strict=True)
+        return {part: self.names[begin:end] for part, begin, end in parts}
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """Everything that the files depend on, as reading it back from JSON gives it."""
+        content = {
+            "made_by": MAKER,
+            "version": __version__,
+            "worlds": asdict(self),
+            "split": self.split,
+        }
+        return dict(json.loads(json.dumps(content)))
+
+    def write(self, folder: Path, name: str) -> None:
+        """Simulates a sequence: one scan, its labels, and what it was drawn as.
+
+        Args:
+            folder: Folder to write.
+            name: Name of the sequence.
+
+        Raises:
+            InputError: A file cannot be written, or Open3D cannot be imported.
+        """
+        assert isinstance(self.world, World)  # it is settled
+        seed = np.random.SeedSequence(self.seed, spawn_key=(int(name),))
+        drawn = draw_scan(self.world, np.random.default_rng(seed))
+        assert drawn.scan.label is not None
+        write_scan(folder / FOLDERS.scans / f"{STEM}.bin", drawn.scan)
+        write_labels(folder / FOLDERS.labels / f"{STEM}.label", *parted(drawn.scan.label))
+        with replacing(folder / DRAWN) as temporary:
+            described = json.loads(json.dumps(drawn.description))
+            temporary.write_text(yaml.safe_dump(described, sort_keys=False), "utf-8")

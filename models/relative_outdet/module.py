@@ -1,0 +1,132 @@
+"""3D-OutDet made relative: it sees nothing that differs between sensors.
+
+3D-OutDet is given places and intensities, by which it knows the sensor that it was trained on, and
+on another one it finds nothing. This variant of our own is given where neighbours are, in steps of
+the sensor's rays, and range.
+
+Source: A. M. Raisuddin, T. Cortinhal, J. Holmblad, E. E. Aksoy, "3D-OutDet: A Fast and Memory
+Efficient Outlier Detector for 3D LiDAR Point Clouds in Adverse Weather", IEEE IV 2024, for two
+convolutions over nearest neighbours.
+"""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import torch
+from lightning.pytorch.utilities.types import OptimizerLRScheduler
+from torch import Tensor
+
+from derain.errors import InputError
+from derain.learning.batch import Batch
+from derain.models.registry import NETWORKS
+from derain.models.relative_outdet.network import RelativeOutDetNetwork
+from derain.models.relative_outdet.steps import OF_STEP
+from derain.models.supervised import SupervisedModule
+from derain.scan import Scan
+from derain.views.neighbours import NeighbourView
+from derain.views.view import View
+
+# What the view gives it of a point; the network takes from it what does not differ.
+CHANNELS = ("x", "y", "z")
+
+# Share of the training in which the learning rate rises; then it falls to nothing.
+WARM_UP = 0.1
+
+
+@NETWORKS.add("relative_outdet")
+class RelativeOutDet(SupervisedModule):
+    """Trains 3D-OutDet made relative.
+
+    Example:
+        >>> trainer = Trainer(max_epochs=2, logger=False, enable_progress_bar=False)
+        >>> data = derain.Folder(".", "wads", train=["scan.bin"], validation=["scan.bin"])
+        >>> model = RelativeOutDet(neighbours=5)
+        >>> trainer.fit(model, data)
+        >>> model.spec.channels
+        ('x', 'y', 'z')
+
+    Args:
+        neighbours: k, the size of a neighbourhood, the point itself included; at least 4.
+        width: Features of a point.
+        of_neighbour: Features of each neighbour, of where it is.
+        opinion: What a point tells those that it is a neighbour of.
+        context: Features of what a scan holds at some range.
+        learning_rate: Of AdamW, where it is highest.
+        weight_decay: Of AdamW.
+        threshold: A point is rain where its probability is greater.
+        balance: How far the rarer class counts for more: 0 not at all, so that a point wrongly
+            called rain counts for no less than one that is missed; 1 by the inverse of its share.
+        spec: Set by derain when it saves a checkpoint; leave it out otherwise.
+    """
+
+    VIEW: ClassVar[type[View]] = NeighbourView
+    network: RelativeOutDetNetwork
+
+    def __init__(
+        self,
+        neighbours: int = 9,
+        width: int = 32,
+        of_neighbour: int = 8,
+        opinion: int = 12,
+        context: int = 16,
+        learning_rate: float = 5e-3,
+        weight_decay: float = 1e-4,
+        threshold: float = 0.5,
+        balance: float = 0.0,
+        spec: dict[str, Any] | None = None,
+    ) -> None:
+        super().__init__(CHANNELS)
+        if neighbours <= OF_STEP:
+            raise InputError("neighbours", f"{neighbours} are too few", f"Give {OF_STEP + 1} or more.")
+        self.save_hyperparameters()
+        self.network = RelativeOutDetNetwork(neighbours, width, of_neighbour, opinion, context)
+        self.adopt(spec)
+
+    def view_for(self, scans: Sequence[Scan]) -> NeighbourView:
+        """The view that the network sees a scan through, whatever the scans."""
+        return NeighbourView(self.hparams["neighbours"], self.channels)
+
+    def sees_through(self, view: View) -> bool:
+        """Whether the network can take what a Spec's view gives: as many neighbours as it has."""
+        return isinstance(view, NeighbourView) and view.neighbours == self.hparams["neighbours"]
+
+    def forward(
+        self,
+        points: Tensor,
+        distances: Tensor,
+        neighbours: Tensor,
+        candidates: Tensor | None = None,
+    ) -> Tensor:
+        """Logits, float (J, 2), of one scan; arguments as for :class:`RelativeOutDetNetwork`."""
+        return self.network(points, distances, neighbours, candidates)
+
+    def logits_of(self, batch: Batch) -> Tensor:
+        """Logits of every cell, float (M, 2), scan by scan: what one holds is nothing to another."""
+        if len(batch.cells) == 1:
+            return self(**batch.inputs)
+        begin, logits = 0, []
+        for cells in batch.cells:
+            scan = slice(begin, begin + cells)
+            inputs = {name: rows[scan] for name, rows in batch.inputs.items()}
+            inputs["neighbours"] = inputs["neighbours"] - begin
+            logits.append(self(**inputs))
+            begin += cells
+        return torch.cat(logits)
+
+    def deployed(self) -> RelativeOutDetNetwork:
+        """The network as it is exported."""
+        return self.network
+
+    def configure_optimizers(self) -> OptimizerLRScheduler:
+        """AdamW with a learning rate that rises and falls once in the whole training."""
+        rate = self.hparams["learning_rate"]
+        optimizer = torch.optim.AdamW(
+            self.parameters(), lr=rate, weight_decay=self.hparams["weight_decay"]
+        )
+        schedule = torch.optim.lr_scheduler.OneCycleLR(
+            optimizer,
+            rate,
+            total_steps=max(int(self.trainer.estimated_stepping_batches), 2),
+            pct_start=WARM_UP,
+        )
+        return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
