@@ -24,6 +24,12 @@ CLEARANCE = 0.35
 
 FLOOR = (0.03, 0.6)
 
+# Of the bumps of a wall, what floors and ceilings have.
+SMOOTH = 0.2
+
+# Walls, floors and ceilings overlap by so much, metres: bumps leave no slit between them.
+OVERLAP = 0.1
+
 
 @dataclass(frozen=True)
 class Walls:
@@ -113,8 +119,9 @@ def _about_axis(triangles: shapes.Triangles) -> NDArray[np.bool_]:
 
 def _floor_and_ceiling(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
     length, width = room.x[1] - room.x[0], room.y[1] - room.y[0]
-    for height, bumps in ((0.0, 1), (room.height, -1)):
-        rough = walls.rough_wall(length, width, generator, cell=0.5)
+    for height, bumps in ((0.0, SMOOTH), (room.height, -SMOOTH)):
+        rough = walls.rough_wall(length + 2 * OVERLAP, width + 2 * OVERLAP, generator, cell=0.5)
+        rough = _moved(rough, -OVERLAP, 0, -OVERLAP)
         x, bump, z = np.moveaxis(rough.triangles, -1, 0)
         lying = np.stack([x + room.x[0], z + room.y[0], height + bumps * bump], axis=-1)
         shine = evenly_in_logarithm(FLOOR, generator)
@@ -127,7 +134,8 @@ def _walls(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
         length = float(np.hypot(end[0] - start[0], end[1] - start[1]))
         kind = generator.choice(["whole", "glass", "doorway"], p=[0.5, 0.3, 0.2])
         if length < 1.5 or kind == "whole":
-            wall: list[Surface] = [walls.rough_wall(length, room.height, generator, cell=0.5)]
+            whole = walls.rough_wall(length + 2 * OVERLAP, room.height, generator, cell=0.5)
+            wall = [_moved(whole, -OVERLAP, 0, 0)]
         else:
             sill, lintel = (generator.choice([0.0, 0.9]), 2.1) if kind == "glass" else (0.0, 2.0)
             wide = length - 0.4 if kind == "glass" else 0.9
