@@ -6,6 +6,7 @@ what is behind it all the same.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 
 import numpy as np
 
@@ -14,16 +15,9 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
 from derain.simulation.places.drawing import Span, evenly_in_logarithm
 from derain.simulation.places.frames import Point, bars
-from derain.simulation.places.specks import specks
+from derain.simulation.places.specks import PAINT, mirrored
 from derain.simulation.shapes import Triangles
 from derain.simulation.track import Track
-
-# Nothing is nearer to the sensor, metres.
-NEAREST = 0.15
-
-# Of paint, and of what reflects so little towards the sensor that no detector sees it.
-PAINT = (0.01, 0.6)
-MIRROR = 1e-9
 
 # Of how many specks a part is seen that returns nothing else.
 SPECKS = (1.0, 100.0)
@@ -86,17 +80,14 @@ def _finished(
     part: Triangles, mounting_height: float, painted: float, generator: np.random.Generator
 ) -> Iterator[Surface]:
     """A part as paint that returns, or as a mirror with specks on it, or as the specks alone."""
+    surface = Surface(part, TrackClass.BACKGROUND, evenly_in_logarithm(PAINT, generator))
     if generator.random() < painted:
-        yield Surface(part, TrackClass.BACKGROUND, evenly_in_logarithm(PAINT, generator))
+        yield surface
         return
-    if generator.random() < 0.7:
-        yield Surface(part, TrackClass.BACKGROUND, MIRROR)
-    sensor = np.array([0, 0, mounting_height])
     count = round(evenly_in_logarithm(SPECKS, generator))
-    on_it = specks(part, sensor, count, generator)
-    on_it = on_it[np.linalg.norm(on_it - sensor, axis=2).min(axis=1) > NEAREST]
-    if len(on_it):
-        yield Surface(on_it, TrackClass.BACKGROUND, evenly_in_logarithm(PAINT, generator))
+    shining = mirrored(surface, np.array([0, 0, mounting_height]), count, generator)
+    hides = generator.random() < 0.7
+    yield from shining if hides else islice(shining, 1, None)
 
 
 def _car(generator: np.random.Generator, mounting_height: float) -> Parts:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from derain.simulation.classes import TrackClass
-from derain.simulation.places.carrier import NEAREST, lay_out_carrier, with_surfaces
+from derain.simulation.places.carrier import lay_out_carrier, with_surfaces
 from derain.simulation.places.horizon import lay_out_horizon
 from derain.simulation.sensor import Returns, Sensor
 from derain.simulation.track import Track
@@ -64,7 +64,7 @@ def test_rays_meet_a_carrier(open3d: ModuleType, height: float) -> None:
         met.append(close.sum())
         near.append((close & detected(track, sensor(height)).returned).sum())
     assert min(met) > 0
-    assert np.mean(np.array(near) > 0) > 0.6
+    assert np.mean(np.array(near) > 0) > 0.5
     # Mirrors hide much of what is behind some of them, and return next to nothing.
     shares = np.array(near) / met
     assert shares.min() < 0.1
@@ -91,7 +91,3 @@ def test_surfaces_are_added_to_a_track_behind_what_it_has() -> None:
     assert np.array_equal(joined.triangles[len(track.label) :], Track.of(added).triangles)
     assert len(joined.label) == len(joined.reflectivity) == len(joined.triangles)
     assert with_surfaces(track, iter(())) is track
-
-
-def test_the_nearest_that_anything_may_be_is_more_than_a_tenth_of_a_metre() -> None:
-    assert NEAREST > 0.1
