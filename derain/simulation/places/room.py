@@ -77,8 +77,8 @@ def _about_axis(triangles: shapes.Triangles) -> NDArray[np.bool_]:
     first = triangles[..., :2]
     second = np.roll(first, -1, axis=1)
     turn = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-    through: NDArray[np.bool_] = (turn > 0).all(axis=1) | (turn < 0).all(axis=1)
-    return through
+    left, right = (turn > 0).all(axis=1), (turn < 0).all(axis=1)
+    return np.asarray(left | right)
 
 
 def _below_the_ceiling(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
