@@ -6,6 +6,7 @@ what is behind it all the same.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 
 import numpy as np
 
@@ -14,19 +15,16 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
 from derain.simulation.places.drawing import Span, evenly_in_logarithm
 from derain.simulation.places.frames import Point, bars
-from derain.simulation.places.specks import specks
+from derain.simulation.places.specks import PAINT, mirrored
 from derain.simulation.shapes import Triangles
 from derain.simulation.track import Track
 
-# Nothing is nearer to the sensor, metres.
-NEAREST = 0.15
-
-# Of paint, and of what reflects so little towards the sensor that no detector sees it.
-PAINT = (0.01, 0.6)
-MIRROR = 1e-9
-
 # Of how many specks a part is seen that returns nothing else.
-SPECKS = (3.0, 150.0)
+SPECKS = (1.0, 100.0)
+
+# Share of the parts of a carrier that are painted so that they return all over: of half of the
+# carriers none.
+PAINTED = (0.0, 0.0, 0.25, 0.6)
 
 # A sensor is mounted on a car from so high on, and on a lorry, metres.
 ON_A_CAR, ON_A_LORRY = 1.3, 2.4
@@ -56,9 +54,12 @@ def lay_out_carrier(generator: np.random.Generator, mounting_height: float) -> I
     carriers = list(shares)
     carrier = carriers[generator.choice(len(carriers), p=list(shares.values()))]
     heading = generator.choice([0.0, generator.normal(0, 0.1), generator.uniform(-np.pi, np.pi)])
+    painted = generator.choice(PAINTED)
     for part in carrier(generator, mounting_height):
         turned = shapes.placed(part, 0, 0, heading)
-        yield from _finished(shapes.raised(turned, mounting_height), mounting_height, generator)
+        yield from _finished(
+            shapes.raised(turned, mounting_height), mounting_height, painted, generator
+        )
 
 
 def with_surfaces(track: Track, surfaces: Iterator[Surface]) -> Track:
@@ -76,21 +77,17 @@ def with_surfaces(track: Track, surfaces: Iterator[Surface]) -> Track:
 
 
 def _finished(
-    part: Triangles, mounting_height: float, generator: np.random.Generator
+    part: Triangles, mounting_height: float, painted: float, generator: np.random.Generator
 ) -> Iterator[Surface]:
     """A part as paint that returns, or as a mirror with specks on it, or as the specks alone."""
-    finish = generator.choice(["paint", "mirror", "nothing"], p=[0.3, 0.5, 0.2])
-    if finish == "paint":
-        yield Surface(part, TrackClass.BACKGROUND, evenly_in_logarithm(PAINT, generator))
+    surface = Surface(part, TrackClass.BACKGROUND, evenly_in_logarithm(PAINT, generator))
+    if generator.random() < painted:
+        yield surface
         return
-    if finish == "mirror":
-        yield Surface(part, TrackClass.BACKGROUND, MIRROR)
-    sensor = np.array([0, 0, mounting_height])
     count = round(evenly_in_logarithm(SPECKS, generator))
-    on_it = specks(part, sensor, count, generator)
-    on_it = on_it[np.linalg.norm(on_it - sensor, axis=2).min(axis=1) > NEAREST]
-    if len(on_it):
-        yield Surface(on_it, TrackClass.BACKGROUND, evenly_in_logarithm(PAINT, generator))
+    shining = mirrored(surface, np.array([0, 0, mounting_height]), count, generator)
+    hides = generator.random() < 0.7
+    yield from shining if hides else islice(shining, 1, None)
 
 
 def _car(generator: np.random.Generator, mounting_height: float) -> Parts:

@@ -38,7 +38,8 @@ def lay_out_horizon(generator: np.random.Generator) -> Iterator[Surface]:
     Yields:
         Surfaces in the frame of a track, all of them at least 50 m from its origin: rough, hilly
         ground from 118 m on, and on it and nearer rows of trees full of gaps, single trees, corners
-        of buildings, poles, masts, signs, scaffolds, cables and lorries.
+        of buildings, poles, masts, signs, cables, lorries and small
+        things that glint.
     """
     yield _hills(generator)
     kinds: list[tuple[Callable[[float, np.random.Generator], Iterator[Surface]], int]] = [
@@ -50,6 +51,7 @@ def lay_out_horizon(generator: np.random.Generator) -> Iterator[Surface]:
         (_sign, 10),
         (_vehicle, 6),
         (_scrub, 8),
+        (_glint, 40),
     ]
     for make, most in kinds:
         for _ in range(generator.integers(0, most + 1)):
@@ -74,10 +76,9 @@ def _hills(generator: np.random.Generator) -> Surface:
     height[:, -1] = height[:, 0]
     ring = np.stack([away * np.cos(angle), away * np.sin(angle), height - 1.5], axis=-1)
     triangles = shapes.sheet(ring)
-    reflectivity = evenly_in_logarithm((0.05, 0.5), generator) * many_evenly_in_logarithm(
-        (0.5, 1.5), len(triangles), generator
-    )
-    return Surface(triangles, TrackClass.BACKGROUND, np.clip(reflectivity, 0.01, 1))
+    usual = evenly_in_logarithm((0.01, 0.3), generator)
+    spread = many_evenly_in_logarithm((0.2, 3), len(triangles), generator)
+    return Surface(triangles, TrackClass.BACKGROUND, usual * spread)
 
 
 def _row_of_trees(away: float, generator: np.random.Generator) -> Iterator[Surface]:
@@ -184,6 +185,13 @@ def _sign(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     yield Surface(turned, TrackClass.BACKGROUND, generator.uniform(*RETROREFLECTIVE))
     post = frames.bars([((0.05, 0, -DEPTH), (0.05, 0, top))], 0.04)
     yield _matter(post, generator)
+
+
+def _glint(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """A lamp, a marker or a scrap of metal that returns light from afar, to one beam or two."""
+    size, height = evenly_in_logarithm((0.05, 0.5), generator), generator.uniform(-1, 8)
+    glint = shapes.raised(shapes.leaves(np.zeros((1, 3)), size, generator), height)
+    yield Surface(glint, TrackClass.BACKGROUND, generator.uniform(*RETROREFLECTIVE))
 
 
 def _vehicle(away: float, generator: np.random.Generator) -> Iterator[Surface]:

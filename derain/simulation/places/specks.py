@@ -1,14 +1,24 @@
 """What little of a surface returns when the rest mirrors the light away: dust, edges, scratches."""
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.simulation import shapes
+from derain.simulation.objects import Surface
 from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.shapes import Triangles
 
+# Of what returns, and of what reflects so little towards the sensor that no detector sees it.
+PAINT = (0.01, 0.6)
+MIRROR = 1e-9
+
+# Nothing is nearer to the sensor, metres.
+NEAREST = 0.15
+
 # Size of a speck over its distance from the sensor: it returns one ray or two.
-SIZE = (5e-4, 5e-3)
+SIZE = (1.5e-3, 8e-3)
 
 
 def specks(
@@ -22,6 +32,9 @@ def specks(
             a beam, which widens as well, is returned by it.
         count: How many.
         generator: Random generator.
+
+    Returns:
+        At most so many; fewer where they would be too near to the sensor.
     """
     places = on_surface(surface, count, generator)
     # A clump is what lies nearest to one of a few places: the rest of the surface stays empty.
@@ -31,7 +44,26 @@ def specks(
     places = places[from_clumps <= np.quantile(from_clumps, kept)]
     size = evenly_in_logarithm(SIZE, generator) * np.linalg.norm(places - sensor, axis=1)
     corners = generator.normal(0, 1, (len(places), 3, 3))
-    return places[:, None] + size[:, None, None] * np.clip(corners, -2, 2)
+    small = places[:, None] + size[:, None, None] * np.clip(corners, -2, 2)
+    away = np.linalg.norm(small - sensor, axis=2).min(axis=1)
+    return small[away > NEAREST]
+
+
+def mirrored(
+    surface: Surface, sensor: NDArray[np.float64], count: int, generator: np.random.Generator
+) -> Iterator[Surface]:
+    """A surface that mirrors the light away and hides what is behind it, with specks on it.
+
+    Args:
+        surface: The surface as it would be if it returned all over.
+        sensor: Place of the sensor, (3,), metres.
+        count: How many specks.
+        generator: Random generator.
+    """
+    yield replace(surface, reflectivity=MIRROR)
+    on_it = specks(surface.triangles, sensor, count, generator)
+    if len(on_it):
+        yield Surface(on_it, surface.label, evenly_in_logarithm(PAINT, generator))
 
 
 def on_surface(
@@ -48,8 +80,3 @@ def on_surface(
         first[which] + u * (second - first)[which] + v * (third - first)[which]
     )
     return places
-
-
-def plate(corners: NDArray[np.float64]) -> Triangles:
-    """A flat or twisted plate of four corners in order, (4, 3), metres."""
-    return shapes.sheet(np.stack([corners[[0, 3]], corners[[1, 2]]]))
