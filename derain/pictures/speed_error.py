@@ -32,12 +32,28 @@ class Standing:
         error: 1 - IoU.
         milliseconds: Time from file to mask, above 0.
         group: ``network``, ``filter`` or ``baseline``.
+        size: Bytes of its file; None where it has none.
     """
 
     title: str
     error: float
     milliseconds: float
     group: str
+    size: int | None = None
+
+    @property
+    def label(self) -> str:
+        """What stands beside its marker: what it is called, and how large its file is."""
+        return self.title if self.size is None else f"{self.title} · {readable_size(self.size)}"
+
+
+def readable_size(size: int) -> str:
+    """A number of bytes in kilobytes, or from a million on in megabytes.
+
+    Args:
+        size: Bytes, 0 or more.
+    """
+    return f"{size / 1e6:.1f} MB" if size >= 999_500 else f"{max(1, round(size / 1e3))} kB"
 
 
 def pareto_front(standings: Sequence[Standing]) -> list[Standing]:
@@ -54,7 +70,7 @@ def pareto_front(standings: Sequence[Standing]) -> list[Standing]:
 
 
 def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
-    """Error over milliseconds, both logarithmic, and the Pareto front.
+    """Error over milliseconds, both logarithmic, and the Pareto front; sizes beside the titles.
 
     Args:
         standings: The methods, one or more.
@@ -104,7 +120,7 @@ def _draw_group(axes: Axes, members: Sequence[Standing], group: str, marker: str
 
 
 def _label(axes: Axes, standings: Sequence[Standing]) -> None:
-    """Writes each title where it covers no marker and no other title, and is nearest to its own."""
+    """Writes each label where it covers no marker and no other label, nearest to its own marker."""
     places = axes.transData.transform([(s.milliseconds, _drawn(s.error)) for s in standings])
     taken = [Bbox.from_bounds(x - 5, y - 5, 10, 10) for x, y in places]
     legend = axes.get_legend()
@@ -130,7 +146,7 @@ def _candidates(axes: Axes, standing: Standing) -> Iterator[Annotation]:
     for distance in DISTANCES:
         for x, y in zip(np.cos(DIRECTIONS), np.sin(DIRECTIONS), strict=True):
             yield axes.annotate(
-                standing.title,
+                standing.label,
                 (standing.milliseconds, _drawn(standing.error)),
                 xytext=(distance * x, distance * y),
                 textcoords="offset points",
@@ -163,6 +179,6 @@ def _drawn(error: float) -> float:
 
 
 def _few_digits(value: float, _: object) -> str:
-    """Names 2 and 5 between the powers of ten."""
+    """Names 2, 3 and 5 between the powers of ten."""
     digit = value / 10 ** np.floor(np.log10(value))
-    return f"{value:g}" if round(digit) in (2, 5) else ""
+    return f"{value:g}" if round(digit) in (2, 3, 5) else ""

@@ -8,7 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.text import Text
 
-from derain.pictures.speed_error import LEAST_ERROR, Standing, pareto_front, speed_error_figure
+from derain.pictures.speed_error import (
+    LEAST_ERROR,
+    Standing,
+    pareto_front,
+    readable_size,
+    speed_error_figure,
+)
 
 values = st.sampled_from([0.0, 0.1, 0.2, 0.5, 1.0])
 standings = st.lists(
@@ -32,14 +38,15 @@ def test_the_pareto_front_is_what_no_other_method_surpasses(methods: list[Standi
 
 
 def crowd(seed: int) -> list[Standing]:
-    """Sixteen methods, half of them close together."""
+    """Sixteen methods, half of them close together, and some of them files."""
     generator = np.random.default_rng(seed)
     error = np.concatenate([generator.uniform(0.02, 1, 8), generator.normal(0.2, 0.01, 8)])
     milliseconds = np.concatenate([generator.uniform(5, 900, 8), generator.normal(120, 8, 8)])
-    groups = itertools.cycle(["network", "filter", "baseline"])
+    kinds = itertools.cycle([("network", 67_535), ("filter", None), ("baseline", None)])
+    places = zip(error, milliseconds, kinds, strict=False)
     return [
-        Standing(f"method number {number}", *place, group)
-        for number, (*place, group) in enumerate(zip(error, milliseconds, groups, strict=False))
+        Standing(f"method number {number}", *place, *kind)
+        for number, (*place, kind) in enumerate(places)
     ]
 
 
@@ -49,12 +56,29 @@ def test_labels_cover_neither_each_other_nor_a_marker(seed: int) -> None:
     figure = speed_error_figure(methods, "a crowd")
     figure.draw_without_rendering()
     (axes,) = figure.axes
-    assert [text.get_text() for text in axes.texts] == [method.title for method in methods]
+    assert [text.get_text() for text in axes.texts] == [method.label for method in methods]
     # Of the letters alone, without the line that leads to them.
     boxes = [Text.get_window_extent(text) for text in axes.texts]
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
     places = axes.transData.transform([(m.milliseconds, m.error) for m in methods])
     assert not any(box.contains(*place) for box in boxes for place in places)
+
+
+def test_beside_a_file_stands_how_large_it_is() -> None:
+    with_file = Standing("outdet", 0.1, 60.0, "network", 67_535)
+    assert with_file.label == "outdet · 68 kB"
+    assert Standing("dror", 0.3, 40.0, "filter").label == "dror"
+
+
+@pytest.mark.parametrize(
+    ("size", "text"),
+    [
+        *((0, "1 kB"), (1_499, "1 kB"), (999_499, "999 kB")),
+        *((999_500, "1.0 MB"), (6_849_378, "6.8 MB")),
+    ],
+)
+def test_sizes_are_written_short(size: int, text: str) -> None:
+    assert readable_size(size) == text
 
 
 def test_a_label_beside_a_marker_is_nearer_to_it_than_to_any_other() -> None:
