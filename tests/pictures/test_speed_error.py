@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.path import Path
 from matplotlib.text import Text
 
 from derain.pictures.speed_error import (
@@ -102,3 +103,16 @@ def test_no_error_at_all_is_drawn_at_the_least() -> None:
     figure = speed_error_figure([Standing("perfect", 0.0, 3.0, "network")], "one method")
     (collection,) = figure.axes[0].collections
     np.testing.assert_allclose(collection.get_offsets(), [[3.0, LEAST_ERROR]])
+
+
+def test_labels_leave_the_front_in_sight_where_there_is_room_beside_it() -> None:
+    methods = [
+        Standing("fast", 0.9, 5, "baseline"),
+        Standing("slow, good", 0.1, 90, "network"),
+    ]
+    figure = speed_error_figure(methods, "a front of two")
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    front = Path(axes.transData.transform([(m.milliseconds, m.error) for m in methods]))
+    for text in axes.texts:
+        assert not front.intersects_bbox(Text.get_window_extent(text), filled=False)
