@@ -9,6 +9,8 @@ import pytest
 
 from benchmarks.across_sensors import main
 from benchmarks.sensor_table.columns import Cell, Column, table
+from benchmarks.sensor_table.measure import Measurement
+from benchmarks.sensor_table.plan import Plan
 from benchmarks.sensor_table.unit import factor_for
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
@@ -106,9 +108,17 @@ def test_its_figures_are_those_of_counting_by_hand(written: tuple[dict, str], sh
     assert values(content, "roof") == values(content, "worst of the clean scans") == clean
 
 
+def test_some_of_the_data_can_be_measured_alone(shared: Path) -> None:
+    plan = Plan.of_yaml(shared / "plan.yaml").with_data(["dry"])
+    measurement = Measurement(plan, shared, shared / "work", threads=1)
+    titles = [column.title for column in measurement.columns()]
+    assert titles == ["dry: all", "dry: pedestrian", "dry: rain", "file"]
+
+
 def test_it_says_what_it_leaves_out_and_why(written: tuple[dict, str]) -> None:
     content, text = written
-    assert content["methods"] == ["nothing", "DROR", "everything", "places"]
+    assert list(content["methods"]) == ["nothing", "DROR", "everything", "places"]
+    assert content["methods"]["DROR"] == {"parameters": DROR().as_dict()}
     assert "no such file" in content["left_out"]["a model that is missing"]
     assert "is not there" in content["left_out"]["elsewhere"]
     assert "no others to learn places from" in content["left_out"]["places: theirs"]

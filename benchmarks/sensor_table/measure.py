@@ -44,6 +44,7 @@ class Measurement:
         threads: Threads of views and networks; 0 takes every core this process may use.
         repeats: Timed runs of each method; 0 times none.
         left_out: What is not in the table, and why.
+        rows: The methods that were measured, by title.
     """
 
     plan: Plan
@@ -52,15 +53,19 @@ class Measurement:
     threads: int = 0
     repeats: int = 0
     left_out: LeftOut = field(default_factory=LeftOut)
+    rows: dict[str, Contestant] = field(default_factory=dict)
 
     def columns(self) -> Iterator[Column]:
         """Every column that can be measured; labels measure alone."""
         rows = rows_of(self.plan.methods, self.shared, self.work / "published", self.left_out)
+        self.rows |= {row.title: row for row in rows}
         finder = DataFinder(self.shared, self.work / "simulated")
         for title, data in self.plan.labelled.items():
             found = self.left_out.unless_found(title, partial(finder.measured, data))
             if found is not None:
-                of_data = [*rows, *self._positions(title, data, finder)]
+                positions = list(self._positions(title, data, finder))
+                self.rows |= {row.title: row for row in positions}
+                of_data = [*rows, *positions]
                 yield from self._of_labelled(title, data, found, of_data)
                 if self.repeats and title == self.plan.timed:
                     yield self._times(found, of_data)

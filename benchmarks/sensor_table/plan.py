@@ -1,6 +1,6 @@
 """What a table across sensors is made of, as its YAML file says it."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -93,6 +93,11 @@ class Plan:
     def with_only(self, methods: Mapping[str, Asked]) -> "Plan":
         """The same columns, of these methods alone."""
         return replace(self, methods=methods)
+
+    def with_data(self, titles: Collection[str]) -> "Plan":
+        """The same rows, of these labelled data and no other scans."""
+        chosen = {title: data for title, data in self.labelled.items() if title in titles}
+        return replace(self, labelled=chosen, clean=())
 
 
 def _tuples(described: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,10 +9,9 @@ from pathlib import Path
 
 from benchmarks.sensor_table.columns import Column, table
 from benchmarks.sensor_table.measure import SIZE, TIME, Measurement
-from derain.export.bench.contestants import LEARNT, TRIVIAL
+from derain.export.bench.speed_error import group_of
 from derain.export.machine import processor, versions
 from derain.files.atomic import replacing
-from derain.filters import FILTERS
 from derain.pictures.scan_pictures import save
 from derain.pictures.speed_error import Standing, speed_error_figure
 
@@ -59,7 +58,7 @@ def report(measurement: Measurement, out: Path, turned: bool, notes: Sequence[st
     print(text)
     content = {
         "command": _command(),
-        "methods": measured,
+        "methods": {title: dict(measurement.rows[title].facts) for title in measured},
         "columns": [column.as_dict() for column in columns],
         "notes": list(notes),
         "left_out": left_out,
@@ -85,18 +84,12 @@ def _draw(measurement: Measurement, columns: dict[str, Column], path: Path) -> N
             title,
             1 - error[title].value,
             times[title].value,
-            _group(plan.methods[title].method),
+            group_of(measurement.rows[title]),
             round(1e3 * sizes[title].value) if title in sizes else None,
         )
         for title in times
     ]
     save(speed_error_figure(standings, f"{plan.timed}, {processor()}"), path)
-
-
-def _group(method: str) -> str:
-    if method in FILTERS:
-        return "filter"
-    return "baseline" if method in (*LEARNT, *TRIVIAL) else "network"
 
 
 def _command() -> str:
