@@ -54,16 +54,26 @@ def test_variants_are_trained_alike_on_the_data_that_they_name(asked: Sweep) -> 
     alone, network, _ = asked.variants
     made, fit, export = asked.commands(alone)
     folder = asked.folder / "range_alone"
-    assert shlex.join(made) == f"simulate --layout street --out {asked.folder}/data/streets"
+    assert shlex.join(made) == f"simulate --layout street --out {asked.folder}/data-sets/streets"
     assert shlex.join(fit).startswith(
         "fit --config outdet_simulated.yaml --seed_everything 4 --trainer.max_epochs 2 "
-        f"--data.make false --data.root {asked.folder}/data/streets --model.channels '[range]' "
+        f"--data.make false --data.root {asked.folder}/data-sets/streets "
+        "--model.channels '[range]' "
     )
     assert export == ["export", str(folder / "model.ckpt"), "--out", str(folder / "model.onnx")]
     made, fit, _ = asked.commands(network)
     assert "facility" in made
     assert fit[:5] == ["fit", "--config", "mine.yaml", "--seed_everything", "4"]
     assert "outdet_simulated.yaml" not in fit
+
+
+@pytest.mark.parametrize("titles", [("a b", "a, b"), ("?", "a")])
+def test_no_variant_takes_the_folder_of_another(titles: tuple[str, str], tmp_path: Path) -> None:
+    lines = [f'  "{title}": --config mine.yaml' for title in titles]
+    text = "\n".join(["seed: 0", "epochs: 1", "variants:", *lines])
+    (tmp_path / "plan.yaml").write_text(text)
+    with pytest.raises(ValueError, match="have to differ"):
+        Sweep.of_yaml(tmp_path / "plan.yaml", tmp_path)
 
 
 def test_a_row_for_each_threshold(asked: Sweep) -> None:

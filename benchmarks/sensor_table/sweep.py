@@ -12,6 +12,9 @@ from typing import Any
 
 import yaml
 
+# Folder of the data sets; no variant's is called so.
+DATA_SETS = "data-sets"
+
 DERAIN = Path(sysconfig.get_path("scripts")) / "derain"
 
 
@@ -67,6 +70,9 @@ class Sweep:
 
         Variants of a title are options of ``derain fit``, or a mapping of ``fit``, ``export`` and
         ``thresholds``.
+
+        Raises:
+            ValueError: Two variants whose folders would be called the same, or one without a name.
         """
         content = yaml.safe_load(path.read_text("utf-8"))
         variants = []
@@ -75,6 +81,9 @@ class Sweep:
             given.setdefault("thresholds", content.get("thresholds", ()))
             given["thresholds"] = tuple(given["thresholds"])
             variants.append(Variant(title, **given))
+        folders = {variant.folder for variant in variants} - {""}
+        if len(folders) < len(variants):
+            raise ValueError(f"{path}: titles of variants have to differ in their letters")
         alike = f"--seed_everything {content['seed']} --trainer.max_epochs {content['epochs']}"
         common = f"{alike} {content.get('common', '')}".strip()
         return cls(content.get("data", {}), variants, common, folder)
@@ -85,7 +94,7 @@ class Sweep:
 
     def commands(self, variant: Variant) -> list[list[str]]:
         """What makes the model: of the data sets that it names, of the training, and the export."""
-        sets = {f"{{{name}}}": str(self.folder / "data" / name) for name in self.data}
+        sets = {f"{{{name}}}": str(self.folder / DATA_SETS / name) for name in self.data}
         folder = self.folder / variant.folder
         made = [
             [*shlex.split(self.data[name.strip("{}")]), "--out", out]
