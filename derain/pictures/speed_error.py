@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.path import Path
 from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FuncFormatter
 from matplotlib.transforms import Bbox
@@ -22,6 +23,9 @@ MARKERS = {"network": "o", "filter": "s", "baseline": "D"}
 DIRECTIONS = np.radians([0, 180, 45, -45, 135, -135, 90, -90])
 DISTANCES = (8, 16, 28, 42, 60, 84)
 
+# A label may be so many distances farther off where it does not cover the line of the front.
+STEPS_TO_AVOID_FRONT = 2
+
 
 @dataclass(frozen=True)
 class Standing:
@@ -32,12 +36,28 @@ class Standing:
         error: 1 - IoU.
         milliseconds: Time from file to mask, above 0.
         group: ``network``, ``filter`` or ``baseline``.
+        size: Bytes of its file; None where it has none.
     """
 
     title: str
     error: float
     milliseconds: float
     group: str
+    size: int | None = None
+
+    @property
+    def label(self) -> str:
+        """What stands beside its marker: what it is called, and how large its file is."""
+        return self.title if self.size is None else f"{self.title} · {readable_size(self.size)}"
+
+
+def readable_size(size: int) -> str:
+    """A number of bytes in kilobytes, or from a million on in megabytes.
+
+    Args:
+        size: Bytes, 0 or more.
+    """
+    return f"{size / 1e6:.1f} MB" if size >= 999_500 else f"{max(1, round(size / 1e3))} kB"
 
 
 def pareto_front(standings: Sequence[Standing]) -> list[Standing]:
@@ -54,7 +74,7 @@ def pareto_front(standings: Sequence[Standing]) -> list[Standing]:
 
 
 def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
-    """Error over milliseconds, both logarithmic, and the Pareto front.
+    """Error over milliseconds, both logarithmic, and the Pareto front; sizes beside the titles.
 
     Args:
         standings: The methods, one or more.
@@ -104,45 +124,70 @@ def _draw_group(axes: Axes, members: Sequence[Standing], group: str, marker: str
 
 
 def _label(axes: Axes, standings: Sequence[Standing]) -> None:
-    """Writes each title where it covers no marker and no other title, and is nearest to its own."""
-    places = axes.transData.transform([(s.milliseconds, _drawn(s.error)) for s in standings])
+    """Writes each label where it covers no marker and no other label, nearest to its own marker."""
+    places, front = (_on_screen(axes, some) for some in (standings, pareto_front(standings)))
     taken = [Bbox.from_bounds(x - 5, y - 5, 10, 10) for x, y in places]
     legend = axes.get_legend()
     assert legend is not None
     taken.append(legend.get_window_extent())
     for number, standing in enumerate(standings):
-        for annotation in _candidates(axes, standing):
+        best, least = None, np.inf
+        for step, annotation in _candidates(axes, standing):
             letters = _letters(annotation)
             inside = all(map(axes.bbox.contains, *letters.corners().T))
             # A label without a line to its marker is taken for that of the nearest marker.
             gaps = _gaps(letters, places)
             clear = annotation.arrow_patch is not None or gaps[number] == gaps.min()
-            if inside and clear and not letters.count_overlaps(taken):
+            free = inside and clear and not letters.count_overlaps(taken)
+            cost = step + STEPS_TO_AVOID_FRONT * _meets(front, letters) if free else np.inf
+            if cost < least:
+                best, annotation, least = annotation, best, cost
+            if annotation is not None:
+                annotation.remove()
+            if step >= least:  # none that follows is better
                 break
-            annotation.remove()
-        else:
+        if best is None:
             # There is no free place: a label that covers others is better than none.
-            letters = _letters(next(_candidates(axes, standing)))
-        taken.append(letters)
+            _, best = next(_candidates(axes, standing))
+        taken.append(_letters(best))
 
 
-def _candidates(axes: Axes, standing: Standing) -> Iterator[Annotation]:
-    for distance in DISTANCES:
+def _on_screen(axes: Axes, standings: Sequence[Standing]) -> NDArray[np.float64]:
+    """Where the markers of some methods are, float64 (n, 2), pixels."""
+    places = [(standing.milliseconds, _drawn(standing.error)) for standing in standings]
+    return axes.transData.transform(places)
+
+
+def _meets(line: NDArray[np.float64], box: Bbox) -> bool:
+    """Whether a line through some places, (n, 2), meets a box."""
+    return len(line) > 1 and bool(Path(line).intersects_bbox(box, filled=False))
+
+
+def _candidates(axes: Axes, standing: Standing) -> Iterator[tuple[int, Annotation]]:
+    """Labels to choose from, the nearest first, each with its place among the distances."""
+    for step, distance in enumerate(DISTANCES):
         for x, y in zip(np.cos(DIRECTIONS), np.sin(DIRECTIONS), strict=True):
-            yield axes.annotate(
-                standing.title,
+            right, up = (0 if abs(part) < 0.1 else int(np.sign(part)) for part in (x, y))
+            annotation = axes.annotate(
+                standing.label,
                 (standing.milliseconds, _drawn(standing.error)),
                 xytext=(distance * x, distance * y),
                 textcoords="offset points",
-                ha="left" if x > 0.1 else "right" if x < -0.1 else "center",
-                va="bottom" if y > 0.1 else "top" if y < -0.1 else "center",
+                ha=("center", "left", "right")[right],
+                va=("center", "bottom", "top")[up],
                 fontsize=9,
                 # Keeps the letters readable where the line of the Pareto front passes them.
                 bbox={"boxstyle": "square,pad=0.1", "color": "white", "alpha": 0.8},
-                arrowprops={"arrowstyle": "-", "color": "#9ca3af", "linewidth": 0.6}
-                if distance > DISTANCES[0]
+                arrowprops={
+                    "arrowstyle": "-",
+                    "color": "#9ca3af",
+                    "linewidth": 0.6,
+                    "relpos": ((1 - right) / 2, (1 - up) / 2),  # to the nearest of its corners
+                }
+                if step
                 else None,
             )
+            yield step, annotation
 
 
 def _letters(annotation: Annotation) -> Bbox:
@@ -163,6 +208,6 @@ def _drawn(error: float) -> float:
 
 
 def _few_digits(value: float, _: object) -> str:
-    """Names 2 and 5 between the powers of ten."""
+    """Names 2, 3 and 5 between the powers of ten."""
     digit = value / 10 ** np.floor(np.log10(value))
-    return f"{value:g}" if round(digit) in (2, 5) else ""
+    return f"{value:g}" if round(digit) in (2, 3, 5) else ""

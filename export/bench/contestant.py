@@ -19,6 +19,9 @@ from derain.views.oddities import Examiner
 # Judges a scan, bool (N,), and gives the stopwatch its stages.
 TimedMethod = Callable[[Scan, Stopwatch], NDArray[np.bool_]]
 
+# Name of the fact that says how many bytes the file of a method has.
+FILE_SIZE = "file_bytes"
+
 
 @dataclass(frozen=True)
 class Contestant:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError, printable
 from derain.evaluation.baselines import PositionPrior, all_points, no_points
 from derain.evaluation.intensity_rule import IntensityRule
-from derain.export.bench.contestant import Contestant
+from derain.export.bench.contestant import FILE_SIZE, Contestant
 from derain.export.bench.functions import TimedFunction
 from derain.export.bench.other_runtime import beside_themselves, run_by
 from derain.export.methods import load_method_of_one_scan, named_method, require_one_scan
@@ -142,6 +142,7 @@ def _model(
     facts = {
         "model": name,
         "sha256": sha256(Path(name).read_bytes()).hexdigest(),
+        FILE_SIZE: derainer.path.stat().st_size,
         "weights": _weights(Path(name)),
         "trained_on": spec.data,
         "threshold": spec.threshold,

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from derain.export.bench.contestant import FILE_SIZE, Contestant
 from derain.export.bench.contestants import LEARNT, TRIVIAL
 from derain.export.bench.rows import Row
 from derain.pictures.scan_pictures import save
@@ -22,7 +23,13 @@ def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) 
         InputError: An output that cannot be written.
     """
     standings = [
-        Standing(row.title, 1 - row.scores.pooled.iou, row.milliseconds, _group(row))
+        Standing(
+            row.title,
+            1 - row.scores.pooled.iou,
+            row.milliseconds,
+            group_of(row.contestant),
+            row.contestant.facts.get(FILE_SIZE),
+        )
         for row in rows
         if row.cost.failure is None
     ]
@@ -30,7 +37,8 @@ def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) 
     save(speed_error_figure(standings, title), path)
 
 
-def _group(row: Row) -> str:
-    if row.contestant.filter is not None:
+def group_of(contestant: Contestant) -> str:
+    """What kind of method it is: a ``network``, a ``filter`` or a ``baseline``."""
+    if contestant.filter is not None:
         return "filter"
-    return "baseline" if row.kind in (*LEARNT, *TRIVIAL) else "network"
+    return "baseline" if contestant.kind in (*LEARNT, *TRIVIAL) else "network"

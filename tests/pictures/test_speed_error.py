@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.path import Path
 from matplotlib.text import Text
 
-from derain.pictures.speed_error import LEAST_ERROR, Standing, pareto_front, speed_error_figure
+from derain.pictures.speed_error import (
+    LEAST_ERROR,
+    Standing,
+    pareto_front,
+    readable_size,
+    speed_error_figure,
+)
 
 values = st.sampled_from([0.0, 0.1, 0.2, 0.5, 1.0])
 standings = st.lists(
@@ -32,14 +39,15 @@ def test_the_pareto_front_is_what_no_other_method_surpasses(methods: list[Standi
 
 
 def crowd(seed: int) -> list[Standing]:
-    """Sixteen methods, half of them close together."""
+    """Sixteen methods, half of them close together, and some of them files."""
     generator = np.random.default_rng(seed)
     error = np.concatenate([generator.uniform(0.02, 1, 8), generator.normal(0.2, 0.01, 8)])
     milliseconds = np.concatenate([generator.uniform(5, 900, 8), generator.normal(120, 8, 8)])
-    groups = itertools.cycle(["network", "filter", "baseline"])
+    kinds = itertools.cycle([("network", 67_535), ("filter", None), ("baseline", None)])
+    places = zip(error, milliseconds, kinds, strict=False)
     return [
-        Standing(f"method number {number}", *place, group)
-        for number, (*place, group) in enumerate(zip(error, milliseconds, groups, strict=False))
+        Standing(f"method number {number}", *place, *kind)
+        for number, (*place, kind) in enumerate(places)
     ]
 
 
@@ -49,12 +57,29 @@ def test_labels_cover_neither_each_other_nor_a_marker(seed: int) -> None:
     figure = speed_error_figure(methods, "a crowd")
     figure.draw_without_rendering()
     (axes,) = figure.axes
-    assert [text.get_text() for text in axes.texts] == [method.title for method in methods]
+    assert [text.get_text() for text in axes.texts] == [method.label for method in methods]
     # Of the letters alone, without the line that leads to them.
     boxes = [Text.get_window_extent(text) for text in axes.texts]
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
     places = axes.transData.transform([(m.milliseconds, m.error) for m in methods])
     assert not any(box.contains(*place) for box in boxes for place in places)
+
+
+def test_beside_a_file_stands_how_large_it_is() -> None:
+    with_file = Standing("outdet", 0.1, 60.0, "network", 67_535)
+    assert with_file.label == "outdet · 68 kB"
+    assert Standing("dror", 0.3, 40.0, "filter").label == "dror"
+
+
+@pytest.mark.parametrize(
+    ("size", "text"),
+    [
+        *((0, "1 kB"), (1_499, "1 kB"), (999_499, "999 kB")),
+        *((999_500, "1.0 MB"), (6_849_378, "6.8 MB")),
+    ],
+)
+def test_sizes_are_written_short(size: int, text: str) -> None:
+    assert readable_size(size) == text
 
 
 def test_a_label_beside_a_marker_is_nearer_to_it_than_to_any_other() -> None:
@@ -78,3 +103,16 @@ def test_no_error_at_all_is_drawn_at_the_least() -> None:
     figure = speed_error_figure([Standing("perfect", 0.0, 3.0, "network")], "one method")
     (collection,) = figure.axes[0].collections
     np.testing.assert_allclose(collection.get_offsets(), [[3.0, LEAST_ERROR]])
+
+
+def test_labels_leave_the_front_in_sight_where_there_is_room_beside_it() -> None:
+    methods = [
+        Standing("fast", 0.9, 5, "baseline"),
+        Standing("slow, good", 0.1, 90, "network"),
+    ]
+    figure = speed_error_figure(methods, "a front of two")
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    front = Path(axes.transData.transform([(m.milliseconds, m.error) for m in methods]))
+    for text in axes.texts:
+        assert not front.intersects_bbox(Text.get_window_extent(text), filled=False)

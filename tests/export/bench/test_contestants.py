@@ -9,6 +9,7 @@ import yaml
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
+from derain.export.bench.contestant import FILE_SIZE
 from derain.export.bench.contestants import contestants
 from derain.export.runtime import Derainer
 from derain.filters import DSOR
@@ -58,6 +59,7 @@ def test_the_weights_are_those_of_the_network(random_outdet, onnx_model: Path) -
     tensors = [onnx.numpy_helper.to_array(tensor) for tensor in graph.initializer]
     numbers = sum(tensor.size for tensor in tensors if tensor.dtype == np.int64)
     assert row.facts["weights"] == folded + numbers
+    assert row.facts[FILE_SIZE] == len(onnx_model.read_bytes())
 
 
 def test_baselines_learn_from_the_scans_that_are_given() -> None:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from derain.evaluation.scores import Scores, score
-from derain.export.bench.contestant import Contestant
+from derain.export.bench.contestant import FILE_SIZE, Contestant
 from derain.export.bench.contestants import contestants
 from derain.export.bench.cost import Cost
 from derain.export.bench.labelled_frames import LabelledFrames
@@ -102,6 +102,15 @@ def test_one_scan_has_no_interval(labelled: LabelledFrames) -> None:
     (row,) = joined(methods, scored(methods, one), [cost(4)], np.random.default_rng(0))
     assert row.iou_interval is None
     assert row.as_dict()["iou_behind_best_interval"] is None
+
+
+def test_the_picture_says_how_large_files_are(
+    rows: list[Row], tmp_path: Path, saved_figures: list[Figure]
+) -> None:
+    contestant = replace(rows[0].contestant, facts={FILE_SIZE: 67_535})
+    draw_speed_error([replace(rows[0], contestant=contestant)], FACTS, tmp_path / "picture.png")
+    ((axes,),) = [figure.axes for figure in saved_figures]
+    assert [text.get_text() for text in axes.texts] == ["dror · 68 kB"]
 
 
 def test_the_picture_leaves_out_what_could_not_be_timed(
