@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from derain.simulation.classes import TrackClass
 from derain.simulation.flying.gusts import Gusts
+from derain.simulation.flying.optics import nearest_seen
 from derain.simulation.flying.precipitation import Precipitation
 from derain.simulation.sensor import Returns, Sensor
 
@@ -39,7 +40,8 @@ def draw_haze(
         patches = field(beams)
         share *= patches / max(patches.mean(), 1e-9)
     lit = np.flatnonzero(generator.random(len(beams)) < share)
-    distance = sensor.minimum_range + generator.exponential(precipitation.haze_depth, len(lit))
+    depth = generator.exponential(precipitation.haze_depth, len(lit))
+    distance = nearest_seen(precipitation, sensor) + depth
     ratio = precipitation.haze_strength ** generator.random(len(lit))
     in_front = (distance < clear.range[lit]) & (
         distance < min(sensor.maximum_range, precipitation.cut_off)

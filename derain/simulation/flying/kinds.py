@@ -63,6 +63,7 @@ class Kind:
         spill: From 1 on.
         reach_chance: How often the reach is stated; else the sensor's threshold gives it.
         reach: Metres.
+        nearest: Metres.
         cut_off_chance: How often there is a plain cut-off.
         cut_off: Metres.
         crowding: Detectable particles that an open beam meets on average, at most.
@@ -96,6 +97,7 @@ class Kind:
     spill: Span = (1.0, 2.0)
     reach_chance: float = 0.5
     reach: Span = (5.0, 30.0)
+    nearest: Span = (1.0, 3.0)
     cut_off_chance: float = 0.2
     cut_off: Span = (10.0, 80.0)
     crowding: Span = (0.005, 0.6)

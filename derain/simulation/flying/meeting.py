@@ -8,7 +8,7 @@ from derain.simulation.detection import detected_surfaces, joined, reported
 from derain.simulation.flying.encounters import Encounters, Population, encounter
 from derain.simulation.flying.gusts import Gusts
 from derain.simulation.flying.haze import draw_haze
-from derain.simulation.flying.optics import Optics
+from derain.simulation.flying.optics import Optics, nearest_seen
 from derain.simulation.flying.particles import OpenBeams, Stretch
 from derain.simulation.flying.plumes import draw_plumes
 from derain.simulation.flying.precipitation import Precipitation
@@ -91,7 +91,8 @@ def uncrowded(precipitation: Precipitation, sensor: Sensor) -> float:
         precipitation: What falls.
         sensor: Whose beams they are.
     """
-    slices = Slices(sensor.minimum_range, Optics.of(precipitation, sensor), _sizes(precipitation))
+    optics, sizes = Optics.of(precipitation, sensor), _sizes(precipitation)
+    slices = Slices(nearest_seen(precipitation, sensor), optics, sizes)
     met = float(slices.met.sum())
     return min(precipitation.number, precipitation.crowding / met if met else precipitation.number)
 
@@ -103,7 +104,7 @@ def _sizes(precipitation: Precipitation) -> Sizes:
 def _open_beams(
     clear: Returns, beams: NDArray[np.float64], precipitation: Precipitation, sensor: Sensor
 ) -> OpenBeams:
-    near = np.full(len(beams), sensor.minimum_range)
+    near = np.full(len(beams), nearest_seen(precipitation, sensor))
     return OpenBeams(beams, Stretch(near, clear.range), Optics.of(precipitation, sensor))
 
 

@@ -64,3 +64,8 @@ class Optics:
         return np.where(
             (needed <= 1) & (range <= self.farthest), self.width(range) * needed, math.inf
         )
+
+
+def nearest_seen(precipitation: Precipitation, sensor: Sensor) -> float:
+    """Distance within which the sensor reports no particle, metres."""
+    return max(precipitation.nearest, sensor.minimum_range)

@@ -32,6 +32,8 @@ class Precipitation:
             sensor turns on while it listens, let neighbouring beams meet one particle.
         reach: Distance where a particle of ``diameter`` in the middle of a beam is just detected,
             metres; 0 leaves it to the sensor's threshold.
+        nearest: Distance within which no particle is reported, metres, if it is more than the
+            sensor's own: so near, receivers see little of what does not fill their beams.
         cut_off: Distance beyond which no particle is reported, metres.
         crowding: Detectable particles that an open beam meets on average, at most; where
             ``number`` gives more, there are fewer.
@@ -64,6 +66,7 @@ class Precipitation:
     flicker: float = 0.0
     spill: float = 1.0
     reach: float = 0.0
+    nearest: float = 0.0
     cut_off: float = math.inf
     crowding: float = math.inf
     jitter: float = 0.0
