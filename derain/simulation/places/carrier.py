@@ -50,7 +50,7 @@ def lay_out_carrier(generator: np.random.Generator, mounting_height: float) -> I
     """
     if generator.random() < 0.2:
         return
-    shares = CARRIERS_BY_HEIGHT[np.searchsorted([ON_A_CAR, ON_A_LORRY], mounting_height)]
+    shares = CARRIERS_BY_HEIGHT[int(np.searchsorted([ON_A_CAR, ON_A_LORRY], mounting_height))]
     carriers = list(shares)
     carrier = carriers[generator.choice(len(carriers), p=list(shares.values()))]
     heading = generator.choice([0.0, generator.normal(0, 0.1), generator.uniform(-np.pi, np.pi)])
@@ -233,7 +233,8 @@ def _equipment(distance: Span, floor: float, generator: np.random.Generator) -> 
 def _loop(distance: Span, floor: float, generator: np.random.Generator) -> Triangles:
     """A cable that runs about the sensor, level or rising and falling."""
     angle = generator.uniform(-np.pi, np.pi) + np.linspace(0, generator.uniform(0.2, 2.5), 13)
-    away = np.linspace(*generator.uniform(*distance, 2), 13)
+    near, far = generator.uniform(*distance, 2)
+    away = np.linspace(near, far, 13)
     height = floor + 0.02 + 0.15 * generator.random() * np.sin(np.linspace(0, np.pi, 13)) ** 2
     knots = np.column_stack([away * np.cos(angle), away * np.sin(angle), height])
     return shapes.rods(knots[:-1], knots[1:], evenly_in_logarithm((0.002, 0.012), generator))

@@ -36,10 +36,10 @@ def lay_out_horizon(generator: np.random.Generator) -> Iterator[Surface]:
         generator: Random generator.
 
     Yields:
-        Surfaces in the frame of a track, all of them at least 50 m from its origin: rough, hilly
+        Surfaces in the frame of a track, all of them at least 40 m from its origin: rough, hilly
         ground from 118 m on, and on it and nearer rows of trees full of gaps, single trees, corners
-        of buildings, poles, masts, signs, cables, lorries and small
-        things that glint.
+        of buildings, poles, masts, signs, cables, lorries
+        and small things that glint.
     """
     yield _hills(generator)
     kinds: list[tuple[Callable[[float, np.random.Generator], Iterator[Surface]], int]] = [

@@ -119,8 +119,8 @@ def _pierced(
     """A wall with an opening in the middle, by its width, lower and upper edge, and its frame."""
     wide, low, high = opening
     left, right = (length - wide) / 2, (length + wide) / 2
-    pieces = [((0, left), (0, height)), ((right, length), (0, height))]
-    pieces += [((left, right), (high, height)), ((left, right), (0, low))]
+    pieces = [((0.0, left), (0.0, height)), ((right, length), (0.0, height))]
+    pieces += [((left, right), (high, height)), ((left, right), (0.0, low))]
     shine = evenly_in_logarithm(walls.STONE, generator)
     for (begin, end), (bottom, top) in pieces:
         if top - bottom > 0.01:
@@ -159,10 +159,10 @@ def _on_the_wall(length: float, height: float, generator: np.random.Generator) -
         radius = evenly_in_logarithm((0.008, 0.06), generator)
         yield made([bars([((x, 0.12, 0), (x, 0.12, height))], radius, 6)], generator)
     if generator.random() < 0.4 and length > 1.5:
-        x = generator.uniform(0, length - 1) + np.arange(0, 1, 0.07)
-        yield made([bars([((a, 0.1, 0.15), (a, 0.1, 0.75)) for a in x], 0.02)], generator)
+        ribs = generator.uniform(0, length - 1) + np.arange(0, 1, 0.07)
+        yield made([bars([((a, 0.1, 0.15), (a, 0.1, 0.75)) for a in ribs], 0.02)], generator)
     for _ in range(generator.integers(0, 3)):
         ends = np.column_stack(
             [generator.uniform(0, length, 2), (0.05, 0.05), generator.uniform(0.1, 2.2, 2)]
         )
-        yield threads.cable(*ends, generator.uniform(0, 0.3), (0.004, 0.02), generator)
+        yield threads.cable(ends[0], ends[1], generator.uniform(0, 0.3), (0.004, 0.02), generator)

@@ -38,15 +38,16 @@ def specks(
     """
     places = on_surface(surface, count, generator)
     # A clump is what lies nearest to one of a few places: the rest of the surface stays empty.
-    kept = generator.choice([1.0, 0.4, 0.15])
+    share = generator.choice([1.0, 0.4, 0.15])
     clumps = places[generator.integers(len(places), size=1 + count // 25)]
     from_clumps = np.linalg.norm(places[:, None] - clumps, axis=2).min(axis=1)
-    places = places[from_clumps <= np.quantile(from_clumps, kept)]
+    places = places[from_clumps <= np.quantile(from_clumps, share)]
     size = evenly_in_logarithm(SIZE, generator) * np.linalg.norm(places - sensor, axis=1)
     corners = generator.normal(0, 1, (len(places), 3, 3))
     small = places[:, None] + size[:, None, None] * np.clip(corners, -2, 2)
     away = np.linalg.norm(small - sensor, axis=2).min(axis=1)
-    return small[away > NEAREST]
+    kept: Triangles = small[away > NEAREST]
+    return kept
 
 
 def mirrored(

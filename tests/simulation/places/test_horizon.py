@@ -17,7 +17,7 @@ SENSOR = Sensor(
     rows=64,
     columns=1440,
     mounting_height=1.8,
-    maximum_range=300,
+    maximum_range=300.0,
 )
 
 
