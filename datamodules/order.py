@@ -1,6 +1,6 @@
 """Which scan a process reads, and when."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,11 +19,13 @@ class Pick(NamedTuple):
         number: Its number among the scans of its part.
         epoch: The epoch that it is read in.
         measured: Whether what a network says of it is counted or written.
+        again: How often it was drawn before in that epoch.
     """
 
     number: int
     epoch: int = 0
     measured: bool = True
+    again: int = 0
 
 
 class TrainingOrder(DistributedSampler[Pick]):
@@ -47,11 +49,16 @@ class TrainingOrder(DistributedSampler[Pick]):
         super().__init__(scans, processes, process, seed=seed)
         self.scans = len(scans)
 
+    def picks(self) -> Sequence[Pick]:
+        """What all processes together read in this epoch, before it is put in order."""
+        return [Pick(number, self.epoch, measured=False) for number in range(self.scans)]
+
     def __iter__(self) -> Iterator[Pick]:
+        picks = self.picks()
         generator = generator_of(Draw.ORDER, self.seed, self.epoch)
-        order = np.resize(generator.permutation(self.scans), self.total_size)
-        for number in order[self.rank :: self.num_replicas]:
-            yield Pick(int(number), self.epoch, measured=False)
+        order = np.resize(generator.permutation(len(picks)), self.total_size)
+        for place in order[self.rank :: self.num_replicas]:
+            yield picks[place]
 
 
 class MeasuringOrder(DistributedSampler[Pick]):

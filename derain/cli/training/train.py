@@ -23,6 +23,7 @@ from derain.cli.training.run_folder import WholeConfig, writing_to_the_run_folde
 # Imported so that a configuration may name them without their modules.
 from derain.datamodules.base import ScanDataModule
 from derain.datamodules.folder import Folder
+from derain.datamodules.mixture import Mixture
 from derain.datamodules.rehearse3d import Rehearse3D
 from derain.datamodules.scan_check import ScanCheck
 from derain.datamodules.sequences import Sequences
@@ -54,6 +55,7 @@ class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatt
 
 __all__ = [
     "Folder",
+    "Mixture",
     "Rehearse3D",
     "Sequences",
     "Simulated",
@@ -69,7 +71,7 @@ def choices() -> dict[str, tuple[type, ...]]:
     They are loaded then, and a configuration may name their classes without a module.
     """
     return {
-        "data": (Folder, Rehearse3D, Sequences, Simulated, Taught, Wads),
+        "data": (Folder, Mixture, Rehearse3D, Sequences, Simulated, Taught, Wads),
         "model": tuple(NETWORKS.values()),
         "trainer.logger": (TensorBoardLogger,),
     }
