@@ -136,8 +136,8 @@ class Mixture(ScanDataModule):
         maps, numbers = label_maps(_cards(self.parts)), shared_out(most, self.shares)
         for (name, part), number in zip(self.parts.items(), numbers, strict=True):
             for scan in part.training_scans(max(number, 1), columns, labelled):
-                known = scan.label is not None
-                yield scan.with_label(maps[name](scan.label, scan.name)) if known else scan
+                label = scan.label
+                yield scan if label is None else scan.with_label(maps[name](label, scan.name))
 
     def training_record(self) -> dict[str, tuple[str, ...]]:
         """Which scans of which parts it trains on."""

@@ -1,7 +1,7 @@
 """Which scan a process reads, and when."""
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Sequence, Sized
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from torch.utils.data import DistributedSampler
@@ -45,8 +45,9 @@ class TrainingOrder(DistributedSampler[Pick]):
         process: Which of them this is.
     """
 
-    def __init__(self, scans: "ScanDataset", seed: int, processes: int, process: int) -> None:
-        super().__init__(scans, processes, process, seed=seed)
+    def __init__(self, scans: Sized, seed: int, processes: int, process: int) -> None:
+        # Of what it is given, the sampler asks no more than how many there are.
+        super().__init__(cast("ScanDataset", scans), processes, process, seed=seed)
         self.scans = len(scans)
 
     def picks(self) -> Sequence[Pick]:

@@ -3,15 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.cards.card import CHANNELS_OF_STATISTICS, DataCard
 from derain.errors import InputError
-
-Known = TypeVar("Known")
 
 # Mean and standard deviation.
 Moments = tuple[float, float]
@@ -113,24 +110,21 @@ def with_pooled_statistics(
         shares: Share of each among the scans that are drawn, of 1 in all.
     """
     extra = [name for name in cards[0].extra if all(name in card.extra for card in cards)]
-    known = [
-        None if card.mean is None or card.std is None else [*zip(card.mean, card.std, strict=True)]
-        for card in cards
-    ]
-    columns = _all_or_none(known)
-    usual = columns and [
-        _pooled([moments[number] for moments in columns], shares)
-        for number in range(len(CHANNELS_OF_STATISTICS))
-    ]
-    ranges = _all_or_none([card.range for card in cards])
-    rain = _all_or_none([card.rain_share for card in cards])
+    known = all(card.mean and card.std and card.range for card in cards)
+    channels = (*CHANNELS_OF_STATISTICS, "range") if known else ()
+    pooled = {
+        name: _pooled([card.statistics(name) for card in cards], shares)
+        for name in (*channels, *extra)
+    }
+    usual = [pooled[name] for name in CHANNELS_OF_STATISTICS] if known else None
+    rain = [card.rain_share for card in cards if card.rain_share is not None]
     return replace(
         mixed,
         mean=usual and tuple(mean for mean, _ in usual),
         std=usual and tuple(std for _, std in usual),
-        range=ranges and _pooled([(mean, std) for mean, std in ranges], shares),
-        extra={name: _pooled([card.extra[name] for card in cards], shares) for name in extra},
-        rain_share=None if rain is None else float(np.dot(rain, shares)),
+        range=pooled.get("range"),
+        extra={name: pooled[name] for name in extra},
+        rain_share=float(np.dot(rain, shares)) if len(rain) == len(cards) else None,
     )
 
 
@@ -140,8 +134,3 @@ def _pooled(moments: Sequence[Moments], shares: Sequence[float]) -> Moments:
     mean = float(np.dot(shares, means))
     # About the common mean; the mean of squares less the square of the mean would cancel.
     return mean, sqrt(float(np.dot(shares, deviations**2 + (means - mean) ** 2)))
-
-
-def _all_or_none(items: Sequence[Known | None]) -> list[Known] | None:
-    known = [item for item in items if item is not None]
-    return known if len(known) == len(items) else None

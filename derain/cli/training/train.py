@@ -13,6 +13,7 @@ from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
 from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
 from lightning.pytorch.loggers import TensorBoardLogger
 
+from derain.cli.start import START_HELP, checkpoint_of
 from derain.cli.training.configurations import own_configurations, with_packaged_configs
 from derain.cli.training.errors import as_input_error, read_configuration
 from derain.cli.training.help import ALL, EXAMPLES
@@ -40,6 +41,7 @@ from derain.models.callbacks.whole_checkpoints import save_whole
 from derain.models.checkpoint import check_resumable, load_model
 from derain.models.measured import MONITOR
 from derain.models.registry import NETWORKS
+from derain.models.start import started
 from derain.system.cores import usable_cores
 from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
 from derain.system.open3d_import import make_open3d_loadable
@@ -82,6 +84,7 @@ class DerainCLI(LightningCLI):
 
     def add_arguments_to_parser(self, parser: LightningArgumentParser) -> None:
         """Adds the callbacks; ``--checkpoint.monitor`` and so on change them."""
+        parser.add_argument("--start", type=str | None, default=None, help=START_HELP)
         parser.add_lightning_class_args(BestCheckpoint, "checkpoint")
         parser.add_lightning_class_args(ModelCheckpoint, "last")
         parser.add_lightning_class_args(LearningRateMonitor, "learning_rate")
@@ -135,6 +138,9 @@ class DerainCLI(LightningCLI):
             if isinstance(error.__cause__, InputError):
                 raise error.__cause__ from None
             raise
+        start = self.config[self.config.subcommand].get("start")
+        if start is not None and self.config.subcommand == "fit":
+            self.model = started(self.model, checkpoint_of(start), start)
 
 
 def train(arguments: list[str]) -> None:
