@@ -47,6 +47,8 @@ def started(model: DerainingModule, checkpoint: Path, name: str) -> DerainingMod
     }
     student = type(model)(**arguments)
     student.load_state_dict(source.state_dict())
+    # By what Lightning's command line has entered there, it reads a checkpoint back.
+    student.hparams.update({key: own for key, own in model.hparams.items() if key[0] == "_"})
     with reading(checkpoint):
         checksum = sha256(checkpoint.read_bytes()).hexdigest()[:DIGITS]
     student.start = Start(f"{name} ({checksum})", source.spec)

@@ -116,12 +116,11 @@ def with_pooled_statistics(
         name: _pooled([card.statistics(name) for card in cards], shares)
         for name in (*channels, *extra)
     }
-    usual = [pooled[name] for name in CHANNELS_OF_STATISTICS] if known else None
     rain = [card.rain_share for card in cards if card.rain_share is not None]
     return replace(
         mixed,
-        mean=usual and tuple(mean for mean, _ in usual),
-        std=usual and tuple(std for _, std in usual),
+        mean=tuple(pooled[name][0] for name in CHANNELS_OF_STATISTICS) if known else None,
+        std=tuple(pooled[name][1] for name in CHANNELS_OF_STATISTICS) if known else None,
         range=pooled.get("range"),
         extra={name: pooled[name] for name in extra},
         rain_share=float(np.dot(rain, shares)) if len(rain) == len(cards) else None,

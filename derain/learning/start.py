@@ -43,6 +43,6 @@ class Start:
             mean=self.spec.mean,
             std=self.spec.std,
             rule=self.spec.rule,
-            licence=f"{spec.licence}; started from {self.spec.data}: {self.spec.licence}",
+            licence=f"{spec.licence}; started from {self.spec.data} ({self.spec.licence})",
             training={**together, STARTED_FROM: starts},
         )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import lightning
 import numpy as np
@@ -58,7 +59,7 @@ def test_an_onnx_file_stands_for_the_checkpoint_beside_it(exported: Path) -> Non
 def test_default_is_the_checkpoint_that_derain_comes_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(start_option.resources, "files", lambda _: tmp_path)
+    monkeypatch.setattr(start_option, "resources", SimpleNamespace(files=lambda _: tmp_path))
     with pytest.raises(InputError, match="comes without its checkpoint"):
         checkpoint_of("default")
     (tmp_path / "default").mkdir()

@@ -80,7 +80,7 @@ def test_the_first_logits_are_those_of_the_start(kind: str, tmp_path: Path) -> N
     for name in ("view", "channels", "units", "mean", "std"):
         assert getattr(spec, name) == getattr(start, name)
     assert (spec.data, spec.rain, spec.classes) == ("other", (0,), OTHER.classes)
-    assert spec.licence == "dear; started from first: free"
+    assert spec.licence == "dear; started from first (free)"
     for argument in recipe.RECIPE:
         assert student.hparams.get(argument) == recipe.hparams.get(argument)
 
