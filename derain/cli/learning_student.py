@@ -17,14 +17,21 @@ def with_network(lesson: Lesson) -> Lesson:
     """The same lesson with the network that learns: a student sees what its start does.
 
     Raises:
-        InputError: A start that cannot be read, of another network than the one asked for, or one
-            that sees intensities where the student is to be blind to them.
+        InputError: A start that cannot be read, that would be cleared away, that is of another
+            network than the one asked for, or sees intensities to which the student is to be blind.
     """
     if lesson.start is None:
         return replace(lesson, model=lesson.model or STUDENTS[0])
     from derain.models.checkpoint import load_model
 
-    spec = load_model(checkpoint_of(lesson.start)).spec
+    checkpoint = checkpoint_of(lesson.start)
+    if lesson.work.resolve() in checkpoint.resolve().parents:
+        raise InputError(
+            lesson.start,
+            f"lies in {lesson.work}, which this run clears first",
+            "Give another --work, or copy it elsewhere.",
+        )
+    spec = load_model(checkpoint).spec
     if lesson.model not in (None, spec.network):
         raise InputError(
             "--model",

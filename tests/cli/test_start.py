@@ -142,6 +142,7 @@ def test_learn_takes_over_what_its_start_sees_and_says_so(
         (("x", "intensity"), 3, (), "has no intensities, which mine.ckpt sees"),
         (("x", "intensity"), 4, ("--blind",), "mine.ckpt sees intensity, and so will a student"),
         (("range",), 4, ("--model", "salsanext"), "mine.ckpt is of outdet, from which salsanext"),
+        (("range",), 4, ("--work", "."), "mine.ckpt: lies in ., which this run clears first"),
     ],
 )
 def test_learn_tells_what_does_not_go_with_its_start(
