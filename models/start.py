@@ -10,7 +10,7 @@ from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model
 
 # Digits of a checksum that tell one checkpoint from others.
-DIGITS = 12
+CHECKSUM_DIGITS = 12
 
 
 def started(model: DerainingModule, checkpoint: Path, name: str) -> DerainingModule:
@@ -50,6 +50,6 @@ def started(model: DerainingModule, checkpoint: Path, name: str) -> DerainingMod
     # By what Lightning's command line has entered there, it reads a checkpoint back.
     student.hparams.update({key: own for key, own in model.hparams.items() if key[0] == "_"})
     with reading(checkpoint):
-        checksum = sha256(checkpoint.read_bytes()).hexdigest()[:DIGITS]
+        checksum = sha256(checkpoint.read_bytes()).hexdigest()[:CHECKSUM_DIGITS]
     student.start = Start(f"{name} ({checksum})", source.spec)
     return student
