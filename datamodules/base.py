@@ -7,6 +7,7 @@ import lightning
 from torch.utils.data import DataLoader
 
 from derain.cards.card import DataCard
+from derain.datamodules.draws import Draws
 from derain.datamodules.loader import scan_loader, with_needed_labels
 from derain.datamodules.loading import Loading, Part
 from derain.datamodules.statistics import measured
@@ -65,6 +66,14 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
             InputError: Missing folders or scans.
         """
         return self.source(part)
+
+    def draws(self) -> Draws | None:
+        """How many of which training scans an epoch draws: by default all of them once, None.
+
+        Raises:
+            InputError: Missing folders or scans.
+        """
+        return None
 
     def frames(self, part: Part) -> Source:
         """The scans of a part of the data, in order, each with the labels that are read there.
@@ -149,7 +158,9 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
         processes, process = 1, 0
         if self.trainer is not None:
             processes, process = self.trainer.world_size, self.trainer.global_rank
-        return scan_loader(self.shown(part), part, self.task, self.loading, processes, process)
+        draws = self.draws() if part == "train" else None
+        shown = self.shown(part)
+        return scan_loader(shown, part, self.task, self.loading, processes, process, draws)
 
     @property
     def _reader(self) -> FrameReader:

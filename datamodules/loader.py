@@ -1,10 +1,11 @@
 """Loaders of batches, with or without a data module around them."""
 
-from torch.utils.data import DataLoader
+from torch.utils.data import DataLoader, Sampler
 
+from derain.datamodules.draws import DrawnOrder, Draws
 from derain.datamodules.kept import MEGABYTE
 from derain.datamodules.loading import Loading, Part
-from derain.datamodules.order import MeasuringOrder, TrainingOrder
+from derain.datamodules.order import MeasuringOrder, Pick, TrainingOrder
 from derain.datamodules.scan_dataset import LateLoader, ScanDataset, packed
 from derain.errors import InputError
 from derain.learning.batch import Sample
@@ -22,6 +23,7 @@ def scan_loader(
     loading: Loading = Loading(),
     processes: int = 1,
     process: int = 0,
+    draws: Draws | None = None,
 ) -> DataLoader[Sample | InputError]:
     """A loader of :class:`~derain.learning.batch.Batch`, as a trainer or a plain loop takes it.
 
@@ -48,6 +50,7 @@ def scan_loader(
         loading: How the scans are read and batched. Of files, the source knows the columns.
         processes: How many processes share the scans.
         process: Which of them this is.
+        draws: How many of which scans are drawn for an epoch of training; None draws each once.
 
     Raises:
         InputError: Labels missing where they are needed; or a network that sees several scans, of
@@ -79,19 +82,29 @@ def scan_loader(
         run_seed(),
         room // max(loading.workers, 1),
     )
-    order = (
-        TrainingOrder(dataset, dataset.seed, processes, process)
-        if part == "train"
-        else MeasuringOrder(dataset, loading.batch_size, processes, process)
-    )
     return LateLoader(
         dataset,
         batch_size=loading.batch_size,
-        sampler=order,
+        sampler=_order(dataset, part, loading.batch_size, processes, process, draws),
         num_workers=loading.workers,
         persistent_workers=loading.workers > 0,
         collate_fn=packed,
     )
+
+
+def _order(
+    dataset: ScanDataset,
+    part: Part,
+    batch_size: int,
+    processes: int,
+    process: int,
+    draws: Draws | None,
+) -> Sampler[Pick]:
+    if part != "train":
+        return MeasuringOrder(dataset, batch_size, processes, process)
+    if draws is not None:
+        return DrawnOrder(draws, dataset.seed, processes, process)
+    return TrainingOrder(dataset, dataset.seed, processes, process)
 
 
 def with_needed_labels(source: Source, part: Part, reads_labels: bool) -> Source:

@@ -1,7 +1,7 @@
 """Which scan a process reads, and when."""
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Sequence, Sized
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from torch.utils.data import DistributedSampler
@@ -19,11 +19,13 @@ class Pick(NamedTuple):
         number: Its number among the scans of its part.
         epoch: The epoch that it is read in.
         measured: Whether what a network says of it is counted or written.
+        again: How often it was drawn before in that epoch.
     """
 
     number: int
     epoch: int = 0
     measured: bool = True
+    again: int = 0
 
 
 class TrainingOrder(DistributedSampler[Pick]):
@@ -43,15 +45,21 @@ class TrainingOrder(DistributedSampler[Pick]):
         process: Which of them this is.
     """
 
-    def __init__(self, scans: "ScanDataset", seed: int, processes: int, process: int) -> None:
-        super().__init__(scans, processes, process, seed=seed)
+    def __init__(self, scans: Sized, seed: int, processes: int, process: int) -> None:
+        # Of what it is given, the sampler asks no more than how many there are.
+        super().__init__(cast("ScanDataset", scans), processes, process, seed=seed)
         self.scans = len(scans)
 
+    def picks(self) -> Sequence[Pick]:
+        """What all processes together read in this epoch, before it is put in order."""
+        return [Pick(number, self.epoch, measured=False) for number in range(self.scans)]
+
     def __iter__(self) -> Iterator[Pick]:
+        picks = self.picks()
         generator = generator_of(Draw.ORDER, self.seed, self.epoch)
-        order = np.resize(generator.permutation(self.scans), self.total_size)
-        for number in order[self.rank :: self.num_replicas]:
-            yield Pick(int(number), self.epoch, measured=False)
+        order = np.resize(generator.permutation(len(picks)), self.total_size)
+        for place in order[self.rank :: self.num_replicas]:
+            yield picks[place]
 
 
 class MeasuringOrder(DistributedSampler[Pick]):

@@ -90,7 +90,9 @@ class ScanDataset(Dataset[Sample | InputError]):
             sample = self._samples.get(number, lambda: self._viewed(self.read(frame), number))
         else:
             scan = self._scans.get(number, lambda: self.read(frame))
-            generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, number)
+            # The first time is drawn as where there is no second one.
+            drawn = (number, pick.again) if pick.again else (number,)
+            generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, *drawn)
             sample = self._viewed(self.augmentation(scan, generator, self.view.azimuth), number)
         return replace(sample, measured=pick.measured)
 

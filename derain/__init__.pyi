@@ -8,6 +8,7 @@ from derain.cards.card import DataCard as DataCard
 from derain.cards.card import load_card as load_card
 from derain.datamodules.folder import Folder as Folder
 from derain.datamodules.in_memory import InMemory as InMemory
+from derain.datamodules.mixture import Mixture as Mixture
 from derain.datamodules.rehearse3d import Rehearse3D as Rehearse3D
 from derain.datamodules.sequences import Sequences as Sequences
 from derain.datamodules.simulated import Simulated as Simulated

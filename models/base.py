@@ -15,6 +15,7 @@ from derain.evaluation.metrics import RainMetrics
 from derain.files.documents import Entry, shown
 from derain.learning.batch import Batch
 from derain.learning.seeds import Draw, generator_of, run_seed
+from derain.learning.start import Start
 from derain.learning.task import Task, TrainingData, agree
 from derain.models.measured import MeasuredModule
 from derain.scan import Scan
@@ -39,10 +40,14 @@ class DerainingModule(MeasuredModule):
         NAME: Name of the network in a Spec and on the command line; the decorator sets it.
         VIEW: Kind of the view that it sees a scan through.
         AMPLIFIES: How many times more than other networks' its logits amplify rounding.
+        RECIPE: Names of the arguments that say how it is trained and what is called rain. One that
+            starts from another model keeps its own, and has the other's in place of all the rest.
         INTEGER_OPERATORS: What computes in eight bits in a model that is exported so; ONNX names.
         channels: Names of its input channels, as :func:`channel_of` takes them.
         network: The network itself.
         card: Data card of the data it is trained or tested on, once that is agreed with them.
+        start: The trained model that its weights are of before it is trained; None where they are
+            drawn at random.
 
     Raises:
         InputError: A network without a name; no channels, or one twice.
@@ -51,6 +56,14 @@ class DerainingModule(MeasuredModule):
     NAME: ClassVar[str]
     VIEW: ClassVar[type[View]]
     AMPLIFIES: ClassVar[float] = 1.0
+    RECIPE: ClassVar[tuple[str, ...]] = (
+        "learning_rate",
+        "weight_decay",
+        "decay",
+        "threshold",
+        "candidates",
+        "balance",
+    )
     INTEGER_OPERATORS: ClassVar[tuple[str, ...]] = ("Conv",)
     network: nn.Module
     mean: Tensor
@@ -71,6 +84,7 @@ class DerainingModule(MeasuredModule):
             )
         self.channels = tuple(channels)
         self._spec: Spec | None = None
+        self.start: Start | None = None
         # Not in the state_dict: the Spec holds them.
         self.register_buffer("mean", torch.zeros(len(channels)), persistent=False)
         self.register_buffer("std", torch.ones(len(channels)), persistent=False)

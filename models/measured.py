@@ -2,13 +2,17 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
+from dataclasses import astuple
 from typing import Any, ClassVar
 
 import lightning
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from derain.cards.card import DataCard
+from derain.evaluation.counts import SCORES, Counts
 from derain.evaluation.metrics import RainMetrics
 from derain.learning.batch import Batch
 from derain.learning.mean_losses import MeanLosses
@@ -28,11 +32,13 @@ class MeasuredModule(lightning.LightningModule, ABC):
 
     Attributes:
         LEARNS_FROM_LABELS: Whether it does; where not, none is read in its training.
+        card: Data card of what is measured, once that is agreed with the data.
         metrics: Counts of the points of the epoch, made when the data are known.
         mean_losses: Sums of the epoch's losses.
     """
 
     LEARNS_FROM_LABELS: ClassVar[bool] = True
+    card: DataCard
     metrics: RainMetrics
 
     def __init__(self) -> None:
@@ -146,9 +152,17 @@ class MeasuredModule(lightning.LightningModule, ABC):
         scores = self.metrics.compute()
         self._log_alike({f"{part}/{name}": score for name, score in scores.items()})
         self._log_alike({f"{part}_iou": scores["iou"]}, prog_bar=True, logger=False)
+        for name, ids in self.card.parts.items():
+            self._log_of_one(f"{part}/{name}", self.metrics.pooled_over(ids))
         if part == "val":
             monitor = {MONITOR: scores["iou"]} if self.LEARNS_FROM_LABELS else {}
             self._log_alike({"hp_metric": scores["iou"], **monitor})
+
+    def _log_of_one(self, title: str, counts: Counts) -> None:
+        """Logs the scores of one of several data sets, where any scan of it was measured."""
+        if sum(astuple(counts)):
+            scores = {f"{title}/{score}": getattr(counts, score) for score in SCORES}
+            self._log_alike({name: torch.tensor(score) for name, score in scores.items()})
 
     def _log_alike(self, values: Mapping[str, Tensor], **options: Any) -> None:
         """Logs what all processes have computed alike; the largest of equal numbers is exact."""

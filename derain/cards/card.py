@@ -57,6 +57,8 @@ class DataCard:
         folders_tell: What may be concluded where folders are called as ``layout`` says and nobody
             names a card: ``nothing``; ``classes``, the names of the classes; or ``rain``, all that
             the card says.
+        parts: Ids of the classes of each of several data sets that it is the card of, by name; no
+            file says it.
     """
 
     name: str
@@ -75,6 +77,7 @@ class DataCard:
     split: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     layout: Layout = field(default_factory=Layout)
     folders_tell: FoldersTell = "nothing"
+    parts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     @property
     def title(self) -> str:

@@ -2,19 +2,19 @@
 
 import argparse
 import shutil
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 from derain.cli.arguments import count
+from derain.cli.learning_student import STUDENTS, network_options, with_network, without_intensity
+from derain.cli.lesson import PERSISTENCE, Lesson
 from derain.cli.narration import Narrator
 from derain.cli.outputs import refuse_unwritable, say
 from derain.cli.pose_options import add_poses
 from derain.cli.results import last_line, proof_of
 from derain.cli.scan_options import add_columns
+from derain.cli.start import START_HELP
 from derain.cli.training.lightning_silence import no_news
 from derain.errors import InputError
-from derain.files import DEFAULT_COLUMNS
 from derain.files.atomic import replacing
 from derain.odometry.posed import ODOMETRY
 from derain.sources.folders import named_frames
@@ -36,6 +36,7 @@ trust it. Every step is a command of derain, printed before it runs.
   derain learn recording/ --out model.onnx --poses standing    the sensor stood still
   derain learn recording/ --out model.onnx --model salsanext --blind
   derain learn recording/ --out model.onnx --teacher crf       no motion needed; dim rain only
+  derain learn recording/ --out model.onnx --start default     go on from the model of derain
   derain run model.onnx more_scans/ --out cleaned              what it is for
 
 The teacher is persistence by default, which judges a point by the scans before and after: solid
@@ -44,68 +45,8 @@ things are where they were, drops are not. Labels that lie beside the scans are 
 beside the model, which a second run clears.
 """
 
-# Networks that learn from labels, and the beginning of their configurations' names.
-STUDENTS = ("outdet", "salsanext", "salsanext_lite")
-
-# What a network sees of a point where it is blind to intensity.
-BLIND = {"outdet": "[x,y,z]", "salsanext": "[range,x,y,z]", "salsanext_lite": "[range,x,y,z]"}
-
-PERSISTENCE = "persistence"
-
 # By this file a folder is known for one that a second run may clear.
 MARK = "learning.txt"
-
-
-@dataclass(frozen=True)
-class Lesson:
-    """What is learnt from what.
-
-    Attributes:
-        recordings: Folders of consecutive scans.
-        out: The ONNX file.
-        work: Folder of all else that is written.
-        model: Name of the network.
-        teacher: Name of the teacher, or the file of a model.
-        poses: Where the sensor was, as ``--poses`` says it; None for what lies beside the scans,
-            and for odometry where nothing does.
-        blind: Whether the network is not to see intensities.
-        columns: Names of the columns of files that do not name them.
-        fit: Further options of the training.
-        card: Data card of labels that measure the finished model; None measures nothing.
-    """
-
-    recordings: Sequence[Path]
-    out: Path
-    work: Path
-    model: str = STUDENTS[0]
-    teacher: str = PERSISTENCE
-    poses: str | None = None
-    blind: bool = False
-    columns: Sequence[str] = DEFAULT_COLUMNS
-    fit: Sequence[str] = ()
-    card: str | None = None
-
-    @property
-    def taught(self) -> Path:
-        """Folder of the teacher's labels."""
-        return self.work / "taught"
-
-    @property
-    def checkpoint(self) -> Path:
-        """Checkpoint of the student, the best by its agreement with the teacher."""
-        return self.work / "student.ckpt"
-
-    def needs_odometry(self, source: Source) -> bool:
-        """Whether the teacher asks where the sensor was, and nobody says so.
-
-        Args:
-            source: The scans.
-
-        Raises:
-            InputError: A record of poses that is damaged or does not fit the scans.
-        """
-        told = self.poses is not None or all(frame.pose is not None for frame in source)
-        return self.teacher == PERSISTENCE and (self.poses == ODOMETRY or not told)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -114,7 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "recording", nargs="+", type=Path, help="folders of consecutive scans, in time order"
     )
     parser.add_argument("--out", type=Path, required=True, help="the ONNX file to write")
-    parser.add_argument("--model", choices=STUDENTS, default=STUDENTS[0], help="(default: outdet)")
+    parser.add_argument("--model", choices=STUDENTS, help="(default: outdet, or that of --start)")
+    parser.add_argument("--start", metavar="MODEL", help=START_HELP)
     parser.add_argument(
         "--teacher",
         default=PERSISTENCE,
@@ -152,6 +94,7 @@ def main(arguments: argparse.Namespace) -> int:
             columns=arguments.columns,
             fit=epochs,
             card=arguments.card,
+            start=arguments.start,
         )
     )
     return 0
@@ -167,6 +110,7 @@ def learn(lesson: Lesson) -> None:
     from derain.cli.learning_report import LearningReport
     from derain.cli.main import main as derain
 
+    lesson = with_network(lesson)
     source = named_frames(lesson.recordings, lesson.columns)
     _refuse_too_few(lesson, source)
     refuse_unwritable(lesson.out)
@@ -174,8 +118,8 @@ def learn(lesson: Lesson) -> None:
     narrator = Narrator(derain, lesson.work / "log.txt")
     say(f"{len(source):,} scans to learn from. All but the model goes to {lesson.work}/")
     if not lesson.blind and source[0].read().intensity is None:
+        lesson = without_intensity(lesson)
         say("They have no intensities: the network learns without.")
-        lesson = replace(lesson, blind=True)
     _teach(narrator, lesson, source)
     report = LearningReport(lesson, narrator)
     report.write()  # what the teacher says is worth reading, whatever comes after
@@ -243,11 +187,10 @@ def _teach(narrator: Narrator, lesson: Lesson, source: Source) -> None:
 
 def _fit(narrator: Narrator, lesson: Lesson) -> None:
     """Trains the student, and keeps the epoch that agrees best with the teacher."""
-    blind = ("--model.channels", BLIND[lesson.model]) if lesson.blind else ()
     narrator.step(
-        *("fit", "--config", f"{lesson.model}_taught.yaml", "--data.root", str(lesson.taught)),
+        *("fit", *network_options(lesson), "--data.root", str(lesson.taught)),
         *("--trainer.logger.save_dir", str(lesson.work / "runs")),
         *("--checkpoint.dirpath", str(lesson.work)),
-        *("--checkpoint.filename", lesson.checkpoint.stem, *blind, *lesson.fit),
+        *("--checkpoint.filename", lesson.checkpoint.stem, *lesson.fit),
         result=lambda _: "the student has learnt",
     )

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from derain.cli.learn import Lesson
 from derain.cli.learning_record import record_of
 from derain.cli.learning_text import LEAST_RAIN, Learnt, as_markdown, summary
+from derain.cli.lesson import Lesson
 from derain.cli.narration import Narrator
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
@@ -55,7 +55,7 @@ class LearningReport:
         self.learnt = Learnt(
             title=", ".join(map(str, lesson.recordings)),
             teacher=lesson.teacher,
-            student=f"{lesson.model}{', blind to intensity' * lesson.blind}",
+            student=lesson.student,
             scans=[
                 AnswersOfScan(frame.key, frame.key in kept_back, self._answers(frame))
                 for frame in tqdm(sorted(frames, key=_in_time), "counting", disable=None)

@@ -165,6 +165,13 @@ class RainMetrics(Metric):
         with self.sync_context():
             return self._pooled()
 
+    def pooled_over(self, ids: Collection[int]) -> Counts:
+        """Counts over the points of some classes, such as those of one of several data sets."""
+        with self.sync_context():
+            table = self.cells.sum(dim=1)
+        chosen = torch.isin(self.ids, torch.tensor([*ids], device=self.ids.device))
+        return self._counts(table * chosen[:, None])
+
     def per_scan(self) -> list[Counts]:
         """Counts of each scan, in the order of the updates, process after process."""
         with self.sync_context():

@@ -16,6 +16,7 @@ class Draw(IntEnum):
     ORDER = 0
     AUGMENTATION = 1
     NETWORK = 2
+    MIXTURE = 3
 
 
 def run_seed() -> int:
@@ -30,7 +31,9 @@ def generator_of(draw: Draw, seed: int, epoch: int, *number: int) -> np.random.G
         draw: What is drawn.
         seed: Seed of the run.
         epoch: The epoch, from 0.
-        number: The number of the scan in the data, or those of the step and of the process.
+        number: The number of the scan in the data, and which time it is drawn where that is not the
+            first; the numbers of the step and of the process; or that of one of several data sets,
+            whose passes are counted then in place of epochs.
     """
     # The numbers are the key, not part of the entropy: there, zeros at the end change nothing, so
     # that two draws could have the same generator.

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol, runtime_checkable
 
 from derain.cards.card import DataCard
+from derain.learning.start import Start
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.spec import Spec
@@ -49,6 +50,7 @@ class Learner(Protocol):
 
     LEARNS_FROM_LABELS: ClassVar[bool]
     channels: tuple[str, ...]
+    start: Start | None
 
     @property
     def has_spec(self) -> bool:
@@ -120,6 +122,8 @@ def agree(model: Learner, data: TrainingData, training: bool = True) -> Task:
     if training and not model.has_spec:
         scans = list(data.training_scans(EXAMPLE_SCANS, columns, labelled))
         spec = replace(model.spec_for(data.card, scans), training=data.training_record())
+        if model.start is not None:
+            spec = model.start.passed_on(spec)
     else:
         spec = model.spec
     task = Task(data.card, spec, labelled)

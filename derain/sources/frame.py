@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.cards.mixed import LabelMap
 from derain.errors import InputError
 from derain.scan import Scan
 
@@ -27,6 +28,8 @@ class Frame(ABC):
         intensity_scale: What takes its intensities to the unit in which they are to be seen.
         sensor_to_world: Its pose, float64 (4, 4), metres, where somebody told it; None leaves it to
             what lies beside the scan.
+        label_map: Takes its labels to the classes of several data sets that it is one of; None
+            leaves them as they are.
     """
 
     key: str
@@ -35,6 +38,7 @@ class Frame(ABC):
     label_path: Path | None = None
     intensity_scale: float = 1.0
     sensor_to_world: NDArray[np.float64] | None = None
+    label_map: LabelMap | None = None
 
     @property
     @abstractmethod
@@ -81,7 +85,7 @@ class Frame(ABC):
 
     @abstractmethod
     def read_label(self, points: int) -> NDArray[np.int64]:
-        """Reads the semantic class ids of its points, int64 (N,).
+        """Reads the semantic class ids of its points, int64 (N,), as its own data set has them.
 
         Args:
             points: N, the number of points of the scan.

@@ -59,6 +59,8 @@ class FrameReader:
     def _with_labels(self, scan: Scan, frame: Frame) -> Scan:
         """The scan with the labels of its frame, none of which the data card does not know."""
         label = frame.read_label(len(scan))
+        if frame.label_map is not None:
+            label = frame.label_map(label, str(frame.label_path or frame.name))
         unknown = np.setdiff1d(label, list(self.card.classes))
         if len(unknown):
             raise InputError(

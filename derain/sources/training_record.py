@@ -4,7 +4,7 @@ Sequences of a published data set are recorded by their names, and all other sca
 of their files: everybody's folders may be called the same.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from derain.cards.card import DataCard
 from derain.sources.frame import Frame
@@ -37,6 +37,26 @@ def by_fingerprint(frames: Sequence[Frame]) -> dict[str, tuple[str, ...]]:
     return {SCANS: prints} if prints else {}
 
 
+def by_parts(
+    records: Iterable[tuple[str, Mapping[str, Sequence[str]]]],
+) -> dict[str, tuple[str, ...]]:
+    """Record of a training on several data sets, each of which has a record of its own.
+
+    Args:
+        records: Name of each data set, and its record; there may be several of one name.
+    """
+    together: dict[str, set[str]] = {}
+    for name, record in records:
+        for kind, entries in record.items():
+            # Sequences of two data sets may be called the same, fingerprints are not.
+            told = _sequences_of(name) if kind == SEQUENCES else kind
+            together.setdefault(told, set()).update(entries)
+    return {
+        kind: tuple(evenly_spaced(sorted(entries), MOST_NAMES))
+        for kind, entries in together.items()
+    }
+
+
 def overlap(title: str, spec: Spec, card: DataCard, frames: Sequence[Frame]) -> str | None:
     """What is to be said of a model that was trained on some of the scans it is measured on.
 
@@ -52,8 +72,11 @@ def overlap(title: str, spec: Spec, card: DataCard, frames: Sequence[Frame]) -> 
     Raises:
         InputError: A scan that cannot be read.
     """
-    same_data = spec.data == card.name
-    known = [frame for frame in frames if _trained_on(frame, spec.training, same_data)]
+    sequences = {
+        *spec.training.get(_sequences_of(card.name), ()),
+        *(spec.training.get(SEQUENCES, ()) if spec.data == card.name else ()),
+    }
+    known = [frame for frame in frames if _trained_on(frame, spec.training, sequences)]
     if not known:
         return None
     return (
@@ -62,7 +85,14 @@ def overlap(title: str, spec: Spec, card: DataCard, frames: Sequence[Frame]) -> 
     )
 
 
-def _trained_on(frame: Frame, training: Mapping[str, tuple[str, ...]], same_data: bool) -> bool:
-    if same_data and frame.sequence in training.get(SEQUENCES, ()):
+def _trained_on(
+    frame: Frame, training: Mapping[str, tuple[str, ...]], sequences: Collection[str]
+) -> bool:
+    if frame.sequence in sequences:
         return True
     return bool(training.get(SCANS)) and frame.fingerprint() in training[SCANS]
+
+
+def _sequences_of(data: str) -> str:
+    """What the sequences of one of several data sets are entered under."""
+    return f"{SEQUENCES} of {data}"

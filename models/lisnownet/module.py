@@ -76,6 +76,10 @@ class LiSnowNet(DerainingModule, Published):
     """
 
     VIEW: ClassVar[type[View]] = RangeView
+    RECIPE: ClassVar[tuple[str, ...]] = (
+        *DerainingModule.RECIPE,
+        *("alpha", "beta", "norm", "dropout"),
+    )
     CHANNELS: ClassVar[tuple[str, ...]] = ("range", "z", "intensity")
     # What denoising changed is divided by the rule's residual, some thousandths.
     AMPLIFIES: ClassVar[float] = 100.0

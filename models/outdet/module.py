@@ -58,6 +58,7 @@ class OutDet(SupervisedModule, Published):
     """
 
     VIEW: ClassVar[type[View]] = NeighbourView
+    RECIPE: ClassVar[tuple[str, ...]] = (*SupervisedModule.RECIPE, "milestones")
     # As published.
     CHANNELS: ClassVar[tuple[str, ...]] = ("x", "y", "z", "intensity")
     network: OutDetNetwork

@@ -90,6 +90,10 @@ class SalsaNextModule(SupervisedModule):
     """
 
     VIEW: ClassVar[type[View]] = RangeView
+    RECIPE: ClassVar[tuple[str, ...]] = (
+        *SupervisedModule.RECIPE,
+        *("momentum", "warm_up", "published_loss", "dropout"),
+    )
     CHANNELS: ClassVar[tuple[str, ...]] = ("range", "x", "y", "z", "intensity")
 
     def __init__(

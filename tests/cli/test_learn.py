@@ -9,6 +9,7 @@ import pytest
 from matplotlib.image import imread
 
 from derain.cli import learn, learning_report, learning_text, narration
+from derain.cli.lesson import Lesson
 from derain.cli.training import train
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
@@ -217,5 +218,5 @@ def test_poses_beside_the_scans_are_taken(
     commands: list[list[str]] = []
     monkeypatch.setattr(learn, "_fit", None)
     with pytest.raises(InputError, match="taught"):
-        learn.learn(learn.Lesson([recording], Path("model.onnx"), Path("work")))
+        learn.learn(Lesson([recording], Path("model.onnx"), Path("work")))
     assert [command[0] for command in commands] == ["teach"]

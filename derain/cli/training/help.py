@@ -15,6 +15,7 @@ to runs/<name>/version_<n>.
   derain fit --config outdet_wads.yaml --data.root WADS
   derain fit --config outdet_wads.yaml --data.root WADS --trainer.logger.name my_run
   derain fit --config outdet_wads.yaml --data.root WADS --ckpt_path .../last.ckpt   (goes on)
+  derain fit --config outdet_wads.yaml --data.root WADS --start trained.ckpt   (from its weights)
   tensorboard --logdir runs
 """,
     "validate": """\
@@ -40,6 +41,7 @@ OPTIONS = {
     "--config FILE": "configuration: a YAML file, or the name of a packaged one",
     "--data.root FOLDER": "where the data set lies",
     "--ckpt_path FILE": "checkpoint to go on from, to measure or to use",
+    "--start MODEL": "begin from a trained model's weights: a checkpoint, or default",
     "--trainer.max_epochs N": "passes over the training scans",
     "--trainer.devices N": "devices, or processes on a CPU",
     "--trainer.accelerator NAME": "cpu, gpu, ...",

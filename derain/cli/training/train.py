@@ -13,6 +13,7 @@ from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
 from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
 from lightning.pytorch.loggers import TensorBoardLogger
 
+from derain.cli.start import START_HELP, checkpoint_of
 from derain.cli.training.configurations import own_configurations, with_packaged_configs
 from derain.cli.training.errors import as_input_error, read_configuration
 from derain.cli.training.help import ALL, EXAMPLES
@@ -23,6 +24,7 @@ from derain.cli.training.run_folder import WholeConfig, writing_to_the_run_folde
 # Imported so that a configuration may name them without their modules.
 from derain.datamodules.base import ScanDataModule
 from derain.datamodules.folder import Folder
+from derain.datamodules.mixture import Mixture
 from derain.datamodules.rehearse3d import Rehearse3D
 from derain.datamodules.scan_check import ScanCheck
 from derain.datamodules.sequences import Sequences
@@ -39,6 +41,7 @@ from derain.models.callbacks.whole_checkpoints import save_whole
 from derain.models.checkpoint import check_resumable, load_model
 from derain.models.measured import MONITOR
 from derain.models.registry import NETWORKS
+from derain.models.start import started
 from derain.system.cores import usable_cores
 from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
 from derain.system.open3d_import import make_open3d_loadable
@@ -54,6 +57,7 @@ class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatt
 
 __all__ = [
     "Folder",
+    "Mixture",
     "Rehearse3D",
     "Sequences",
     "Simulated",
@@ -69,7 +73,7 @@ def choices() -> dict[str, tuple[type, ...]]:
     They are loaded then, and a configuration may name their classes without a module.
     """
     return {
-        "data": (Folder, Rehearse3D, Sequences, Simulated, Taught, Wads),
+        "data": (Folder, Mixture, Rehearse3D, Sequences, Simulated, Taught, Wads),
         "model": tuple(NETWORKS.values()),
         "trainer.logger": (TensorBoardLogger,),
     }
@@ -80,6 +84,7 @@ class DerainCLI(LightningCLI):
 
     def add_arguments_to_parser(self, parser: LightningArgumentParser) -> None:
         """Adds the callbacks; ``--checkpoint.monitor`` and so on change them."""
+        parser.add_argument("--start", type=str | None, default=None, help=START_HELP)
         parser.add_lightning_class_args(BestCheckpoint, "checkpoint")
         parser.add_lightning_class_args(ModelCheckpoint, "last")
         parser.add_lightning_class_args(LearningRateMonitor, "learning_rate")
@@ -133,6 +138,9 @@ class DerainCLI(LightningCLI):
             if isinstance(error.__cause__, InputError):
                 raise error.__cause__ from None
             raise
+        start = self.config[self.config.subcommand].get("start")
+        if start is not None and self.config.subcommand == "fit":
+            self.model = started(self.model, checkpoint_of(start), start)
 
 
 def train(arguments: list[str]) -> None:

@@ -106,7 +106,8 @@ PREPARATIONS = {
 
 
 def test_every_packaged_configuration_is_put_to_the_test() -> None:
-    assert list(packaged_configs()) == list(PREPARATIONS)
+    with_tests_of_their_own = {"outdet_mixture.yaml"}
+    assert packaged_configs().keys() - with_tests_of_their_own == PREPARATIONS.keys()
 
 
 @pytest.mark.usefixtures("one_block", "two_sizes")

@@ -1,0 +1,239 @@
+"""Several data sets at once, each with its data card and its weight."""
+
+import math
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from torch.utils.data import DataLoader
+
+from derain.cards.card import DataCard
+from derain.cards.mixed import LabelMap, label_maps, mixed_card, with_pooled_statistics
+from derain.datamodules.base import Loading, Part, ScanDataModule
+from derain.datamodules.draws import Draws, shared_out
+from derain.errors import InputError
+from derain.learning.batch import Sample
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.source import Frames, Source
+from derain.sources.training_record import by_parts
+from derain.views.channels import channel_of
+
+# A name is a folder of predictions, a group of figures in a log and the beginning of classes.
+_NAME = re.compile(r"\w[\w-]*")
+
+
+class Mixture(ScanDataModule):
+    """Several data sets as one: each epoch draws from all of them by weight.
+
+    Each part keeps its own data card: what is rain to one may be none to another. The classes of
+    all stand side by side, as ``part: class``, so that every score can be told by part, and is.
+    What a model is normalised by are the parts' statistics, pooled by weight.
+
+    How single files are read is said by each part's own ``loading`` (columns, unit of intensity);
+    batches, workers and augmentation are the mixture's. Points at one position are measured once
+    where any part's card says so.
+
+    Example:
+        >>> from derain.datamodules.folder import Folder
+        >>> night = Folder(".", card="wads", train=["*.bin"], validation=["*.bin"])
+        >>> day = Folder(".", card="wads", train=["*.bin"])
+        >>> data = Mixture({"night": night, "day": day}, {"night": 3}, measured=["night"])
+        >>> data.weights, [frame.key for frame in data.source("train")]
+        ({'night': 3.0, 'day': 1.0}, ['night/scan', 'day/scan'])
+        >>> [data.card.classes[number] for number in data.card.rain]
+        ['night: falling-snow', 'day: falling-snow']
+
+    Args:
+        parts: Data modules, by a name for each.
+        weights: By the same names, in what proportion training draws scans from the parts; 1 where
+            nothing is said.
+        scans_per_epoch: Scans that an epoch of training draws; by default as many as all parts have
+            together. Of a part with fewer than its share, scans are drawn again.
+        measured: Names of the parts that are validated, tested and predicted; by default all.
+        loading: How the scans are batched.
+
+    Raises:
+        InputError: No parts, or none with rain; a weight that is not greater than 0; a name that no
+            part has or that is none; a part that is a mixture itself; a scale of intensity for all.
+    """
+
+    def __init__(
+        self,
+        parts: dict[str, ScanDataModule],
+        weights: dict[str, float] | None = None,
+        scans_per_epoch: int | None = None,
+        measured: list[str] | None = None,
+        loading: Loading = Loading(),
+    ) -> None:
+        _check_parts(parts)
+        if loading.intensity_scale != 1:
+            raise InputError(
+                "loading.intensity_scale", "would be that of all parts", "Give it to each part."
+            )
+        super().__init__(mixed_card(_cards(parts)), loading)
+        self.parts = parts
+        self.weights = {**dict.fromkeys(parts, 1.0), **_checked_weights(parts, weights or {})}
+        if scans_per_epoch is not None and scans_per_epoch < 1:
+            raise InputError("scans_per_epoch", f"is {scans_per_epoch}", "Give 1 or more.")
+        self.scans_per_epoch = scans_per_epoch
+        self.measured = list(parts) if measured is None else measured
+        _refuse_strangers("measured", self.measured, parts)
+
+    @property
+    def shares(self) -> list[float]:
+        """Share of each part among the scans of an epoch, of 1 in all."""
+        return [weight / sum(self.weights.values()) for weight in self.weights.values()]
+
+    def prepare_data(self) -> None:
+        """Has each part make what it has to make, such as simulated scans."""
+        for part in self.parts.values():
+            part.prepare_data()
+
+    def source(self, part: Part) -> Source:
+        """The scans of all parts, one part after the other.
+
+        Raises:
+            InputError: A part without scans for it.
+        """
+        names = self.parts if part == "train" else self.measured
+        maps = label_maps(_cards(self.parts))
+        return Frames(
+            _of_part(frame, name, self.parts[name].loading, maps[name])
+            for name in names
+            for frame in self.parts[name].source(part)
+        )
+
+    def draws(self) -> Draws:
+        """How many scans of each part an epoch draws.
+
+        Raises:
+            InputError: A part without training scans, or too light for a single one.
+        """
+        scans = {name: len(part.source("train")) for name, part in self.parts.items()}
+        return Draws.by_weight(scans, self.weights, self.scans_per_epoch)
+
+    def complete_card(self, columns: Sequence[str] = (), labelled: bool = True) -> None:
+        """Takes from each part's training scans what its card lacks, and pools the statistics.
+
+        Raises:
+            InputError: A scan that cannot be read, or a part without one of the columns.
+        """
+        self._refuse_missing(columns)
+        for part in self.parts.values():
+            part.complete_card(columns, labelled)
+        cards = _cards(self.parts)
+        self.card = with_pooled_statistics(self.card, [*cards.values()], self.shares)
+
+    def training_scans(
+        self, most: int, columns: Sequence[str] | None = None, labelled: bool = True
+    ) -> Iterator[Scan]:
+        """Reads some of the training scans, of each part by its weight, but of each at least one.
+
+        Raises:
+            InputError: A scan or labels that cannot be read.
+        """
+        maps, numbers = label_maps(_cards(self.parts)), shared_out(most, self.shares)
+        for (name, part), number in zip(self.parts.items(), numbers, strict=True):
+            for scan in part.training_scans(max(number, 1), columns, labelled):
+                label = scan.label
+                yield scan if label is None else scan.with_label(maps[name](label, scan.name))
+
+    def training_record(self) -> dict[str, tuple[str, ...]]:
+        """Which scans of which parts it trains on."""
+        return by_parts((part.card.name, part.training_record()) for part in self.parts.values())
+
+    def train_dataloader(self) -> DataLoader[Sample | InputError]:
+        """Training scans, drawn by weight, in another order and augmented anew every epoch.
+
+        Raises:
+            InputError: Intensities that the model sees, in units that differ or missing in a part.
+        """
+        if self.task is not None and "intensity" in self.task.spec.channels:
+            self._refuse_missing(["intensity"])
+            self._refuse_units()
+        return super().train_dataloader()
+
+    def _refuse_missing(self, channels: Sequence[str]) -> None:
+        """Refuses channels that the first training scan of some part does not have."""
+        for name, part in self.parts.items() if channels else ():
+            scan = next(part.training_scans(1, channels, labelled=False))
+            for channel in channels:
+                if channel_of(scan, channel) is None:
+                    raise InputError(
+                        f"part '{name}'",
+                        f"{scan.name} has no {channel}, which the model is to see",
+                        "Leave the part out, or leave the channel out of --model.channels.",
+                    )
+
+    def _refuse_units(self) -> None:
+        """Refuses intensities of which two parts' cards say different units."""
+        units = {
+            name: part.card.intensity_unit
+            for name, part in self.parts.items()
+            if part.card.intensity_unit != DataCard.intensity_unit
+        }
+        if len({*units.values()}) > 1:
+            raise InputError(
+                "intensity",
+                ", ".join(f"'{name}' has it in {unit}" for name, unit in units.items()),
+                "Leave it out of --model.channels, or state cards of one unit and what takes the "
+                "scans there: loading.intensity_scale.",
+            )
+
+
+def _cards(parts: Mapping[str, ScanDataModule]) -> dict[str, DataCard]:
+    return {name: part.card for name, part in parts.items()}
+
+
+def _of_part(frame: Frame, name: str, loading: Loading, label_map: LabelMap) -> Frame:
+    """A part's frame as one of the mixture: no other part has its key or its sequence."""
+    return replace(
+        frame.with_intensity_times(loading.intensity_scale),
+        key=f"{name}/{frame.key}",
+        sequence=f"{name}/{frame.sequence}",
+        label_map=label_map,
+    )
+
+
+def _check_parts(parts: Mapping[str, ScanDataModule]) -> None:
+    if not parts:
+        raise InputError("parts", "there are none", "Give a data module for each name.")
+    for name, part in parts.items():
+        if not _NAME.fullmatch(name):
+            raise InputError(
+                f"part '{name}'", "is no plain name", "Use letters, digits, _ and - alone."
+            )
+        if part.card.parts:
+            raise InputError(f"part '{name}'", "is a mixture itself", "Name its parts.")
+    if not any(part.card.rain for part in parts.values()):
+        names = ", ".join(dict.fromkeys(part.card.name for part in parts.values()))
+        raise InputError(
+            "parts", f"no class of {names} is rain", "Give a part with rain, or another card."
+        )
+
+
+def _checked_weights(
+    parts: Mapping[str, ScanDataModule], weights: Mapping[str, float]
+) -> dict[str, float]:
+    _refuse_strangers("weights", weights, parts)
+    for name, weight in weights.items():
+        if not (math.isfinite(weight) and weight > 0):
+            raise InputError(
+                f"part '{name}'",
+                f"its weight is {weight:g}",
+                "Give a number greater than 0, or leave the part out.",
+            )
+    return {name: float(weight) for name, weight in weights.items()}
+
+
+def _refuse_strangers(
+    subject: str, names: Collection[str], parts: Mapping[str, ScanDataModule]
+) -> None:
+    strangers = [name for name in names if name not in parts]
+    if strangers or (subject == "measured" and not names):
+        raise InputError(
+            subject,
+            f"{strangers[0]!r} is no part" if strangers else "names no part",
+            f"Parts are {', '.join(parts)}.",
+        )

@@ -1,0 +1,48 @@
+"""A trained model that another one begins from, in place of weights drawn at random."""
+
+from dataclasses import dataclass, replace
+
+from derain.sources.training_record import by_parts
+from derain.spec import Spec
+
+# What a Spec's record of training has the models under that it began from, the first one first.
+STARTED_FROM = "started from"
+
+
+@dataclass(frozen=True)
+class Start:
+    """The trained model.
+
+    Attributes:
+        name: What a user calls it, and the beginning of its file's checksum.
+        spec: How it is used.
+    """
+
+    name: str
+    spec: Spec
+
+    def passed_on(self, spec: Spec) -> Spec:
+        """The Spec of a model that begins from it, on data of its own.
+
+        View, units, normalisation and rule are the start's, to which its weights belong. The record
+        names the scans that both were trained on, for what is learnt from the one is in the other.
+
+        Args:
+            spec: What the model's Spec would be without a start.
+        """
+        records = [(self.spec.data, self.spec.training), (spec.data, spec.training)]
+        together = by_parts(
+            (data, {kind: names for kind, names in record.items() if kind != STARTED_FROM})
+            for data, record in records
+        )
+        starts = (*self.spec.training.get(STARTED_FROM, ()), self.name)
+        return replace(
+            spec,
+            view=self.spec.view,
+            units=self.spec.units,
+            mean=self.spec.mean,
+            std=self.spec.std,
+            rule=self.spec.rule,
+            licence=f"{spec.licence}; started from {self.spec.data} ({self.spec.licence})",
+            training={**together, STARTED_FROM: starts},
+        )

@@ -1,0 +1,84 @@
+"""The packaged mixture trains, tests and predicts, on two small made-up data sets."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.cards.card import load_card
+from derain.models.checkpoint import load_model
+from derain.simulation.manifest import MAKER, MANIFEST
+
+QUICK = ["--trainer.enable_progress_bar", "false", "--data.scans_per_epoch", "9"]
+
+
+def test_the_packaged_mixture_goes_from_training_to_predictions(
+    run_derain,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    write_labelled: Callable[..., None],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    snow, streets = Path("WADS/sequences"), Path("streets/sequences")
+    for sequence in (name for names in load_card("wads").split.values() for name in names):
+        folder = snow / sequence
+        write_labelled(folder / "velodyne/0.bin", folder / "labels/0.label", rain=110)
+    for sequence in ("000", "001", "002"):
+        folder = streets / sequence
+        write_labelled(
+            folder / "lidar_radar_pcd/0.bin", folder / "lidar_radar_labels/0.label", rain=3
+        )
+    split = {"train": ["000"], "validation": ["001"], "test": ["002"]}
+    manifest = {"made_by": MAKER, "split": split, "files": {}}
+    (streets.parent / MANIFEST).write_text(json.dumps(manifest))
+
+    data = ["--config", "outdet_mixture.yaml", *QUICK]
+    fitted = run_derain("fit", *data, "--trainer.max_epochs", "1", "--data.weights.snow", "2")
+    assert fitted.code == 0, fitted.err
+    run = Path("runs/outdet_mixture")
+    checkpoint = run / "version_0/checkpoints/best.ckpt"
+    spec = load_model(checkpoint).spec
+    assert spec.data == "WADS + simulated rain"
+    assert spec.training["sequences of WADS"] == tuple(sorted(load_card("wads").split["train"]))
+    assert len(spec.training["scans"]) == 1
+
+    tested = run_derain("test", *data, "--ckpt_path", checkpoint)
+    assert tested.code == 0, tested.err
+    classes = json.loads((run / "version_1/test.json").read_text())["classes"]
+    assert classes["snow: falling-snow"]["points"] == 30 * len(load_card("wads").split["test"])
+    assert classes["streets: rain"] == {
+        **classes["streets: rain"],
+        **{"points": 30, "rain": True},
+    }
+
+    assert run_derain("predict", *data, "--ckpt_path", checkpoint).code == 0
+    written = sorted(Path("predictions").rglob("*.label"))
+    assert [path.relative_to("predictions").parts[0] for path in written] == [
+        *["snow"] * len(load_card("wads").split["test"]),
+        "streets",
+    ]
+    assert all(len(np.fromfile(path, "<u4")) == 300 for path in written)
+
+
+def test_parts_that_do_not_fit_together_are_told_in_a_line(run_derain, tmp_path: Path) -> None:
+    own = tmp_path / "own.yaml"
+    own.write_text(
+        """
+        model: {class_path: OutDet}
+        data:
+          class_path: Mixture
+          init_args:
+            parts:
+              hill: {class_path: Folder, init_args: {root: ., card: wads, train: [hill/*.bin]}}
+              vale: {class_path: Folder, init_args: {root: ., card: wads, train: [vale/*.bin]}}
+        """
+    )
+    for option, value, told in (
+        ("weights.dale", "2", "weights: 'dale' is no part. Parts are hill, vale."),
+        ("weights.hill", "0", "part 'hill': its weight is 0"),
+    ):
+        refused = run_derain("fit", "--config", own, f"--data.{option}", value)
+        assert refused.code == 2
+        assert told in refused.err.splitlines()[-1]
