@@ -26,7 +26,7 @@ from derain.sources.sink import Sink
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import far_off, left_out, much_removed
+from derain.views.oddities import left_out, much_removed
 
 SUMMARY = "clean scans on a CPU, without torch"
 
@@ -159,7 +159,6 @@ class _Cleaning:
         share_removed = removed / max(valid, 1)
         odd = [
             *self.method.oddities(judgement),
-            *far_off(scan),
             *much_removed(share_removed),
             *left_out(scan),
         ]
