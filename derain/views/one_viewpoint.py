@@ -15,7 +15,7 @@ from derain.scan import LARGEST_COORDINATE, Scan
 from derain.views.oddities import Oddity
 
 # Fewer points than these, or a smaller share of the rows, and a scan says next to nothing.
-FEWEST_POINTS = 50
+FEWEST_RETURNS = 50
 LEAST_VALID = 0.01
 
 # Positions and units are told from so many points, spread over all.
@@ -38,17 +38,17 @@ NEAR_BY = 1.0
 OUT_OF_PLANE = 0.01
 OPENING = 1.0
 
-# Returns nearer to each other than this, degrees, are mostly of one ray. A ray gives two returns at
-# most, here told apart by a quarter of their range: a third is another sensor's, or another place's
-# (map). Of single scans one point in a thousand lies behind two others, of ten scans of a drive
-# merged into one 2 to 15 in a hundred.
+# Of one sensor, rays are as dense near by as far off: returns crowd a cell of this many degrees, and
+# of this ratio of ranges, alike at any range. Of a map, whose points are as dense in space, those
+# far off crowd it. So many times as crowded as among the nearest quarter of the points are those of
+# another quarter in single scans (at most 1.2) and in scans of a drive merged (1.6 to 4).
 CELL = 0.1
-APART = 1.25
-BEHIND_TWO = 0.02
+ONE_SURFACE = 1.25
+MORE_CROWDED = 1.4
 
-# Where that is looked for: within this of the x and y axes, as a tangent. It is a fortieth of the
-# circle, and has to hold so many points.
-BESIDE_AXIS = 0.02
+# Where that is looked for: within this of the x and y axes and of the diagonals between them, as a
+# tangent. It is a fortieth of the circle, and has to hold so many points.
+BESIDE_AXIS = 0.01
 FEWEST_IN_CELLS = 200
 
 
@@ -61,7 +61,7 @@ def unlike_one_viewpoint(scan: Scan) -> Iterator[Oddity]:
         scan: The scan.
     """
     rows = np.flatnonzero(scan.valid)
-    if len(rows) < LEAST_VALID * len(scan) or len(rows) < FEWEST_POINTS:
+    if len(rows) < LEAST_VALID * len(scan) or len(rows) < FEWEST_RETURNS:
         yield from _beyond_all_sensors(scan)
         if len(rows):
             yield Oddity(
@@ -138,44 +138,53 @@ def _of_one_beam(sample: NDArray[np.float64]) -> Iterator[Oddity]:
 
 
 def _of_many_viewpoints(scan: Scan) -> Iterator[Oddity]:
-    """Whether points lie behind more others than one sensor would see."""
-    share = share_behind_two(scan)
-    if share > BEHIND_TWO:
+    """Whether points are denser far off than one sensor would see them."""
+    crowding = crowding_far_off(scan)
+    if crowding > MORE_CROWDED:
         yield Oddity(
             "points of several viewpoints",
-            f"{share:.0%} of the points lie behind two others in one direction, which no sensor "
-            "sees from one place: clean scans one by one, before they are merged into a map, in "
-            "coordinates of the sensor",
+            f"points far off are {crowding:.1f} times as dense, in angle, as those near by, which "
+            "no sensor sees from one place: clean scans one by one, in the sensor's coordinates, "
+            "before they are merged into a map",
         )
 
 
-def share_behind_two(scan: Scan) -> float:
-    """Share of points that lie behind two others, as seen from the origin.
+def crowding_far_off(scan: Scan) -> float:
+    """How much closer, in angle, points lie together at some range than the nearest ones do.
 
     Args:
-        scan: The scan, of whose points those in the directions of the x and y axes are looked at.
+        scan: The scan, of whose points those near the x and y axes and the diagonals between them
+            are looked at; those at one position count once.
 
     Returns:
-        From 0 to 1; 0 where few points lie there.
+        The greatest mean number of points to a cell among quarters of the points by range, over
+        that of the nearest quarter; 1 where few points are looked at.
     """
-    x, y = np.abs(scan.xyz[:, 0]), np.abs(scan.xyz[:, 1])
-    beside = (y < BESIDE_AXIS * x) | (x < BESIDE_AXIS * y)
-    beside &= scan.valid
-    rows = np.flatnonzero(beside)
+    rows = np.flatnonzero(_near_axes(scan) & scan.valid)
     if len(rows) < FEWEST_IN_CELLS:
-        return 0.0
+        return 1.0
     x, y, z = scan.xyz.take(rows, axis=0).T.astype(np.float64)
     horizontal = np.hypot(x, y)
-    cells = np.round(np.degrees([np.arctan2(y, x), np.arctan2(z, horizontal)]) / CELL).astype(int)
-    cell = cells[0] * 2 * round(360 / CELL) + cells[1]
-    log_range = np.log(np.hypot(horizontal, z)) / np.log(APART)
-    order = np.lexsort((log_range, cell))
-    cell, log_range = cell[order], log_range[order]
-    begins = np.append(True, cell[1:] != cell[:-1])
-    starts = np.flatnonzero(begins)
-    group = np.cumsum(begins) - 1
-    # Layers by range, counted from the nearest point of each cell on; empty ones do not count.
-    layer = np.floor(log_range - log_range[starts][group])
-    deeper = np.append(False, layer[1:] != layer[:-1]) & ~begins
-    passed = np.cumsum(deeper)
-    return float(np.mean(passed - passed[starts][group] >= 2))
+    range_ = np.hypot(horizontal, z)
+    order = np.argsort(range_)
+    range_ = range_[order]
+    first = order[np.append(True, range_[1:] > range_[:-1])]
+    azimuth, inclination = np.degrees([np.arctan2(y, x), np.arctan2(z, horizontal)])
+    cells = np.round(azimuth / CELL) * 360 / CELL + np.round(inclination / CELL)
+    surface = np.floor(np.log(np.hypot(horizontal, z)) / np.log(ONE_SURFACE))
+    _, cell, points = np.unique(
+        (cells * 1000 + surface)[first], return_inverse=True, return_counts=True
+    )
+    quarters = [part.mean() for part in np.array_split(points[cell], 4)]
+    return float(max(quarters) / quarters[0])
+
+
+def _near_axes(scan: Scan) -> NDArray[np.bool_]:
+    """Which points are near the x and y axes and the diagonals between them, bool (N,)."""
+    near = np.zeros(len(scan), bool)
+    x, y = np.ascontiguousarray(scan.xyz[:, :2].T)
+    with np.errstate(invalid="ignore"):
+        for u, v in ((x, y), (x + y, x - y)):
+            u, v = np.abs(u), np.abs(v)
+            near |= (v < BESIDE_AXIS * u) | (u < BESIDE_AXIS * v)
+    return near

@@ -12,7 +12,7 @@ from derain.files import read_scan
 from derain.filters import DROR, FilterDerainer
 from derain.models.outdet import OutDet
 from derain.scan import LARGEST_COORDINATE, Scan
-from derain.views.one_viewpoint import FEWEST_POINTS, share_behind_two, unlike_one_viewpoint
+from derain.views.one_viewpoint import FEWEST_RETURNS, crowding_far_off, unlike_one_viewpoint
 
 # Where the sensor is above the road, metres.
 HEIGHT = 1.8
@@ -31,13 +31,13 @@ def rays(beams: int, steps: int, sector: float = 360.0, opening: float = 30.0) -
 def street(directions: Points, x: float = 0.0) -> Points:
     """What rays meet of a street, seen from a place on it, (N, 3) metres in the sensor's frame.
 
-    There are a road, two walls 12 m to the sides, and a hundred thick poles of 5 m.
+    There are a road, two walls far off to the sides, and hundreds of trees before them.
     """
     generator = np.random.default_rng(0)
-    poles = np.stack([generator.uniform(-80, 80, 100) - x, generator.uniform(-11, 11, 100)])
+    poles = np.stack([generator.uniform(-60, 60, 600) - x, generator.uniform(-60, 60, 600)])
     poles = poles[:, np.abs(poles[1]) > 2]
     with np.errstate(divide="ignore"):
-        range_ = np.minimum(12 / np.abs(directions[:, 1]), 120.0)
+        range_ = np.minimum(70 / np.abs(directions[:, 1]), 120.0)
         down = directions[:, 2] < 0
         range_[down] = np.minimum(range_[down], -HEIGHT / directions[down, 2])
     horizontal = np.linalg.norm(directions[:, :2], axis=1)
@@ -64,10 +64,15 @@ def spinning() -> Points:
     return street(rays(64, 1024))
 
 
+def moved(points: Points, x: float, y: float = 0.0, z: float = 0.0) -> Points:
+    """Points in a frame whose origin lies elsewhere."""
+    return points + np.array([x, y, z])
+
+
 def drive(scans: int, step: float) -> Points:
     """Scans of a sensor that drives along the street, merged in the frame of the last."""
     places = step * np.arange(scans)
-    seen = [street(rays(64, 1024), place) + (place - places[-1], 0, 0) for place in places]
+    seen = [moved(street(rays(64, 1024), place), place - places[-1]) for place in places]
     return np.concatenate(seen)
 
 
@@ -82,7 +87,6 @@ def test_what_one_sensor_sees_is_not_odd(directions: Points) -> None:
 def test_nor_are_two_returns_of_every_ray_in_dense_snow(spinning: Points) -> None:
     share = np.random.default_rng(0).uniform(0.05, 0.9, (len(spinning), 1))
     both = np.concatenate([spinning, spinning * share, spinning])  # and one of them twice
-    assert share_behind_two(scan_of(both)) == 0
     assert kinds(both) == []
 
 
@@ -108,7 +112,7 @@ def test_units_are_told_by_how_far_sensors_see(
 def test_points_far_from_the_origin_are_those_of_a_map(
     spinning: Points, origin: tuple[float, ...]
 ) -> None:
-    assert kinds(spinning + origin) == ["coordinates of a map"]
+    assert kinds(moved(spinning, *origin)) == ["coordinates of a map"]
 
 
 def test_a_few_points_beyond_all_sensors_are_damage_and_no_map(spinning: Points) -> None:
@@ -117,14 +121,17 @@ def test_a_few_points_beyond_all_sensors_are_damage_and_no_map(spinning: Points)
     assert kinds(damaged) == []
 
 
+# Rays of a scanner of the plane z = 0.
+FLAT = rays(1, 1000) * (1, 1, 0)
+
+
 @pytest.mark.parametrize(
     "directions",
     [
-        rays(1, 1000) + (0, 0, np.sin(np.radians(5))),  # the plane z = 0
-        rays(1, 1000),  # a cone
+        FLAT,
+        rays(1, 1000),
         rays(1, 1000, sector=180),
-        (rays(1, 1000) + (0, 0, np.sin(np.radians(5))))
-        @ [[0.8, 0, -0.6], [0, 1, 0], [0.6, 0, 0.8]],
+        FLAT @ [[0.8, 0, -0.6], [0, 1, 0], [0.6, 0, 0.8]],
     ],
     ids=["plane", "cone", "half a cone", "tilted plane"],
 )
@@ -149,32 +156,35 @@ def test_a_sensor_that_stands_sees_from_one_place_however_often(spinning: Points
     assert kinds((spinning * noise).reshape(-1, 3)) == []
 
 
-def behind_two_by_hand(scan: Scan) -> float:
-    """The same share, cell after cell."""
+def crowding_by_hand(scan: Scan) -> float:
+    """The same number, point after point."""
     x, y, z = scan.xyz.T.astype(np.float64)
-    beside = (np.abs(y) < 0.02 * np.abs(x)) | (np.abs(x) < 0.02 * np.abs(y))
-    azimuth = np.round(np.degrees(np.arctan2(y, x)) / 0.1).astype(int)
-    inclination = np.round(np.degrees(np.arctan2(z, np.hypot(x, y))) / 0.1).astype(int)
-    cells: dict[tuple[int, int], list[float]] = {}
-    for number in np.flatnonzero(beside):
-        cell = (int(azimuth[number]), int(inclination[number]))
-        cells.setdefault(cell, []).append(float(np.linalg.norm(scan.xyz[number].astype(float))))
-    behind = 0
-    for ranges in cells.values():
-        layers = [int(np.log(r / min(ranges)) / np.log(1.25)) for r in ranges]
-        behind += sum(len({other for other in layers if other < layer}) >= 2 for layer in layers)
-    return behind / beside.sum()
+    from_axis = np.abs((np.degrees(np.arctan2(y, x)) + 22.5) % 45 - 22.5)
+    near = np.flatnonzero(np.tan(np.radians(from_axis)) < 0.01)
+    cells: dict[tuple[int, ...], int] = {}
+    found = []
+    for number in near:
+        azimuth = np.degrees(np.arctan2(y[number], x[number]))
+        inclination = np.degrees(np.arctan2(z[number], np.hypot(x[number], y[number])))
+        range_ = float(np.sqrt(x[number] ** 2 + y[number] ** 2 + z[number] ** 2))
+        surface = int(np.log(range_) // np.log(1.25))
+        cell = (round(azimuth / 0.1), round(inclination / 0.1), surface)
+        cells[cell] = cells.get(cell, 0) + 1
+        found.append((range_, cell))
+    quarters = np.array_split([cells[cell] for _, cell in sorted(found)], 4)
+    return float(max(map(np.mean, quarters)) / quarters[0].mean())
 
 
-def test_the_share_behind_two_is_that_of_counting_cell_after_cell() -> None:
+def test_crowding_is_that_of_counting_point_after_point() -> None:
     generator = np.random.default_rng(1)
     directions = rays(8, 400)[generator.integers(0, 3200, 20_000)]
-    scan = scan_of(directions * generator.uniform(2, 40, (20_000, 1)))
-    assert 0.1 < share_behind_two(scan) < 1
-    assert share_behind_two(scan) == pytest.approx(behind_two_by_hand(scan), abs=1e-3)
+    range_ = 40 * generator.uniform(0.1, 1, (20_000, 1)) ** 0.3  # most are far off
+    scan = scan_of(directions * range_)
+    assert crowding_far_off(scan) == pytest.approx(crowding_by_hand(scan), rel=0.01)
+    assert crowding_far_off(scan) > 1.5
 
 
-@pytest.mark.parametrize("points", [1, FEWEST_POINTS - 1])
+@pytest.mark.parametrize("points", [1, FEWEST_RETURNS - 1])
 def test_few_points_are_almost_none(spinning: Points, points: int) -> None:
     assert kinds(spinning[:points]) == ["almost empty"]
     nothing = np.full((5000, 3), np.nan)
@@ -193,7 +203,7 @@ def test_every_oddity_says_what_can_be_done(spinning: Points) -> None:
     remedies = {
         "divide millimetres": spinning * 1000,
         "neither in kilometres": spinning / 1000,
-        "subtract where the sensor was": spinning + (4e5, 5e5, 0),
+        "subtract where the sensor was": moved(spinning, 4e5, 5e5),
         "clean scans one by one": drive(10, 2.0),
         "made for sensors of many beams": street(rays(1, 1000)),
         "is the sensor covered": spinning[:9],
