@@ -40,8 +40,8 @@ OPENING = 1.0
 
 # The rays of one sensor are as dense near by as far off, so that returns crowd a cell of this many
 # degrees, and of this ratio of ranges, alike at any range. Points of a map are as dense in space,
-# and crowd the cells far off. Of the scans looked at none is more than 1.14 times as crowded at some
-# range as near by; ten scans of a drive merged into one are 1.4 to 3.5 times.
+# and crowd the cells far off. Of the scans looked at none is more than 1.14 times as crowded at
+# some range as near by; ten scans of a drive merged into one are 1.4 to 3.5 times.
 CELL = 0.1
 ONE_SURFACE = 1.25
 MORE_CROWDED = 1.3
