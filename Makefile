@@ -5,8 +5,9 @@ READY := $(VENV)/.ready
 
 .PHONY: demo test test-openvino lint types clean
 
+# With SCAN=path, it ends with a scan of your own.
 demo: $(READY)
-	$(VENV)/bin/derain demo
+	$(VENV)/bin/derain demo $(if $(SCAN),--scan "$(SCAN)")
 
 # Two processes, a file of tests to each in turn: what a file's tests share is made once.
 test: $(READY)

@@ -13,6 +13,7 @@ from derain.scan import Scan
 from derain.views.candidates import Candidates, bounded_channels, candidates_at
 from derain.views.channels import MOST_CHANNELS, channel_of
 from derain.views.oddities import Oddity, intensity_unlike_training, missing_channels
+from derain.views.one_viewpoint import unlike_one_viewpoint
 from derain.views.registry import VIEWS
 from derain.views.view import View
 
@@ -107,6 +108,7 @@ class Spec:
         Args:
             scan: The scan, its intensities in the unit of the training data.
         """
+        yield from unlike_one_viewpoint(scan)
         yield from missing_channels(scan, self.missing_channels(scan), self.data)
         yield from intensity_unlike_training(
             scan, self.mean_intensity, self.intensity_unit, self.data

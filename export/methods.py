@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import Runtime
@@ -30,14 +31,20 @@ def named_method(text: str) -> tuple[str, dict[str, Any]]:
     return read_parameters(text) if Path(text).suffix in PARAMETER_SUFFIXES else (text, {})
 
 
+def method_names() -> list[str]:
+    """Names that methods are called by: the model that comes with derain, filters, and others."""
+    return [DEFAULT, *FILTERS, *METHODS]
+
+
 def load_method(
     name: str, parameters: Mapping[str, Any], threads: int = 0, runtime: Runtime = Runtime()
 ) -> Method:
     """Makes a method ready to judge scans.
 
     Args:
-        name: A filter (one of ``FILTERS``), a method that sees several scans (one of ``METHODS``),
-            or an ONNX file written by ``derain export``.
+        name: ``default``, the model that comes with derain; a filter (one of ``FILTERS``), a method
+            that sees several scans (one of ``METHODS``), or an ONNX file written by ``derain
+            export``.
         parameters: Parameters by name: those of the filter and its ``candidates``, those of the
             method, or the ``threshold`` of the model.
         threads: Threads to use; 0 takes every core this process may use.
@@ -47,6 +54,10 @@ def load_method(
         InputError: No such method, a parameter that it does not have, or one out of its bounds; a
             runtime that cannot run it, or any but the usual for what has no network.
     """
+    if name == DEFAULT:
+        return _with_threshold(
+            Derainer(None, threads, runtime.name, runtime.precision), name, parameters
+        )
     # What has a suffix is a file, for which other packages need not be asked.
     if not Path(name).suffix:
         if name in FILTERS:
@@ -57,9 +68,10 @@ def load_method(
             _refuse_runtime(name, "method", runtime)
             return METHODS[name].with_parameters(parameters, threads)
     if not is_file(Path(name)):
-        known = ", ".join([*FILTERS, *METHODS])
         raise InputError(
-            name, "no such file", f"Give a model written by `derain export`, or one of {known}."
+            name,
+            "no such file",
+            f"Give a model written by `derain export`, or one of {', '.join(method_names())}.",
         )
     if Path(name).suffix == CHECKPOINT_SUFFIX:
         raise InputError(

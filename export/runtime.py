@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.default import DEFAULT, default_model
 from derain.errors import InputError
 from derain.export.model_file import METADATA_KEY, ModelFile
 from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
@@ -36,9 +37,11 @@ class Derainer(Method):
         >>> clean = points[~derainer(points)]
         >>> derainer.spec.network, derainer.probability(points).shape
         ('outdet', (820,))
+        >>> clean = points[~Derainer()(points)]  # by the model that comes with derain
 
     Args:
-        model: ONNX file written by ``derain export``.
+        model: ONNX file written by ``derain export``; None takes the model that comes with derain,
+            of which ``derain info default`` says what it is.
         threads: Threads for view and network; 0 takes every core this process may use.
         runtime: What runs the network: ``onnxruntime``, or ``openvino``, which has to be installed
             (``pip install 'derain[openvino]'``).
@@ -47,6 +50,7 @@ class Derainer(Method):
 
     Attributes:
         path: Its file.
+        name: What commands call it: the file, or ``default``.
         threads: How many it uses.
         runtime: What runs the network, and its precision.
         spec: How the model sees a scan and what it was trained on.
@@ -60,7 +64,7 @@ class Derainer(Method):
 
     def __init__(
         self,
-        model: str | Path,
+        model: str | Path | None = None,
         threads: int = 0,
         runtime: str = DEFAULT_RUNTIME,
         precision: str = FLOAT32_PRECISION,
@@ -68,8 +72,9 @@ class Derainer(Method):
         if threads < 0:
             raise InputError("threads", f"{threads} is negative", "Give 0 for every core.")
         self.runtime = Runtime(runtime, precision)
-        file = ModelFile.read(Path(model))
+        file = ModelFile.read(default_model() if model is None else Path(model))
         self.path = file.path
+        self.name = DEFAULT if model is None else str(file.path)
         self.threads = threads or usable_cores()
         self.metadata, self.spec = file.metadata, file.spec
         self.view = self.spec.make_view(self.threads)
@@ -205,8 +210,8 @@ class Derainer(Method):
         yield from outside_view(judgement.scan, judgement.judged, self.spec.data)
 
     def as_dict(self) -> dict[str, Any]:
-        """The model's file, and what it calls rain by."""
-        return {"method": str(self.path), "threshold": self.spec.threshold}
+        """What commands call the model, and what it calls rain by."""
+        return {"method": self.name, "threshold": self.spec.threshold}
 
     def logits(self, view: SeenScan) -> NDArray[np.float32]:
         """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).

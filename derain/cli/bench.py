@@ -37,7 +37,8 @@ DESCRIPTION = """\
 Runs every method on the same labelled scans, and writes one table (bench.md, bench.csv, bench.json)
 and one picture of error against time (speed_error.png).
 
-  derain bench --data scans/ --card wads --methods outdet.onnx dror dsor all none --out bench
+  derain bench --data scans/ --card wads --methods default outdet.onnx dror dsor all none \\
+      --out bench
   derain bench --data DATASET --methods outdet.onnx int8=outdet_int8.onnx tuned=dsor.yaml \\
       position intensity all none --out bench
   derain bench --data scans/ --card wads --methods outdet.onnx --runtime openvino \\
@@ -48,8 +49,8 @@ and one picture of error against time (speed_error.png).
   derain bench --paper table3 --data REHEARSE3D_PUBLIC --rain-rates rates.yaml \\
       --methods outdet.onnx dsor.yaml position all none --out table3
 
-A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), a filter (below), or a
-baseline: position and intensity, learnt from the training scans, all and none.
+A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), default or a filter
+(below), or a baseline: position and intensity, learnt from the training scans, all and none.
 With --runtime, every model is run by that one too, in a row of its own,
 and what it changes beside onnxruntime is printed.
 Scoring runs all methods in this process, where filters share one search for neighbours; then each

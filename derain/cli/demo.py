@@ -6,26 +6,34 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from derain.cli.arguments import count
+from derain.cli.demo_scan import clean_own_scans
 from derain.cli.narration import Narrator
 from derain.cli.results import first_line, iou_on, last_line, proof_of
+from derain.cli.scan_options import add_columns
+from derain.default import DEFAULT
+from derain.files import DEFAULT_COLUMNS
+from derain.sources.folders import named_frames
 
 SUMMARY = "the whole story on simulated rain, in about six minutes"
 
 DESCRIPTION = """\
 Lets it rain on simulated streets, and draws a scan of them; trains 3D-OutDet, SalsaNext and
 LiSnowNet-L1 on them, the last without labels; exports, proves and times each; cleans scans; and
-compares the networks with filters and with what every derainer has to beat. Every step is a command
+compares the networks with filters, with the model that comes with derain, and with what every
+derainer has to beat. With --scan, that model then cleans scans of your own. Every step is a command
 of derain, printed before it runs; what it prints goes to log.txt.
 
   derain demo
   derain demo --out somewhere
+  derain demo --scan scan.pcd
 """
 
 # What the networks are called, and the beginning of their configurations' names.
 DEMO_NETWORKS = {"3D-OutDet": "outdet", "SalsaNext": "salsanext", "LiSnowNet-L1": "lisnownet"}
 
-# What they are compared with: a filter, and the baselines that every method has to beat.
-OTHERS = ("dror", "position", "intensity", "all", "none")
+# What they are compared with: the model that comes with derain, a filter, and the baselines that
+# every method has to beat.
+OTHERS = (DEFAULT, "dror", "position", "intensity", "all", "none")
 
 # 16 streets to train on, 5 to choose by, 5 to test on.
 STREETS = (
@@ -48,6 +56,8 @@ class Story:
         others: Methods that they are compared with.
         fit: Options of every training.
         bench: Options of the comparison.
+        scan: A scan of the user's own, or a folder of them; None where none is given.
+        columns: Names of the columns of its file, where that does not name them.
     """
 
     out: Path
@@ -56,18 +66,27 @@ class Story:
     others: Sequence[str] = OTHERS
     fit: Sequence[str] = ()
     bench: Sequence[str] = ()
+    scan: Path | None = None
+    columns: Sequence[str] = DEFAULT_COLUMNS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument("--out", type=Path, default=Path("demo"), help="folder (default: demo)")
     parser.add_argument("--epochs", type=count, help="train for another number of epochs")
+    parser.add_argument(
+        "--scan", type=Path, help="scan of your own, or folder of scans, to end with"
+    )
+    add_columns(parser, of="your ")
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     epochs = ("--trainer.max_epochs", str(arguments.epochs)) if arguments.epochs else ()
-    tell(Story(arguments.out, fit=epochs))
+    if arguments.scan is not None:
+        # Minutes before it is its turn: what cannot be read is told now.
+        named_frames([arguments.scan], arguments.columns)[0].read()
+    tell(Story(arguments.out, fit=epochs, scan=arguments.scan, columns=arguments.columns))
     return 0
 
 
@@ -103,6 +122,10 @@ def tell(story: Story) -> None:
     )
     print("", *_narrowed(table), "", sep="\n")
     print("Simulated rain on streets not trained on is easy, and says nothing of real rain.")
+    if story.scan is not None:
+        print("\nScans of your own, by the model that comes with derain:")
+        clean_own_scans(narrator, story.scan, story.columns, out / "yours")
+        print()
     print(f"Pictures: {out}/filters.png, before_after.png, bench/speed_error.png")
     print(f"Training: tensorboard --logdir {out / 'runs'}")
     print(f"Done in {narrator.elapsed}; what the commands said: {out / 'log.txt'}")

@@ -1,21 +1,23 @@
-"""Help that lists the filters and other methods there are, those of other packages included."""
+"""Help that lists the methods that have names, those of other packages included."""
 
 import argparse
 
+from derain.default import DEFAULT
 from derain.filters import FILTERS
 from derain.methods.registry import METHODS
 
+_MODEL = f"the model that comes with derain:\n  {DEFAULT}  see `derain info {DEFAULT}`"
 _FILTERS_HERE, _METHODS_HERE = "{filters}", "{methods}"
 
 
 def list_filters(parser: argparse.ArgumentParser) -> None:
-    """Ends the help of a command with the filters, one a line."""
+    """Ends the help of a command with the default model and the filters, one a line."""
     parser.formatter_class = _FilterHelp
-    parser.epilog = f"filters:\n{_FILTERS_HERE}"
+    parser.epilog = f"{_MODEL}\nfilters:\n{_FILTERS_HERE}"
 
 
 def list_methods(parser: argparse.ArgumentParser) -> None:
-    """Ends the help of a command with the filters, and the methods that see several scans."""
+    """Ends the help of a command with these, and the methods that see several scans."""
     list_filters(parser)
     parser.epilog = f"{parser.epilog}\n{_METHODS_HERE}"
 

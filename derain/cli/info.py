@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
+from derain.cli.info_default import card_as_text
 from derain.cli.info_folder import draw, facts_of_folder
 from derain.cli.info_returns import facts_of_returns
 from derain.cli.outputs import say
 from derain.cli.scan_options import ListFormats, add_columns
+from derain.default import DEFAULT, default_model, model_card
 from derain.errors import InputError, printable
 from derain.files.documents import Entry
 from derain.files.labels import read_labels, semantic
@@ -35,8 +37,10 @@ scan, and how many of its rays have two returns; with --card, also how often the
 labelled scan gives back what lies behind rain. And how many scans and points, by class and by rain
 rate, are in a data set: a folder of sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated), one
 sequence, or a folder of scans. With --grid, fits one grid to all the scans, to be written into a
-configuration.
+configuration. Of the model that comes with derain (default) it prints the card: what it is, how
+good, and when not to use it.
 
+  derain info default
   derain info scan.bin
   derain info scan.bin --columns x,y,z,intensity,ring --json
   derain info velodyne/042228.bin --card wads
@@ -52,7 +56,7 @@ configuration.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument(
-        "files", nargs="+", type=Path, help="scans, labels, models, checkpoints, folders"
+        "files", nargs="+", type=Path, help="scans, labels, models, checkpoints, folders, default"
     )
     parser.add_argument("--grid", action="store_true", help="fit one grid to all the scans")
     parser.add_argument(
@@ -84,6 +88,9 @@ def main(arguments: argparse.Namespace) -> int:
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0
     for path in arguments.files:
+        if str(path) == DEFAULT:
+            _describe_default(arguments)
+            continue
         if os.path.isdir(path):
             _describe_folder(path, arguments)
             continue
@@ -102,6 +109,21 @@ def _refuse_unclear_picture(arguments: argparse.Namespace) -> None:
         arguments.grid or len(arguments.files) > 1 or not os.path.isdir(arguments.files[0])
     ):
         raise InputError("--picture", "shows one folder's statistics", "Name one folder alone.")
+
+
+def _describe_default(arguments: argparse.Namespace) -> None:
+    """Prints the card of the model that comes with derain, once its file is known to be it."""
+    if os.path.exists(DEFAULT):
+        raise InputError(
+            DEFAULT,
+            "it is the model that comes with derain, and something here is called so too",
+            f"Write {os.path.abspath(DEFAULT)} for that, or ask from another folder.",
+        )
+    model, card = default_model(), model_card()
+    if arguments.json:
+        print(json.dumps({"file": str(model), **card.as_dict()}))
+    else:
+        say(card_as_text(card, model.stat().st_size))
 
 
 def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:

@@ -33,8 +33,10 @@ DESCRIPTION = """\
 Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
 
   derain demo                                           the whole story on simulated rain
-  derain run model.onnx scans/ --out cleaned            clean scans on a CPU; or `run dror ...`
-  derain bench --data scans/ --methods model.onnx dsor   speed against error
+  derain run scans/ --out cleaned                       clean scans by the model of derain's own
+  derain run model.onnx scans/ --out cleaned            by another; or `run dror ...`
+  derain info default                                   what derain's own is, and how good
+  derain bench --data scans/ --methods default dsor     speed against error
   derain fit --config outdet_wads.yaml --data.root WADS train on your data
   derain export outdet.ckpt --out model.onnx            make a file that runs without torch
 """

@@ -12,10 +12,15 @@ from derain.filters import read_parameters
 from derain.sources.method import Method
 
 
-def add_method(parser: argparse.ArgumentParser) -> None:
-    """Declares the method, and lists in the help which there are."""
+def add_method(parser: argparse.ArgumentParser, metavar: str = "METHOD") -> None:
+    """Declares the method, and lists in the help which there are.
+
+    Args:
+        parser: The command's parser.
+        metavar: What the method is called in the help.
+    """
     parser.add_argument(
-        "method", metavar="METHOD", help="ONNX file, YAML file of parameters, or name of a method"
+        "method", metavar=metavar, help="ONNX file, YAML file of parameters, or name of a method"
     )
     list_methods(parser)
 

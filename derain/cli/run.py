@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from derain.cli.arguments import add_threads, share
-from derain.cli.method_options import add_method, add_parameters, method_of
-from derain.cli.outputs import folder_sink, tell
+from derain.cli.method_options import add_parameters, method_of
+from derain.cli.method_or_scans import RULE, add_method_and_scans, method_and_scans
+from derain.cli.outputs import folder_sink, say, tell
 from derain.cli.pose_options import add_poses, placed
 from derain.cli.runtime_options import add_runtime
 from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns, add_intensity_scale
+from derain.default import DEFAULT, model_card
 from derain.errors import InputError, printable
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
@@ -24,14 +26,15 @@ from derain.sources.sink import Sink
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import far_off, left_out, much_removed
+from derain.views.oddities import left_out, much_removed
 
 SUMMARY = "clean scans on a CPU, without torch"
 
-DESCRIPTION = """\
+DESCRIPTION = f"""\
 Cleans scans: writes <stem>.label (1 = rain, one per row of the input) and the scan without its
 rain, in the input's format with every field kept.
 
+  derain run scans/ --out cleaned
   derain run model.onnx scan.bin --out cleaned
   derain run model.onnx scans/ more/scan.pcd --out cleaned --threads 2 --json
   derain run model.onnx nuscenes/ --out cleaned --columns x,y,z,intensity,ring
@@ -43,9 +46,10 @@ rain, in the input's format with every field kept.
   derain run persistence recording/ --out cleaned --poses poses.txt
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
-a filter, or a method that sees several scans (below): for that, a recording's scans have to come in
-time order. Where a method is not sure of a point, its best guess decides. Of a data set, results
-are named by their paths in it.
+or a name (below). {RULE}
+For a method that sees several scans, those of a recording have to come in time order. Where a
+method is not sure of a point, its best guess decides. Of a data set, results are named by their
+paths in it.
 What is odd about a scan is warned of, each fault once. One of which more than --most-removed is
 called rain is left alone. It and a scan that cannot be read are reported and passed over; the exit
 code is then 2.
@@ -93,10 +97,7 @@ class Cleaned:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    add_method(parser)
-    parser.add_argument(
-        "scans", nargs="+", type=Path, help="scans, folders of scans, or a data set's folder"
-    )
+    add_method_and_scans(parser, help="scans, folders of scans, or a data set's folder")
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     add_threads(parser)
     add_runtime(parser, help="what runs the model")
@@ -117,9 +118,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
+    arguments.method, arguments.scans = method_and_scans(arguments)
     method = method_of(arguments)
     source = placed(named_frames(arguments.scans, arguments.columns), arguments)
     cleaning = _Cleaning(method, folder_sink(arguments.out, source), arguments)
+    stream = sys.stderr if arguments.json else sys.stdout
+    if arguments.method == DEFAULT:
+        say(
+            f"by the model that comes with derain: {model_card().title}; what it is, and when not "
+            f"to use it: derain info {DEFAULT}",
+            stream,
+        )
     for sentence in irregularities(source, method.window):
         warn(sentence)
     in_unit = source.map(lambda frame: frame.with_intensity_times(arguments.intensity_scale))
@@ -129,7 +138,7 @@ def main(arguments: argparse.Namespace) -> int:
             cleaning.write(frame, judgement, stopwatch)
     cleaning.notices.tell_how_many_more()
     if len(cleaning.done) > 1:
-        print(_summary(cleaning.done), file=sys.stderr if arguments.json else sys.stdout)
+        print(_summary(cleaning.done), file=stream)
     return scans.exit_code("{scans} could not be cleaned")
 
 
@@ -150,7 +159,6 @@ class _Cleaning:
         share_removed = removed / max(valid, 1)
         odd = [
             *self.method.oddities(judgement),
-            *far_off(scan),
             *much_removed(share_removed),
             *left_out(scan),
         ]

@@ -39,13 +39,14 @@ and 255 not known, which is neither trained on nor measured.
   derain teach persistence drive/ --out taught
   derain teach persistence drive/ --out taught --poses poses.txt
   derain teach crf drive/ other_drive/ --out taught
+  derain teach default drive/ --out taught
   derain teach persistence WADS/sequences/36 --out taught --card wads
   derain fit --config outdet_taught.yaml --data.root taught
 
-METHOD is a method that sees several scans, a filter (below), a model (.onnx), or parameters that
-`derain tune` wrote (.yaml). The folder gets labels, their data card and a list of the scans, which
-stay where they are. The last fifth of each sequence is held out, as the validation part. A scan of
-which nothing is known is left out.
+METHOD is a method that sees several scans, a filter, the model that comes with derain (below), a
+model of your own (.onnx), or parameters that `derain tune` wrote (.yaml). The folder gets labels,
+their data card and a list of the scans, which stay where they are. The last fifth of each sequence
+is held out, as the validation part. A scan of which nothing is known is left out.
 With --card, which says what the scans' own labels mean, what is taught is measured beside them, for
 the record only: they change nothing.
 """

@@ -18,6 +18,7 @@ from derain.cli.arguments import add_threads, command_line, count, share
 from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
+from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.filters import FILTERS, filter_from
@@ -44,6 +45,7 @@ labelled scans, and writes them for `derain run --parameters` and `derain bench 
   derain tune dror --data REHEARSE3D_PUBLIC --scans 100 --trials 100 --out dror.yaml
   derain tune dror --data REHEARSE3D_PUBLIC --trials 300 --storage study.db --out dror.yaml
   derain tune outdet.onnx --data REHEARSE3D_PUBLIC --out outdet.yaml
+  derain tune default --data scans/ --card wads --out default.yaml
 
 A filter is searched by Optuna, from its default parameters on; each scan's neighbours are found
 once, and take some 150 bytes a point. With --storage, a second call goes on to --trials.
@@ -55,7 +57,7 @@ A model's threshold is found exactly, from its probabilities, without trials.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument("method", metavar="METHOD", help="a filter (below) or an ONNX file")
+    parser.add_argument("method", metavar="METHOD", help="ONNX file, default or a filter (below)")
     list_filters(parser)
     add_data_arguments(parser, part="validation")
     parser.add_argument("--out", type=Path, required=True, help="YAML file to write")
@@ -216,6 +218,6 @@ def _write(arguments: argparse.Namespace, tuned: "Tuned", facts: str) -> None:
 
 def _seen_from(folder: Path, method: str) -> str:
     """The method as a file in a folder names it: a model by the way from there to it."""
-    if method in FILTERS:
+    if method == DEFAULT or method in FILTERS:
         return method
     return Path(os.path.relpath(Path(method).resolve(), folder.resolve())).as_posix()

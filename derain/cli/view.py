@@ -10,6 +10,7 @@ from derain.cli.arguments import add_threads
 from derain.cli.filter_help import list_filters
 from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns, add_intensity_scale
+from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.sources.folders import frame_of
 from derain.system.notices import Notices
@@ -29,13 +30,14 @@ DESCRIPTION = """\
 Draws a scan, its truth where it has labels, and what each method makes of it, from above and as the
 sensor sees it.
 
-  derain view scan.bin --methods outdet.onnx dsor --out figure.png
+  derain view scan.bin --out figure.png
+  derain view scan.bin --methods default outdet.onnx dsor --out figure.png
   derain view scan.bin --card wads --methods outdet.onnx tuned=dsor.yaml dror --out figure.png
   derain view scan.bin --methods outdet.onnx --window
 
-A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), a filter (below), all or
-none. --card says what the scan's labels mean; without it there is no truth, and with it points
-whose label says that they are unknown are left out.
+A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), default or a filter
+(below), all or none. --card says what the scan's labels mean; without it there is no truth, and
+with it points whose label says that they are unknown are left out.
 """
 
 
@@ -43,7 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument("scan", type=Path)
     list_filters(parser)
-    parser.add_argument("--methods", nargs="+", required=True, metavar="[TITLE=]METHOD")
+    parser.add_argument(
+        "--methods",
+        nargs="+",
+        default=[DEFAULT],
+        metavar="[TITLE=]METHOD",
+        help="(default: default, the model that comes with derain)",
+    )
     parser.add_argument("--out", type=Path, help="PNG file to write")
     parser.add_argument("--window", action="store_true", help="open a window for each method")
     parser.add_argument(

@@ -18,6 +18,7 @@ from derain.system.cores import usable_cores
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.oddities import Oddity
+from derain.views.one_viewpoint import unlike_one_viewpoint
 from derain.views.window import Window
 
 
@@ -113,8 +114,9 @@ class FilterDerainer(Method):
         return iter(())
 
     def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
-        """What is odd about a scan for the filter."""
-        return self.filter.oddities(judgement.scan)
+        """What is odd about a scan for the filter, or for whatever looks at places."""
+        yield from unlike_one_viewpoint(judgement.scan)
+        yield from self.filter.oddities(judgement.scan)
 
     def as_dict(self) -> dict[str, Any]:
         """The filter's name and parameters, and its candidates if it has any."""

@@ -26,6 +26,7 @@ from derain.system.cores import usable_cores
 from derain.system.parameters import made_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.oddities import Oddity
+from derain.views.one_viewpoint import unlike_one_viewpoint
 from derain.views.window import PlacedScan, Window, WindowOfScans
 
 # Scans kept at a time are bounded: each takes some 30 MB with its neighbours and rays.
@@ -169,7 +170,8 @@ class PersistenceDerainer(RecordingMethod):
         self._end_recording()
 
     def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
-        """What is odd about a scan: nothing known of it, or no pose that could be trusted."""
+        """What is odd about a scan: its places, nothing known of it, or no pose to be trusted."""
+        yield from unlike_one_viewpoint(judgement.scan)
         yield from self._doubts.get(judgement.scan, ())
         if judgement.known is not None and not judgement.known.any() and judgement.judged.any():
             yield Oddity(

@@ -27,9 +27,6 @@ MOST_OUTSIDE = 0.02
 HEAVIEST_RAIN = 0.17
 MOST_RAIN = 2 * HEAVIEST_RAIN
 
-# Half of the points of a scan are nearer, metres: in the open, few LiDARs see anything so far off.
-FAR_OFF = 500.0
-
 
 @dataclass(frozen=True)
 class Oddity:
@@ -155,23 +152,6 @@ def much_removed(share: float) -> Iterator[Oddity]:
             f"more than {MOST_RAIN:.0%} called rain",
             f"{share:.0%} of the points are called rain, where the heaviest rain has "
             f"{HEAVIEST_RAIN:.0%}: the method may not suit the sensor",
-        )
-
-
-def far_off(scan: Scan) -> Iterator[Oddity]:
-    """Whether a scan lies farther off than sensors see, as in millimetres or on a map it does.
-
-    Args:
-        scan: The scan.
-    """
-    if not scan.valid.any():
-        return
-    median = float(np.median(scan.range[scan.valid]))
-    if median > FAR_OFF:
-        yield Oddity(
-            "points farther off than sensors see",
-            f"half of the points are more than {median:,.0f} m away: coordinates have to be in "
-            "metres, as seen from the sensor",
         )
 
 

@@ -125,9 +125,9 @@ def bench(
 
     Args:
         methods: Each an exported model (``.onnx``), parameters that ``derain tune`` wrote
-            (``.yaml``), the name of a filter or baseline (``position``, ``intensity``, ``all``,
-            ``none``), a ``Derainer``, a filter, or any function that takes a Scan and says which
-            points are rain, bool (N,). A mapping gives them titles.
+            (``.yaml``), ``default``, the name of a filter or baseline (``position``,
+            ``intensity``, ``all``, ``none``), a ``Derainer``, a filter, or any function that takes
+            a Scan and says which points are rain, bool (N,). A mapping gives them titles.
         scans: Labelled scans, in memory or in files and folders: all that a source gives.
         card: What their labels mean: a data card, the name of a packaged one, or a YAML file.
         train: Labelled scans that ``position`` and ``intensity`` learn from.

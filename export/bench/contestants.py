@@ -49,9 +49,9 @@ def contestants(
     """The methods of a bench.
 
     Args:
-        methods: The methods, by their titles or with titles of their own. A text is an exported
-            model, a YAML file of parameters, a filter or a baseline (position, intensity, all,
-            none), and without a mapping may have ``title=`` before it.
+        methods: The methods, by their titles or with titles of their own. A text is ``default``, an
+            exported model, a YAML file of parameters, a filter or a baseline (position, intensity,
+            all, none), and without a mapping may have ``title=`` before it.
         learn_from: Scans for position and intensity; None where there are none to learn from.
         runtime: What every model is run by besides onnxruntime, where it is another.
 
@@ -88,10 +88,10 @@ def _contestant(method: GivenMethod, learn_from: LearnFrom | None) -> Contestant
             return _filter(method.name, FilterDerainer(method))
         case FilterDerainer():
             return _filter(method.filter.name, method)
-        case Derainer(path=path, spec=spec):
+        case Derainer(name=name, spec=spec):
             known = {"threshold": spec.threshold}
-            ready = partial(load_method_of_one_scan, str(path), known)
-            row = _model(printable(path.stem), str(path), method, ready)
+            ready = partial(load_method_of_one_scan, name, known)
+            row = _model(printable(Path(name).stem), name, method, ready)
             return row if method.runtime.is_default else run_by(row, method.runtime)
         case _ if callable(method) and not isinstance(method, type):
             return _function(method)
@@ -141,9 +141,9 @@ def _model(
     spec = derainer.spec
     facts = {
         "model": name,
-        "sha256": sha256(Path(name).read_bytes()).hexdigest(),
+        "sha256": sha256(derainer.path.read_bytes()).hexdigest(),
         FILE_SIZE: derainer.path.stat().st_size,
-        "weights": _weights(Path(name)),
+        "weights": _weights(derainer.path),
         "trained_on": spec.data,
         "threshold": spec.threshold,
     }

@@ -16,12 +16,13 @@ from matplotlib.image import imread
 
 from derain.cli import demo, narration
 from derain.cli.demo import STREETS, Story, tell
+from derain.cli.demo_scan import clean_own_scans, taken_by_range
 from derain.cli.main import main
 from derain.cli.narration import Narrator, Transcript
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
-from derain.files import read_scan
+from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.scan import Scan
 from derain.simulation.campaign import Campaign, partition
 from derain.system.open3d_import import import_open3d
@@ -46,7 +47,7 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Story:
             *("--sensor", "sensor.yaml", "--no-radar", "--workers", "1"),
         ),
         networks=("3D-OutDet",),
-        others=("none",),
+        others=("default", "none"),
         fit=("--trainer.max_epochs", "1", "--panels.scans", "0"),
         bench=("--timed", "1", "--repeats", "1"),
     )
@@ -65,7 +66,7 @@ def test_every_step_is_told_and_leaves_what_it_says(
     assert len(times) == len(steps)
     assert any("3D-OutDet trained: IoU 0." in line for line in times)
     table = [line.split("|")[1].strip() for line in lines if line.startswith("| ")]
-    assert table == ["method", "3D-OutDet", "dsor, tuned", "none"]
+    assert table == ["method", "3D-OutDet", "dsor, tuned", "default", "none"]
     (header,) = [line for line in lines if line.startswith("| method")]
     assert [name.strip() for name in header.split("|")[1:-1]] == list(demo.SHOWN)
     assert len(lines) <= 40
@@ -81,6 +82,45 @@ def test_every_step_is_told_and_leaves_what_it_says(
     log = (out / "log.txt").read_text()
     assert all(command in log for command in commands)
     assert "it/s" not in log
+
+
+def test_the_model_that_comes_with_derain_cleans_scans_of_the_users_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    for number in range(2):
+        scene(500, number).tofile(mine / f"{number}.bin")
+    np.full((60, 4), 1e5, np.float32).tofile(mine / "far.bin")
+    out = tmp_path / "out"
+    clean_own_scans(Narrator(main, tmp_path / "log.txt"), mine, DEFAULT_COLUMNS, out)
+    command, result, warning, by_range, picture = capsys.readouterr().out.splitlines()
+    assert command == f"$ derain run default {mine} --out {out} --columns x,y,z,intensity"
+    assert "3 scans: 1,060 points" in result
+    assert "far.bin" in warning
+    assert re.fullmatch(r"  taken by range: 0-10 m [\d.]+%, .*, 80\+ m [\d.]+%", by_range)
+    assert picture == f"  before and after: {out / 'before_after.png'}"
+    assert imread(out / "before_after.png")[..., :3].std() > 0
+    assert {path.name for path in out.glob("*.label")} == {"0.label", "1.label", "far.label"}
+
+
+def test_what_is_taken_is_counted_by_range() -> None:
+    xyz = np.zeros((6, 3), np.float32)
+    xyz[:, 0] = [9.9, 10, 39, 500, 0, 8]
+    rain = np.array([True, False, True, False, True, False])
+    counted = taken_by_range(Scan(xyz), rain)
+    assert counted.tolist() == [[2, 1], [1, 0], [1, 1], [0, 0], [1, 0]]
+
+
+def test_a_scan_that_cannot_be_read_is_told_before_the_story_begins(
+    tmp_path: Path, run_derain
+) -> None:
+    (tmp_path / "cut.bin").write_bytes(b"12345")
+    for name, reason in (("cut.bin", "5 bytes are not whole rows"), ("none", "there is no such")):
+        outcome = run_derain("demo", "--out", tmp_path / "out", "--scan", tmp_path / name)
+        assert (outcome.code, outcome.out) == (2, "")
+        assert reason in outcome.err
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.usefixtures("small")

@@ -224,7 +224,7 @@ def test_labels_that_cannot_be_written_leave_no_temporary_file(
     ("arguments", "reason"),
     [
         (["none.onnx", "scans", "--out", "out"], "derain: none.onnx: no such file."),
-        (["scans/000001.bin", "scans", "--out", "out"], "derain: scans/000001.bin: not an ONNX"),
+        (["notes", "scans", "--out", "out"], "derain: notes: not an ONNX"),
         (["{model}", "none", "--out", "out"], "derain: none: there is no such file or folder."),
         (["{model}", "empty", "--out", "out"], "derain: empty: holds no scans"),
         (["{model}", "scans", "--out", "out", "--threads", "-1"], "--threads: -1 is less than 0"),
@@ -242,8 +242,9 @@ def test_what_cannot_be_used_is_refused_before_any_work(
 ) -> None:
     monkeypatch.chdir(scans.parent)
     Path("empty").mkdir()
+    Path("notes").write_text("of no kind")
     outcome = run_derain("run", *(argument.format(model=onnx_model) for argument in arguments))
     assert outcome.code == 2
     assert outcome.out == ""
     assert reason in outcome.err.splitlines()[-1]
-    assert sorted(path.name for path in Path().iterdir()) == ["empty", "scans"]
+    assert sorted(path.name for path in Path().iterdir()) == ["empty", "notes", "scans"]

@@ -18,7 +18,6 @@ from derain.views.oddities import (
     HEAVIEST_RAIN,
     MOST_OUTSIDE,
     Examiner,
-    far_off,
     left_out,
     much_removed,
     outside_view,
@@ -133,15 +132,6 @@ def test_twice_the_heaviest_rain_is_too_much() -> None:
     assert not list(much_removed(2 * HEAVIEST_RAIN))
     (oddity,) = much_removed(0.35)
     assert oddity.detail.startswith("35% of the points are called rain")
-
-
-def test_millimetres_and_places_on_a_map_are_farther_off_than_sensors_see() -> None:
-    metres = Scan.of(scene(300))
-    assert not list(far_off(metres))
-    for xyz in (metres.xyz * 1000, metres.xyz + np.float32([4e5, 5e5, 0])):
-        (odd,) = far_off(Scan(xyz))
-        assert "metres, as seen from the sensor" in odd.detail
-    assert not list(far_off(Scan(np.zeros((5, 3), np.float32))))
 
 
 def test_any_header_may_say_that_parts_of_its_file_are_not_written() -> None:

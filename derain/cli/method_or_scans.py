@@ -1,0 +1,80 @@
+"""Reads ``[METHOD] SCAN...``: whether the first word names a method, or is a scan already."""
+
+import argparse
+import os
+from pathlib import Path
+
+from derain.cli.method_options import add_method
+from derain.default import DEFAULT
+from derain.errors import InputError
+from derain.export.methods import CHECKPOINT_SUFFIX, PARAMETER_SUFFIXES, method_names
+from derain.files.format import FORMATS
+from derain.files.names import scan_suffix
+from derain.files.reading import is_file
+
+# Suffixes of files that name a method, or, as a checkpoint does, are refused as one.
+METHOD_SUFFIXES = (".onnx", CHECKPOINT_SUFFIX, *PARAMETER_SUFFIXES)
+
+# How a command's help says it.
+RULE = """\
+The first word is METHOD where it is one of these. Where it is a folder or a scan, METHOD is left
+out, and the model that comes with derain cleans them all. Write ./crf for a folder called crf."""
+
+
+def add_method_and_scans(parser: argparse.ArgumentParser, *, help: str) -> None:
+    """Declares a method, which need not be named, and the scans.
+
+    Args:
+        parser: The command's parser.
+        help: What the scans are.
+    """
+    add_method(parser, metavar="[METHOD]")
+    scans = parser.add_argument("scans", nargs="+", type=Path, metavar="SCAN", help=help)
+    # Where only one word is given it goes to the method, and the words are sorted afterwards. Were
+    # it the method that is not required, `run dror --out cleaned scans/` would be misread.
+    scans.required = False
+
+
+def method_and_scans(arguments: argparse.Namespace) -> tuple[str, list[Path]]:
+    """The method and the scans that a command line means.
+
+    Raises:
+        InputError: A first word that is neither, or could be both where that matters; a method
+            without scans.
+    """
+    first, others = arguments.method, arguments.scans or []
+    named, there = _names_method(first), os.path.isdir(first) or is_file(Path(first))
+    if not (named or there):
+        raise InputError(
+            first,
+            "no such file",
+            "Give a model written by `derain export`, or one of "
+            f"{', '.join(method_names())}, and scans after it; or scans alone.",
+        )
+    if not named and (not others or _may_be_scans(first)):
+        return DEFAULT, [Path(first), *others]
+    if others:
+        return first, others
+    beside = f"`derain {arguments.command} {first} SCANS --out cleaned`"
+    if there and not _is_method_file(first):
+        raise InputError(
+            first,
+            "it is a method's name, and something here is called so too",
+            f"Write ./{first} to have that cleaned by the model that comes with derain, or "
+            f"{beside} to clean others by the method.",
+        )
+    raise InputError(first, "it is a method, and no scans are named", f"Write {beside}.")
+
+
+def _may_be_scans(word: str) -> bool:
+    """Whether a folder or a file, which is no method by its name, may be scans by its name."""
+    return os.path.isdir(word) or scan_suffix(Path(word)) in FORMATS
+
+
+def _names_method(word: str) -> bool:
+    """Whether a word is a method's name, or a file of a kind that holds methods."""
+    return _is_method_file(word) or (not Path(word).suffix and word in method_names())
+
+
+def _is_method_file(word: str) -> bool:
+    return Path(word).suffix in METHOD_SUFFIXES and not os.path.isdir(word)

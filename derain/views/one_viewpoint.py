@@ -1,0 +1,189 @@
+"""Whether points are what one LiDAR sees from where it stands, in metres.
+
+Whatever derains a scan takes that for granted: neighbours are judged by distances in metres, and by
+how far apart rays of one sensor are at that range. Each check is told by a share of the points far
+beyond what any scan of a single sensor has, so that none is told of in vain.
+Feet cannot be told from metres: a street in feet is as long as a longer one.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.scan import LARGEST_COORDINATE, Scan
+from derain.views.oddities import Oddity
+
+# Fewer points than these, or a smaller share of the rows, and a scan says next to nothing.
+FEWEST_RETURNS = 50
+LEAST_VALID = 0.01
+
+# Positions and units are told from so many points, spread over all.
+SAMPLED = 1024
+
+# Points lie this many times farther off than from one another: the sensor is not at the origin. A
+# sensor that sees no more than 11 degrees of a wall would come as near.
+OFF_CENTRE = 10.0
+
+# One point in twenty is farther off, metres: few LiDARs see anything there. The farthest of the
+# scans looked at has one in a hundred beyond 160 m.
+FAR_OFF = 500.0
+FAR_PERCENTILE = 95
+
+# All but one point in a hundred is nearer, metres: nothing but its own cover, if these are metres.
+NEAR_BY = 1.0
+
+# Where rays keep to a plane, or to a cone about the axis: the root mean square of what they leave
+# it by, as a sine, and degrees of inclination between all but 2 % of them.
+OUT_OF_PLANE = 0.01
+OPENING = 1.0
+
+# The rays of one sensor are as dense near by as far off, so that returns crowd a cell of this many
+# degrees, and of this ratio of ranges, alike at any range. Points of a map are as dense in space,
+# and crowd the cells far off. Of the scans looked at none is more than 1.14 times as crowded at
+# some range as near by; ten scans of a drive merged into one are 1.4 to 3.5 times.
+CELL = 0.1
+ONE_SURFACE = 1.25
+MORE_CROWDED = 1.3
+
+# Where that is looked for: within this of the x and y axes and of the diagonals between them, as a
+# tangent. It is a fortieth of the circle, and has to hold so many points.
+BESIDE_AXIS = 0.01
+FEWEST_IN_CELLS = 200
+
+
+def unlike_one_viewpoint(scan: Scan) -> Iterator[Oddity]:
+    """Says where a scan is not what one sensor sees from where it stands, in metres.
+
+    Of a scan that is too far off or too small nothing else can be said.
+
+    Args:
+        scan: The scan.
+    """
+    rows = np.flatnonzero(scan.valid)
+    if len(rows) < LEAST_VALID * len(scan) or len(rows) < FEWEST_RETURNS:
+        yield from _beyond_all_sensors(scan)
+        if len(rows):
+            yield Oddity(
+                "almost empty",
+                f"{len(rows):,} of {len(scan):,} rows are points that can be judged: too few to "
+                "say anything of (is the sensor covered, or the file cut short?)",
+            )
+        return
+    sample = scan.xyz.take(rows[:: -(-len(rows) // SAMPLED)], axis=0).astype(np.float64)
+    misplaced = [*_elsewhere(sample)] or [*_in_other_units(sample)]
+    yield from misplaced
+    if not misplaced:
+        yield from _of_one_beam(sample)
+        yield from _of_many_viewpoints(scan)
+
+
+def _beyond_all_sensors(scan: Scan) -> Iterator[Oddity]:
+    """Whether most of the rows are points, and too far off for any unit: those of a map."""
+    finite = np.isfinite(scan.xyz).all(axis=1)
+    beyond = (np.abs(scan.xyz[finite]) > LARGEST_COORDINATE).any(axis=1)
+    if 2 * beyond.sum() > len(scan):
+        yield Oddity(
+            "coordinates of a map",
+            f"{beyond.sum():,} points are more than {LARGEST_COORDINATE:,.0f} m away and cannot be "
+            "judged: subtract where the sensor was, as from coordinates of a map (UTM)",
+        )
+
+
+def _elsewhere(sample: NDArray[np.float64]) -> Iterator[Oddity]:
+    """Whether points, float64 (M, 3), lie together, far from the origin."""
+    centre = np.median(sample, axis=0)
+    around = float(np.median(np.linalg.norm(sample - centre, axis=1)))
+    away = float(np.linalg.norm(centre))
+    if away > OFF_CENTRE * around > 0:
+        yield Oddity(
+            "coordinates of a map",
+            f"the points lie about {away:,.0f} m from the origin, and half of them within "
+            f"{around:,.0f} m of one another: subtract where the sensor was, as from coordinates "
+            "of a map (UTM), for they have to be as seen from the sensor",
+        )
+
+
+def _in_other_units(sample: NDArray[np.float64]) -> Iterator[Oddity]:
+    """Whether points, float64 (M, 3), are farther off or nearer than sensors see in metres."""
+    range_ = np.linalg.norm(sample, axis=1)
+    far, near = np.percentile(range_, [FAR_PERCENTILE, 99])
+    if far > FAR_OFF:
+        yield Oddity(
+            "points farther off than sensors see",
+            f"one point in twenty is more than {far:,.0f} m away: coordinates have to be in "
+            "metres, as seen from the sensor (divide millimetres by 1,000, centimetres by 100)",
+        )
+    elif near < NEAR_BY:
+        yield Oddity(
+            "points nearer than sensors see",
+            f"all but one point in a hundred are within {near:.2g} m: coordinates have to be in "
+            "metres, neither in kilometres nor scaled to a unit",
+        )
+
+
+def _of_one_beam(sample: NDArray[np.float64]) -> Iterator[Oddity]:
+    """Whether points, float64 (M, 3), are all of one plane or cone of rays."""
+    rays = sample / np.linalg.norm(sample, axis=1, keepdims=True)
+    lowest, highest = np.degrees(np.arcsin(np.percentile(rays[:, 2], [1, 99]).clip(-1, 1)))
+    # Not a product of matrices, whose threads would take longer to wake than it takes.
+    moments = np.einsum("ij,ik->jk", rays, rays) / len(rays)
+    least = float(np.linalg.eigvalsh(moments)[0])
+    if least < OUT_OF_PLANE**2 or highest - lowest < OPENING:
+        yield Oddity(
+            "a single beam",
+            "all points are of one beam, as those of a scanner of a plane are: models and filters "
+            "were made for sensors of many beams, and may take what stays",
+        )
+
+
+def _of_many_viewpoints(scan: Scan) -> Iterator[Oddity]:
+    """Whether points are denser far off than one sensor would see them."""
+    crowding = crowding_far_off(scan)
+    if crowding > MORE_CROWDED:
+        yield Oddity(
+            "points of several viewpoints",
+            f"points far off are {crowding:.1f} times as dense, in angle, as those near by, which "
+            "no sensor sees from one place: clean scans one by one, in the sensor's coordinates, "
+            "before they are merged into a map",
+        )
+
+
+def crowding_far_off(scan: Scan) -> float:
+    """How much closer, in angle, points lie together at some range than the nearest ones do.
+
+    Args:
+        scan: The scan, of whose points those near the x and y axes and the diagonals between them
+            are looked at; those at one position count once.
+
+    Returns:
+        The greatest mean number of points to a cell among quarters of the points by range, over
+        that of the nearest quarter; 1 where few points are looked at.
+    """
+    rows = np.flatnonzero(_near_axes(scan) & scan.valid)
+    if len(rows) < FEWEST_IN_CELLS:
+        return 1.0
+    x, y, z = scan.xyz.take(rows, axis=0).T.astype(np.float64)
+    horizontal = np.hypot(x, y)
+    range_ = np.hypot(horizontal, z)
+    azimuth, inclination = np.degrees([np.arctan2(y, x), np.arctan2(z, horizontal)])
+    cells = np.round(azimuth / CELL) * 360 / CELL + np.round(inclination / CELL)
+    surface = np.floor(np.log(range_) / np.log(ONE_SURFACE))
+    order = np.argsort(range_)
+    first = order[np.append(True, np.diff(range_[order]) > 0)]
+    _, cell, points = np.unique(
+        (cells * 1000 + surface)[first], return_inverse=True, return_counts=True
+    )
+    quarters = [part.mean() for part in np.array_split(points[cell], 4)]
+    return float(max(quarters) / quarters[0])
+
+
+def _near_axes(scan: Scan) -> NDArray[np.bool_]:
+    """Which points are near the x and y axes and the diagonals between them, bool (N,)."""
+    near = np.zeros(len(scan), bool)
+    x, y = np.ascontiguousarray(scan.xyz[:, :2].T)
+    with np.errstate(invalid="ignore"):
+        for u, v in ((x, y), (x + y, x - y)):
+            u, v = np.abs(u), np.abs(v)
+            near |= (v < BESIDE_AXIS * u) | (u < BESIDE_AXIS * v)
+    return near

@@ -1,0 +1,184 @@
+"""The model that comes with derain, wherever a user meets it on the command line."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from derain.cli.info_default import card_as_text
+from derain.default import ModelScore, default_model, model_card
+from derain.evaluation.hard_cases import scene
+from derain.export.runtime import Derainer
+
+SAYS = "by the model that comes with derain: "
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder, with a folder of two scans."""
+    monkeypatch.chdir(tmp_path)
+    for folder in ("scans", "crf"):
+        (tmp_path / folder).mkdir()
+        for number in range(2):
+            scene(200, number).tofile(tmp_path / folder / f"{number}.bin")
+    return tmp_path
+
+
+def judged(folder: Path) -> list[np.ndarray]:
+    return [np.fromfile(path, "<u4") for path in sorted(folder.glob("*.label"))]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["scans"],
+        ["scans/"],
+        ["scans/0.bin", "scans/1.bin"],
+        ["default", "scans"],
+        ["./crf"],
+        ["./crf/0.bin", "scans/1.bin"],
+    ],
+)
+def test_scans_alone_are_cleaned_by_the_model_that_comes_with_derain(
+    run_derain, here: Path, words: list[str]
+) -> None:
+    outcome = run_derain("run", *words, "--out", "cleaned")
+    assert (outcome.code, outcome.said) == (0, [])
+    first, *lines = outcome.out.splitlines()
+    assert first == f"{SAYS}{model_card().title}; what it is, and when not to use it: " + (
+        "derain info default"
+    )
+    assert len(lines) == 3
+    derainer = Derainer(default_model(), threads=1)
+    expected = [derainer(scene(200, number)) for number in range(2)]
+    np.testing.assert_array_equal(judged(here / "cleaned"), expected)
+
+
+def test_with_json_it_says_so_beside_the_objects(run_derain, here: Path) -> None:
+    outcome = run_derain("run", "scans", "--out", "cleaned", "--json")
+    assert outcome.code == 0
+    assert [json.loads(line)["points"] for line in outcome.out.splitlines()] == [200, 200]
+    assert outcome.err.startswith(SAYS)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["dror", "scans", "--out", "cleaned"],
+        ["crf", "scans", "--out", "cleaned"],  # though a folder is called so
+        ["dror", "--out", "cleaned", "scans"],
+        ["--out", "cleaned", "dror", "scans/0.bin", "scans/1.bin"],
+    ],
+)
+def test_a_method_that_is_named_is_the_one_that_cleans(
+    run_derain, here: Path, words: list[str]
+) -> None:
+    outcome = run_derain("run", *words)
+    assert outcome.code == 0
+    assert SAYS not in outcome.out + outcome.err
+    assert len(judged(here / "cleaned")) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["crf"], "crf: it is a method's name, and something here is called so too. Write ./crf"),
+        (["dror"], "dror: it is a method, and no scans are named. Write `derain run dror SCANS"),
+        (["default"], "default: it is a method, and no scans are named"),
+        (["m.onnx"], "m.onnx: it is a method, and no scans are named"),
+        (["best.yaml"], "best.yaml: it is a method, and no scans are named"),
+        (["scnas"], "scnas: no such file. Give a model written by `derain export`, or one of def"),
+        (["scnas/", "scans"], "scnas/: no such file. Give a model written by `derain export`"),
+        (["scans", "scnas"], "scnas: there is no such file or folder"),
+        (["notes"], "notes: '' is not the suffix of a scan"),
+        (["notes", "scans"], "notes: not an ONNX model"),
+        ([], "the following arguments are required"),
+    ],
+)
+def test_words_that_can_be_read_in_no_way_or_in_two_are_refused(
+    run_derain, here: Path, words: list[str], reason: str
+) -> None:
+    Path("notes").write_text("of no kind")
+    Path("best.yaml").write_text("method: dsor\n")
+    outcome = run_derain("run", *words, "--out", "cleaned")
+    assert outcome.code == 2
+    assert reason in outcome.err
+    assert not judged(here / "cleaned")
+
+
+def test_parameters_are_its_own(run_derain, here: Path) -> None:
+    outcome = run_derain("run", "scans", "--out", "all", "--set", "threshold=0")
+    assert outcome.code == 0
+    probability = [Derainer(threads=1).probability(scene(200, number)) for number in range(2)]
+    np.testing.assert_array_equal(judged(here / "all"), np.array(probability) > 0)
+    Path("other.yaml").write_text("method: dsor\n")
+    outcome = run_derain("run", "scans", "--out", "none", "--parameters", "other.yaml")
+    assert "holds parameters of dsor, not of default" in outcome.err
+
+
+def test_the_card_is_printed(run_derain, here: Path) -> None:
+    outcome = run_derain("info", "default")
+    assert (outcome.code, outcome.err) == (0, "")
+    card = model_card()
+    assert outcome.out.startswith(f"{card.title}, {default_model().stat().st_size:,} bytes\n")
+    squeezed = " ".join(outcome.out.split())
+    for text in (card.what, *card.not_for, *card.training, card.threshold_chosen, card.sha256):
+        assert " ".join(text.split()) in squeezed
+    assert max(map(len, outcome.out.splitlines())) <= 100
+    told = json.loads(run_derain("info", "default", "--json").out)
+    assert told == {"file": str(default_model()), **json.loads(json.dumps(card.as_dict()))}
+
+
+def test_scores_of_a_card_are_a_table() -> None:
+    scores = (ModelScore("WADS sample", 0.9, 1.0, 0.9, 0.1), ModelScore("clean", taken=0.0005))
+    text = card_as_text(replace(model_card(), scores=scores), 10)
+    assert "WADS sample  0.900  1.000  0.900  10.000%" in text
+    assert "clean            -      -      -   0.050%" in text
+
+
+def test_a_folder_of_its_name_makes_it_unclear_what_is_asked(run_derain, here: Path) -> None:
+    (here / "default").mkdir()
+    outcome = run_derain("info", "default")
+    assert outcome.code == 2
+    assert "default: it is the model that comes with derain, and something here" in outcome.err
+    scene(50).tofile(here / "default" / "0.bin")
+    assert run_derain("info", here / "default").code == 0
+
+
+@pytest.mark.parametrize("command", ["run", "teach", "bench", "view", "tune"])
+def test_help_names_it(run_derain, command: str) -> None:
+    assert "see `derain info default`" in run_derain(command, "--help").out
+
+
+def test_the_first_help_names_it(run_derain) -> None:
+    told = run_derain("--help").out
+    assert "derain run scans/ --out cleaned" in told
+    assert "derain info default" in told
+
+
+def test_other_commands_know_it(
+    run_derain, here: Path, write_labelled: Callable[..., None]
+) -> None:
+    for number in range(3):
+        write_labelled(here / f"data/{number}.bin", here / f"data/{number}.label", rain=110)
+    labelled = ["--data", "data", "--card", "wads"]
+    out = ["--out", "bench", "--timed", "1", "--repeats", "1"]
+    outcome = run_derain("bench", *labelled, "--methods", "default", "all", *out)
+    assert outcome.code == 0, outcome.err
+    first, _ = json.loads(Path("bench/bench.json").read_text())["rows"]
+    assert first["method"] == "default"
+
+    assert run_derain("tune", "default", *labelled, "--out", "tuned/best.yaml").code == 0
+    assert yaml.safe_load(Path("tuned/best.yaml").read_text())["method"] == "default"
+    assert run_derain("run", "tuned/best.yaml", "scans", "--out", "by_tuned").code == 0
+
+    assert run_derain("teach", "default", "data", "--out", "taught").code == 0
+    taught = yaml.safe_load(Path("taught/taught.yaml").read_text())
+    assert taught["teacher"]["method"] == "default"
+
+    assert run_derain("view", "scans/0.bin", "--out", "view.png").code == 0
+    assert Path("view.png").stat().st_size > 1000

@@ -1,0 +1,114 @@
+"""The model that comes with derain: it is the one of its card, or it is refused."""
+
+import shutil
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import derain
+from derain.default import DEFAULT, default_model, model_card, packaged_model
+from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.export.methods import load_method
+from derain.files.documents import LARGEST_DOCUMENT
+from derain.scan import Scan
+
+# What the file may weigh, bytes: it is in every installation.
+LARGEST = 2_000_000
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the model's folder, in place of the installed one."""
+    folder = tmp_path / "installed"
+    folder.mkdir()
+    for name in ("model.onnx", "card.yaml"):
+        shutil.copy(Path(str(resources.files("derain.default"))) / name, folder)
+    monkeypatch.setattr(packaged_model, "_folder", lambda: folder)
+    return folder
+
+
+def test_the_file_is_that_of_the_card_and_small() -> None:
+    assert default_model().stat().st_size <= LARGEST
+    spec = derain.Derainer(threads=1).spec
+    card = model_card()
+    assert (spec.threshold, spec.licence, spec.data) == (card.threshold, card.licence, card.data)
+    assert card.name == DEFAULT
+
+
+def test_it_sees_neighbours_and_no_intensity() -> None:
+    spec = derain.Derainer(threads=1).spec
+    assert spec.view["kind"] == "neighbours"
+    assert "intensity" not in spec.channels
+
+
+def test_without_a_name_it_is_the_model_and_judges_as_its_file_does() -> None:
+    own, by_path = derain.Derainer(threads=1), derain.Derainer(default_model(), threads=1)
+    by_name = load_method(DEFAULT, {}, 1)
+    points = scene(2000)
+    np.testing.assert_array_equal(own.probability(points), by_path.probability(points))
+    np.testing.assert_array_equal(own(points), by_name.push(points).rain)
+    assert (
+        own.as_dict() == by_name.as_dict() == {"method": DEFAULT, "threshold": own.spec.threshold}
+    )
+    assert by_path.as_dict()["method"] == str(default_model())
+
+
+@pytest.mark.parametrize(("name", "scan"), list(hard_cases(2000)))
+def test_it_survives_hard_cases(name: str, scan: Scan) -> None:
+    judgement = derain.Derainer(threads=1).judge(scan)
+    assert np.isfinite(judgement.probability).all()
+    assert not judgement.rain[~scan.valid].any()
+
+
+@pytest.mark.parametrize("change", [b"", b"more", None])
+def test_a_changed_file_is_refused(installed: Path, change: bytes | None) -> None:
+    model = installed / "model.onnx"
+    if change is None:
+        content = bytearray(model.read_bytes())
+        content[1000] ^= 1
+        model.write_bytes(content)
+    else:
+        model.write_bytes(model.read_bytes() + change if change else b"")
+    with pytest.raises(InputError) as refused:
+        derain.Derainer()
+    text = str(refused.value)
+    assert text.startswith(f"{model}: it is not the model that came with derain: its SHA-256")
+    assert "Install derain again" in text
+
+
+def test_a_missing_file_is_told(installed: Path) -> None:
+    (installed / "model.onnx").unlink()
+    with pytest.raises(InputError, match=r"model that comes with derain is missing\. Install"):
+        default_model()
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "reason"),
+    [
+        ("sha256", "12", "is no SHA-256"),
+        ("threshold", 2, "is not within 0 and 1"),
+        ("scores", [{"iou": 0.5}], "data is missing"),
+        ("scores", [{"data": "streets", "iou": 1.5}], "is not within 0 and 1"),
+        ("seed", -1, "is not a whole number"),
+        ("not_for", None, "not_for is missing"),
+        ("better", "yes", "there is no such key"),
+    ],
+)
+def test_a_damaged_card_is_refused(installed: Path, key: str, value: object, reason: str) -> None:
+    path = installed / "card.yaml"
+    content = yaml.safe_load(path.read_text("utf-8"))
+    content[key] = value
+    path.write_text(yaml.safe_dump({k: v for k, v in content.items() if v is not None}))
+    with pytest.raises(InputError, match=reason):
+        model_card()
+
+
+def test_what_is_no_card_is_refused(installed: Path) -> None:
+    for content in ("[]", "a: [", "x" * (LARGEST_DOCUMENT + 1)):
+        (installed / "card.yaml").write_text(content)
+        with pytest.raises(InputError, match=r"card\.yaml"):
+            model_card()

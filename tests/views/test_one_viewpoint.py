@@ -1,0 +1,266 @@
+"""Scans that are not what one sensor sees in metres are told of, and no others."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from derain.cards.card import load_card
+from derain.files import read_scan
+from derain.filters import DROR, FilterDerainer
+from derain.models.outdet import OutDet
+from derain.scan import LARGEST_COORDINATE, Scan
+from derain.views.one_viewpoint import FEWEST_RETURNS, crowding_far_off, unlike_one_viewpoint
+
+# Where the sensor is above the road, metres.
+HEIGHT = 1.8
+
+Points = NDArray[np.float64]
+
+
+def rays(beams: int, steps: int, sector: float = 360.0, opening: float = 30.0) -> Points:
+    """Directions of a sensor that looks ahead, 5 degrees down in the middle, (beams · steps, 3)."""
+    inclination = np.radians(np.linspace(-opening / 2, opening / 2, beams) - 5)[:, None]
+    azimuth = np.radians(np.linspace(-sector / 2, sector / 2, steps, endpoint=sector < 360))
+    x, y = np.cos(inclination) * np.cos(azimuth), np.cos(inclination) * np.sin(azimuth)
+    return np.stack([x, y, np.broadcast_to(np.sin(inclination), x.shape)], axis=-1).reshape(-1, 3)
+
+
+def street(directions: Points, x: float = 0.0) -> Points:
+    """What rays meet of a street, seen from a place on it, (N, 3) metres in the sensor's frame.
+
+    There are a road, two walls far off to the sides, and hundreds of trees before them.
+    """
+    generator = np.random.default_rng(0)
+    poles = np.stack([generator.uniform(-60, 60, 600) - x, generator.uniform(-60, 60, 600)])
+    poles = poles[:, np.abs(poles[1]) > 2]
+    with np.errstate(divide="ignore"):
+        range_ = np.minimum(70 / np.abs(directions[:, 1]), 120.0)
+        down = directions[:, 2] < 0
+        range_[down] = np.minimum(range_[down], -HEIGHT / directions[down, 2])
+    horizontal = np.linalg.norm(directions[:, :2], axis=1)
+    ahead = directions[:, :2] / horizontal[:, None]
+    for pole in poles.T:
+        along, aside = ahead @ pole, ahead @ (pole[1], -pole[0])
+        met = (np.abs(aside) < 0.3) & (along > 0)
+        near = (along[met] - np.sqrt(0.09 - aside[met] ** 2)) / horizontal[met]
+        low = near * directions[met, 2] < 5 - HEIGHT
+        range_[met] = np.where(low, np.minimum(range_[met], near), range_[met])
+    return directions * range_[:, None]
+
+
+def scan_of(points: Points) -> Scan:
+    return Scan.of(points)
+
+
+def kinds(points: Points) -> list[str]:
+    return [oddity.kind for oddity in unlike_one_viewpoint(scan_of(points))]
+
+
+@pytest.fixture(scope="module")
+def spinning() -> Points:
+    return street(rays(64, 1024))
+
+
+def moved(points: Points, x: float, y: float = 0.0, z: float = 0.0) -> Points:
+    """Points in a frame whose origin lies elsewhere."""
+    return points + np.array([x, y, z])
+
+
+def drive(scans: int, step: float) -> Points:
+    """Scans of a sensor that drives along the street, merged in the frame of the last."""
+    places = step * np.arange(scans)
+    seen = [moved(street(rays(64, 1024), place), place - places[-1]) for place in places]
+    return np.concatenate(seen)
+
+
+@pytest.mark.parametrize(
+    "directions",
+    [rays(64, 1024), rays(16, 1800), rays(256, 500, 120, 25), rays(32, 2048, opening=90)],
+)
+def test_what_one_sensor_sees_is_not_odd(directions: Points) -> None:
+    assert kinds(street(directions)) == []
+
+
+def test_nor_are_two_returns_of_every_ray_in_dense_snow(spinning: Points) -> None:
+    share = np.random.default_rng(0).uniform(0.05, 0.9, (len(spinning), 1))
+    both = np.concatenate([spinning, spinning * share, spinning])  # and one of them twice
+    assert kinds(both) == []
+
+
+@pytest.mark.parametrize(
+    ("factor", "found"),
+    [
+        (1000, ["points farther off than sensors see"]),
+        (100, ["points farther off than sensors see"]),
+        (0.001, ["points nearer than sensors see"]),
+        (1 / 200, ["points nearer than sensors see"]),
+        (3.28084, []),  # feet are a longer street
+    ],
+)
+def test_units_are_told_by_how_far_sensors_see(
+    spinning: Points, factor: float, found: list[str]
+) -> None:
+    assert kinds(spinning * factor) == found
+
+
+@pytest.mark.parametrize(
+    "origin", [(400_000, 500_000, 200), (400_000, 5_400_000, 200), (700, 100, 0), (0, 0, 300)]
+)
+def test_points_far_from_the_origin_are_those_of_a_map(
+    spinning: Points, origin: tuple[float, ...]
+) -> None:
+    assert kinds(moved(spinning, *origin)) == ["coordinates of a map"]
+
+
+def test_a_few_points_beyond_all_sensors_are_damage_and_no_map(spinning: Points) -> None:
+    damaged = spinning.copy()
+    damaged[:1000] = 2 * LARGEST_COORDINATE
+    assert kinds(damaged) == []
+
+
+# Rays of a scanner of the plane z = 0.
+FLAT = rays(1, 1000) * (1, 1, 0)
+
+
+@pytest.mark.parametrize(
+    "directions",
+    [
+        FLAT,
+        rays(1, 1000),
+        rays(1, 1000, sector=180),
+        FLAT @ [[0.8, 0, -0.6], [0, 1, 0], [0.6, 0, 0.8]],
+    ],
+    ids=["plane", "cone", "half a cone", "tilted plane"],
+)
+def test_a_single_beam_is_one_plane_or_cone(directions: Points) -> None:
+    assert kinds(street(directions)) == ["a single beam"]
+
+
+def test_four_beams_are_no_single_one() -> None:
+    assert kinds(street(rays(4, 1000, opening=3.2))) == []
+
+
+@pytest.mark.parametrize(("scans", "step"), [(10, 1.3), (20, 1.3), (5, 10.0)])
+def test_scans_merged_into_a_map_are_seen_from_several_places(scans: int, step: float) -> None:
+    merged = drive(scans, step)
+    assert kinds(merged) == ["points of several viewpoints"]
+    voxels = np.unique(np.floor(merged / 0.2).astype(int), axis=0, return_index=True)[1]
+    assert kinds(merged[voxels]) == ["points of several viewpoints"]
+
+
+def test_a_sensor_that_stands_sees_from_one_place_however_often(spinning: Points) -> None:
+    noise = np.random.default_rng(0).normal(1, 0.001, (10, *spinning.shape))
+    assert kinds((spinning * noise).reshape(-1, 3)) == []
+
+
+def crowding_by_hand(scan: Scan) -> float:
+    """The same number, point after point."""
+    x, y, z = scan.xyz.T.astype(np.float64)
+    from_axis = np.abs((np.degrees(np.arctan2(y, x)) + 22.5) % 45 - 22.5)
+    near = np.flatnonzero(np.tan(np.radians(from_axis)) < 0.01)
+    cells: dict[tuple[int, ...], int] = {}
+    found = []
+    for number in near:
+        azimuth = np.degrees(np.arctan2(y[number], x[number]))
+        inclination = np.degrees(np.arctan2(z[number], np.hypot(x[number], y[number])))
+        range_ = float(np.sqrt(x[number] ** 2 + y[number] ** 2 + z[number] ** 2))
+        surface = int(np.log(range_) // np.log(1.25))
+        cell = (round(azimuth / 0.1), round(inclination / 0.1), surface)
+        cells[cell] = cells.get(cell, 0) + 1
+        found.append((range_, cell))
+    quarters = np.array_split([cells[cell] for _, cell in sorted(found)], 4)
+    return float(max(map(np.mean, quarters)) / quarters[0].mean())
+
+
+def test_crowding_is_that_of_counting_point_after_point() -> None:
+    generator = np.random.default_rng(1)
+    directions = rays(8, 400)[generator.integers(0, 3200, 20_000)]
+    range_ = 40 * generator.uniform(0.1, 1, (20_000, 1)) ** 0.3  # most are far off
+    scan = scan_of(directions * range_)
+    assert crowding_far_off(scan) == pytest.approx(crowding_by_hand(scan), rel=0.01)
+    assert crowding_far_off(scan) > 1.5
+
+
+@pytest.mark.parametrize("points", [1, FEWEST_RETURNS - 1])
+def test_few_points_are_almost_none(spinning: Points, points: int) -> None:
+    assert kinds(spinning[:points]) == ["almost empty"]
+    nothing = np.full((5000, 3), np.nan)
+    assert kinds(np.concatenate([spinning[:points], nothing])) == ["almost empty"]
+    assert kinds(np.concatenate([spinning[::1000], np.zeros((7000, 3))])) == ["almost empty"]
+
+
+@pytest.mark.parametrize(
+    "points", [np.zeros((0, 3)), np.zeros((500, 3)), np.full((500, 3), np.nan)]
+)
+def test_a_scan_without_a_point_is_not_odd(points: Points) -> None:
+    assert kinds(points) == []
+
+
+def test_every_oddity_says_what_can_be_done(spinning: Points) -> None:
+    remedies = {
+        "divide millimetres": spinning * 1000,
+        "neither in kilometres": spinning / 1000,
+        "subtract where the sensor was": moved(spinning, 4e5, 5e5),
+        "clean scans one by one": drive(10, 2.0),
+        "made for sensors of many beams": street(rays(1, 1000)),
+        "is the sensor covered": spinning[:9],
+    }
+    for remedy, points in remedies.items():
+        (oddity,) = unlike_one_viewpoint(scan_of(points))
+        assert remedy in oddity.detail
+
+
+@pytest.mark.parametrize("method", ["network", "filter"])
+def test_networks_and_filters_say_it(spinning: Points, method: str) -> None:
+    scan = Scan.of(np.column_stack([spinning * 1000, np.resize(np.arange(90.0), len(spinning))]))
+    if method == "network":
+        found = OutDet().spec_for(load_card("wads")).oddities(scan)
+    else:
+        derainer = FilterDerainer(DROR(), threads=1)
+        found = derainer.oddities(derainer.judge(scan))
+    assert [oddity.kind for oddity in found] == ["points farther off than sensors see"]
+
+
+@pytest.fixture(scope="module")
+def real(shared: Path) -> dict[str, Scan]:
+    """Every real scan that there is."""
+    data = shared / "data"
+    folders = ("clean", "snowykitti/velodyne", "wads", "wads/drive/velodyne")
+    found = [path for folder in folders for path in sorted((data / folder).glob("*.*"))]
+    return {path.name: read_scan(path) for path in found if path.suffix in (".bin", ".npz", ".pcd")}
+
+
+def test_no_real_scan_is_odd(real: dict[str, Scan]) -> None:
+    assert len(real) >= 30
+    assert not {name: odd for name, scan in real.items() if (odd := [*unlike_one_viewpoint(scan)])}
+
+
+@pytest.mark.parametrize(
+    ("change", "kind"),
+    [
+        (lambda xyz: xyz * 1000, "points farther off than sensors see"),
+        (lambda xyz: xyz * 100, "points farther off than sensors see"),
+        (lambda xyz: xyz / 1000, "points nearer than sensors see"),
+        (lambda xyz: xyz + np.float32([4e5, 5e5, 200]), "coordinates of a map"),
+        (lambda xyz: xyz * np.float32([1, 1, 1e-4]), "a single beam"),
+        (lambda xyz: xyz[:20], "almost empty"),
+    ],
+    ids=["millimetres", "centimetres", "kilometres", "map", "plane", "few"],
+)
+def test_every_real_scan_is_once_it_is_changed(
+    real: dict[str, Scan], change: Callable[[NDArray[np.float32]], NDArray[np.float32]], kind: str
+) -> None:
+    for name, scan in real.items():
+        changed = Scan(change(scan.xyz[scan.valid]))
+        assert [odd.kind for odd in unlike_one_viewpoint(changed)] == [kind], name
+
+
+def test_real_scans_of_a_drive_are_odd_once_merged(real: dict[str, Scan]) -> None:
+    scans = [scan for name, scan in sorted(real.items()) if name.startswith("0422")]
+    assert len(scans) == 20
+    moved = [scan.xyz[scan.valid] + np.float32([1.33 * n, 0, 0]) for n, scan in enumerate(scans)]
+    (oddity,) = unlike_one_viewpoint(Scan(np.concatenate(moved)))
+    assert oddity.kind == "points of several viewpoints"
