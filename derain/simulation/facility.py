@@ -44,8 +44,8 @@ MASTS = np.arange(16.0, 85, 9)
 # street, is one too: the published network has seen next to nothing solid that is so dark.
 # Source: Wehr and Lohr 1999, "Airborne laser scanning - an introduction and overview", its table of
 #     typical reflectivities.
-ASPHALT = (0.12, 0.22)
-GROUND = (0.15, 0.30)
+ASPHALT = (0.12, 0.20)
+GROUND = (0.13, 0.27)
 LEAVES = (0.03, 0.6)
 
 # Of the asphalt and of the ground, radians: a modelling choice. At a grazing angle they return 0.36

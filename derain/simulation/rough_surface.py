@@ -4,9 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def backscatter(
-    cosine: NDArray[np.float64], roughness: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def backscatter(cosine: NDArray[np.float64], roughness: NDArray[np.float64]) -> NDArray[np.float64]:
     """Apparent reflectivity of surfaces over their reflectivity, float64 (N,).
 
     A smooth matt surface returns as Lambert's: in proportion to the cosine of the angle of
