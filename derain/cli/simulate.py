@@ -27,11 +27,12 @@ To train takes three or more; one is enough to look at.
   derain simulate --out country --layout country --sensor spinning_64 --no-radar
   derain simulate --out drive --layout street --speed 13 --traffic 8 --sensor spinning_64
 
-In the facility nothing but rain is near, as in the real one: a rule that learns places finds it. In
-the streets there are boughs and bushes between the drops. The other layouts are full of what looks
-like drops and is none: windows, nets, twigs, grass, and people near the sensor. With --speed the
-sensor drives along a street, without a radar; with --traffic others move, whether it drives or
-stands. Beside such scans lies poses.txt, and the upper 16 bits of their labels number what moves.
+In the facility nothing but rain is near, and little else is as dim, as in the real one: a rule that
+learns places finds it, and so does one of intensity. In the streets there are boughs and bushes
+between the drops. The other layouts are full of what looks like drops and is none: windows, nets,
+twigs, grass, and people near the sensor. With --speed the sensor drives along a street, without a
+radar; with --traffic others move, whether it drives or stands. Beside such scans lies poses.txt, and
+the upper 16 bits of their labels number what moves.
 
 The sequences take the rain rates in turn, 0 being clean. An interrupted run is taken up where it
 ended. To train on the data set:

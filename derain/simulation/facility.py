@@ -1,10 +1,21 @@
-"""Lays out a rain facility at random, like the test track of REHEARSE."""
+"""Lays out a rain facility at random, like the test track of REHEARSE.
 
-from collections.abc import Callable, Iterator
+What its surfaces return is what matt materials return in the near infrared. How rough they are and
+how far they differ was chosen so that intensities, of 0..255, are distributed as far as that is
+known of REHEARSE-3D: there their mean is about 23 and their standard deviation about 17, drops lie
+below about 10, and hardly anything else lies below 13. All of that is deduced from the network that
+is published for it, whose first BatchNorm layer holds the moments of what it was trained on, and
+which decides by intensity; it then finds the simulated rain. `benchmarks/facility_observer.py` and
+`benchmarks/batchnorm_memory.py` show it.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from derain.simulation import objects
+from derain.simulation.classes import TrackClass
 from derain.simulation.layout import on_slope, road_and_ground
 from derain.simulation.objects import Surface
 from derain.simulation.track import Track
@@ -28,6 +39,20 @@ CLEARANCE = 6.0
 # derain.simulation.rain_field has every 3 m.
 MASTS = np.arange(16.0, 85, 9)
 
+# Reflectivity at 900 nm: asphalt 0.17, smooth concrete 0.24, deciduous trees 0.6. How far it
+# spreads about these values is a modelling choice: wet asphalt is darker, and a leaf often fills
+# only a part of the beam. That there is no film of water that mirrors the light away, as on a
+# street, is one too: the published network has seen next to nothing solid that is so dark.
+# Source: Wehr and Lohr 1999, "Airborne laser scanning - an introduction and overview", its table of
+#     typical reflectivities.
+ASPHALT = (0.12, 0.20)
+GROUND = (0.13, 0.27)
+LEAVES = (0.03, 0.6)
+
+# Of the asphalt and of the ground, radians: a modelling choice. At a grazing angle they return 0.36
+# of their reflectivity, so that a road of 0.17 measures 16 of 255 wherever the sensor looks.
+ROUGHNESS = 0.6
+
 
 def lay_out_facility(generator: np.random.Generator) -> Track:
     """Lays out a facility.
@@ -35,19 +60,40 @@ def lay_out_facility(generator: np.random.Generator) -> Track:
     A road 6.8 to 7.6 m wide leads straight away from the sensor, turned by up to 2 degrees and
     sloping by up to 1 %. A car, two pedestrians, a bike and a target stand on it, with a row of
     sprinklers on each side. Bushes and the posts of a fence line it; trees and buildings close the
-    view. Puddles darken the road and bushes stand near the sensor, so that a point is not rain
-    merely because it is dark or near.
+    view.
     """
     half_width = generator.uniform(3.4, 3.8)
+    # Materials have a generator of their own, so that a seed's places stay where they are.
+    (material_generator,) = generator.spawn(1)
     surfaces = [
-        *road_and_ground(half_width, generator),
+        *_paved(road_and_ground(half_width, generator), material_generator),
         *_road_users(half_width, generator),
         *_sprinklers(half_width, generator),
-        *_verges(half_width, generator),
-        *_horizon(half_width, generator),
+        *_verges(half_width, generator, material_generator),
+        *_horizon(half_width, generator, material_generator),
     ]
     heading = np.radians(generator.uniform(-2, 2))
     return on_slope(surfaces, 0, heading, generator.uniform(-0.01, 0.01, 2))
+
+
+def _paved(
+    surfaces: Iterable[Surface], material_generator: np.random.Generator
+) -> Iterator[Surface]:
+    for surface in surfaces:
+        span = ASPHALT if surface.label is TrackClass.ROAD else GROUND
+        yield replace(surface, reflectivity=material_generator.uniform(*span), roughness=ROUGHNESS)
+
+
+def _foliage(
+    radii: tuple[float, float, float],
+    height: float,
+    generator: np.random.Generator,
+    material_generator: np.random.Generator,
+) -> Surface:
+    foliage = objects.foliage(radii, height, generator)
+    return replace(
+        foliage, reflectivity=material_generator.uniform(*LEAVES, len(foliage.triangles))
+    )
 
 
 def _road_users(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
@@ -66,21 +112,26 @@ def _sprinklers(half_width: float, generator: np.random.Generator) -> Iterator[S
         yield objects.sprinkler(generator).placed(x, -half_width - 0.7, np.pi)
 
 
-def _verges(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _verges(
+    half_width: float, generator: np.random.Generator, material_generator: np.random.Generator
+) -> Iterator[Surface]:
     for side in (-1, 1):
         for _ in range(generator.integers(10, 20)):
             radii = generator.uniform(0.3, 1.2, 3)
             x, y = generator.uniform(5, 40), side * (half_width + generator.uniform(2, 12))
-            yield objects.foliage(tuple(radii), 0.7 * radii[2], generator).placed(x, y)
+            yield _foliage(tuple(radii), 0.7 * radii[2], generator, material_generator).placed(x, y)
         for x in np.arange(5.0, 100, 5):
             yield objects.pole(generator).placed(x, side * (half_width + 14))
 
 
-def _horizon(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _horizon(
+    half_width: float, generator: np.random.Generator, material_generator: np.random.Generator
+) -> Iterator[Surface]:
     for side in (-1, 1):
         for x in np.arange(30.0, 110, 10):
             y, crown = side * (half_width + generator.uniform(15, 40)), generator.uniform(1.5, 3)
             yield objects.trunk(generator).placed(x, y)
-            yield objects.foliage((crown, crown, crown), 2 + crown, generator).placed(x, y)
+            tree = _foliage((crown, crown, crown), 2 + crown, generator, material_generator)
+            yield tree.placed(x, y)
     for y in (-25, 25):
         yield objects.building(generator).placed(generator.uniform(85, 110), y)

@@ -22,11 +22,13 @@ class Surface:
         triangles: Corners, float64 (T, 3, 3), metres.
         label: Class of all of them.
         reflectivity: Of each triangle, float64 (T,), or of all of them, in 0..1.
+        roughness: Of all of them, radians, see :mod:`derain.simulation.rough_surface`.
     """
 
     triangles: Triangles
     label: TrackClass
     reflectivity: NDArray[np.float64] | float
+    roughness: float = 0.0
 
     def placed(self, x: float, y: float, heading: float = 0.0) -> "Surface":
         """The same surface, turned by a heading in radians, then moved to (x, y)."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
+from derain.simulation.rough_surface import backscatter
 from derain.simulation.sensor import Returns, Sensor
 from derain.system.open3d_import import import_open3d
 
@@ -23,21 +24,25 @@ class Track:
             the road under the sensor.
         reflectivity: Reflectivity of each triangle, float64 (T,), in 0..1.
         label: TrackClass of each triangle, int64 (T,).
+        roughness: Roughness of each triangle, float64 (T,), or of all of them, radians, see
+            :mod:`derain.simulation.rough_surface`.
     """
 
     triangles: NDArray[np.float32]
     reflectivity: NDArray[np.float64]
     label: NDArray[np.int64]
+    roughness: NDArray[np.float64] | float = 0.0
 
     @classmethod
     def of(cls, surfaces: Iterable[Surface]) -> "Track":
         """Joins surfaces, at least one, into a track."""
-        triangles, reflectivity, label = zip(
+        triangles, reflectivity, label, roughness = zip(
             *(
                 (
                     surface.triangles,
                     np.broadcast_to(surface.reflectivity, len(surface.triangles)),
                     np.full(len(surface.triangles), surface.label, dtype=np.int64),
+                    np.full(len(surface.triangles), surface.roughness),
                 )
                 for surface in surfaces
             ),
@@ -47,13 +52,15 @@ class Track:
             np.concatenate(triangles).astype(np.float32),
             np.concatenate(reflectivity),
             np.concatenate(label),
+            np.concatenate(roughness),
         )
 
     def cast(self, sensor: Sensor, pose: NDArray[np.float64] | None = None) -> Returns:
         """What every beam of a sensor would return through clear air to a perfect detector.
 
-        A beam is one ray. Surfaces scatter like Lambert's: their apparent reflectivity falls with
-        the cosine of the angle of incidence.
+        A beam is one ray. Smooth surfaces scatter like Lambert's: their apparent reflectivity falls
+        with the cosine of the angle of incidence. That of rough ones falls less, see
+        :func:`derain.simulation.rough_surface.backscatter`.
 
         Args:
             sensor: The sensor.
@@ -72,11 +79,12 @@ class Track:
         hit = hits["t_hit"] <= sensor.maximum_range
         triangle = hits["primitive_ids"][hit]
         cosine = np.abs((hits["primitive_normals"][hit] * beams[hit]).sum(axis=1))
-        distance = np.full(len(beams), sensor.maximum_range)
+        distance = np.full(len(beams), float(sensor.maximum_range))
         reflectivity = np.zeros(len(beams))
         label = np.full(len(beams), TrackClass.BACKGROUND, dtype=np.int64)
         distance[hit] = hits["t_hit"][hit]
-        reflectivity[hit] = self.reflectivity[triangle] * cosine
+        roughness = np.broadcast_to(self.roughness, len(self.triangles))[triangle]
+        reflectivity[hit] = self.reflectivity[triangle] * backscatter(cosine, roughness)
         label[hit] = self.label[triangle]
         return Returns(distance, reflectivity, label, np.arange(len(beams)))
 

@@ -12,6 +12,7 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_facility
 from derain.simulation.layout import lay_out_track
 from derain.simulation.objects import Surface
+from derain.simulation.rough_surface import backscatter
 from derain.simulation.sensor import Sensor
 from derain.simulation.track import Track
 
@@ -33,6 +34,16 @@ def test_flat_ground_lies_where_its_angle_says_and_darkens_with_it(open3d: Modul
     assert np.allclose(clear.reflectivity[hit], 0.3 * sine[hit], rtol=1e-4)
     assert (clear.label[hit] == TrackClass.ROAD).all()
     assert (clear.range[~hit] == SENSOR.maximum_range).all()
+
+
+def test_rough_ground_is_seen_at_a_grazing_angle(open3d: ModuleType) -> None:
+    plane = shapes.rectangle((-500, 500), (-500, 500), 0)
+    smooth, rough = (Surface(plane, TrackClass.ROAD, 0.3, roughness) for roughness in (0, 0.6))
+    first, second = Track.of([smooth]).cast(SENSOR), Track.of([rough]).cast(SENSOR)
+    assert np.array_equal(first.range, second.range)
+    sine = -SENSOR.beams()[:, 2][first.returned]
+    returned = 0.3 * backscatter(sine, np.full(len(sine), 0.6))
+    assert np.allclose(second.reflectivity[first.returned], returned, rtol=1e-4)
 
 
 def test_casting_finds_the_nearest_of_all_triangles(open3d: ModuleType) -> None:
