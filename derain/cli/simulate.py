@@ -31,8 +31,8 @@ In the facility nothing but rain is near, and little else is as dim, as in the r
 learns places finds it, and so does one of intensity. In the streets there are boughs and bushes
 between the drops. The other layouts are full of what looks like drops and is none: windows, nets,
 twigs, grass, and people near the sensor. With --speed the sensor drives along a street, without a
-radar; with --traffic others move, whether it drives or stands. Beside such scans lies poses.txt, and
-the upper 16 bits of their labels number what moves.
+radar; with --traffic others move, whether it drives or stands. Beside such scans lies poses.txt,
+and the upper 16 bits of their labels number what moves.
 
 The sequences take the rain rates in turn, 0 being clean. An interrupted run is taken up where it
 ended. To train on the data set:
@@ -210,7 +210,5 @@ def _simulate_worlds(arguments: argparse.Namespace) -> int:
 
 
 def _told(out: Path, sequences: int, scans: int) -> int:
-    say(
-        f"{out}: {sequences} sequences, {scans:,} scans. What is in them: derain info {out}"
-    )
+    say(f"{out}: {sequences} sequences, {scans:,} scans. What is in them: derain info {out}")
     return 0

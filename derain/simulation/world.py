@@ -150,9 +150,7 @@ def _drawn(world: World, generator: np.random.Generator) -> DrawnScan:
     return DrawnScan(sensor.measure(detected, generator), place, sensor, precipitation)
 
 
-def _laid_out(
-    place: str, world: World, sensor: Sensor, generator: np.random.Generator
-) -> Track:
+def _laid_out(place: str, world: World, sensor: Sensor, generator: np.random.Generator) -> Track:
     track = LAYOUTS[place](generator)
     if place not in INDOORS and generator.random() < world.horizon:
         track = with_surfaces(track, lay_out_horizon(generator))

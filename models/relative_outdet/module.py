@@ -77,7 +77,8 @@ class RelativeOutDet(SupervisedModule):
     ) -> None:
         super().__init__(CHANNELS)
         if neighbours <= OF_STEP:
-            raise InputError("neighbours", f"{neighbours} are too few", f"Give {OF_STEP + 1} or more.")
+            remedy = f"Give {OF_STEP + 1} or more."
+            raise InputError("neighbours", f"{neighbours} are too few", remedy)
         self.save_hyperparameters()
         self.network = RelativeOutDetNetwork(neighbours, width, of_neighbour, opinion, context)
         self.adopt(spec)
@@ -101,7 +102,7 @@ class RelativeOutDet(SupervisedModule):
         return self.network(points, distances, neighbours, candidates)
 
     def logits_of(self, batch: Batch) -> Tensor:
-        """Logits of every cell, float (M, 2), scan by scan: what one holds is nothing to another."""
+        """Logits of every cell, float (M, 2), scan by scan: each has a context of its own."""
         if len(batch.cells) == 1:
             return self(**batch.inputs)
         begin, logits = 0, []

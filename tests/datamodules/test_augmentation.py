@@ -19,6 +19,7 @@ HARD_CASES = dict(hard_cases(largest=5000))
 TURN = Augmentation(rotation_probability=1, jitter_probability=0)
 JITTER = Augmentation(rotation_probability=0, jitter_probability=1)
 MIRROR = Augmentation(0, 0, mirror_probability=1)
+SECTOR = Augmentation(0, 0, sector_probability=1, sector=70)
 DROP = Augmentation(0, 0, dropping_probability=1)
 BOTH = Augmentation(rotation_probability=1, jitter_probability=1)
 NEITHER = Augmentation(rotation_probability=0, jitter_probability=0)
@@ -161,3 +162,24 @@ def test_points_that_cannot_be_judged_stay_as_they_are(scan: Scan) -> None:
 def test_with_neither_a_scan_stays_as_it_is() -> None:
     scan = street()
     np.testing.assert_array_equal(NEITHER(scan, np.random.default_rng(0)).xyz, scan.xyz)
+
+
+@given(st.integers(0, 2**32))
+def test_a_sector_is_all_that_there_is_between_two_azimuths(seed: int) -> None:
+    scan = street()
+    kept = SECTOR(scan, np.random.default_rng(seed))
+    assert kept.label is not None
+    rows = kept.label
+    np.testing.assert_array_equal(kept.xyz, scan.xyz[rows])
+    left = np.setdiff1d(np.arange(len(scan)), rows)
+    azimuth = np.degrees(np.arctan2(scan.xyz[:, 1], scan.xyz[:, 0]))
+    # Some direction is the middle of what is kept, and has nothing of the rest within 35 degrees.
+    middles = np.arange(-180, 180, 0.25)
+    off = np.abs((azimuth[:, None] - middles + 180) % 360 - 180)
+    inside, outside = off[rows].max(axis=0) <= 35.2, off[left].min(axis=0, initial=180) >= 34.8
+    assert (inside & outside).any()
+
+
+def test_a_sector_of_nothing_is_nothing() -> None:
+    nothing = Scan.of(np.full((3, 4), np.nan))
+    assert len(SECTOR(nothing, np.random.default_rng(0))) == 3

@@ -1,0 +1,173 @@
+"""Makes the model that comes with derain from a seed: worlds, training, threshold, file.
+
+    python -m benchmarks.make_default --out made
+    python -m benchmarks.make_default --out made --clean clean/    # counts clean scans, too
+    python -m benchmarks.make_default --out made1 --seed 1 --worlds made/worlds
+
+Leaves ``model.onnx`` and ``model.ckpt`` in the folder, and the table that the threshold was chosen
+by. That is the one of highest IoU over the worlds held out of training, raised until no clean scan
+that is given loses more than MOST_TAKEN, as long as that costs no more than MOST_LOST of the IoU.
+No label of a real scan is read.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.datamodules.worlds import Worlds
+from derain.evaluation.text_tables import markdown_table
+from derain.export.onnx_file import export
+from derain.export.runtime import Derainer
+from derain.models.checkpoint import load_model, save_model
+from derain.scan import Scan
+from derain.simulation.world_campaign import WorldCampaign
+from derain.sources.folders import named_frames
+
+CONFIGURATION = "relative_outdet_worlds.yaml"
+
+# Thresholds to choose from.
+THRESHOLDS = tuple(np.round(np.arange(0.3, 0.951, 0.05), 2).tolist())
+
+# Share of a clean scan that may be taken, and of the highest IoU that may be given for it.
+MOST_TAKEN = 5e-4
+MOST_LOST = 0.02
+
+
+def main() -> None:
+    """Runs the command."""
+    arguments = _parser().parse_args()
+    out: Path = arguments.out
+    out.mkdir(parents=True, exist_ok=True)
+    worlds = arguments.worlds or out / "worlds"
+    checkpoint = _trained(out, worlds, arguments)
+    unchosen = out / "unchosen.onnx"
+    model = load_model(checkpoint)
+    export(model, unchosen)
+    derainer = Derainer(str(unchosen))
+    iou = _iou(derainer, _held_out(worlds, arguments))
+    taken = {scan.name: _taken(derainer, scan) for scan in _scans(arguments.clean)}
+    threshold = chosen(iou, taken)
+    spec = replace(model.spec, threshold=threshold)
+    model.hparams["threshold"] = threshold
+    model.adopt(spec)
+    save_model(model, out / "model.ckpt")
+    export(model, out / "model.onnx")
+    unchosen.unlink()
+    table = _table(iou, taken, threshold)
+    (out / "threshold.md").write_text(table, "utf-8")
+    content = {"threshold": threshold, "iou": iou, "taken": taken}
+    (out / "threshold.json").write_text(json.dumps(content, indent=2) + "\n", "utf-8")
+    print(table)
+
+
+def chosen(iou: Mapping[float, float], taken: Mapping[str, Mapping[float, float]]) -> float:
+    """The threshold.
+
+    Args:
+        iou: IoU over worlds held out, by threshold.
+        taken: Of each clean scan the share of its points called rain, by threshold.
+    """
+    highest = max(iou.values())
+    possible = [t for t, value in iou.items() if value >= highest - MOST_LOST]
+    best = next(t for t, value in iou.items() if value == highest)
+    from_best = [t for t in possible if t >= best]
+    clean = [t for t in from_best if all(of[t] <= MOST_TAKEN for of in taken.values())]
+    return min(clean) if clean else max(from_best) if taken else best
+
+
+def _trained(out: Path, worlds: Path, arguments: argparse.Namespace) -> Path:
+    """The last checkpoint of a training, which is skipped where it has been done."""
+    runs = out / "runs"
+    found = sorted(runs.glob("*/version_*/checkpoints/last.ckpt"))
+    if found:
+        return found[-1]
+    command = [
+        *(str(Path(sys.executable).with_name("derain")), "fit", "--config", CONFIGURATION),
+        *("--seed_everything", str(arguments.seed), "--data.root", str(worlds)),
+        *("--data.campaign.train", str(arguments.train)),
+        *("--data.campaign.validation", str(arguments.validation)),
+        *("--data.campaign.world", arguments.world),
+        *("--trainer.max_epochs", str(arguments.epochs)),
+        *("--trainer.logger.init_args.save_dir", str(runs)),
+        *arguments.fit,
+    ]
+    print(*command, flush=True)
+    subprocess.run(command, check=True)
+    return sorted(runs.glob("*/version_*/checkpoints/last.ckpt"))[-1]
+
+
+def _held_out(
+    worlds: Path, arguments: argparse.Namespace
+) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
+    campaign = WorldCampaign(arguments.train, arguments.validation, world=arguments.world)
+    data = Worlds(str(worlds), campaign)
+    for frame in data.source("validation"):
+        scan = data.read(frame)
+        yield scan, data.card.rain_of(scan)
+
+
+def _iou(
+    derainer: Derainer, labelled: Iterator[tuple[Scan, NDArray[np.bool_]]]
+) -> dict[float, float]:
+    """IoU by threshold, of pooled counts, as many of each world as it has points."""
+    hit, either = np.zeros(len(THRESHOLDS)), np.zeros(len(THRESHOLDS))
+    for scan, rain in labelled:
+        probability = derainer.probability(scan)
+        for number, threshold in enumerate(THRESHOLDS):
+            called = probability > threshold
+            hit[number] += np.count_nonzero(called & rain)
+            either[number] += np.count_nonzero(called | rain)
+    return dict(zip(THRESHOLDS, (hit / np.maximum(either, 1)).tolist(), strict=True))
+
+
+def _taken(derainer: Derainer, scan: Scan) -> dict[float, float]:
+    """Share of the points of a scan that is called rain, by threshold."""
+    probability = derainer.probability(scan)[scan.valid]
+    return {threshold: float((probability > threshold).mean()) for threshold in THRESHOLDS}
+
+
+def _scans(paths: Sequence[Path]) -> Iterator[Scan]:
+    if paths:
+        yield from (frame.read() for frame in named_frames(paths))
+
+
+def _table(
+    iou: Mapping[float, float], taken: Mapping[str, Mapping[float, float]], threshold: float
+) -> str:
+    columns = ["threshold", "IoU, worlds held out", *(f"{name}, % taken" for name in taken)]
+    rows = [
+        [
+            f"**{one:g}**" if one == threshold else f"{one:g}",
+            f"{iou[one]:.4f}",
+            *(f"{100 * of[one]:.3f}" for of in taken.values()),
+        ]
+        for one in THRESHOLDS
+    ]
+    return markdown_table(columns, rows)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--out", type=Path, required=True, help="folder to write to")
+    parser.add_argument("--worlds", type=Path, help="worlds that are there (default: OUT/worlds)")
+    parser.add_argument("--world", default="world", help="YAML, or name of a packaged one")
+    parser.add_argument("--train", type=int, default=1000, help="worlds to train on")
+    parser.add_argument("--validation", type=int, default=60, help="worlds held out")
+    parser.add_argument("--epochs", type=int, default=10)
+    parser.add_argument("--seed", type=int, default=0, help="of the training")
+    parser.add_argument("--clean", type=Path, nargs="*", default=[], help="clean scans")
+    parser.add_argument("fit", nargs="*", help="more options of derain fit, after --")
+    return parser
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,102 @@
+"""3D-OutDet made relative: what it says of a scan, alone and among others, trained and exported."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import lightning
+import numpy as np
+import pytest
+import torch
+
+from derain.datamodules.in_memory import InMemory
+from derain.datamodules.loading import Loading
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.export.onnx_file import export
+from derain.export.runtime import Derainer
+from derain.learning.batch import Batch, Sample
+from derain.models.checkpoint import load_model, save_model
+from derain.models.relative_outdet import RelativeOutDet
+from derain.scan import Scan
+
+
+def labelled(seed: int, drops: int = 300) -> Scan:
+    """A scene with drops in the air: WADS's falling snow."""
+    generator = np.random.default_rng(seed)
+    flying = np.concatenate([generator.uniform(-8, 8, (drops, 3)), np.zeros((drops, 1))], axis=1)
+    points = np.concatenate([scene(3000), flying])
+    return Scan.of(points).with_label(np.repeat([40, 110], [3000, drops]))
+
+
+@pytest.fixture(scope="module")
+def trained() -> RelativeOutDet:
+    """Trained on a few scenes."""
+    lightning.seed_everything(0)
+    model = RelativeOutDet(learning_rate=1e-2)
+    data = InMemory(
+        train=[labelled(seed) for seed in range(4)],
+        validation=[labelled(9)],
+        card="wads",
+        loading=Loading(batch_size=2),
+    )
+    trainer = lightning.Trainer(
+        max_epochs=25, logger=False, enable_progress_bar=False, enable_checkpointing=False
+    )
+    trainer.fit(model, data)
+    return model.eval()
+
+
+def test_it_learns_drops_and_is_blind_to_intensity(trained: RelativeOutDet, tmp_path: Path) -> None:
+    export(trained, tmp_path / "model.onnx")
+    derainer = Derainer(str(tmp_path / "model.onnx"))
+    scan = labelled(20)
+    called, rain = derainer(scan), scan.label == 110
+    assert (called & rain).sum() / (called | rain).sum() > 0.6
+    bright = replace(scan, intensity=np.full(len(scan), 200, np.float32))
+    np.testing.assert_array_equal(derainer(bright), called)
+
+
+def test_scans_of_a_batch_say_nothing_to_each_other(trained: RelativeOutDet) -> None:
+    view = trained.spec.make_view(threads=1)
+    scans = [labelled(1), labelled(2, drops=5), Scan.of(scene(40))]
+    samples = [Sample(scan, view(scan), None) for scan in scans]
+    with torch.no_grad():
+        together = trained.logits_of(Batch.of(samples))
+        alone = [trained.logits_of(Batch.of([sample])) for sample in samples]
+    torch.testing.assert_close(together, torch.cat(alone))
+
+
+def test_candidates_get_what_they_would_get_among_all(trained: RelativeOutDet) -> None:
+    view = trained.spec.make_view(threads=1)
+    seen = view(labelled(3))
+    inputs = {name: torch.from_numpy(array) for name, array in seen.inputs().items()}
+    chosen = torch.arange(0, len(seen.points), 7)
+    with torch.no_grad():
+        every = trained(**inputs)
+        some = trained(**inputs, candidates=inputs["neighbours"][chosen])
+    torch.testing.assert_close(some, every[chosen])
+
+
+def test_what_a_scan_holds_matters(trained: RelativeOutDet) -> None:
+    """The same drop is judged by how many others there are."""
+    view = trained.spec.make_view(threads=1)
+    seen = view(labelled(4))
+    inputs = {name: torch.from_numpy(array) for name, array in seen.inputs().items()}
+    network = trained.network
+    with torch.no_grad():
+        before = network(**inputs)
+        network.from_context.weight.zero_()
+        after = network(**inputs)
+    assert not torch.allclose(before, after)
+
+
+def test_a_checkpoint_gives_the_same(trained: RelativeOutDet, tmp_path: Path) -> None:
+    save_model(trained, tmp_path / "model.ckpt")
+    again = load_model(tmp_path / "model.ckpt")
+    for name, tensor in trained.state_dict().items():
+        torch.testing.assert_close(again.state_dict()[name], tensor)
+
+
+def test_too_small_a_neighbourhood_is_refused() -> None:
+    with pytest.raises(InputError, match="neighbours"):
+        RelativeOutDet(neighbours=3)
