@@ -160,7 +160,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument("--worlds", type=Path, help="worlds that are there (default: OUT/worlds)")
     parser.add_argument("--world", default="world", help="YAML, or name of a packaged one")
-    parser.add_argument("--train", type=int, default=1000, help="worlds to train on")
+    parser.add_argument("--train", type=int, default=900, help="worlds to train on")
     parser.add_argument("--validation", type=int, default=60, help="worlds held out")
     parser.add_argument("--epochs", type=int, default=10)
     parser.add_argument("--seed", type=int, default=0, help="of the training")
