@@ -50,7 +50,7 @@ class RelativeOutDet(SupervisedModule):
         width: Features of a point.
         of_neighbour: Features of each neighbour, of where it is.
         opinion: What a point tells those that it is a neighbour of.
-        context: Features of what a scan holds at some range.
+        context: Features of what a scan holds at some range; 0 leaves that out.
         learning_rate: Of AdamW, where it is highest.
         weight_decay: Of AdamW.
         threshold: A point is rain where its probability is greater.

@@ -34,7 +34,7 @@ class RelativeOutDetNetwork(nn.Module):
         width: Features of a point.
         of_neighbour: Features of each neighbour, of where it is.
         opinion: What a point tells those that it is a neighbour of.
-        context: Features of a shell.
+        context: Features of a shell; 0 tells a point nothing of the rest of its scan.
     """
 
     centres: Tensor
@@ -50,8 +50,10 @@ class RelativeOutDetNetwork(nn.Module):
         super().__init__()
         self.neighbour = nn.Linear(NUMBERS, of_neighbour)
         self.neighbourhood = nn.Linear((neighbours - 1) * of_neighbour + 1, width)
-        self.to_context = nn.Linear(width, context)
-        self.from_context = nn.Linear(2 * context, width)
+        self.has_context = context > 0
+        if self.has_context:
+            self.to_context = nn.Linear(width, context)
+            self.from_context = nn.Linear(2 * context, width)
         self.to_opinion = nn.Linear(width, opinion)
         self.opinions = nn.Linear(neighbours * opinion + width, width)
         self.head = nn.Linear(width, 1)
@@ -80,7 +82,8 @@ class RelativeOutDetNetwork(nn.Module):
         seen, far = in_steps(points, distances, neighbours)
         around = _active(self.neighbour(seen)).flatten(1)
         features = _active(self.neighbourhood(torch.cat([around, far[:, None]], dim=1)))
-        features = features + self._context(features, far)
+        if self.has_context:
+            features = features + self._context(features, far)
         if candidates is None:
             candidates, own = neighbours, features
         else:
