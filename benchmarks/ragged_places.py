@@ -27,7 +27,8 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import UniformRain
-from derain.simulation.sensor import Sensor, load_sensor
+from derain.simulation.sensor import Sensor
+from derain.simulation.sensor_file import load_sensor
 from derain.system.cores import usable_cores
 
 BANDS = ((0.0, 10.0), (10.0, 30.0), (30.0, np.inf), (0.0, np.inf))

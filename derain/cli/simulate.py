@@ -56,11 +56,11 @@ Simulated rain is easy: a score on it says nothing about real rain.
 """
 
 # The names of derain.simulation.layouts, which takes too long to import where it is not used.
-LAYOUTS = (
+LAYOUT_NAMES = (
     *("facility", "street", "city", "country", "car_park", "motorway", "garage", "yard", "room"),
 )
 
-# What only one of the two uses knows, and what it takes where nothing is said.
+# What only one of the three uses knows, and what it takes where nothing is said.
 OF_DATA_SETS = {
     "layout": "facility",
     "sequences": 10,
@@ -98,7 +98,7 @@ def _add_those_of_data_sets(group: "argparse._ArgumentGroup") -> None:
     default = {name: f"(default: {value})" for name, value in OF_DATA_SETS.items()}
     group.add_argument(
         "--layout",
-        choices=LAYOUTS,
+        choices=LAYOUT_NAMES,
         help=f"a test track under sprinklers, or random places in even rain {default['layout']}",
     )
     group.add_argument("--sequences", type=count, help=f"sequences {default['sequences']}")
@@ -152,26 +152,26 @@ def main(arguments: argparse.Namespace) -> int:
         from derain.cli.rain_on_scans import rain_on_scans
 
         foreign = [*OF_DATA_SETS, "world"]
-        _settle(arguments, OF_SCANS, foreign, remedy="Leave it out, or --on.")
+        _settle(arguments, OF_SCANS, foreign, needs="without --on")
         return rain_on_scans(arguments)
     if arguments.world is not None:
         foreign = [name for name in (*OF_DATA_SETS, *OF_SCANS) if name not in OF_WORLDS]
         foreign += ["rain", "sensor"]  # of which a world has its own
-        _settle(arguments, OF_WORLDS, foreign, remedy="Leave it out, or --world.")
+        _settle(arguments, OF_WORLDS, foreign, needs="without --world")
         return _simulate_worlds(arguments)
     if arguments.radar is None:
         arguments.radar = not (arguments.speed or arguments.traffic or arguments.skew)
-    _settle(arguments, OF_DATA_SETS, foreign=OF_SCANS, remedy="Give --on, or leave it out.")
+    _settle(arguments, OF_DATA_SETS, foreign=OF_SCANS, needs="with --on")
     return _simulate(arguments)
 
 
 def _settle(
-    arguments: argparse.Namespace, own: Mapping[str, Any], foreign: Collection[str], remedy: str
+    arguments: argparse.Namespace, own: Mapping[str, Any], foreign: Collection[str], needs: str
 ) -> None:
-    """Refuses the options of the other use, and fills in what was not said."""
+    """Refuses the options of other uses, and fills in what was not said."""
     for name in foreign:
         if getattr(arguments, name) is not None:
-            raise InputError(f"--{name}", "means nothing for what is to be made", remedy)
+            raise InputError(f"--{name}", f"has a meaning only {needs}", "Leave it out.")
     for name, default in own.items():
         if getattr(arguments, name) is None:
             setattr(arguments, name, default)

@@ -17,7 +17,7 @@ from derain.simulation.returns import Returns
 
 # Parts of a scan that are lost together: sensors send a scan in 75 (Ouster) to 180 (Velodyne)
 # packets, of which a network drops some in a row.
-SECTORS = 60
+SECTORS_OF_A_SCAN = 60
 
 # Two neighbouring returns nearer together than this are of one surface, metres.
 SMALLEST_GAP = 0.3
@@ -108,8 +108,8 @@ class Defects:
         if self.dropped_rows:
             lost |= (generator.random(rows) < self.dropped_rows)[returns.beam // columns]
         if self.dropped_sectors:
-            sector = returns.beam % columns * SECTORS // columns
-            lost |= (generator.random(SECTORS) < self.dropped_sectors)[sector]
+            sector = returns.beam % columns * SECTORS_OF_A_SCAN // columns
+            lost |= (generator.random(SECTORS_OF_A_SCAN) < self.dropped_sectors)[sector]
         return np.asarray(~lost, np.bool_)
 
     def stepped(self, range: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -133,8 +133,9 @@ class Defects:
 
 def _single(beam: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether each row is the only one of its beam, bool (N,), beams ascending."""
-    another = beam[1:] == beam[:-1]
-    return ~(np.append(another, False) | np.append(False, another)) if len(beam) else another
+    changes = np.diff(beam, prepend=-1, append=-1) != 0
+    single: NDArray[np.bool_] = changes[1:] & changes[:-1]
+    return single
 
 
 def _borders(returns: Returns, columns: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

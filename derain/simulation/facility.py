@@ -45,7 +45,7 @@ MASTS = np.arange(16.0, 85, 9)
 # street, is one too: the published network has seen next to nothing solid that is so dark.
 # Source: Wehr and Lohr 1999, "Airborne laser scanning - an introduction and overview", its table of
 #     typical reflectivities.
-ASPHALT = (0.12, 0.20)
+ASPHALT_REFLECTIVITY = (0.12, 0.20)
 GROUND = (0.13, 0.27)
 LEAVES = (0.03, 0.6)
 
@@ -80,7 +80,7 @@ def _paved(
     surfaces: Iterable[Surface], material_generator: np.random.Generator
 ) -> Iterator[Surface]:
     for surface in surfaces:
-        span = ASPHALT if surface.label is TrackClass.ROAD else GROUND
+        span = ASPHALT_REFLECTIVITY if surface.label is TrackClass.ROAD else GROUND
         yield replace(surface, reflectivity=material_generator.uniform(*span), roughness=ROUGHNESS)
 
 

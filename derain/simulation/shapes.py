@@ -1,5 +1,7 @@
 """Shapes of triangles: float64 arrays of shape (T, 3, 3), T triangles of 3 corners in metres."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -174,7 +176,7 @@ def across(along: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     return first.T, second.T
 
 
-def nearest_to_axis(triangles: Triangles) -> NDArray[np.float64]:
+def nearest_to_axis(triangles: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     """The x and y, (2, T), where each triangle, seen from above, is nearest to the z axis.
 
     That is a corner or a place on an edge; that the axis goes through a triangle does not count.

@@ -21,7 +21,7 @@ Spans = TypeVar("Spans")
 MOST_ROWS = 4096
 
 # Kinds of drawn sensors.
-KINDS = ("spinning", "front", "rosette")
+SENSOR_KINDS = ("spinning", "front", "rosette")
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class SensorSpans:
     def __post_init__(self) -> None:
         subject = "sensor spans"
         _check_spans(self, subject)
-        for name in LOGARITHMIC:
+        for name in LOGARITHMIC_SPANS:
             if getattr(self, name)[0] <= 0:
                 raise _impossible(subject, self, name, "Give two numbers above 0.")
         for name in ("spinning_rows", "front_rows"):
@@ -161,7 +161,7 @@ class SensorSpans:
         for name in ("uneven", "head_down"):
             if not 0 <= getattr(self, name) <= 1:
                 raise _impossible(subject, self, name, "Give a share of 0 to 1.")
-        for name, known in (("kinds", KINDS), ("returns", get_args(ReturnMode))):
+        for name, known in (("kinds", SENSOR_KINDS), ("returns", get_args(ReturnMode))):
             weights = getattr(self, name)
             positive = all(weight >= 0 for weight in weights.values()) and any(weights.values())
             if not positive or not weights.keys() <= set(known):
@@ -178,7 +178,7 @@ class SensorSpans:
 
 
 # Spans that are drawn evenly in their logarithm.
-LOGARITHMIC = frozenset(
+LOGARITHMIC_SPANS = frozenset(
     {
         *("azimuth_step", "front_step", "rosette_beams", "prism_turns", "range_noise"),
         *("minimum_range", "maximum_range", "detection_threshold", "beam_divergence"),
@@ -195,7 +195,7 @@ def draw(spans: Any, name: str, generator: np.random.Generator) -> float:
         generator: Random generator.
     """
     low, high = getattr(spans, name)
-    if name in LOGARITHMIC:
+    if name in LOGARITHMIC_SPANS:
         return float(np.exp(generator.uniform(np.log(low), np.log(high))))
     return float(generator.uniform(low, high))
 
@@ -220,7 +220,7 @@ def _impossible(subject: str, spans: Any, name: str, remedy: str) -> InputError:
 
 def _read(kind: type[Spans], entry: Entry) -> Spans:
     hints = get_type_hints(kind)
-    values = entry.record({name: _PARSERS_BY_TYPE[hint] for name, hint in hints.items()})
+    values = entry.record({name: _PARSERS[hint] for name, hint in hints.items()})
     try:
         return kind(**values)
     except InputError as error:
@@ -244,7 +244,7 @@ def _beams(entry: Entry) -> int:
 
 
 # What reads a property, by its type.
-_PARSERS_BY_TYPE: dict[Any, Callable[[Entry], Any]] = {
+_PARSERS: dict[Any, Callable[[Entry], Any]] = {
     Span: _span,
     tuple[int, ...]: _rows,
     Mapping[str, float]: _weights,

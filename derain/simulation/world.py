@@ -25,8 +25,8 @@ from derain.simulation.track import Track
 
 # A scan with fewer points teaches nothing, and one of more rain than this is none of weather that a
 # sensor is used in: both are drawn anew, and after so many times it is said that the spans are bad.
-FEWEST_POINTS = 1000
-MOST_RAIN = 0.4
+SMALLEST_SCAN = 1000
+LARGEST_SHARE_OF_RAIN = 0.4
 MOST_TRIES = 100
 
 
@@ -136,7 +136,7 @@ def draw_scan(world: World, generator: np.random.Generator) -> DrawnScan:
         drawn = _drawn(world, generator)
         kind = drawn.scan.label
         assert kind is not None  # a simulated scan is labelled
-        if len(kind) >= FEWEST_POINTS and (kind == TrackClass.RAIN).mean() <= MOST_RAIN:
+        if len(kind) >= SMALLEST_SCAN and (kind == TrackClass.RAIN).mean() <= LARGEST_SHARE_OF_RAIN:
             return drawn
     raise InputError("world", "its scans are empty or nothing but rain", "Draw less rain.")
 

@@ -25,7 +25,7 @@ FOLDERS = load_card("simulated").layout
 
 # Of each sequence.
 STEM = "000000"
-DRAWN = "drawn.yaml"
+DRAWN_WORLDS = "drawn.yaml"
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,6 @@ class WorldCampaign:
         assert drawn.scan.label is not None
         write_scan(folder / FOLDERS.scans / f"{STEM}.bin", drawn.scan)
         write_labels(folder / FOLDERS.labels / f"{STEM}.label", *parted(drawn.scan.label))
-        with replacing(folder / DRAWN) as temporary:
+        with replacing(folder / DRAWN_WORLDS) as temporary:
             described = json.loads(json.dumps(drawn.description))
             temporary.write_text(yaml.safe_dump(described, sort_keys=False), "utf-8")

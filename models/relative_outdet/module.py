@@ -30,7 +30,7 @@ from derain.views.view import View
 CHANNELS = ("x", "y", "z")
 
 # Share of the training in which the learning rate rises; then it falls to nothing.
-WARM_UP = 0.1
+WARM_UP_SHARE = 0.1
 
 
 @NETWORKS.add("relative_outdet")
@@ -128,6 +128,6 @@ class RelativeOutDet(SupervisedModule):
             optimizer,
             rate,
             total_steps=max(int(self.trainer.estimated_stepping_batches), 2),
-            pct_start=WARM_UP,
+            pct_start=WARM_UP_SHARE,
         )
         return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}

@@ -7,12 +7,12 @@ from torch.nn import functional
 from derain.models.relative_outdet.steps import HARDLY_ANY, NUMBERS, in_steps
 
 # Slope of every activation below 0.
-SLOPE = 0.1
+NEGATIVE_SLOPE = 0.1
 
 # Shells around the sensor in which what a scan holds is averaged: logarithms of their ranges over
 # 10 m, which are 1.7 to 90 m, and how far each reaches into the next.
 SHELLS = (-1.8, 2.2, 9)
-REACH = 0.35
+SHELL_REACH = 0.35
 
 
 class RelativeOutDetNetwork(nn.Module):
@@ -95,7 +95,7 @@ class RelativeOutDetNetwork(nn.Module):
 
     def _context(self, features: Tensor, far: Tensor) -> Tensor:
         """What the scan holds at the range of each point, and in all."""
-        share = torch.softmax(-(((far[:, None] - self.centres) / REACH) ** 2), dim=1)
+        share = torch.softmax(-(((far[:, None] - self.centres) / SHELL_REACH) ** 2), dim=1)
         said = _active(self.to_context(features))
         of_shell = share.T @ said / (share.sum(dim=0)[:, None] + HARDLY_ANY)
         of_all = said.sum(dim=0) / (said.shape[0] + HARDLY_ANY)
@@ -105,4 +105,4 @@ class RelativeOutDetNetwork(nn.Module):
 
 
 def _active(features: Tensor) -> Tensor:
-    return functional.leaky_relu(features, SLOPE)
+    return functional.leaky_relu(features, NEGATIVE_SLOPE)

@@ -6,7 +6,7 @@ from torch.nn import functional
 
 # Nothing is measured nearer than this, metres, nor right above the sensor; both keep every
 # division finite.
-NEAREST = 0.05
+NEAREST_POINT = 0.05
 NEAREST_TO_AXIS = 0.01
 
 # To the third nearest ray among those of its neighbours a ray has a step or two, whichever of the
@@ -14,10 +14,10 @@ NEAREST_TO_AXIS = 0.01
 OF_STEP = 3
 
 # Of so many points, evenly spread over a scan, the step of its rays is the median.
-MOST_RAYS = 2049
+SAMPLED_RAYS = 2049
 
 # Radians; no sensor's rays lie closer.
-LEAST_STEP = 1e-4
+FINEST_ANGLE = 1e-4
 
 # What is added before logarithms, and to sums that are divided by: next to nothing, but where there
 # is nothing at all.
@@ -28,7 +28,7 @@ HARDLY_ANY = 1e-3
 USUAL_RANGE = 10.0
 
 # However far a neighbour is, no number that says so is greater.
-MOST = 10.0
+FARTHEST_IN_STEPS = 10.0
 
 # How many numbers say where a neighbour is.
 NUMBERS = 4
@@ -55,7 +55,7 @@ def in_steps(points: Tensor, distances: Tensor, neighbours: Tensor) -> tuple[Ten
     own = functional.embedding(neighbours[:, 0], points)
     x, y, z = own.unbind(1)
     level = (x * x + y * y).sqrt().clamp_min(NEAREST_TO_AXIS)
-    distance = (x * x + y * y + z * z).sqrt().clamp_min(NEAREST)
+    distance = (x * x + y * y + z * z).sqrt().clamp_min(NEAREST_POINT)
     offset = functional.embedding(neighbours[:, 1:], points) - own[:, None]
     ahead, left, up = offset.unbind(2)
     outwards = (x[:, None] * ahead + y[:, None] * left) / level[:, None]
@@ -73,11 +73,11 @@ def in_steps(points: Tensor, distances: Tensor, neighbours: Tensor) -> tuple[Ten
         ],
         dim=2,
     )
-    return seen.clamp(-MOST, MOST), torch.log(distance / USUAL_RANGE)
+    return seen.clamp(-FARTHEST_IN_STEPS, FARTHEST_IN_STEPS), torch.log(distance / USUAL_RANGE)
 
 
 def _range_of(places: Tensor) -> Tensor:
-    return places.square().sum(dim=2).sqrt().clamp_min(NEAREST)
+    return places.square().sum(dim=2).sqrt().clamp_min(NEAREST_POINT)
 
 
 def _step(aside: Tensor, risen: Tensor, distance: Tensor) -> Tensor:
@@ -85,6 +85,6 @@ def _step(aside: Tensor, risen: Tensor, distance: Tensor) -> Tensor:
     angles = (aside.square() + risen.square()).sqrt() / distance[:, None]
     # A row more, so that there is one to take the median of.
     angles = torch.cat([angles, angles.new_full((1, angles.shape[1]), 0.1)])
-    some = torch.arange(MOST_RAYS, device=angles.device) * distance.shape[0] // MOST_RAYS
+    some = torch.arange(SAMPLED_RAYS, device=angles.device) * distance.shape[0] // SAMPLED_RAYS
     third = angles[some].topk(OF_STEP, dim=1, largest=False).values[:, -1]
-    return third.topk(MOST_RAYS // 2 + 1).values[-1].clamp_min(LEAST_STEP)
+    return third.topk(SAMPLED_RAYS // 2 + 1).values[-1].clamp_min(FINEST_ANGLE)

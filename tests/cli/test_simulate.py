@@ -255,7 +255,7 @@ def test_clean_scans_are_not_overwritten(run_derain, clean: Path) -> None:
         (["--rain", "-1"], "rain rate: -1.0 mm/h is no rain rate. Give up to 2000 mm/h."),
         (["--rain", "nan"], "rain rate: nan mm/h is no rain rate. Give up to 2000 mm/h."),
         (["--seed", "-1"], "--seed: -1 is negative. Give 0 or more."),
-        (["--sensor", "mars"], "mars: no such sensor. Give a YAML file or one of mems_256,"),
+        (["--sensor", "mars"], "mars: no such sensor. Give a YAML file or one of front_128,"),
         (["--picture"], "--picture: has a meaning only with --on. Leave it out."),
         (["--on", "x.bin"], "--rain: it rains on scans at one rate. Give one, e.g. --rain 25."),
         (["--on", "x.bin", "--rain", "1", "2"], "--rain: it rains on scans at one rate."),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.simulation.classes import TrackClass
-from derain.simulation.defects import SECTORS, Defects
+from derain.simulation.defects import SECTORS_OF_A_SCAN, Defects
 from derain.simulation.returns import Returns
 from derain.simulation.sensor import Sensor
 
@@ -64,10 +64,10 @@ def test_sectors_are_lost_in_all_rows() -> None:
     for _ in range(20):
         received = defects.received(posts(), (ROWS, COLUMNS), generator).reshape(ROWS, COLUMNS)
         assert (received == received[0]).all()
-        sectors = received[0].reshape(SECTORS, -1)
+        sectors = received[0].reshape(SECTORS_OF_A_SCAN, -1)
         assert (sectors == sectors[:, :1]).all()
         lost += np.count_nonzero(~sectors[:, 0])
-    assert within(lost, 20 * SECTORS, 0.1)
+    assert within(lost, 20 * SECTORS_OF_A_SCAN, 0.1)
 
 
 def test_distances_are_multiples_of_the_step_and_no_farther_than_half_of_it() -> None:

@@ -16,7 +16,8 @@ from derain.simulation.facility import lay_out_facility
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import SprinkledRain
 from derain.simulation.scene import SimulatedScene
-from derain.simulation.sensor import Sensor, load_sensor
+from derain.simulation.sensor import Sensor
+from derain.simulation.sensor_file import load_sensor
 
 # Of the scans that the materials were chosen on none has such a seed.
 HELD_OUT = range(5000, 5008)
@@ -70,7 +71,7 @@ def test_the_published_network_finds_the_rain(
 
 def test_materials_leave_a_seeds_places_where_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     before = lay_out_facility(np.random.default_rng(3))
-    monkeypatch.setattr(facility, "ASPHALT", (0.5, 0.6))
+    monkeypatch.setattr(facility, "ASPHALT_REFLECTIVITY", (0.5, 0.6))
     monkeypatch.setattr(facility, "LEAVES", (0.9, 1.0))
     after = lay_out_facility(np.random.default_rng(3))
     assert np.array_equal(before.triangles, after.triangles)

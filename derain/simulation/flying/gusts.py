@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from derain.simulation.flying.precipitation import GustForm
 
 # Plane waves of a random field; from so many on it is as good as Gaussian.
-WAVES = 12
+GUST_WAVES = 12
 
 # Share of the densest that is left between sheets and filaments, a modelling choice.
 THINNEST = 0.05
@@ -33,11 +33,11 @@ class Gusts:
 
     def __init__(self, form: GustForm, length: float, contrast: float, seed: int) -> None:
         generator = np.random.default_rng(seed)
-        direction = generator.normal(size=(2, 3, WAVES))
+        direction = generator.normal(size=(2, 3, GUST_WAVES))
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        wavelength = length * 4 ** generator.random((2, 1, WAVES))
+        wavelength = length * 4 ** generator.random((2, 1, GUST_WAVES))
         self._wave = 2 * math.pi * direction / wavelength
-        self._phase = generator.uniform(0, 2 * math.pi, (2, WAVES))
+        self._phase = generator.uniform(0, 2 * math.pi, (2, GUST_WAVES))
         self._form, self._contrast = form, contrast
 
     def __call__(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -69,4 +69,4 @@ class Gusts:
 
     def _field(self, number: int, place: NDArray[np.float64]) -> NDArray[np.float64]:
         waves = np.cos(place @ self._wave[number] + self._phase[number])
-        return np.asarray(waves.sum(axis=1) * math.sqrt(2 / WAVES))
+        return np.asarray(waves.sum(axis=1) * math.sqrt(2 / GUST_WAVES))

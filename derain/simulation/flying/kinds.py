@@ -21,8 +21,8 @@ LOGARITHMIC = frozenset(
 )
 
 # What else a span must keep to besides 0 < low <= high.
-MOST = {"reflectivity": 1.0, "haze": 1.0, "largest": LARGEST}
-LEAST = {"spill": 1.0, "haze_strength": 1.0, "largest": math.nextafter(SMALLEST, 1)}
+UPPER_LIMITS = {"reflectivity": 1.0, "haze": 1.0, "largest": LARGEST}
+LOWER_LIMITS = {"spill": 1.0, "haze_strength": 1.0, "largest": math.nextafter(SMALLEST, 1)}
 FROM_ZERO = frozenset({"flicker", "jitter", "haze_patches", "gust_contrast"})
 
 
@@ -40,8 +40,8 @@ def _possible(name: str, value: float | Span) -> bool:
     low, high = value
     # A kind of which nothing falls has 0 and 0.
     from_zero = name in FROM_ZERO or (name == "number" and high == 0)
-    least = LEAST.get(name, 0 if from_zero else math.nextafter(0, 1))
-    below = high < 1 if name == "flicker" else high <= MOST.get(name, 1e9)
+    least = LOWER_LIMITS.get(name, 0 if from_zero else math.nextafter(0, 1))
+    below = high < 1 if name == "flicker" else high <= UPPER_LIMITS.get(name, 1e9)
     return least <= low <= high and below
 
 

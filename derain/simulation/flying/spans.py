@@ -130,5 +130,6 @@ def _span(entry: Entry) -> Span:
 
 
 # What reads the attributes of a kind, by their type.
-_PARSERS_BY_TYPE: dict[Any, Callable[[Entry], Any]] = {float: Entry.number, Span: _span}
-_PARSERS = {name: _PARSERS_BY_TYPE[kind] for name, kind in get_type_hints(Kind).items()}
+_PARSERS: dict[str, Callable[[Entry], Any]] = {
+    name: _span if kind == Span else Entry.number for name, kind in get_type_hints(Kind).items()
+}

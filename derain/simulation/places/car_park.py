@@ -11,6 +11,7 @@ from derain.simulation.places import frames, heaps, people, plants, relief, thre
 from derain.simulation.places.crowd import mixed, ragged_things
 from derain.simulation.places.relief import Relief, ground_mesh
 from derain.simulation.places.standing import (
+    Piece,
     assembled,
     free_places,
     lined_up,
@@ -26,7 +27,7 @@ from derain.simulation.track import Track
 LOT_LENGTH, LOT_WIDTH, LANE = 5.2, 2.6, 6.5
 
 # How far the car park reaches, metres along x and y.
-REACH = 38.0
+HALF_SIZE = 38.0
 
 
 def lay_out_car_park(generator: np.random.Generator) -> Track:
@@ -56,7 +57,7 @@ def _ground(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
     beyond = relief.SNOW if winter and generator.random() < 0.5 else relief.MEADOW
 
     def kind_at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
-        return np.where(np.maximum(np.abs(x), np.abs(y)) < REACH, 0, 1)
+        return np.where(np.maximum(np.abs(x), np.abs(y)) < HALF_SIZE, 0, 1)
 
     yield from ground_mesh([surface, beyond], kind_at, generator)
 
@@ -68,7 +69,7 @@ def _rows(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
     rows = [near_lane, near_lane + LOT_LENGTH + 0.3, near_lane + 2 * LOT_LENGTH + LANE + 0.3]
     rows += [2 * aside - y for y in rows]
     for y in rows:
-        for x in np.arange(-REACH + 4, REACH - 4, LOT_WIDTH):
+        for x in np.arange(-HALF_SIZE + 4, HALF_SIZE - 4, LOT_WIDTH):
             if generator.random() < full and np.hypot(x, y) > 4.5:
                 near = np.hypot(x, y) < 25
                 make = vehicles.glazed_car if near else objects.car
@@ -83,7 +84,7 @@ def _people(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
     def in_a_lane(x: float, y: float) -> bool:
         # The next lanes are beyond two rows.
         across = abs(y - aside) % (LANE + 2 * LOT_LENGTH + 0.3)
-        return max(abs(x), abs(y)) < REACH and across < LANE / 2 + 0.8
+        return max(abs(x), abs(y)) < HALF_SIZE and across < LANE / 2 + 0.8
 
     for count, distances in ((generator.integers(6, 16), (2.2, 35)), (6, (15, 50))):
         makes = shared([(people.person, 8), (people.cyclist, 1)], int(count), generator)
@@ -100,14 +101,14 @@ def _between(aside: float, winter: bool, generator: np.random.Generator) -> Iter
     )
 
     def at_its_edge(x: float, y: float) -> bool:
-        return abs(x) < REACH and abs(abs(y - aside) - LANE / 2 - 0.3) < 0.5
+        return abs(x) < HALF_SIZE and abs(abs(y - aside) - LANE / 2 - 0.3) < 0.5
 
     yield from strewn(
         mixed(small, generator),
         free_places(len(small), (2.2, 35), 0.5, generator, at_its_edge),
         generator,
     )
-    for x in np.arange(-REACH, REACH, generator.uniform(10, 20)):
+    for x in np.arange(-HALF_SIZE, HALF_SIZE, generator.uniform(10, 20)):
         y = aside + LANE / 2 + LOT_LENGTH + 0.15
         yield from put(_young_tree(winter, generator), float(x), y)
     if winter:
@@ -117,12 +118,14 @@ def _between(aside: float, winter: bool, generator: np.random.Generator) -> Iter
 
 def _edge(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
     """What closes the car park off: on each of four sides a hedge, a fence, or houses."""
-    makes = [threads.chain_link, frames.railing, _nets, walls.facade]
+    makes: list[Piece] = [threads.chain_link, frames.railing, _nets, walls.facade]
     makes.append(_brushes if winter else plants.hedge)
     for quarter in range(4):
         make = makes[generator.integers(len(makes))]
         piece = 19.0 if make is walls.facade else 9.5
-        for surface in lined_up(make, straight(REACH), (-REACH, REACH), piece, generator, 0.15):
+        for surface in lined_up(
+            make, straight(HALF_SIZE), (-HALF_SIZE, HALF_SIZE), piece, generator, 0.15
+        ):
             yield surface.placed(0, 0, quarter * np.pi / 2)
 
 

@@ -20,7 +20,7 @@ from derain.simulation.shapes import Triangles
 from derain.simulation.track import Track
 
 # Of how many specks a part is seen that returns nothing else.
-SPECKS = (1.0, 100.0)
+SPECKS_OF_A_CARRIER = (1.0, 100.0)
 
 # Share of the parts of a carrier that are painted so that they return all over: of half of the
 # carriers none.
@@ -84,7 +84,7 @@ def _finished(
     if generator.random() < painted:
         yield surface
         return
-    count = round(evenly_in_logarithm(SPECKS, generator))
+    count = round(evenly_in_logarithm(SPECKS_OF_A_CARRIER, generator))
     shining = mirrored(surface, np.array([0, 0, mounting_height]), count, generator)
     hides = generator.random() < 0.7
     yield from shining if hides else islice(shining, 1, None)

@@ -23,7 +23,7 @@ from derain.simulation.places.standing import (
 )
 from derain.simulation.track import Track
 
-SIGHT = (-60.0, 85.0)
+CITY_SIGHT = (-60.0, 85.0)
 
 
 @dataclass(frozen=True)
@@ -91,17 +91,17 @@ def _houses(section: Section, generator: np.random.Generator) -> Iterator[Surfac
     make: Callable[[float, np.random.Generator], Iterable[Surface]] = walls.facade
     for side, front in zip((-1, 1), section.fronts, strict=True):
         gaps, piece = generator.uniform(0, 0.3), generator.uniform(9, 18)
-        for house in lined_up(make, straight(abs(front)), SIGHT, piece, generator, gaps):
+        for house in lined_up(make, straight(abs(front)), CITY_SIGHT, piece, generator, gaps):
             # Houses are seen from the street: those on the right are those on the left, turned.
-            yield house if side > 0 else house.placed(SIGHT[0] + SIGHT[1], 0, np.pi)
+            yield house if side > 0 else house.placed(CITY_SIGHT[0] + CITY_SIGHT[1], 0, np.pi)
     far = walls.facade(30, generator)
-    yield from put(far, SIGHT[1], 15, -np.pi / 2)
+    yield from put(far, CITY_SIGHT[1], 15, -np.pi / 2)
 
 
 def _parked(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
     for kerb, side in zip(section.kerbs, (-1, 1), strict=True):
         full = generator.uniform(0.1, 0.9)
-        for x in along(*SIGHT, (5.8, 7.5), generator):
+        for x in along(*CITY_SIGHT, (5.8, 7.5), generator):
             y = kerb - side * 1.1 + generator.normal(0, 0.08)
             if generator.random() < full and np.hypot(x, y) > 3.9:
                 make = vehicles.glazed_car if abs(x) < 30 else objects.car
@@ -119,11 +119,13 @@ def _people(section: Section, generator: np.random.Generator) -> Iterator[Surfac
 def _furniture(section: Section, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
     """Trees, lamps, signs, bollards and railings along the kerbs; bushes in tubs."""
     for kerb, side in zip(section.kerbs, (-1, 1), strict=True):
-        for x in along(*SIGHT, (6, 30), generator):
+        for x in along(*CITY_SIGHT, (6, 30), generator):
             tree = [plants.bare_tree(generator)] if winter else plants.crowned_tree(generator)
             yield from put(tree, x, kerb + side * generator.uniform(0.5, 1))
         makes = shared([(frames.thin_pole, 3), (frames.bollard, 2)], 40, generator)
-        for make, x in zip(mixed(makes, generator), along(*SIGHT, (1, 7), generator), strict=False):
+        for make, x in zip(
+            mixed(makes, generator), along(*CITY_SIGHT, (1, 7), generator), strict=False
+        ):
             yield from put(make(generator), x, kerb + side * 0.35)
         if generator.random() < 0.4:
             begin = generator.uniform(2, 20)
@@ -147,9 +149,9 @@ def _cables(section: Section, generator: np.random.Generator) -> Iterator[Surfac
     """Cables from house to house, with lamps on them, and a tram's along the street."""
     if generator.random() < 0.6:
         height = generator.uniform(5, 7)
-        for x in along(*SIGHT, (12, 30), generator):
+        for x in along(*CITY_SIGHT, (12, 30), generator):
             ends = [np.array([x, y, height + 0.5]) for y in section.fronts]
             yield threads.cable(ends[0], ends[1], 0.4, (0.006, 0.02), generator)
         for y in generator.uniform(-2, 4, generator.integers(0, 3)):
-            ends = [np.array([x, y, height]) for x in SIGHT]
+            ends = [np.array([x, y, height]) for x in CITY_SIGHT]
             yield threads.cable(ends[0], ends[1], 0.3, (0.008, 0.02), generator)

@@ -16,7 +16,7 @@ from derain.simulation.places.standing import Line, assembled, lined_up, put
 from derain.simulation.track import Track
 
 # How far what is beside the road goes on behind the sensor and ahead of it, metres.
-SIGHT = (-45.0, 75.0)
+COUNTRY_SIGHT = (-45.0, 75.0)
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,9 @@ class Road:
         """The line so many metres outwards from its left (1) or right edge."""
         return lambda x: self.aside + self.bend * x**2 + side * (self.half_width + outwards)
 
-    def outside(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def outside(
+        self, x: NDArray[np.float64] | float, y: NDArray[np.float64] | float
+    ) -> NDArray[np.float64]:
         """How far places are from the road, metres; less than 0 on it."""
         from_middle = np.abs(y - self.aside - self.bend * np.asarray(x) ** 2)
         return np.asarray(from_middle - self.half_width)
@@ -107,7 +109,7 @@ def _boundary(
         "gate": frames.railing,
     }
     make = makes[generator.choice(list(makes), p=[0.35, 0.2, 0.15, 0.15, 0.05, 0.1])]
-    return lined_up(make, line, SIGHT, generator.uniform(4, 9), generator, gaps)
+    return lined_up(make, line, COUNTRY_SIGHT, generator.uniform(4, 9), generator, gaps)
 
 
 def _bare_hedge(length: float, generator: np.random.Generator) -> Iterator[Surface]:
@@ -119,7 +121,7 @@ def _bare_hedge(length: float, generator: np.random.Generator) -> Iterator[Surfa
 def _trees(road: Road, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
     for side in (-1, 1):
         line, spacing = road.beside(side, generator.uniform(1.5, 10)), generator.uniform(6, 25)
-        for x in along(*SIGHT, (0.5 * spacing, spacing), generator):
+        for x in along(*COUNTRY_SIGHT, (0.5 * spacing, spacing), generator):
             y = float(line(np.array(x))) + side * generator.uniform(0, 3)
             tree = plants.bare_tree if winter else plants.crowned_tree
             yield from put(tree(generator), x, y, generator.uniform(0, 6))
@@ -129,7 +131,7 @@ def _cables(road: Road, generator: np.random.Generator) -> Iterator[Surface]:
     """Poles beside the road with one to four cables from each to the next."""
     line = road.beside(int(generator.choice([-1, 1])), generator.uniform(1.5, 6))
     spacing, height = generator.uniform(18, 40), generator.uniform(4.5, 8)
-    x = generator.uniform(-spacing, 0) + spacing * np.arange(-1, 4)
+    x = generator.uniform(-spacing, 0) + spacing * np.arange(-1.0, 4.0)
     heads = np.column_stack([x, line(x), np.full_like(x, height)])
     feet = heads * (1, 1, 0)
     for foot, head in zip(feet, heads, strict=True):

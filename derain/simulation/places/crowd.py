@@ -7,8 +7,10 @@ import numpy as np
 from derain.simulation import objects
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, threads, vehicles
-from derain.simulation.places.drawing import Span
 from derain.simulation.places.standing import Allowed, Make, anywhere, free_places, shared, strewn
+
+# Fewest, and one more than the most.
+Counts = tuple[int, int]
 
 # How far from the sensor they are, metres.
 NEAR_AND_FAR = (2.2, 70.0)
@@ -18,9 +20,9 @@ def users(
     generator: np.random.Generator,
     allowed: Allowed = anywhere,
     *,
-    walkers: Span = (6, 16),
-    cyclists: Span = (1, 5),
-    cars: Span = (2, 7),
+    walkers: Counts = (6, 16),
+    cyclists: Counts = (1, 5),
+    cars: Counts = (2, 7),
 ) -> Iterator[Surface]:
     """People, cyclists and vehicles.
 
@@ -59,7 +61,7 @@ def ragged_things(
     generator: np.random.Generator,
     allowed: Allowed = anywhere,
     *,
-    count: Span = (10, 30),
+    count: Counts = (10, 30),
     leafy: bool = True,
 ) -> Iterator[Surface]:
     """Bushes, brushwood, nets, pieces of fence, poles, grass, rubble, near the sensor and far.

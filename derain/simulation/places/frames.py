@@ -10,7 +10,7 @@ from derain.simulation.objects import Surface
 from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.shapes import Triangles
 
-REFLECTIVITY = (0.03, 0.7)
+FRAME_REFLECTIVITY = (0.03, 0.7)
 
 Point = tuple[float, float, float]
 
@@ -128,5 +128,7 @@ def bollard(generator: np.random.Generator) -> Surface:
 def made(parts: list[Triangles], generator: np.random.Generator) -> Surface:
     """Parts of one material as a surface."""
     return Surface(
-        np.concatenate(parts), TrackClass.BACKGROUND, evenly_in_logarithm(REFLECTIVITY, generator)
+        np.concatenate(parts),
+        TrackClass.BACKGROUND,
+        evenly_in_logarithm(FRAME_REFLECTIVITY, generator),
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.shapes import Triangles
 
-CELL = 0.04
+GLASS_CELL = 0.04
 MOST_CELLS = 900
 
 # Share of a pane that returns a ray: of clean glass, and of a dirty or frosted pane.
@@ -25,7 +25,7 @@ def pane(corners: NDArray[np.float64], generator: np.random.Generator) -> Triang
         generator: Random generator.
     """
     sides = np.linalg.norm(corners[[1, 3]] - corners[0], axis=1)
-    cell = max(CELL, float(np.sqrt(sides.prod() / MOST_CELLS)))
+    cell = max(GLASS_CELL, float(np.sqrt(sides.prod() / MOST_CELLS)))
     wide, high = (1 + int(side / cell) for side in sides)
     share = evenly_in_logarithm(RETURNING, generator)
     # A pane is never nothing at all.

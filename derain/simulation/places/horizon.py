@@ -16,14 +16,14 @@ from derain.simulation.places.drawing import (
 from derain.simulation.shapes import Triangles
 
 # Where things stand, and where the hills begin and end, metres.
-DISTANCES = (55.0, 260.0)
+HORIZON = (55.0, 260.0)
 HILLS = (118.0, 290.0)
 
 # What stands reaches so far below the level of the sensor's foot: the ground there is uneven.
 DEPTH = 6.0
 
-LEAF = (0.01, 0.4)
-REFLECTIVITY = (0.03, 0.9)
+FAR_LEAF = (0.01, 0.4)
+HORIZON_REFLECTIVITY = (0.03, 0.9)
 
 # Signs and plates beside roads return light whence it came: they are seen from afar.
 RETROREFLECTIVE = (0.7, 1.0)
@@ -55,7 +55,7 @@ def lay_out_horizon(generator: np.random.Generator) -> Iterator[Surface]:
     ]
     for make, most in kinds:
         for _ in range(generator.integers(0, most + 1)):
-            away = evenly_in_logarithm(DISTANCES, generator)
+            away = evenly_in_logarithm(HORIZON, generator)
             azimuth = generator.uniform(-np.pi, np.pi)
             for surface in make(away, generator):
                 yield surface.placed(
@@ -90,7 +90,7 @@ def _row_of_trees(away: float, generator: np.random.Generator) -> Iterator[Surfa
     for y in np.arange(-half, half, spacing):
         if generator.random() > gaps:
             x = generator.normal(0, depth) + turned * y
-            if away + x > DISTANCES[0]:
+            if away + x > HORIZON[0]:
                 parts.append(shapes.placed(_crown(250, generator), float(x), float(y)))
     if parts:
         yield _plant(np.concatenate(parts), generator)
@@ -123,7 +123,7 @@ def _crown(most: int, generator: np.random.Generator) -> Triangles:
     clumps = centres[generator.integers(count, size=max(2, count // 12))]
     own = clumps[generator.integers(len(clumps), size=count)]
     centres += generator.choice([0.0, 0.4, 0.8]) * (own - centres)
-    leaves = shapes.leaves(centres, evenly_in_logarithm(LEAF, generator), generator)
+    leaves = shapes.leaves(centres, evenly_in_logarithm(FAR_LEAF, generator), generator)
     stem = shapes.rods(
         np.array([[0.0, 0.0, -DEPTH]]), np.array([[0.0, 0.0, height - radii[2]]]), 0.02 * height
     )
@@ -154,7 +154,7 @@ def _poles(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     height, radius = generator.uniform(3, 12), evenly_in_logarithm((0.02, 0.2), generator)
     ahead = generator.uniform(-0.3, 1.0)
     y = step * (np.arange(count) - (count - 1) / 2)
-    x = np.maximum(ahead * y, DISTANCES[0] - away)
+    x = np.maximum(ahead * y, HORIZON[0] - away)
     rods = [((a, b, -DEPTH), (a, b, height)) for a, b in zip(x, y, strict=True)]
     rods += [((a, b, height), (a, b + 1.5, height + 0.2)) for a, b in zip(x, y, strict=True)]
     yield _matter(frames.bars(rods, radius, 6), generator)
@@ -214,5 +214,5 @@ def _plant(triangles: Triangles, generator: np.random.Generator) -> Surface:
 
 
 def _matter(triangles: Triangles, generator: np.random.Generator) -> Surface:
-    reflectivity = evenly_in_logarithm(REFLECTIVITY, generator)
+    reflectivity = evenly_in_logarithm(HORIZON_REFLECTIVITY, generator)
     return Surface(triangles, TrackClass.BACKGROUND, reflectivity)

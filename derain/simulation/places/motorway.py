@@ -22,7 +22,7 @@ from derain.simulation.places.standing import (
 )
 from derain.simulation.track import Track
 
-SIGHT = (-80.0, 115.0)
+MOTORWAY_SIGHT = (-80.0, 115.0)
 LANE = 3.75
 
 
@@ -65,7 +65,7 @@ def _rails(lines: tuple[float, ...], generator: np.random.Generator) -> Iterator
         make: Callable[[float, np.random.Generator], Iterable[Surface]] = (
             frames.guard_rail if generator.random() < 0.7 else _cable_barrier
         )
-        yield from lined_up(make, straight(y), SIGHT, 16, generator, gaps=0.05)
+        yield from lined_up(make, straight(y), MOTORWAY_SIGHT, 16, generator, gaps=0.05)
 
 
 def _cable_barrier(length: float, generator: np.random.Generator) -> Iterable[Surface]:
@@ -79,7 +79,7 @@ def _driving(
     for lane in range(2 * lanes):
         own_carriageway = lane < lanes
         y = (lane - own) * LANE if own_carriageway else median + (lane - lanes + 0.5) * LANE
-        for x in along(*SIGHT, (14, 70), generator):
+        for x in along(*MOTORWAY_SIGHT, (14, 70), generator):
             if lane == own and abs(x) < 12:
                 continue
             slow = lane in (0, 2 * lanes - 1)
@@ -107,12 +107,12 @@ def _beside(edges: tuple[float, float], generator: np.random.Generator) -> Itera
     """Delineators, signs, emergency telephones and lamps; weeds, and what lies on the shoulder."""
     for y, side in zip(edges, (-1, 1), strict=True):
         count = int(generator.integers(20, 300))
-        x, out = generator.uniform(-30, 60, count), generator.exponential(1.5, count)
-        yield plants.grass(np.column_stack([x, y + side * (out - 1)]), generator)
+        ahead, out = generator.uniform(-30, 60, count), generator.exponential(1.5, count)
+        yield plants.grass(np.column_stack([ahead, y + side * (out - 1)]), generator)
         for x in along(-30, 50, (5, 40), generator):
             litter = heaps.rubble(generator.uniform(0.3, 1), generator)
             yield from put(litter, x, y + side * generator.uniform(-1.5, 0.5))
-        for x in along(*SIGHT, (4, 25), generator):
+        for x in along(*MOTORWAY_SIGHT, (4, 25), generator):
             yield from put(frames.thin_pole(generator), x, y + side * generator.uniform(0.8, 3))
 
 
@@ -140,17 +140,23 @@ def _embankments(edges: tuple[float, float], generator: np.random.Generator) -> 
         kind = generator.choice(["wall", "fence", "bank"])
         away = y + side * generator.uniform(0.5, 4)
         if kind == "wall":
-            yield from lined_up(_noise_wall, straight(away), SIGHT, 13, generator, gaps=0.05)
+            yield from lined_up(
+                _noise_wall, straight(away), MOTORWAY_SIGHT, 13, generator, gaps=0.05
+            )
         elif kind == "fence":
-            yield from lined_up(threads.chain_link, straight(away), SIGHT, 13, generator, 0.1)
+            yield from lined_up(
+                threads.chain_link, straight(away), MOTORWAY_SIGHT, 13, generator, 0.1
+            )
         else:
-            yield from lined_up(heaps.bank, straight(away + 2 * side), SIGHT, 10, generator)
-        for x in along(*SIGHT, (5, 18), generator):
+            yield from lined_up(
+                heaps.bank, straight(away + 2 * side), MOTORWAY_SIGHT, 10, generator
+            )
+        for x in along(*MOTORWAY_SIGHT, (5, 18), generator):
             place = x, away + side * generator.uniform(1, 12)
             bare = generator.random() < 0.4
             tree = [plants.bare_tree(generator)] if bare else plants.crowned_tree(generator)
             yield from put(tree, *place)
-        for x in along(*SIGHT, (2, 12), generator):
+        for x in along(*MOTORWAY_SIGHT, (2, 12), generator):
             scrub = plants.brushwood(generator.uniform(0.5, 2.5), generator)
             yield from put(scrub, x, away + side * generator.uniform(0.5, 6))
 

@@ -11,7 +11,7 @@ from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.shapes import Triangles
 
 # Of cloth, which in the near infrared is anything from black to white.
-REFLECTIVITY = (0.03, 0.7)
+PERSON_REFLECTIVITY = (0.03, 0.7)
 
 
 def person(generator: np.random.Generator) -> Surface:
@@ -142,6 +142,6 @@ def _limbs(ends: Sequence[tuple[tuple[float, ...], tuple[float, ...]]], radius: 
 def _clothed(parts: list[Triangles], label: TrackClass, generator: np.random.Generator) -> Surface:
     """Every part of a reflectivity of its own."""
     reflectivity = [
-        np.full(len(part), evenly_in_logarithm(REFLECTIVITY, generator)) for part in parts
+        np.full(len(part), evenly_in_logarithm(PERSON_REFLECTIVITY, generator)) for part in parts
     ]
     return Surface(np.concatenate(parts), label, np.concatenate(reflectivity))

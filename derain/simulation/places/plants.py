@@ -18,7 +18,7 @@ from derain.simulation.places.drawing import (
 )
 from derain.simulation.shapes import Triangles
 
-REFLECTIVITY = (0.01, 0.6)
+PLANT_REFLECTIVITY = (0.01, 0.6)
 
 # Standard deviation of a corner of a leaf about its middle, metres: leaves of 1 to 15 cm.
 LEAF = (0.005, 0.06)
@@ -112,7 +112,7 @@ def grass(places: NDArray[np.float64], generator: np.random.Generator) -> Surfac
 
 
 def _plant(triangles: Triangles, generator: np.random.Generator) -> Surface:
-    reflectivity = many_evenly_in_logarithm(REFLECTIVITY, len(triangles), generator)
+    reflectivity = many_evenly_in_logarithm(PLANT_REFLECTIVITY, len(triangles), generator)
     return Surface(triangles, TrackClass.BACKGROUND, reflectivity)
 
 

@@ -11,7 +11,7 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
 from derain.simulation.places.drawing import Span, evenly_in_logarithm, many_evenly_in_logarithm
 
-WAVES = 12
+RELIEF_WAVES = 12
 WAVELENGTHS = (2.5, 60.0)
 
 # The mesh of the ground: rings of corners, each so many, from the first radius to the last, metres.
@@ -45,11 +45,11 @@ class Relief:
             height: Standard deviation of the height, metres. Long waves are higher than short ones.
             generator: Random generator.
         """
-        length = many_evenly_in_logarithm(WAVELENGTHS, WAVES, generator)
-        direction = generator.uniform(0, 2 * np.pi, WAVES)
+        length = many_evenly_in_logarithm(WAVELENGTHS, RELIEF_WAVES, generator)
+        direction = generator.uniform(0, 2 * np.pi, RELIEF_WAVES)
         waves = 2 * np.pi / length * np.stack([np.cos(direction), np.sin(direction)])
         amplitudes = height * np.sqrt(2) * length / np.linalg.norm(length)
-        phases = generator.uniform(0, 2 * np.pi, WAVES)
+        phases = generator.uniform(0, 2 * np.pi, RELIEF_WAVES)
         return cls(*(part.astype(np.float32) for part in (waves.T, amplitudes, phases)))
 
     def __call__(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -62,7 +62,7 @@ class Relief:
 
 
 @dataclass(frozen=True)
-class Ground:
+class GroundKind:
     """A kind of ground.
 
     Attributes:
@@ -80,19 +80,19 @@ class Ground:
     furrow: float = 0.0
 
 
-ASPHALT = Ground(TrackClass.ROAD, (0.001, 0.008), (0.05, 0.25), wet=0.15)
-COBBLES = Ground(TrackClass.ROAD, (0.008, 0.025), (0.08, 0.3), wet=0.1)
-TRACK = Ground(TrackClass.ROAD, (0.015, 0.05), (0.1, 0.4), wet=0.1)
-PAVING = Ground(TrackClass.BACKGROUND, (0.002, 0.012), (0.1, 0.4), wet=0.1)
-MEADOW = Ground(TrackClass.BACKGROUND, (0.02, 0.1), (0.1, 0.5))
-GRAVEL = Ground(TrackClass.BACKGROUND, (0.01, 0.05), (0.1, 0.4))
-FIELD = Ground(TrackClass.BACKGROUND, (0.04, 0.12), (0.05, 0.3), wet=0.1, furrow=0.15)
-SNOW = Ground(TrackClass.BACKGROUND, (0.01, 0.08), (0.3, 0.9))
-CONCRETE = Ground(TrackClass.ROAD, (0.001, 0.006), (0.1, 0.4), wet=0.1)
+ASPHALT = GroundKind(TrackClass.ROAD, (0.001, 0.008), (0.05, 0.25), wet=0.15)
+COBBLES = GroundKind(TrackClass.ROAD, (0.008, 0.025), (0.08, 0.3), wet=0.1)
+TRACK = GroundKind(TrackClass.ROAD, (0.015, 0.05), (0.1, 0.4), wet=0.1)
+PAVING = GroundKind(TrackClass.BACKGROUND, (0.002, 0.012), (0.1, 0.4), wet=0.1)
+MEADOW = GroundKind(TrackClass.BACKGROUND, (0.02, 0.1), (0.1, 0.5))
+GRAVEL = GroundKind(TrackClass.BACKGROUND, (0.01, 0.05), (0.1, 0.4))
+FIELD = GroundKind(TrackClass.BACKGROUND, (0.04, 0.12), (0.05, 0.3), wet=0.1, furrow=0.15)
+SNOW = GroundKind(TrackClass.BACKGROUND, (0.01, 0.08), (0.3, 0.9))
+CONCRETE = GroundKind(TrackClass.ROAD, (0.001, 0.006), (0.1, 0.4), wet=0.1)
 
 
 def ground_mesh(
-    kinds: Sequence[Ground],
+    kinds: Sequence[GroundKind],
     kind_at: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.int64]],
     generator: np.random.Generator,
 ) -> Iterator[Surface]:
@@ -120,7 +120,7 @@ def ground_mesh(
 
 
 def _patch(
-    kind: Ground,
+    kind: GroundKind,
     triangles: shapes.Triangles,
     wetness: NDArray[np.float64],
     generator: np.random.Generator,

@@ -21,11 +21,11 @@ from derain.simulation.track import Track
 MOUNTING_HEIGHTS = (0.3, 1.5)
 
 # Nothing but the floor and the ceiling is nearer to the sensor's axis, metres.
-CLEARANCE = 0.35
+ROOM_CLEARANCE = 0.35
 
 # Share of the things that are polished, and of how many specks they are seen.
 POLISHED = 0.12
-SPECKS = (3.0, 150.0)
+SPECKS_OF_A_THING = (3.0, 150.0)
 
 
 def lay_out_room(generator: np.random.Generator) -> Track:
@@ -58,7 +58,7 @@ def lay_out_room(generator: np.random.Generator) -> Track:
 def _cleared(surface: Surface) -> Surface:
     """A surface without what is too near to the sensor's axis."""
     x, y = shapes.nearest_to_axis(surface.triangles)
-    far = (np.hypot(x, y) > CLEARANCE) & ~_about_axis(surface.triangles)
+    far = (np.hypot(x, y) > ROOM_CLEARANCE) & ~_about_axis(surface.triangles)
     reflectivity = np.broadcast_to(surface.reflectivity, len(far))[far]
     return replace(surface, triangles=surface.triangles[far], reflectivity=reflectivity)
 
@@ -68,7 +68,7 @@ def _polished(surface: Surface, generator: np.random.Generator) -> Iterator[Surf
     if generator.random() > POLISHED or surface.label != TrackClass.BACKGROUND:
         yield surface
         return
-    count = round(evenly_in_logarithm(SPECKS, generator))
+    count = round(evenly_in_logarithm(SPECKS_OF_A_THING, generator))
     yield from mirrored(surface, np.array([0, 0, np.mean(MOUNTING_HEIGHTS)]), count, generator)
 
 

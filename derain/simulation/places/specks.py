@@ -15,7 +15,7 @@ PAINT = (0.01, 0.6)
 MIRROR = 1e-9
 
 # Nothing is nearer to the sensor, metres.
-NEAREST = 0.15
+NEAREST_SPECK = 0.15
 
 # Size of a speck over its distance from the sensor: it returns one ray or two.
 SIZE = (1.5e-3, 8e-3)
@@ -46,7 +46,7 @@ def specks(
     corners = generator.normal(0, 1, (len(places), 3, 3))
     small = places[:, None] + size[:, None, None] * np.clip(corners, -2, 2)
     away = np.linalg.norm(small - sensor, axis=2).min(axis=1)
-    kept: Triangles = small[away > NEAREST]
+    kept: Triangles = small[away > NEAREST_SPECK]
     return kept
 
 

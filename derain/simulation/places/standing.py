@@ -18,16 +18,19 @@ Allowed = Callable[[float, float], bool]
 # Something made at the origin, of one surface or of several.
 Make = Callable[[np.random.Generator], Surface | Iterable[Surface]]
 
+# Made piece by piece along a line, by the length of a piece in metres.
+Piece = Callable[[float, np.random.Generator], Surface | Iterable[Surface]]
+
 # A line on the ground: its y at each x.
 Line = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 # What stands in a place is farther from the sensor's axis, metres. Only the ground reaches it.
-CLEARANCE = 1.6
+AXIS_CLEARANCE = 1.6
 
 # Half of the things are within so many degrees of straight ahead, where every sensor looks.
 AHEAD = 55.0
 
-TRIES = 30
+PLACING_TRIES = 30
 
 
 def anywhere(x: float, y: float) -> bool:
@@ -53,7 +56,7 @@ def free_places(
     """
     taken: list[tuple[float, float]] = []
     for number in range(count):
-        for _ in range(TRIES):
+        for _ in range(PLACING_TRIES):
             distance = evenly_in_logarithm(distances, generator)
             limit = AHEAD if number % 2 else 180.0
             azimuth = np.radians(generator.uniform(-limit, limit))
@@ -95,7 +98,7 @@ def put(
 
 
 def lined_up(
-    make: Callable[[float, np.random.Generator], Surface | Iterable[Surface]],
+    make: Piece,
     line: Line,
     x: Span,
     piece: float,
@@ -168,10 +171,11 @@ def _tilt(generator: np.random.Generator) -> NDArray[np.float64]:
 def _cleared(track: Track) -> Track:
     """A track without those of its triangles that are too near to the sensor's axis."""
     lowest, greatest = _bounds(track.triangles[..., :2])
-    about = ((lowest < CLEARANCE) & (greatest > -CLEARANCE)).all(axis=1)
+    near = (lowest < AXIS_CLEARANCE) & (greatest > -AXIS_CLEARANCE)
+    about = near[:, 0] & near[:, 1]
     far = ~about
     x, y = shapes.nearest_to_axis(track.triangles[about])
-    far[about] = np.hypot(x, y) > CLEARANCE
+    far[about] = np.hypot(x, y) > AXIS_CLEARANCE
     return Track(track.triangles[far], track.reflectivity[far], track.label[far])
 
 

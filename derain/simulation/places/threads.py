@@ -14,7 +14,7 @@ from derain.simulation.objects import Surface
 from derain.simulation.places.drawing import Span, evenly_in_logarithm
 from derain.simulation.shapes import Triangles
 
-REFLECTIVITY = (0.03, 0.6)
+THREAD_REFLECTIVITY = (0.03, 0.6)
 POST_SPACING = (2.0, 4.0)
 
 
@@ -106,4 +106,6 @@ def _ribbons(starts: NDArray[np.float64], ends: NDArray[np.float64], width: floa
 
 
 def _strung(triangles: Triangles, generator: np.random.Generator) -> Surface:
-    return Surface(triangles, TrackClass.BACKGROUND, evenly_in_logarithm(REFLECTIVITY, generator))
+    return Surface(
+        triangles, TrackClass.BACKGROUND, evenly_in_logarithm(THREAD_REFLECTIVITY, generator)
+    )

@@ -14,8 +14,8 @@ from derain.simulation.places.frames import bars
 from derain.simulation.places.glass import pane
 from derain.simulation.shapes import Triangles
 
-PAINT = (0.02, 0.7)
-GLASS = (0.01, 0.15)
+BODYWORK = (0.02, 0.7)
+CAR_GLASS = (0.01, 0.15)
 CLOTH = (0.05, 0.5)
 RUBBER = (0.02, 0.1)
 
@@ -35,8 +35,8 @@ def glazed_car(generator: np.random.Generator) -> Iterator[Surface]:
     ]
     antenna = bars([((-0.2 * length, 0, roof), (-0.3 * length, 0, roof + 0.4))], 0.005)
     painted = np.concatenate([body, pillars, top, *mirrors, antenna])
-    yield _part(painted, PAINT, generator)
-    yield _part(np.concatenate(_panes(cabin, generator)), GLASS, generator)
+    yield _part(painted, BODYWORK, generator)
+    yield _part(np.concatenate(_panes(cabin, generator)), CAR_GLASS, generator)
     yield _part(_seats(length, width, sill, generator), CLOTH, generator)
     yield _part(_wheels(0.31 * length, width), RUBBER, generator)
 
@@ -50,15 +50,15 @@ def lorry(generator: np.random.Generator) -> Iterator[Surface]:
     foot += (length / 2 + 1.1, 0, 0)
     head = shapes.raised(foot, 0.9)
     pillars = shapes.rods(foot, head, 0.05, sides=4)
-    yield _part(np.concatenate([cab, roof, pillars]), PAINT, generator)
-    yield _part(np.concatenate(_panes((foot, head), generator)), GLASS, generator)
+    yield _part(np.concatenate([cab, roof, pillars]), BODYWORK, generator)
+    yield _part(np.concatenate(_panes((foot, head), generator)), CAR_GLASS, generator)
     sides = [_tarpaulin(length, y, top, generator) for y in (-width / 2, width / 2)]
     ends = [
         shapes.placed(shapes.box(0.05, width, 1.1, top), x, 0) for x in (-length / 2, length / 2)
     ]
     bed = shapes.box(length, width, 1.0, 1.15)
     lid = shapes.box(length, width, top, top + 0.03)
-    yield _part(np.concatenate([*sides, *ends, bed, lid]), PAINT, generator)
+    yield _part(np.concatenate([*sides, *ends, bed, lid]), BODYWORK, generator)
     frame = [((-length / 2, y, 0.8), (length / 2, y, 0.8)) for y in (-0.4, 0.4)]
     frame += [((-0.2 * length, y, 0.55), (0.2 * length, y, 0.55)) for y in (-1.2, 1.2)]
     frame += [((-length / 2, -1.1, 0.5), (-length / 2, 1.1, 0.5))]

@@ -1,6 +1,6 @@
 """A yard or building site, all of ragged things: nets, scaffolds, rubble, scrub, mesh, logs."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,8 @@ from derain.simulation.places import frames, heaps, plants, relief, threads, wal
 from derain.simulation.places.crowd import ragged_things, users
 from derain.simulation.places.relief import Relief, ground_mesh
 from derain.simulation.places.standing import (
-    CLEARANCE,
+    AXIS_CLEARANCE,
+    Piece,
     anywhere,
     assembled,
     free_places,
@@ -20,9 +21,6 @@ from derain.simulation.places.standing import (
     strewn,
 )
 from derain.simulation.track import Track
-
-# Made piece by piece along a line, by the length of a piece.
-Piece = Callable[[float, np.random.Generator], Surface | Iterable[Surface]]
 
 
 def lay_out_yard(generator: np.random.Generator) -> Track:
@@ -56,11 +54,13 @@ def _ground(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
 
 
 def _heaps(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
-    def mound(drawn: np.random.Generator) -> Surface:
-        return heaps.bank(drawn.uniform(2, 8), drawn, snow=winter and drawn.random() < 0.7)
+    def mound(generator: np.random.Generator) -> Surface:
+        return heaps.bank(
+            generator.uniform(2, 8), generator, snow=winter and generator.random() < 0.7
+        )
 
-    def stones(drawn: np.random.Generator) -> Surface:
-        return heaps.rubble(drawn.uniform(0.5, 2.5), drawn)
+    def stones(generator: np.random.Generator) -> Surface:
+        return heaps.rubble(generator.uniform(0.5, 2.5), generator)
 
     makes = [mound] * 4 + [stones] * 6 + [heaps.logs] * 3
     places = free_places(int(generator.integers(4, 14)), (4, 40), 3, generator)
@@ -75,8 +75,8 @@ def _lines(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
         threads.wire_fence,
         frames.railing,
         frames.scaffold,
-        lambda length, drawn: threads.net(length, drawn.uniform(1, 5), drawn),
-        lambda length, drawn: walls.rough_wall(length, drawn.uniform(0.5, 4), drawn),
+        lambda length, generator: threads.net(length, generator.uniform(1, 5), generator),
+        lambda length, generator: walls.rough_wall(length, generator.uniform(0.5, 4), generator),
     ]
     kinds.append(threads.chain_link if winter else plants.hedge)
     for x, y in free_places(int(generator.integers(4, 10)), (5, 45), 4, generator):
@@ -92,7 +92,7 @@ def _lines(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
 def _grass(generator: np.random.Generator) -> Iterator[Surface]:
     for _ in range(generator.integers(1, 4)):
         count = int(generator.integers(100, 900))
-        distance = CLEARANCE + generator.exponential(generator.uniform(3, 9), count)
+        distance = AXIS_CLEARANCE + generator.exponential(generator.uniform(3, 9), count)
         angle = generator.uniform(0, 2 * np.pi, count)
         places = distance[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
         yield plants.grass(places, generator)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.cli.simulate import LAYOUTS as NAMES
+from derain.cli.simulate import LAYOUT_NAMES
 from derain.simulation.classes import TrackClass
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.sensor import Sensor
@@ -39,7 +39,7 @@ def seen(place: str, seed: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def test_the_command_knows_every_layout() -> None:
-    assert set(NAMES) == set(LAYOUTS)
+    assert set(LAYOUT_NAMES) == set(LAYOUTS)
 
 
 @pytest.mark.parametrize("place", PLACES)

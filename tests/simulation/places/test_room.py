@@ -6,7 +6,7 @@ from types import ModuleType
 import numpy as np
 
 from derain.simulation.classes import TrackClass
-from derain.simulation.places.room import CLEARANCE, MOUNTING_HEIGHTS, lay_out_room
+from derain.simulation.places.room import MOUNTING_HEIGHTS, ROOM_CLEARANCE, lay_out_room
 from derain.simulation.sensor import Returns, Sensor
 from derain.simulation.track import Track
 
@@ -49,7 +49,7 @@ def test_nothing_but_the_floor_and_the_ceiling_is_at_the_sensor(open3d: ModuleTy
             returns = seen(seed, which)
             ends = sensor.beams() * returns.range[:, None]
             level = returns.returned & (np.abs(ends[:, 2]) < 0.2)
-            assert np.hypot(ends[level, 0], ends[level, 1]).min() > CLEARANCE - 0.01
+            assert np.hypot(ends[level, 0], ends[level, 1]).min() > ROOM_CLEARANCE - 0.01
             assert returns.range.min() > 0.2
 
 
