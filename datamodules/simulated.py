@@ -60,7 +60,9 @@ class SimulatedDataModule(SequenceDataModule):
         """
         if not self.split["test" if part == "predict" else part]:
             raise InputError(
-                self.root, f"no sequence is for {part}", "Simulate three sequences or more."
+                self.root,
+                f"no sequence is for {part}",
+                "Simulate three sequences or more, or ask for some for it.",
             )
         return super().source(part)
 

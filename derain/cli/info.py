@@ -56,7 +56,7 @@ good, and when not to use it.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument(
-        "files", nargs="+", type=Path, help="scans, labels, models, checkpoints, folders, default"
+        "files", nargs="+", help="scans, labels, models, checkpoints, folders, or default"
     )
     parser.add_argument("--grid", action="store_true", help="fit one grid to all the scans")
     parser.add_argument(
@@ -83,14 +83,15 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     _refuse_unclear_picture(arguments)
     if arguments.grid:
-        frames = named_frames(arguments.files, arguments.columns)
+        frames = named_frames([Path(name) for name in arguments.files], arguments.columns)
         fit = fit_grid([frame.read() for frame in frames]).as_dict()
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0
-    for path in arguments.files:
-        if str(path) == DEFAULT:
+    for name in arguments.files:
+        if name == DEFAULT:  # ./default is another thing, and a Path would not tell them apart
             _describe_default(arguments)
             continue
+        path = Path(name)
         if os.path.isdir(path):
             _describe_folder(path, arguments)
             continue
@@ -117,7 +118,7 @@ def _describe_default(arguments: argparse.Namespace) -> None:
         raise InputError(
             DEFAULT,
             "it is the model that comes with derain, and something here is called so too",
-            f"Write {os.path.abspath(DEFAULT)} for that, or ask from another folder.",
+            f"Write ./{DEFAULT} for that, or ask from another folder.",
         )
     model, card = default_model(), model_card()
     if arguments.json:

@@ -23,7 +23,7 @@ def reading(path: Path, *damage: type[Exception]) -> Iterator[None]:
     """
     try:
         yield
-    except InputError:
+    except (InputError, BrokenPipeError):  # the pipe is one that is told to, never the file
         raise
     except damage as error:
         reason = " ".join(str(error).split())

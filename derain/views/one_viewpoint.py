@@ -51,6 +51,10 @@ MORE_CROWDED = 1.3
 BESIDE_AXIS = 0.01
 FEWEST_IN_CELLS = 200
 
+# Half of those eight arms. A sensor that looks one way sees fewer, and its rays may be as dense as
+# it likes: those of a rosette crowd where it looks, and there it sees farthest.
+FEWEST_ARMS = 4
+
 
 def unlike_one_viewpoint(scan: Scan) -> Iterator[Oddity]:
     """Says where a scan is not what one sensor sees from where it stands, in metres.
@@ -158,7 +162,8 @@ def crowding_far_off(scan: Scan) -> float:
 
     Returns:
         The greatest mean number of points to a cell among quarters of the points by range, over
-        that of the nearest quarter; 1 where few points are looked at.
+        that of the nearest quarter; 1 where few points are looked at, or all are on one
+        side of the sensor.
     """
     rows = np.flatnonzero(_near_axes(scan) & scan.valid)
     if len(rows) < FEWEST_IN_CELLS:
@@ -167,6 +172,8 @@ def crowding_far_off(scan: Scan) -> float:
     horizontal = np.hypot(x, y)
     range_ = np.hypot(horizontal, z)
     azimuth, inclination = np.degrees([np.arctan2(y, x), np.arctan2(z, horizontal)])
+    if len(np.unique(np.round(azimuth / 45) % 8)) < FEWEST_ARMS:
+        return 1.0
     cells = np.round(azimuth / CELL) * 360 / CELL + np.round(inclination / CELL)
     surface = np.floor(np.log(range_) / np.log(ONE_SURFACE))
     order = np.argsort(range_)

@@ -147,6 +147,7 @@ def test_a_folder_of_its_name_makes_it_unclear_what_is_asked(run_derain, here: P
     assert "default: it is the model that comes with derain, and something here" in outcome.err
     scene(50).tofile(here / "default" / "0.bin")
     assert run_derain("info", here / "default").code == 0
+    assert run_derain("info", "./default").code == 0
 
 
 @pytest.mark.parametrize("command", ["run", "teach", "bench", "view", "tune"])

@@ -84,6 +84,13 @@ def test_what_one_sensor_sees_is_not_odd(directions: Points) -> None:
     assert kinds(street(directions)) == []
 
 
+def test_nor_are_the_rays_of_a_rosette_which_crowd_where_it_looks() -> None:
+    generator = np.random.default_rng(0)
+    off, turn = np.radians([generator.uniform(0, 30, 40_000), generator.uniform(0, 360, 40_000)])
+    aside, up = np.sin(off) * [np.cos(turn), np.sin(turn)]
+    assert kinds(street(np.stack([np.cos(off), aside, up], axis=1))) == []
+
+
 def test_nor_are_two_returns_of_every_ray_in_dense_snow(spinning: Points) -> None:
     share = np.random.default_rng(0).uniform(0.05, 0.9, (len(spinning), 1))
     both = np.concatenate([spinning, spinning * share, spinning])  # and one of them twice
