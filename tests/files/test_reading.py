@@ -9,7 +9,7 @@ from derain.files.reading import reading
 
 
 def test_a_file_that_cannot_be_read_is_named() -> None:
-    with pytest.raises(InputError, match="scan.bin: cannot be read"), reading(Path("scan.bin")):
+    with pytest.raises(InputError, match=r"scan\.bin: cannot be read"), reading(Path("scan.bin")):
         raise PermissionError
 
 
