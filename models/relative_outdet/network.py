@@ -1,10 +1,12 @@
 """The network: a neighbourhood, what the scan holds at its range, the neighbours' opinions."""
 
+import math
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from derain.models.relative_outdet.steps import HARDLY_ANY, NUMBERS, in_steps
+from derain.models.relative_outdet.steps import HARDLY_ANY, NUMBERS, USUAL_RANGE, in_steps
 
 # Slope of every activation below 0.
 NEGATIVE_SLOPE = 0.1
@@ -13,6 +15,16 @@ NEGATIVE_SLOPE = 0.1
 # 10 m, which are 1.7 to 90 m, and how far each reaches into the next.
 SHELLS = (-1.8, 2.2, 9)
 SHELL_REACH = 0.35
+
+# What carries a sensor is seen within so many metres of it, often in scattered points that look
+# like drops. But drops do not end there: of those that a sensor sees, more lie in the next metres,
+# as far as the second number, for there is more room. Modelling choices.
+OF_CARRIER, BEYOND_CARRIER = 2.0, 6.0
+
+# What a logit loses where they do end there, and what is counted as drops beyond besides, so that
+# none at all can be divided by.
+CERTAINLY_NOT = 20.0
+HALF_A_DROP = 0.5
 
 
 class RelativeOutDetNetwork(nn.Module):
@@ -84,14 +96,17 @@ class RelativeOutDetNetwork(nn.Module):
         features = _active(self.neighbourhood(torch.cat([around, far[:, None]], dim=1)))
         if self.has_context:
             features = features + self._context(features, far)
-        if candidates is None:
+        judged = None if candidates is None else candidates[:, 0]
+        if candidates is None or judged is None:
             candidates, own = neighbours, features
         else:
-            own = functional.embedding(candidates[:, 0], features)
+            own = functional.embedding(judged, features)
         heard = functional.embedding(candidates, _active(self.to_opinion(features))).flatten(1)
         own = own + _active(self.opinions(torch.cat([heard, own], dim=1)))
-        rain = self.head(own)
-        return torch.cat([torch.zeros_like(rain), rain], dim=1)
+        rain = self.head(own)[:, 0]
+        if not self.training:
+            rain = _without_carrier(rain, far if judged is None else far[judged])
+        return torch.stack([torch.zeros_like(rain), rain], dim=1)
 
     def _context(self, features: Tensor, far: Tensor) -> Tensor:
         """What the scan holds at the range of each point, and in all."""
@@ -106,3 +121,20 @@ class RelativeOutDetNetwork(nn.Module):
 
 def _active(features: Tensor) -> Tensor:
     return functional.leaky_relu(features, NEGATIVE_SLOPE)
+
+
+def _without_carrier(rain: Tensor, far: Tensor) -> Tensor:
+    """Takes back what was called rain right before the sensor, where there is none farther off.
+
+    Args:
+        rain: Logits of rain, float (J,).
+        far: Logarithms of the points' ranges over the usual one, float (J,).
+
+    Returns:
+        Logits, float (J,).
+    """
+    near = far < math.log(OF_CARRIER / USUAL_RANGE)
+    beyond = ~near & (far < math.log(BEYOND_CARRIER / USUAL_RANGE))
+    drops = rain.sigmoid()
+    ratio = (drops * near).sum() / ((drops * beyond).sum() + HALF_A_DROP)
+    return rain - CERTAINLY_NOT * (ratio - 1).clamp(0, 1) * near
