@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.cards.card import load_card
 from derain.datamodules.worlds import Worlds
 from derain.evaluation.text_tables import markdown_table
 from derain.export.onnx_file import export
@@ -79,7 +80,9 @@ def main() -> None:
     iou = _iou(derainer, _held_out(first))
     taken = {Path(scan.name).name: _taken(derainer, scan) for scan in _scans(arguments.clean)}
     threshold = chosen(iou, taken)
-    spec = replace(model.spec, threshold=threshold)
+    # Both worlds are simulated: what it was started from has the same licence.
+    licence = load_card("simulated").licence
+    spec = replace(model.spec, threshold=threshold, licence=licence)
     model.hparams["threshold"] = threshold
     model.adopt(spec)
     save_model(model, out / "model.ckpt")
