@@ -8,6 +8,7 @@ from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
 from derain.models.published import Published
 from derain.models.registry import NETWORKS
+from derain.models.relative_outdet import RelativeOutDet
 from derain.models.salsanext import SalsaNext
 from derain.models.salsanext_lite import SalsaNextLite
 
@@ -16,6 +17,7 @@ def test_derain_has_these_networks_and_each_knows_its_name() -> None:
     assert dict(NETWORKS) == {
         "lisnownet": LiSnowNet,
         "outdet": OutDet,
+        "relative_outdet": RelativeOutDet,
         "salsanext": SalsaNext,
         "salsanext_lite": SalsaNextLite,
     }

@@ -22,7 +22,7 @@ from derain.errors import InputError
 from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.scan import Scan
-from derain.simulation import dataset, sequence
+from derain.simulation import sequence
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
 from derain.simulation.dataset import ensure_track, simulate_track
@@ -157,7 +157,7 @@ def test_an_interrupted_run_is_taken_up_again(
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(dataset, "write_sequence", interrupted)
+        patched.setattr(sequence, "write_sequence", interrupted)
         with pytest.raises(KeyboardInterrupt):
             simulate_track(root, TINY)
     assert [folder.name for folder in (root / "sequences").iterdir()] == ["000"]
