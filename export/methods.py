@@ -36,6 +36,11 @@ def method_names() -> list[str]:
     return [DEFAULT, *FILTERS, *METHODS]
 
 
+def is_method_name(word: str) -> bool:
+    """Whether a method is called so; other packages are asked only if none of derain's is."""
+    return word == DEFAULT or word in FILTERS or word in METHODS
+
+
 def load_method(
     name: str, parameters: Mapping[str, Any], threads: int = 0, runtime: Runtime = Runtime()
 ) -> Method:

@@ -7,7 +7,12 @@ from pathlib import Path
 from derain.cli.method_options import add_method
 from derain.default import DEFAULT
 from derain.errors import InputError
-from derain.export.methods import CHECKPOINT_SUFFIX, PARAMETER_SUFFIXES, method_names
+from derain.export.methods import (
+    CHECKPOINT_SUFFIX,
+    PARAMETER_SUFFIXES,
+    is_method_name,
+    method_names,
+)
 from derain.files.format import FORMATS
 from derain.files.names import scan_suffix
 from derain.files.reading import is_file
@@ -73,7 +78,7 @@ def _may_be_scans(word: str) -> bool:
 
 def _names_method(word: str) -> bool:
     """Whether a word is a method's name, or a file of a kind that holds methods."""
-    return _is_method_file(word) or (not Path(word).suffix and word in method_names())
+    return _is_method_file(word) or (not Path(word).suffix and is_method_name(word))
 
 
 def _is_method_file(word: str) -> bool:

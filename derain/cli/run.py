@@ -46,7 +46,8 @@ rain, in the input's format with every field kept.
   derain run persistence recording/ --out cleaned --poses poses.txt
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
-or a name (below). {RULE}
+or a name (below).
+{RULE}
 For a method that sees several scans, those of a recording have to come in time order. Where a
 method is not sure of a point, its best guess decides. Of a data set, results are named by their
 paths in it.

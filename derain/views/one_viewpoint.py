@@ -78,8 +78,7 @@ def unlike_one_viewpoint(scan: Scan) -> Iterator[Oddity]:
     misplaced = [*_elsewhere(sample)] or [*_in_other_units(sample)]
     yield from misplaced
     if not misplaced:
-        yield from _of_one_beam(sample)
-        yield from _of_many_viewpoints(scan)
+        yield from [*_of_one_beam(sample)] or _of_many_viewpoints(scan)
 
 
 def _beyond_all_sensors(scan: Scan) -> Iterator[Oddity]:

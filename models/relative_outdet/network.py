@@ -16,14 +16,15 @@ NEGATIVE_SLOPE = 0.1
 SHELLS = (-1.8, 2.2, 9)
 SHELL_REACH = 0.35
 
-# What carries a sensor is seen within so many metres of it, often in scattered points that look
-# like drops. But drops do not end there: of those that a sensor sees, more lie in the next metres,
-# as far as the second number, for there is more room. Modelling choices.
+# What carries a sensor is seen within so many metres of it, often in a few scattered points that
+# look like drops. But drops do not end there: in the next metres, as far as the second number, a
+# sensor sees as many, or more than a share of the scan. Modelling choices.
 OF_CARRIER, BEYOND_CARRIER = 2.0, 6.0
+SHARE_OF_CARRIER = 0.0025
 
-# What a logit loses where they do end there, and what is counted as drops beyond besides, so that
-# none at all can be divided by.
-CERTAINLY_NOT = 20.0
+# What a logit loses where they do end there: all of it where a third more would be expected; and
+# what is counted as drops beyond besides, so that none at all can be divided by.
+CERTAINLY_NOT, OF_A_THIRD = 20.0, 3.0
 HALF_A_DROP = 0.5
 
 
@@ -124,7 +125,7 @@ def _active(features: Tensor) -> Tensor:
 
 
 def _without_carrier(rain: Tensor, far: Tensor) -> Tensor:
-    """Takes back what was called rain right before the sensor, where there is none farther off.
+    """Takes back rain right before the sensor where there is hardly any farther off.
 
     Args:
         rain: Logits of rain, float (J,).
@@ -136,5 +137,6 @@ def _without_carrier(rain: Tensor, far: Tensor) -> Tensor:
     near = far < math.log(OF_CARRIER / USUAL_RANGE)
     beyond = ~near & (far < math.log(BEYOND_CARRIER / USUAL_RANGE))
     drops = rain.sigmoid()
-    ratio = (drops * near).sum() / ((drops * beyond).sum() + HALF_A_DROP)
-    return rain - CERTAINLY_NOT * (ratio - 1).clamp(0, 1) * near
+    expected = torch.minimum((drops * near).sum(), SHARE_OF_CARRIER * torch.ones_like(rain).sum())
+    missing = expected / ((drops * beyond).sum() + HALF_A_DROP) - 1
+    return rain - CERTAINLY_NOT * (OF_A_THIRD * missing).clamp(0, 1) * near

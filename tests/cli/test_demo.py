@@ -94,10 +94,10 @@ def test_the_model_that_comes_with_derain_cleans_scans_of_the_users_own(
     np.full((60, 4), 1e5, np.float32).tofile(mine / "far.bin")
     out = tmp_path / "out"
     clean_own_scans(Narrator(main, tmp_path / "log.txt"), mine, DEFAULT_COLUMNS, out)
-    command, result, warning, by_range, picture = capsys.readouterr().out.splitlines()
+    command, result, *warnings, by_range, picture = capsys.readouterr().out.splitlines()
     assert command == f"$ derain run default {mine} --out {out} --columns x,y,z,intensity"
     assert "3 scans: 1,060 points" in result
-    assert "far.bin" in warning
+    assert any("far.bin" in warning for warning in warnings)
     assert re.fullmatch(r"  taken by range: 0-10 m [\d.]+%, .*, 80\+ m [\d.]+%", by_range)
     assert picture == f"  before and after: {out / 'before_after.png'}"
     assert imread(out / "before_after.png")[..., :3].std() > 0

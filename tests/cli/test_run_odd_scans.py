@@ -129,10 +129,10 @@ def test_a_scan_is_projected_once_and_in_the_time_that_is_told(
 
 
 def test_parts_of_a_file_that_are_not_written_are_named(run_derain, tmp_path: Path) -> None:
-    points = "\n".join(f"{x} {y} 0" for x in range(1, 4) for y in range(3))
+    points = "\n".join(f"{x} {y} {x * y % 7}" for x in range(1, 4) for y in range(40))
     scan = tmp_path / "mesh.ply"
     scan.write_text(
-        "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nproperty float y\n"
+        "ply\nformat ascii 1.0\nelement vertex 120\nproperty float x\nproperty float y\n"
         "property float z\nelement edge 1\nproperty int a\nproperty int b\nend_header\n"
         f"{points}\n0 1\n"
     )

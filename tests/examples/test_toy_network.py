@@ -148,8 +148,8 @@ def test_without_the_package_that_brings_it_its_checkpoint_is_refused(
     outcome = run_derain("info", checkpoint)
     assert (outcome.code, outcome.out) == (2, "")
     assert outcome.err == (
-        f"derain: {checkpoint}: a checkpoint of 'toy'. Known are lisnownet, outdet, salsanext, "
-        "salsanext_lite.\n"
+        f"derain: {checkpoint}: a checkpoint of 'toy'. Known are lisnownet, outdet, "
+        "relative_outdet, salsanext, salsanext_lite.\n"
     )
 
 

@@ -129,7 +129,7 @@ def test_an_installed_filter_is_run_tuned_benched_drawn_and_listed(
     for _, out, _ in helps:
         assert "\n  haze  rain is near the sensor and has no other point near it\n" in out
     assert unknown[0] == senseless[0] == 2
-    assert "or one of crf, dror, dsor, haze, ror, sor, ssr, persistence." in unknown[2]
+    assert "or one of default, crf, dror, dsor, haze, ror, sor, ssr, persistence" in unknown[2]
     assert "haze: reach is -1. Give a finite number" in senseless[2]
 
 

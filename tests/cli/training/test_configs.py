@@ -106,7 +106,7 @@ PREPARATIONS = {
 
 
 def test_every_packaged_configuration_is_put_to_the_test() -> None:
-    with_tests_of_their_own = {"outdet_mixture.yaml"}
+    with_tests_of_their_own = {"outdet_mixture.yaml", "relative_outdet_worlds.yaml"}
     assert packaged_configs().keys() - with_tests_of_their_own == PREPARATIONS.keys()
 
 

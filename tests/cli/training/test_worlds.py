@@ -1,0 +1,42 @@
+"""The configuration of the model that comes with derain: from worlds to a file that judges."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.system.open3d_import import import_open3d
+
+WORLD = """
+places: {street: 1}
+horizon: 0
+carrier: 0
+sensors: {kinds: {front: 1}, front_rows: [32], front_step: [0.5, 1.0]}
+precipitation: {snow: {weight: 1, crowding: [0.1, 0.3]}}
+"""
+
+
+def test_worlds_are_made_trained_on_and_exported(
+    run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    try:
+        import_open3d()
+    except InputError as error:
+        pytest.skip(str(error))
+    monkeypatch.chdir(tmp_path)
+    Path("small.yaml").write_text(WORLD, "utf-8")
+    outcome = run_derain(
+        *("fit", "--config", "relative_outdet_worlds.yaml", "--trainer.max_epochs", 2),
+        *("--data.root", "worlds", "--data.workers", 1, "--data.loading.workers", 0),
+        *("--data.campaign.train", 2, "--data.campaign.validation", 1),
+        *("--data.campaign.world", "small.yaml", "--trainer.enable_progress_bar", "false"),
+    )
+    assert outcome.code == 0, outcome.err
+    (checkpoint,) = Path("runs").rglob("last.ckpt")
+    assert run_derain("export", checkpoint, "--out", "model.onnx").code == 0
+    scene(500).tofile("scan.bin")
+    outcome = run_derain("run", "model.onnx", "scan.bin", "--out", "out")
+    assert outcome.code == 0, outcome.err
+    assert len(np.fromfile("out/scan.label", np.uint32)) == 500
