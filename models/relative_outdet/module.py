@@ -88,29 +88,26 @@ class RelativeOutDet(SupervisedModule):
         return NeighbourView(self.hparams["neighbours"], self.channels)
 
     def sees_through(self, view: View) -> bool:
-        """Whether the network can take what a Spec's view gives: as many neighbours as it has."""
-        return isinstance(view, NeighbourView) and view.neighbours == self.hparams["neighbours"]
+        """Whether the network can take what a Spec's view gives: all points, and its neighbours."""
+        return (
+            isinstance(view, NeighbourView)
+            and view.neighbours == self.hparams["neighbours"]
+            and view.candidates is None
+        )
 
-    def forward(
-        self,
-        points: Tensor,
-        distances: Tensor,
-        neighbours: Tensor,
-        candidates: Tensor | None = None,
-    ) -> Tensor:
-        """Logits, float (J, 2), of one scan; arguments as for :class:`RelativeOutDetNetwork`."""
-        return self.network(points, distances, neighbours, candidates)
+    def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
+        """Logits, float (M, 2), of one scan; arguments as for :class:`RelativeOutDetNetwork`."""
+        return self.network(points, distances, neighbours)
 
     def logits_of(self, batch: Batch) -> Tensor:
         """Logits of every cell, float (M, 2), scan by scan: each has a context of its own."""
-        if len(batch.cells) == 1:
-            return self(**batch.inputs)
         begin, logits = 0, []
         for cells in batch.cells:
-            scan = slice(begin, begin + cells)
-            inputs = {name: rows[scan] for name, rows in batch.inputs.items()}
-            inputs["neighbours"] = inputs["neighbours"] - begin
-            logits.append(self(**inputs))
+            points, distances, neighbours = (
+                batch.inputs[name][begin : begin + cells]
+                for name in ("points", "distances", "neighbours")
+            )
+            logits.append(self(points, distances, neighbours - begin))
             begin += cells
         return torch.cat(logits)
 
