@@ -33,6 +33,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     sweep = Sweep.of_yaml(arguments.plan, arguments.models)
+    columns = Plan.of_yaml(arguments.columns)  # read before anything is trained for it
     variants = [v for v in sweep.variants if v.title in (arguments.variants or (v.title,))]
     failed = {}
     for variant in variants:
@@ -45,7 +46,7 @@ def main() -> None:
         if variant.title not in failed
         for title, settings in variant.rows()
     }
-    plan = Plan.of_yaml(arguments.columns).with_only(rows)
+    plan = columns.with_only(rows)
     measurement = Measurement(plan, arguments.shared, arguments.work, arguments.threads)
     measurement.left_out.reasons |= failed
     report(measurement, arguments.out, turned=False, notes=[sweep.told(v) for v in variants])
