@@ -8,14 +8,7 @@ from torch import Tensor
 from derain.models.relative_outdet.steps import in_steps
 from derain.views.neighbour_search import NeighbourSearch
 
-
-def sphere(rows: int, columns: int, step: float, distance: float) -> np.ndarray:
-    """Points on a grid of rays with even steps, radians, at one distance."""
-    azimuth = step * (np.arange(columns) - columns / 2)
-    inclination = step * (np.arange(rows) - rows / 2)
-    a, i = (grid.ravel() for grid in np.meshgrid(azimuth, inclination))
-    unit = np.stack([np.cos(i) * np.cos(a), np.cos(i) * np.sin(a), np.sin(i)], axis=1)
-    return (distance * unit).astype(np.float32)
+from .rays import sphere
 
 
 def seen(xyz: np.ndarray, k: int = 9) -> tuple[Tensor, Tensor]:
