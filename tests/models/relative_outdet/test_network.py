@@ -12,7 +12,7 @@ from derain.models.relative_outdet.network import OF_CARRIER, _without_carrier
 from derain.models.relative_outdet.steps import USUAL_RANGE
 from derain.views.neighbour_search import NeighbourSearch
 
-from .rays import sphere
+from .beams import sphere
 
 # Logits of what is surely a drop, and of what is surely none.
 DROP, NO_DROP = 8.0, -8.0
@@ -28,7 +28,7 @@ def logits(network: RelativeOutDetNetwork, xyz: np.ndarray) -> Tensor:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("context", [0, 16])
 def test_the_rest_of_a_scan_matters_by_its_context_alone(seed: int, context: int) -> None:
-    """What is four times as far off is no one's neighbour, and on rays of the same step."""
+    """What is four times as far off is no one's neighbour, and on beams of the same step."""
     torch.manual_seed(seed)
     network = RelativeOutDetNetwork(context=context).eval()
     here, there = (sphere(20, 40, 0.01, distance) for distance in (12.0, 48.0))
