@@ -51,8 +51,7 @@ class Stage:
             *("--data.campaign.validation", str(self.validation)),
             *("--trainer.max_epochs", str(self.epochs)),
             *("--model.learning_rate", str(self.rate), *started),
-            *("--trainer.logger.init_args.save_dir", str(folder / "log")),
-            *("--checkpoint.dirpath", str(folder)),
+            *("--trainer.logger.init_args.save_dir", str(folder)),
         ]
 
 
@@ -69,10 +68,10 @@ def trained(stage: Stage, folder: Path, seed: int, start: Path | None = None) ->
         InputError: The folder has a training of another command, or derain failed.
     """
     command = stage.command(folder, seed, start)
-    told, record, checkpoint = shlex.join(command), folder / RECORD, folder / "last.ckpt"
+    told, record = shlex.join(command), folder / RECORD
     if record.exists():
-        if record.read_text("utf-8") == told and checkpoint.exists():
-            return checkpoint
+        if record.read_text("utf-8") == told:
+            return _last(folder)
         remedy = "Give another --out, or remove it."
         raise InputError(folder, f"has the training of another command, which {RECORD} is", remedy)
     if folder.exists():
@@ -81,4 +80,10 @@ def trained(stage: Stage, folder: Path, seed: int, start: Path | None = None) ->
     if subprocess.run([DERAIN, *command], check=False).returncode:
         raise InputError(folder, "derain fit failed", "See above.")
     record.write_text(told, "utf-8")  # last: a training that is stopped before is begun anew
+    return _last(folder)
+
+
+def _last(folder: Path) -> Path:
+    """The last checkpoint of the one training in a folder."""
+    (checkpoint,) = folder.glob("*/version_0/checkpoints/last.ckpt")
     return checkpoint

@@ -17,8 +17,8 @@ STAGE = Stage("calm", Path("worlds/calm"), 8, 2, 3, 0.01)
 STAND_IN = """\
 #!/bin/sh
 echo "$@" >> "{calls}"
-while [ "$1" != --checkpoint.dirpath ]; do shift; done
-mkdir -p "$2"; echo trained > "$2/last.ckpt"
+while [ "$1" != --trainer.logger.init_args.save_dir ]; do shift; done
+mkdir -p "$2/name/version_0/checkpoints"; echo trained > "$2/name/version_0/checkpoints/last.ckpt"
 [ ! -e "{broken}" ]
 """
 
@@ -51,12 +51,11 @@ def test_a_training_that_did_not_end_is_begun_anew(calls: Path, tmp_path: Path) 
     (tmp_path / "broken.txt").touch()
     with pytest.raises(InputError, match="derain fit failed"):
         trained(STAGE, folder, 7)
-    assert (folder / "last.ckpt").exists()  # it failed, or was stopped, after an epoch
-    (folder / "last-v1.ckpt").touch()
+    (left,) = folder.rglob("last.ckpt")  # it failed, or was stopped, after an epoch
+    left.write_text("half\n")
     (tmp_path / "broken.txt").unlink()
-    trained(STAGE, folder, 7)
+    assert trained(STAGE, folder, 7).read_text() == "trained\n"
     assert len(calls.read_text().splitlines()) == 2
-    assert not (folder / "last-v1.ckpt").exists()
 
 
 def test_the_training_of_another_seed_is_neither_taken_nor_lost(
