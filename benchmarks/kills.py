@@ -23,7 +23,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import sysconfig
 import tempfile
 import time
 from collections import Counter
@@ -34,13 +33,11 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from benchmarks.installed import DERAIN
 from benchmarks.small_inputs import COMMANDS, SmallInputs
 from benchmarks.whole_files import fault_of
 from derain.cli.signals import interrupting
 from derain.evaluation.text_tables import markdown_table
-
-# The command as installed: Lightning starts it again for each further process.
-DERAIN = Path(sysconfig.get_path("scripts")) / "derain"
 
 # Seconds that what a command began may take to notice that it is gone: a data loader of torch's
 # looks every five.

@@ -13,15 +13,14 @@ as long as that costs no more than MOST_LOST of the IoU. No label of a real scan
 
 import argparse
 import json
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.stages import Stage, trained
 from derain.cards.card import load_card
 from derain.datamodules.worlds import Worlds
 from derain.evaluation.text_tables import markdown_table
@@ -32,35 +31,12 @@ from derain.scan import Scan
 from derain.simulation.world_campaign import WorldCampaign
 from derain.sources.folders import named_frames
 
-CONFIGURATION = "relative_outdet_worlds.yaml"
-
 # Thresholds to choose from.
 THRESHOLDS = tuple(np.round(np.arange(0.3, 0.951, 0.05), 2).tolist())
 
 # Share of a clean scan that may be taken, and of the highest IoU that may be given for it.
 MOST_TAKEN = 1e-3
 MOST_LOST = 0.02
-
-
-@dataclass(frozen=True)
-class Stage:
-    """A part of the training.
-
-    Attributes:
-        world: Name of the packaged world.
-        root: Folder of its scans, which are made where they are missing.
-        train: Scans to train on.
-        validation: Scans that are held out.
-        epochs: How often each is trained on.
-        rate: Highest rate of learning.
-    """
-
-    world: str
-    root: Path
-    train: int
-    validation: int
-    epochs: int
-    rate: float
 
 
 def main() -> None:
@@ -71,8 +47,9 @@ def main() -> None:
     worlds = arguments.worlds or out / "worlds"
     first = Stage("world", worlds / "world", 900, 60, 10, 0.005)
     second = Stage("calm", worlds / "calm", 320, 40, 4, 0.002)
-    checkpoint = _trained(first, out, arguments.seed)
-    checkpoint = _trained(second, out, arguments.seed, start=checkpoint)
+    trainings = out / "trainings"
+    checkpoint = trained(first, trainings / first.world, arguments.seed)
+    checkpoint = trained(second, trainings / second.world, arguments.seed, start=checkpoint)
     unchosen = out / "unchosen.onnx"
     model = load_model(checkpoint)
     export(model, unchosen)
@@ -96,41 +73,16 @@ def main() -> None:
 
 
 def chosen(iou: Mapping[float, float], taken: Mapping[str, Mapping[float, float]]) -> float:
-    """The threshold.
+    """The threshold of highest IoU, raised as far as clean scans ask, and no farther than it may.
 
     Args:
         iou: IoU over worlds held out, by threshold.
         taken: Of each clean scan the share of its points called rain, by threshold.
     """
-    highest = max(iou.values())
-    possible = [t for t, value in iou.items() if value >= highest - MOST_LOST]
-    best = next(t for t, value in iou.items() if value == highest)
-    from_best = [t for t in possible if t >= best]
-    clean = [t for t in from_best if all(of[t] <= MOST_TAKEN for of in taken.values())]
-    return min(clean) if clean else max(from_best) if taken else best
-
-
-def _trained(stage: Stage, out: Path, seed: int, start: Path | None = None) -> Path:
-    """The last checkpoint of a stage of the training, which is skipped where it has been done."""
-    runs = out / stage.world
-    found = sorted(runs.glob("*/version_*/checkpoints/last.ckpt"))
-    if found:
-        return found[-1]
-    command = [
-        *(str(Path(sys.executable).with_name("derain")), "fit", "--config", CONFIGURATION),
-        *("--seed_everything", str(seed), "--data.root", str(stage.root)),
-        *("--data.campaign.train", str(stage.train)),
-        *("--data.campaign.validation", str(stage.validation)),
-        *("--data.campaign.world", stage.world),
-        *("--trainer.max_epochs", str(stage.epochs)),
-        *("--model.learning_rate", str(stage.rate)),
-        *("--trainer.logger.init_args.save_dir", str(runs)),
-    ]
-    if start is not None:
-        command += ["--start", str(start)]
-    print(*command, flush=True)
-    subprocess.run(command, check=True)
-    return sorted(runs.glob("*/version_*/checkpoints/last.ckpt"))[-1]
+    best = max(sorted(iou), key=lambda threshold: iou[threshold])
+    possible = [t for t in sorted(iou) if t >= best and iou[t] >= iou[best] - MOST_LOST]
+    clean = [t for t in possible if all(of[t] <= MOST_TAKEN for of in taken.values())]
+    return clean[0] if clean else possible[-1]
 
 
 def _held_out(stage: Stage) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
@@ -143,7 +95,7 @@ def _held_out(stage: Stage) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
 def _iou(
     derainer: Derainer, labelled: Iterator[tuple[Scan, NDArray[np.bool_]]]
 ) -> dict[float, float]:
-    """IoU by threshold, of pooled counts, as many of each world as it has points."""
+    """IoU by threshold, of the points of all scans together."""
     hit, either = np.zeros(len(THRESHOLDS)), np.zeros(len(THRESHOLDS))
     for scan, rain in labelled:
         probability = derainer.probability(scan)

@@ -4,7 +4,6 @@ import re
 import shlex
 import shutil
 import subprocess
-import sysconfig
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +11,10 @@ from typing import Any
 
 import yaml
 
+from benchmarks.installed import DERAIN
+
 # Folder of the data sets; no variant's is called so.
 DATA_SETS = "data-sets"
-
-DERAIN = Path(sysconfig.get_path("scripts")) / "derain"
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,10 @@
 """What a user may name to start a training from: a checkpoint, or the model that it became."""
 
-from importlib import resources
 from pathlib import Path
 
+from derain.default import DEFAULT, default_checkpoint
 from derain.errors import InputError
 from derain.files.reading import is_file
-
-# The model that comes with derain.
-DEFAULT = "default"
 
 START_HELP = (
     "begin from the weights of a trained model: a checkpoint, an ONNX file that has its checkpoint "
@@ -30,7 +27,7 @@ def checkpoint_of(start: str) -> Path:
         InputError: No such file, no checkpoint beside an ONNX file, or that of another model.
     """
     if start == DEFAULT:
-        return _of_default()
+        return default_checkpoint()
     path = Path(start)
     if not is_file(path):
         raise InputError(start, "no such file", f"Give a checkpoint, or {DEFAULT}.")
@@ -45,17 +42,6 @@ def checkpoint_of(start: str) -> Path:
             "its folder.",
         )
     _refuse_another(path, checkpoint)
-    return checkpoint
-
-
-def _of_default() -> Path:
-    checkpoint = Path(str(resources.files("derain"))) / "default" / "model.ckpt"
-    if not is_file(checkpoint):
-        raise InputError(
-            DEFAULT,
-            f"this derain comes without its checkpoint: {checkpoint} is missing",
-            "Install derain again, or give a checkpoint of your own.",
-        )
     return checkpoint
 
 

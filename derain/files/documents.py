@@ -116,6 +116,8 @@ class Entry:
 
     def members(self) -> dict[str, "Entry"]:
         """The values of a mapping by their keys, which must be text."""
+        if self.value is None and not self.key:
+            raise self.fault("it is empty", "Write `key: value` pairs.")
         if not isinstance(self.value, dict):
             raise self.fault(f"{shown(self.value)} is not a mapping", "Write `key: value` pairs.")
         for key in self.value:

@@ -9,10 +9,8 @@ import numpy as np
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
+from derain.simulation.drawing import Span, evenly_in_logarithm
 from derain.simulation.sensor import MOST_BEAMS, ReturnMode
-
-# Lowest and highest value of what is drawn evenly in between.
-Span = tuple[float, float]
 
 # Whatever holds spans.
 Spans = TypeVar("Spans")
@@ -194,10 +192,10 @@ def draw(spans: Any, name: str, generator: np.random.Generator) -> float:
         name: Its name.
         generator: Random generator.
     """
-    low, high = getattr(spans, name)
+    span: Span = getattr(spans, name)
     if name in LOGARITHMIC_SPANS:
-        return float(np.exp(generator.uniform(np.log(low), np.log(high))))
-    return float(generator.uniform(low, high))
+        return evenly_in_logarithm(span, generator)
+    return float(generator.uniform(*span))
 
 
 def draw_kind(weights: Mapping[str, float], generator: np.random.Generator) -> str:

@@ -1,5 +1,6 @@
 """The training world: where, with which sensor and in what weather a scan is taken, by spans."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -52,12 +53,17 @@ class World:
     precipitation: PrecipitationSpans = field(default_factory=PrecipitationSpans)
 
     def __post_init__(self) -> None:
-        weights = self.places.values()
-        if not any(weights) or not all(weight >= 0 for weight in weights):
-            raise InputError("world: places", f"{shown(dict(self.places))}", "Give weights from 0.")
+        for place, weight in self.places.items():
+            if not 0 <= weight < math.inf:
+                reason = f"{shown(weight)} is no weight"
+                raise InputError(f"world: places: {place}", reason, "Give 0 or more.")
+        if not any(self.places.values()):
+            raise InputError("world: places", "no place has a weight", "Give one place a weight.")
         for name in ("horizon", "carrier"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise InputError(f"world: {name}", "is no share", "Give a share of 0 to 1.")
+            share = getattr(self, name)
+            if not 0 <= share <= 1:
+                reason = f"{shown(share)} is no share"
+                raise InputError(f"world: {name}", reason, "Give a share of 0 to 1.")
 
     @classmethod
     def of(cls, entry: Entry) -> Self:

@@ -1,7 +1,7 @@
 """A data set of scans that are drawn one by one, and how one of them is written."""
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +64,7 @@ class WorldCampaign:
             InputError: A file that is missing or damaged.
         """
         world = load_world(self.world) if isinstance(self.world, str) else self.world
-        return WorldCampaign(self.train, self.validation, self.test, self.seed, world)
+        return replace(self, world=world)
 
     @property
     def names(self) -> list[str]:

@@ -2,7 +2,7 @@
 
 3D-OutDet is given places and intensities, by which it knows the sensor that it was trained on, and
 on another one it finds nothing. This variant of our own is given where neighbours are, in steps of
-the sensor's rays, and range.
+the sensor's beams, and range.
 
 Source: A. M. Raisuddin, T. Cortinhal, J. Holmblad, E. E. Aksoy, "3D-OutDet: A Fast and Memory
 Efficient Outlier Detector for 3D LiDAR Point Clouds in Adverse Weather", IEEE IV 2024, for two

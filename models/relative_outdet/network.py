@@ -16,14 +16,16 @@ NEGATIVE_SLOPE = 0.1
 SHELLS = (-1.8, 2.2, 9)
 SHELL_REACH = 0.35
 
-# What carries a sensor is seen within so many metres of it, often in a few scattered points that
-# look like drops. But drops do not end there: in the next metres, as far as the second number, a
-# sensor sees as many, or more than a share of the scan. Modelling choices.
+# The vehicle or mast that carries a sensor is seen within OF_CARRIER metres, often in a few
+# scattered points that look like drops. Real drops do not end there: from there to BEYOND_CARRIER
+# metres the sensor sees as many again or, where rain is dense, drops that make up SHARE_OF_CARRIER
+# of the scan. Modelling choices.
 OF_CARRIER, BEYOND_CARRIER = 2.0, 6.0
 SHARE_OF_CARRIER = 0.0025
 
-# What a logit loses where they do end there: all of it where a third more would be expected; and
-# what is counted as drops beyond besides, so that none at all can be divided by.
+# Where fewer lie beyond than would be expected, near logits are lowered, in proportion to how many
+# are missing: by CERTAINLY_NOT once a third more would be expected than there are. HALF_A_DROP is
+# added to those beyond, since there may be none to divide by.
 CERTAINLY_NOT, OF_A_THIRD = 20.0, 3.0
 HALF_A_DROP = 0.5
 
@@ -113,14 +115,16 @@ def _active(features: Tensor) -> Tensor:
 
 
 def _of_both(layer: nn.Linear, first: Tensor, second: Tensor) -> Tensor:
-    """A layer of two inputs side by side, which are not copied to lie so: that is faster."""
+    """A layer on two inputs side by side; they are not copied next to each other, to be faster."""
     width = first.shape[1]
     of_first = functional.linear(first, layer.weight[:, :width], layer.bias)
     return of_first + functional.linear(second, layer.weight[:, width:])
 
 
 def _without_carrier(rain: Tensor, far: Tensor) -> Tensor:
-    """Takes back rain right before the sensor where there is hardly any farther off.
+    """Lowers logits of rain right before the sensor where there is hardly any rain beyond.
+
+    It is a rule for scans as they are judged; training leaves it out.
 
     Args:
         rain: Logits of rain, float (M,).

@@ -1,4 +1,4 @@
-"""Neighbourhoods in steps of the sensor's rays: nothing that differs between sensors."""
+"""Neighbourhoods in steps of the sensor's beams: nothing that differs between sensors."""
 
 import torch
 from torch import Tensor
@@ -9,18 +9,18 @@ from torch.nn import functional
 NEAREST_POINT = 0.05
 NEAREST_TO_AXIS = 0.01
 
-# To the third nearest ray among those of its neighbours a ray has a step or two, whichever of the
-# two axes steps finer; the nearest may be the other return of the same ray.
+# A step is the angle to the third nearest beam among those of a point's neighbours. Two of the
+# nearest lie on either side, along the axis of finer resolution, and another return of the point's
+# own beam may be nearer still.
 OF_STEP = 3
 
-# Of so many points, evenly spread over a scan, the step of its rays is the median.
-SAMPLED_RAYS = 2049
+# The step of a scan is the median over so many of its points, evenly spread over its rows.
+SAMPLED_POINTS = 2049
 
-# Radians; no sensor's rays lie closer.
+# Radians; no sensor's beams lie closer together.
 FINEST_ANGLE = 1e-4
 
-# What is added before logarithms, and to sums that are divided by: next to nothing, but where there
-# is nothing at all.
+# Added to what logarithms are taken of, and to what is divided by: either may be 0.
 FEWEST_STEPS = 1e-2
 HARDLY_ANY = 1e-3
 
@@ -35,11 +35,11 @@ NUMBERS = 4
 
 
 def in_steps(points: Tensor, distances: Tensor, neighbours: Tensor) -> tuple[Tensor, Tensor]:
-    """Where each point's neighbours are, seen along its ray and across it.
+    """Where each point's neighbours are, along its beam and across it.
 
-    A step is the angle between neighbouring rays, taken from the scan itself: the median of the
-    angles between its points and the third nearest among their neighbours' rays. Across a point's
-    ray it is as long as the step at the point's range.
+    A step is the angle between neighbouring beams, the angular resolution of the sensor. It is
+    taken from the scan itself: the median over its points of the angle to the third nearest among
+    their neighbours' beams. In metres it is that angle times the range of the point.
 
     Args:
         points: x, y, z in metres, in the sensor's frame, float (M, 3).
@@ -88,10 +88,10 @@ def _range_of(places: Tensor) -> Tensor:
 
 
 def _step(aside: Tensor, risen: Tensor, distance: Tensor) -> Tensor:
-    """The angle between neighbouring rays, radians, float (); of no points 0.1."""
+    """The angle between neighbouring beams, radians, float (); of no points 0.1."""
     angles = (aside.square() + risen.square()).sqrt() / distance[:, None]
     # A row more, so that there is one to take the median of.
     angles = torch.cat([angles, angles.new_full((1, angles.shape[1]), 0.1)])
-    some = torch.arange(SAMPLED_RAYS, device=angles.device) * distance.shape[0] // SAMPLED_RAYS
+    some = torch.arange(SAMPLED_POINTS, device=angles.device) * distance.shape[0] // SAMPLED_POINTS
     third = angles[some].topk(OF_STEP, dim=1, largest=False).values[:, -1]
-    return third.topk(SAMPLED_RAYS // 2 + 1).values[-1].clamp_min(FINEST_ANGLE)
+    return third.topk(SAMPLED_POINTS // 2 + 1).values[-1].clamp_min(FINEST_ANGLE)

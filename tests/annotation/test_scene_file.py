@@ -69,7 +69,7 @@ BOX = "{class: car, centre: [0, 0, 0], size: [1, 1, 1]}"
 @pytest.mark.parametrize(
     ("text", "key", "reason"),
     [
-        ("", "", "None is not a mapping"),
+        ("", "", "it is empty"),
         ("boxes: {}", "", "road is missing"),
         (ROAD + "roof: 1", "roof", "there is no such key"),
         ("road: [[0, 0], [1, 0]]", "road", "2 corners make no polygon"),

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import lightning
 import numpy as np
@@ -10,10 +9,10 @@ import pytest
 import torch
 
 from derain.cards.card import load_card
-from derain.cli import start as start_option
 from derain.cli.learning_student import network_options
 from derain.cli.lesson import Lesson
 from derain.cli.start import checkpoint_of
+from derain.default import packaged_model
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
@@ -63,12 +62,11 @@ def test_an_onnx_file_stands_for_the_checkpoint_beside_it(exported: Path) -> Non
 def test_default_is_the_checkpoint_that_derain_comes_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(start_option, "resources", SimpleNamespace(files=lambda _: tmp_path))
-    with pytest.raises(InputError, match="comes without its checkpoint"):
+    monkeypatch.setattr(packaged_model, "_folder", lambda: tmp_path)
+    with pytest.raises(InputError, match=r"comes with derain is missing\. Install derain again"):
         checkpoint_of("default")
-    (tmp_path / "default").mkdir()
-    trained(tmp_path / "default/model.ckpt")
-    assert checkpoint_of("default") == tmp_path / "default/model.ckpt"
+    trained(tmp_path / "model.ckpt")
+    assert checkpoint_of("default") == tmp_path / "model.ckpt"
 
 
 def test_fit_begins_with_the_weights_of_its_start(

@@ -1,20 +1,30 @@
 """The model that comes with derain: it is the one of its card, or it is refused."""
 
 import shutil
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 import yaml
 
 import derain
-from derain.default import DEFAULT, default_model, model_card, packaged_model
+from derain.default import (
+    DEFAULT,
+    default_checkpoint,
+    default_model,
+    model_card,
+    packaged_model,
+)
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.methods import load_method
 from derain.files.documents import LARGEST_DOCUMENT
+from derain.models.checkpoint import load_model
 from derain.scan import Scan
+from derain.views.probability import probability_of_rain
 
 # What the file may weigh, bytes: it is in every installation.
 LARGEST = 2_000_000
@@ -25,7 +35,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the model's folder, in place of the installed one."""
     folder = tmp_path / "installed"
     folder.mkdir()
-    for name in ("model.onnx", "card.yaml"):
+    for name in ("model.onnx", "model.ckpt", "card.yaml"):
         shutil.copy(Path(str(resources.files("derain.default"))) / name, folder)
     monkeypatch.setattr(packaged_model, "_folder", lambda: folder)
     return folder
@@ -80,10 +90,32 @@ def test_a_changed_file_is_refused(installed: Path, change: bytes | None) -> Non
     assert "Install derain again" in text
 
 
-def test_a_missing_file_is_told(installed: Path) -> None:
-    (installed / "model.onnx").unlink()
+@pytest.mark.parametrize(
+    ("name", "find"),
+    [
+        ("model.onnx", default_model),
+        ("model.ckpt", default_checkpoint),
+        ("card.yaml", model_card),
+        ("card.yaml", default_model),
+    ],
+)
+def test_a_missing_file_is_told(installed: Path, name: str, find: Callable[[], object]) -> None:
+    (installed / name).unlink()
     with pytest.raises(InputError, match=r"model that comes with derain is missing\. Install"):
-        default_model()
+        find()
+
+
+def test_the_checkpoint_is_of_the_same_model() -> None:
+    model, derainer = load_model(default_checkpoint()).eval(), derain.Derainer(threads=1)
+    drops = np.random.default_rng(0).uniform(-8, 8, (200, 4))
+    scan = Scan.of(np.concatenate([scene(2000), drops]))
+    seen = model.spec.make_view(threads=1)(scan)
+    with torch.inference_mode():
+        logits = model(**{name: torch.from_numpy(each) for name, each in seen.inputs().items()})
+    probability = seen.back(probability_of_rain(logits.numpy()))
+    np.testing.assert_allclose(derainer.probability(scan), probability, atol=1e-4)
+    assert 0 < derainer(scan).sum() < len(scan)
+    assert model.spec.as_dict() == derainer.spec.as_dict()
 
 
 @pytest.mark.parametrize(
@@ -103,12 +135,12 @@ def test_a_damaged_card_is_refused(installed: Path, key: str, value: object, rea
     content = yaml.safe_load(path.read_text("utf-8"))
     content[key] = value
     path.write_text(yaml.safe_dump({k: v for k, v in content.items() if v is not None}))
-    with pytest.raises(InputError, match=reason):
+    with pytest.raises(InputError, match=f"{reason}.*Install derain again"):
         model_card()
 
 
 def test_what_is_no_card_is_refused(installed: Path) -> None:
     for content in ("[]", "a: [", "x" * (LARGEST_DOCUMENT + 1)):
         (installed / "card.yaml").write_text(content)
-        with pytest.raises(InputError, match=r"card\.yaml"):
+        with pytest.raises(InputError, match=r"card\.yaml.*Install derain again"):
             model_card()

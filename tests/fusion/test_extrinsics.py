@@ -76,7 +76,7 @@ def rigid(**changes: float) -> list[list[float]]:
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
-        ("", "None is not a mapping"),
+        ("", "it is empty"),
         ("- 1", "[1] is not a mapping"),
         ("a: [", "while parsing"),
         ("{x: 1}", "its keys are x"),

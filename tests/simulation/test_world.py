@@ -74,8 +74,10 @@ def test_another_world_is_not_mixed_in(small: str, tmp_path: Path) -> None:
     ("document", "said"),
     [
         ({"places": {"moon": 1}}, "moon"),
-        ({"places": {"street": 0}}, "weights"),
-        ({"places": {"street": -1}}, "weights"),
+        ({"places": {"street": 0}}, "no place has a weight"),
+        ({"places": {}}, "no place has a weight"),
+        ({"places": {"street": -1}}, "places: street: -1.0 is no weight"),
+        (None, "it is empty"),
         ({"horizon": 2}, "horizon"),
         ({"weather": "fine"}, "weather"),
         ({"precipitation": {"frogs": {}}}, "frogs"),

@@ -188,7 +188,7 @@ def test_a_user_describes_a_grid_in_yaml() -> None:
     ("config", "reason"),
     [
         ("kitti", "no grid named 'kitti'"),
-        (None, "None is not a mapping"),
+        (None, "it is empty"),
         ([64, 2048], "[64, 2048] is not a mapping"),
         ({}, "columns is missing"),
         ({"columns": 64}, "its rows are described by nothing"),

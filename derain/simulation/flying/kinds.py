@@ -7,9 +7,8 @@ import numpy as np
 
 from derain.errors import InputError
 from derain.files.documents import shown
+from derain.simulation.drawing import Span
 from derain.simulation.flying.precipitation import LARGEST, SMALLEST, GustForm, Precipitation
-
-Span = tuple[float, float]
 
 # How the density varies where it does.
 UNEVEN: tuple[GustForm, ...] = ("gusts", "sheets", "filaments")

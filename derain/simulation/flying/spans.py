@@ -8,7 +8,8 @@ import numpy as np
 
 from derain.errors import InputError
 from derain.files.documents import Entry
-from derain.simulation.flying.kinds import Kind, Span
+from derain.simulation.drawing import Span
+from derain.simulation.flying.kinds import Kind
 from derain.simulation.flying.precipitation import Precipitation
 
 # Rain: numbers and sizes from drizzle to a cloudburst as Marshall and Palmer give them above .2 mm;

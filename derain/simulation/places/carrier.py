@@ -12,8 +12,8 @@ import numpy as np
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
+from derain.simulation.drawing import Span, evenly_in_logarithm
 from derain.simulation.objects import Surface
-from derain.simulation.places.drawing import Span, evenly_in_logarithm
 from derain.simulation.places.frames import Point, bars
 from derain.simulation.places.specks import PAINT, mirrored
 from derain.simulation.shapes import Triangles

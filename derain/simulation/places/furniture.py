@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from derain.simulation import shapes
+from derain.simulation.drawing import evenly_in_logarithm
 from derain.simulation.objects import Surface
 from derain.simulation.places import plants, threads
-from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.places.frames import Point, bars, made
 from derain.simulation.shapes import Triangles
 

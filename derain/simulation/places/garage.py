@@ -7,9 +7,9 @@ from itertools import product
 import numpy as np
 
 from derain.simulation import shapes
+from derain.simulation.drawing import evenly_in_logarithm
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
-from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.places.relief import Relief, ground_mesh
 from derain.simulation.places.standing import (
     Make,

@@ -7,7 +7,7 @@ behind, as it does through real glass; where it meets one it returns weakly, by 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.simulation.places.drawing import evenly_in_logarithm
+from derain.simulation.drawing import evenly_in_logarithm
 from derain.simulation.shapes import Triangles
 
 GLASS_CELL = 0.04

@@ -4,8 +4,8 @@ import numpy as np
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
+from derain.simulation.drawing import evenly_in_logarithm, many_evenly_in_logarithm
 from derain.simulation.objects import Surface
-from derain.simulation.places.drawing import evenly_in_logarithm, many_evenly_in_logarithm
 
 # Of snow, and of earth and stone.
 BRIGHT, DULL = (0.3, 0.95), (0.05, 0.4)

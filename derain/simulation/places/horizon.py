@@ -7,12 +7,9 @@ import numpy as np
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
+from derain.simulation.drawing import evenly_in_logarithm, many_evenly_in_logarithm
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, threads
-from derain.simulation.places.drawing import (
-    evenly_in_logarithm,
-    many_evenly_in_logarithm,
-)
 from derain.simulation.shapes import Triangles
 
 # Where things stand, and where the hills begin and end, metres.

@@ -9,8 +9,8 @@ from derain.simulation import objects, shapes
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
 from derain.simulation.places.crowd import ragged_things
-from derain.simulation.places.drawing import along
 from derain.simulation.places.relief import Relief, ground_mesh
+from derain.simulation.places.spacing import along
 from derain.simulation.places.standing import (
     Make,
     assembled,

@@ -6,8 +6,8 @@ import numpy as np
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
+from derain.simulation.drawing import evenly_in_logarithm
 from derain.simulation.objects import Surface
-from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.shapes import Triangles
 
 # Of cloth, which in the near infrared is anything from black to white.

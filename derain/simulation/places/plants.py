@@ -11,11 +11,8 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
+from derain.simulation.drawing import evenly_in_logarithm, many_evenly_in_logarithm
 from derain.simulation.objects import Surface
-from derain.simulation.places.drawing import (
-    evenly_in_logarithm,
-    many_evenly_in_logarithm,
-)
 from derain.simulation.shapes import Triangles
 
 PLANT_REFLECTIVITY = (0.01, 0.6)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
+from derain.simulation.drawing import Span, evenly_in_logarithm, many_evenly_in_logarithm
 from derain.simulation.objects import Surface
-from derain.simulation.places.drawing import Span, evenly_in_logarithm, many_evenly_in_logarithm
 
 RELIEF_WAVES = 12
 WAVELENGTHS = (2.5, 60.0)

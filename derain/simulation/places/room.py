@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
+from derain.simulation.drawing import evenly_in_logarithm
 from derain.simulation.objects import Surface
 from derain.simulation.places import furniture, people, plants, threads
-from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.places.frames import bars, made, railing
 from derain.simulation.places.shell import Walls, moved, shell
 from derain.simulation.places.specks import mirrored

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 
 from derain.simulation import shapes
+from derain.simulation.drawing import Span, evenly_in_logarithm
 from derain.simulation.objects import Surface
 from derain.simulation.places import threads, walls
-from derain.simulation.places.drawing import Span, evenly_in_logarithm
 from derain.simulation.places.frames import Point, bars, made
 from derain.simulation.places.glass import pane
 from derain.simulation.places.standing import put

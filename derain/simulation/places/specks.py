@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.simulation.drawing import evenly_in_logarithm
 from derain.simulation.objects import Surface
-from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.shapes import Triangles
 
 # Of what returns, and of what reflects so little towards the sensor that no detector sees it.

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.simulation import shapes
+from derain.simulation.drawing import Span, evenly_in_logarithm
 from derain.simulation.objects import Surface
-from derain.simulation.places.drawing import Span, evenly_in_logarithm
 from derain.simulation.places.relief import Relief
 from derain.simulation.track import Track
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
+from derain.simulation.drawing import Span, evenly_in_logarithm
 from derain.simulation.objects import Surface
-from derain.simulation.places.drawing import Span, evenly_in_logarithm
 from derain.simulation.shapes import Triangles
 
 THREAD_REFLECTIVITY = (0.03, 0.6)

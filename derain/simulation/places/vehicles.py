@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
+from derain.simulation.drawing import evenly_in_logarithm
 from derain.simulation.objects import Surface
-from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.places.frames import bars
 from derain.simulation.places.glass import pane
 from derain.simulation.shapes import Triangles

@@ -6,8 +6,8 @@ import numpy as np
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
+from derain.simulation.drawing import evenly_in_logarithm
 from derain.simulation.objects import Surface
-from derain.simulation.places.drawing import evenly_in_logarithm
 from derain.simulation.places.frames import bars, railing
 from derain.simulation.places.glass import pane
 from derain.simulation.places.threads import cable

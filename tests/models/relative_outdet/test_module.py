@@ -8,16 +8,19 @@ import numpy as np
 import pytest
 import torch
 
+from derain.cards.card import load_card
 from derain.datamodules.in_memory import InMemory
 from derain.datamodules.loading import Loading
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
+from derain.export.candidates import candidates_of_findings
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
 from derain.models.checkpoint import load_model, save_model
 from derain.models.relative_outdet import RelativeOutDet
 from derain.scan import Scan
+from derain.views.candidates import Bound, Candidates
 
 
 def labelled(seed: int, drops: int = 300) -> Scan:
@@ -66,28 +69,16 @@ def test_scans_of_a_batch_say_nothing_to_each_other(trained: RelativeOutDet) -> 
     torch.testing.assert_close(together, torch.cat(alone))
 
 
-def test_candidates_get_what_they_would_get_among_all(trained: RelativeOutDet) -> None:
-    view = trained.spec.make_view(threads=1)
-    seen = view(labelled(3))
-    inputs = {name: torch.from_numpy(array) for name, array in seen.inputs().items()}
-    chosen = torch.arange(0, len(seen.points), 7)
-    with torch.no_grad():
-        every = trained(**inputs)
-        some = trained(**inputs, candidates=inputs["neighbours"][chosen])
-    torch.testing.assert_close(some, every[chosen])
-
-
-def test_what_a_scan_holds_matters(trained: RelativeOutDet) -> None:
-    """The same drop is judged by how many others there are."""
-    view = trained.spec.make_view(threads=1)
-    seen = view(labelled(4))
-    inputs = {name: torch.from_numpy(array) for name, array in seen.inputs().items()}
-    network = trained.network
-    with torch.no_grad():
-        before = network(**inputs)
-        network.from_context.weight.zero_()
-        after = network(**inputs)
-    assert not torch.allclose(before, after)
+def test_it_takes_no_candidates(trained: RelativeOutDet) -> None:
+    """What it says of a point depends on all the others, so that none may be left out."""
+    candidates = Candidates((Bound("range", most=20.0),))
+    view = trained.spec.make_view()
+    assert trained.sees_through(view)
+    assert not trained.sees_through(view.judging(candidates))
+    with pytest.raises(InputError, match="relative_outdet"):
+        RelativeOutDet().adopt(replace(trained.spec, candidates=candidates))
+    with pytest.raises(InputError, match="--candidates: relative_outdet judges every point alike"):
+        candidates_of_findings(trained, [labelled(3)], load_card("wads"))
 
 
 def test_a_checkpoint_gives_the_same(trained: RelativeOutDet, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Neighbourhoods in steps of the sensor's rays: what does not change from sensor to sensor."""
+"""Neighbourhoods in steps of the sensor's beams: what does not change from sensor to sensor."""
 
 import numpy as np
 import pytest
@@ -8,14 +8,7 @@ from torch import Tensor
 from derain.models.relative_outdet.steps import in_steps
 from derain.views.neighbour_search import NeighbourSearch
 
-
-def sphere(rows: int, columns: int, step: float, distance: float) -> np.ndarray:
-    """Points on a grid of rays with even steps, radians, at one distance."""
-    azimuth = step * (np.arange(columns) - columns / 2)
-    inclination = step * (np.arange(rows) - rows / 2)
-    a, i = (grid.ravel() for grid in np.meshgrid(azimuth, inclination))
-    unit = np.stack([np.cos(i) * np.cos(a), np.cos(i) * np.sin(a), np.sin(i)], axis=1)
-    return (distance * unit).astype(np.float32)
+from .beams import sphere
 
 
 def seen(xyz: np.ndarray, k: int = 9) -> tuple[Tensor, Tensor]:
@@ -23,7 +16,7 @@ def seen(xyz: np.ndarray, k: int = 9) -> tuple[Tensor, Tensor]:
     return in_steps(*map(torch.from_numpy, (xyz, distances, neighbours)))
 
 
-def test_a_step_of_even_rays_is_one_step() -> None:
+def test_a_step_of_even_beams_is_one_step() -> None:
     around, far = seen(sphere(40, 60, 0.004, 20.0))
     middle = slice(1000, 1400)
     nearest = torch.exp(around[middle, :4, 0])

@@ -1,0 +1,103 @@
+"""The model that comes with derain: each stage is trained once, and its threshold is chosen."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from benchmarks import stages
+from benchmarks.make_default import MOST_LOST, MOST_TAKEN, chosen
+from benchmarks.stages import Stage, trained
+from derain.errors import InputError
+
+STAGE = Stage("calm", Path("worlds/calm"), 8, 2, 3, 0.01)
+
+# Stands in for derain: writes the checkpoint that it is told to, and fails where broken.txt is.
+STAND_IN = """\
+#!/bin/sh
+echo "$@" >> "{calls}"
+while [ "$1" != --trainer.logger.init_args.save_dir ]; do shift; done
+mkdir -p "$2/name/version_0/checkpoints"; echo trained > "$2/name/version_0/checkpoints/last.ckpt"
+[ ! -e "{broken}" ]
+"""
+
+THRESHOLDS = (0.3, 0.4, 0.5, 0.6)
+
+
+@pytest.fixture
+def calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A file that tells how derain was called."""
+    stand_in, calls = tmp_path / "derain", tmp_path / "calls.txt"
+    stand_in.write_text(STAND_IN.format(calls=calls, broken=tmp_path / "broken.txt"))
+    stand_in.chmod(0o755)
+    monkeypatch.setattr(stages, "DERAIN", stand_in)
+    return calls
+
+
+def test_a_stage_that_was_trained_is_not_trained_again(calls: Path, tmp_path: Path) -> None:
+    folder, start = tmp_path / "made", tmp_path / "start.ckpt"
+    checkpoint = trained(STAGE, folder, 7, start)
+    told = calls.read_text()
+    assert "--seed_everything 7 --data.root worlds/calm --data.campaign.world calm" in told
+    assert f"--start {start}" in told
+    assert checkpoint.read_text() == "trained\n"
+    assert trained(STAGE, folder, 7, start) == checkpoint
+    assert calls.read_text() == told
+
+
+def test_a_training_that_did_not_end_is_begun_anew(calls: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "made"
+    (tmp_path / "broken.txt").touch()
+    with pytest.raises(InputError, match="derain fit failed"):
+        trained(STAGE, folder, 7)
+    (left,) = folder.rglob("last.ckpt")  # it failed, or was stopped, after an epoch
+    left.write_text("half\n")
+    (tmp_path / "broken.txt").unlink()
+    assert trained(STAGE, folder, 7).read_text() == "trained\n"
+    assert len(calls.read_text().splitlines()) == 2
+
+
+def test_the_training_of_another_seed_is_neither_taken_nor_lost(
+    calls: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "made"
+    checkpoint = trained(STAGE, folder, 7)
+    with pytest.raises(InputError, match="training of another command"):
+        trained(STAGE, folder, 8)
+    assert checkpoint.exists()
+    assert len(calls.read_text().splitlines()) == 1
+
+
+shares = st.floats(0, 4 * MOST_TAKEN)
+ious = st.floats(0.5, 0.5 + 3 * MOST_LOST)
+
+
+def by_threshold(values: st.SearchStrategy[float]) -> st.SearchStrategy[dict[float, float]]:
+    return st.fixed_dictionaries(dict.fromkeys(THRESHOLDS, values))
+
+
+@given(by_threshold(ious), st.dictionaries(st.sampled_from("abc"), by_threshold(shares)))
+def test_a_threshold_is_raised_as_far_as_clean_scans_ask_and_it_may(
+    iou: dict[float, float], taken: dict[str, dict[float, float]]
+) -> None:
+    best, threshold = chosen(iou, {}), chosen(iou, taken)
+    assert iou[best] == max(iou.values())
+    assert threshold >= best
+    assert iou[threshold] >= iou[best] - MOST_LOST
+    bearable = {t for t in THRESHOLDS if all(of[t] <= MOST_TAKEN for of in taken.values())}
+    affordable = {t for t in THRESHOLDS if t >= best and iou[t] >= iou[best] - MOST_LOST}
+    if threshold in bearable:
+        assert not any(t < threshold for t in bearable & affordable)
+    else:  # none would do: as little as may be is taken
+        assert not bearable & affordable
+        assert threshold == max(affordable)
+
+
+def test_thresholds_by_hand() -> None:
+    iou = dict(zip(THRESHOLDS, (0.7, 0.8, 0.79, 0.5), strict=True))
+    assert chosen(iou, {}) == 0.4
+    assert chosen(iou, {"clean": dict.fromkeys(THRESHOLDS, 0.0)}) == 0.4
+    falling = dict(zip(THRESHOLDS, (1.0, 0.5, MOST_TAKEN, 0.0), strict=True))
+    assert chosen(iou, {"clean": falling}) == 0.5
+    assert chosen(iou, {"clean": dict.fromkeys(THRESHOLDS, 1.0)}) == 0.5
