@@ -103,8 +103,12 @@ class RelativeOutDetNetwork(nn.Module):
         """What the scan holds at the range of each point, and in all."""
         share = torch.softmax(-(((far[:, None] - self.centres) / SHELL_REACH) ** 2), dim=1)
         said = _active(self.to_context(features))
-        of_shell = share.T @ said / (share.sum(dim=0)[:, None] + HARDLY_ANY)
-        of_all = said.sum(dim=0) / (said.shape[0] + HARDLY_ANY)
+        # In float64: sums of float32 over a whole scan differ from one runtime to another, by enough
+        # to change a logit in its third digit.
+        shares, all_said = share.double(), said.double()
+        of_shell = shares.T @ all_said / (shares.sum(dim=0)[:, None] + HARDLY_ANY)
+        of_all = all_said.sum(dim=0) / (said.shape[0] + HARDLY_ANY)
+        of_shell, of_all = of_shell.to(said.dtype), of_all.to(said.dtype)
         of_all = of_all.expand(said.shape[0], -1)
         result: Tensor = self.from_context(torch.cat([share @ of_shell, of_all], dim=1))
         return result
@@ -135,7 +139,8 @@ def _without_carrier(rain: Tensor, far: Tensor) -> Tensor:
     """
     near = far < math.log(OF_CARRIER / USUAL_RANGE)
     beyond = ~near & (far < math.log(BEYOND_CARRIER / USUAL_RANGE))
-    drops = rain.sigmoid()
-    expected = torch.minimum((drops * near).sum(), SHARE_OF_CARRIER * torch.ones_like(rain).sum())
+    drops = rain.sigmoid().double()  # of many points sums are taken in float64, as above
+    expected = torch.minimum((drops * near).sum(), SHARE_OF_CARRIER * torch.ones_like(drops).sum())
     missing = expected / ((drops * beyond).sum() + HALF_A_DROP) - 1
-    return rain - CERTAINLY_NOT * (OF_A_THIRD * missing).clamp(0, 1) * near
+    taken_back = CERTAINLY_NOT * (OF_A_THIRD * missing).clamp(0, 1).to(rain.dtype)
+    return rain - taken_back * near

@@ -56,13 +56,13 @@ def in_steps(points: Tensor, distances: Tensor, neighbours: Tensor) -> tuple[Ten
     x, y, z = own.unbind(1)
     level = (x * x + y * y).sqrt().clamp_min(NEAREST_TO_AXIS)
     distance = (x * x + y * y + z * z).sqrt().clamp_min(NEAREST_POINT)
-    places = functional.embedding(neighbours[:, 1:], points)
-    offset = places - own[:, None]
+    offset = functional.embedding(neighbours[:, 1:], points) - own[:, None]
     ahead, left, up = offset.unbind(2)
-    outwards = (x[:, None] * ahead + y[:, None] * left) / level[:, None]
+    level_dot = x[:, None] * ahead + y[:, None] * left
+    outwards = level_dot / level[:, None]
     aside = (x[:, None] * left - y[:, None] * ahead) / level[:, None]
     risen = (level[:, None] * up - z[:, None] * outwards) / distance[:, None]
-    farther = _range_of(places) - distance[:, None]
+    farther = _farther(distance[:, None], level_dot + z[:, None] * up, distances[:, 1:])
     step = _step(aside, risen, distance)
     length = (distance * step)[:, None]
     seen = torch.stack(
@@ -83,8 +83,22 @@ def _asinh(steps: Tensor) -> Tensor:
     return torch.sign(steps) * torch.log(size + (size * size + 1).sqrt())
 
 
-def _range_of(places: Tensor) -> Tensor:
-    return places.square().sum(dim=2).sqrt().clamp_min(NEAREST_POINT)
+def _farther(distance: Tensor, dot: Tensor, apart: Tensor) -> Tensor:
+    """How much farther neighbours are from the sensor: a difference of squares by the sum.
+
+    The difference of two ranges would leave the rounding of both, which where beams lie close is no
+    small part of a step.
+
+    Args:
+        distance: Ranges of the points, metres, float (M, 1).
+        dot: Products of the points with the offsets of their neighbours, float (M, k - 1).
+        apart: How far those are from the points, metres, float (M, k - 1).
+
+    Returns:
+        Metres, float (M, k - 1).
+    """
+    squares = 2 * dot + apart * apart
+    return squares / ((distance * distance + squares).clamp_min(0).sqrt() + distance)
 
 
 def _step(aside: Tensor, risen: Tensor, distance: Tensor) -> Tensor:
