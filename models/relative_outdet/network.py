@@ -103,8 +103,8 @@ class RelativeOutDetNetwork(nn.Module):
         """What the scan holds at the range of each point, and in all."""
         share = torch.softmax(-(((far[:, None] - self.centres) / SHELL_REACH) ** 2), dim=1)
         said = _active(self.to_context(features))
-        # In float64: sums of float32 over a whole scan differ from one runtime to another, by enough
-        # to change a logit in its third digit.
+        # In float64, for sums of float32 over a whole scan differ from one runtime to another, and
+        # with them the logits in their third digit.
         shares, all_said = share.double(), said.double()
         of_shell = shares.T @ all_said / (shares.sum(dim=0)[:, None] + HARDLY_ANY)
         of_all = all_said.sum(dim=0) / (said.shape[0] + HARDLY_ANY)
