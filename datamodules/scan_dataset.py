@@ -12,7 +12,7 @@ from derain.datamodules.kept import Kept
 from derain.datamodules.order import Pick
 from derain.datamodules.windows import seen
 from derain.errors import InputError
-from derain.learning.batch import READING, VIEW, Batch, Sample, total_seconds
+from derain.learning.batch import READ, VIEW, Batch, Sample, added_up
 from derain.learning.seeds import Draw, generator_of
 from derain.scan import Scan
 from derain.sources.frame import Frame
@@ -86,28 +86,28 @@ class ScanDataset(Dataset[Sample | InputError]):
         return map(self.reader.read, evenly_spaced(self.frames, most))
 
     def _sample(self, pick: Pick) -> Sample:
-        watch, number, frame = Stopwatch(), pick.number, self.frames[pick.number]
+        stopwatch, number, frame = Stopwatch(), pick.number, self.frames[pick.number]
 
         def read() -> Scan:
-            with watch.times(READING):
+            with stopwatch.stage(READ):
                 return self.read(frame)
 
-        with watch.times(VIEW):
+        with stopwatch.stage(VIEW):
             if self.augmentation is None:
-                made = self._samples.get(number, lambda: self._viewed(read(), number, watch))
+                made = self._samples.get(number, lambda: self._viewed(read(), number, stopwatch))
             else:
                 scan = self._scans.get(number, read)
                 # The first time is drawn as where there is no second one.
                 drawn = (number, pick.again) if pick.again else (number,)
                 generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, *drawn)
                 scan = self.augmentation(scan, generator, self.view.azimuth)
-                made = self._viewed(scan, number, watch)
+                made = self._viewed(scan, number, stopwatch)
         # Of a sample that was kept, what this epoch took, which is next to nothing.
-        return replace(made, measured=pick.measured, seconds=watch.seconds)
+        return replace(made, measured=pick.measured, milliseconds=stopwatch.milliseconds)
 
-    def _viewed(self, scan: Scan, number: int, watch: Stopwatch) -> Sample:
+    def _viewed(self, scan: Scan, number: int, stopwatch: Stopwatch) -> Sample:
         def read_around(frame: Frame) -> Scan:
-            with watch.times(READING):
+            with stopwatch.stage(READ):
                 return self.reader.read_unlabelled(frame)
 
         view = seen(self.view, scan, self.frames, number, read_around)
@@ -133,7 +133,7 @@ def packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:
     for error in samples:
         if isinstance(error, InputError):
             return error
-    watch = Stopwatch()
-    with watch.times(VIEW):
+    stopwatch = Stopwatch()
+    with stopwatch.stage(VIEW):
         batch = Batch.of([sample for sample in samples if isinstance(sample, Sample)])
-    return replace(batch, seconds=total_seconds([batch.seconds, watch.seconds]))
+    return replace(batch, milliseconds=added_up([batch.milliseconds, stopwatch.milliseconds]))

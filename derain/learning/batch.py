@@ -12,7 +12,7 @@ from derain.views.view import IGNORED, BackProjection, SeenScan
 
 # What is timed of the making of a batch: reading files, and viewing what was read, its augmentation
 # and packing included.
-READING, VIEW = "reading", "view"
+READ, VIEW = "read", "view"
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Sample:
         measured: Whether what the network says is counted or written. It is not in training, nor
             of a scan that is only read again so that all processes take as many steps.
         key: What is made of the scan is named by this: the key of its frame.
-        seconds: How long it took to make, by ``READING`` and ``VIEW``, wall-clock seconds.
+        milliseconds: How long it took to make, by ``READ`` and ``VIEW``, wall time.
     """
 
     scan: Scan
@@ -34,7 +34,7 @@ class Sample:
     target: Tensor | None
     measured: bool = True
     key: str = ""
-    seconds: Mapping[str, float] = field(default_factory=dict)
+    milliseconds: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -76,15 +76,15 @@ class Batch:
         cells: How many cells each scan has, in order.
         measured: The scans, in order, where what the network says of them is counted or written;
             else none, so that no worker sends what nobody asks for.
-        seconds: How long its scans took to make, one after the other, by ``READING`` and ``VIEW``,
-            wall-clock seconds of the process that made them.
+        milliseconds: How long its scans took to make, one after the other, by ``READ`` and ``VIEW``,
+            wall time of the process that made them.
     """
 
     inputs: dict[str, Tensor]
     target: Tensor | None
     cells: Sequence[int]
     measured: Sequence[MeasuredScan]
-    seconds: Mapping[str, float] = field(default_factory=dict)
+    milliseconds: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, samples: Sequence[Sample]) -> "Batch":
@@ -103,7 +103,7 @@ class Batch:
                 for sample in samples
                 if sample.measured
             ],
-            seconds=total_seconds([sample.seconds for sample in samples]),
+            milliseconds=added_up([sample.milliseconds for sample in samples]),
         )
 
     def to(self, device: torch.device, non_blocking: bool = False) -> "Batch":
@@ -122,7 +122,7 @@ class Batch:
         return list(torch.split(scores, list(self.cells)))
 
 
-def total_seconds(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:
+def added_up(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Adds up how long several things took, by the names of what is timed of them."""
     return {
         name: sum(part.get(name, 0.0) for part in parts)

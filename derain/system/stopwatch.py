@@ -1,4 +1,4 @@
-"""How long each part of a piece of work takes."""
+"""Milliseconds by stage."""
 
 import time
 from collections.abc import Iterator
@@ -6,29 +6,22 @@ from contextlib import contextmanager
 
 
 class Stopwatch:
-    """Seconds of parts of a piece of work, by name; of a part within a part, to the inner one.
+    """Adds up the wall time of named stages; that of a stage within a stage is the inner one's.
 
     Attributes:
-        seconds: What was timed so far, wall-clock seconds by the name of the part.
+        milliseconds: Time spent so far, by stage, in the order the stages first came to an end.
     """
 
     def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._part: str | None = None  # what runs by now
-        self._since = 0.0
+        self.milliseconds: dict[str, float] = {}
+        self._within = 0.0  # spent in stages within the one that goes on
 
     @contextmanager
-    def times(self, part: str) -> Iterator[None]:
-        """Times the block as one part; what it interrupts goes on being timed after it."""
-        outer = self._part
-        self._turn_to(part)
-        try:
-            yield
-        finally:
-            self._turn_to(outer)
-
-    def _turn_to(self, part: str | None) -> None:
-        now = time.perf_counter()
-        if self._part is not None:
-            self.seconds[self._part] = self.seconds.get(self._part, 0.0) + now - self._since
-        self._part, self._since = part, now
+    def stage(self, name: str) -> Iterator[None]:
+        """Times what happens inside the ``with`` block."""
+        outer, self._within = self._within, 0.0
+        start = time.perf_counter()
+        yield
+        elapsed = 1e3 * (time.perf_counter() - start)
+        self.milliseconds[name] = self.milliseconds.get(name, 0.0) + elapsed - self._within
+        self._within = outer + elapsed
