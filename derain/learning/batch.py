@@ -76,8 +76,8 @@ class Batch:
         cells: How many cells each scan has, in order.
         measured: The scans, in order, where what the network says of them is counted or written;
             else none, so that no worker sends what nobody asks for.
-        milliseconds: How long its scans took to make, one after the other, by ``READ`` and ``VIEW``,
-            wall time of the process that made them.
+        milliseconds: How long its scans took to make, one after the other, by ``READ`` and
+            ``VIEW``, wall time of the process that made them.
     """
 
     inputs: dict[str, Tensor]
