@@ -97,7 +97,11 @@ def _rows(counts: Mapping[str, Sequence[ClassCounts]]) -> dict[str, list[ClassCo
         columns = zip(*(filled[name] for name in others), strict=True)
         filled[f"{len(others)} others"] = [_total(column) for column in columns]
         order.append(f"{len(others)} others")
-    return {f"{name} (rain)" if filled[name][-1].rain else name: filled[name] for name in order}
+    return {_title(name, filled[name][-1]): filled[name] for name in order}
+
+
+def _title(name: str, total: ClassCounts) -> str:
+    return f"{name} (rain)" if total.rain and name != "rain" else name
 
 
 def _total(cells: Sequence[ClassCounts]) -> ClassCounts:
@@ -119,12 +123,10 @@ def _text(cell: ClassCounts) -> str:
 
 
 def _draw_curve(axes: Axes, points: OperatingPoints, chosen: int, best: int) -> None:
-    recall = np.linspace(0.01, 1, 200)
     for iou in LINES_OF_IOU:
-        # Of IoU = 1 / (1 / precision + 1 / recall - 1).
-        precision = 1 / (1 / iou - 1 / recall + 1)
-        on = (precision > 0) & (precision <= 1)
-        axes.plot(recall[on], precision[on], color="#e5e7eb", linewidth=1, zorder=0)
+        recall = np.linspace(iou, 1, 100)
+        # From IoU = 1 / (1 / precision + 1 / recall - 1).
+        axes.plot(recall, 1 / (1 / iou - 1 / recall + 1), color="#d1d5db", linewidth=1, zorder=0)
         axes.text(1.005, iou, f" IoU {iou:g}", color=FAINT, fontsize=8, va="center")
     axes.plot(points.recall, points.precision, color=RECALL, linewidth=1.8, zorder=2)
     for number, name, face in ((best, "most IoU", "white"), (chosen, "chosen", IOU)):

@@ -8,11 +8,15 @@ from lightning.pytorch.loggers import TensorBoardLogger
 from derain.models.callbacks.errors import BY_CLASS, LEFT_BY_RANGE, LOST_BY_RANGE
 from derain.models.callbacks.step_times import SPEED, STEP
 
-# Charts by question, each with regular expressions of the scalars in it.
+# Charts by question, each with regular expressions of the scalars in it. All lines of a run have
+# one colour, and only their marks tell them apart: what is to be compared stands in one chart.
 LAYOUT = {
     "Is it learning?": {
-        "loss": ["train/loss$", "val/loss$"],
-        "validation: IoU, precision, recall": ["val/iou$", "val/precision$", "val/recall$"],
+        "loss in training": ["train/loss$"],
+        "loss in validation": ["val/loss$"],
+        "validation: IoU": ["val/iou$"],
+        "validation: precision": ["val/precision$"],
+        "validation: recall": ["val/recall$"],
         "validation: average precision": ["val/average_precision$"],
     },
     "Where does it err?": {

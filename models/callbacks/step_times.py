@@ -7,7 +7,7 @@ from typing import Any
 import lightning
 import torch
 
-from derain.learning.batch import Batch
+from derain.learning.batch import READ, VIEW, Batch
 
 # Groups of scalars: milliseconds of a step by what they are spent on, and scans a second.
 STEP, SPEED = "milliseconds_per_step", "speed"
@@ -81,7 +81,8 @@ class StepTimes(lightning.Callback):
     def _begin(self) -> None:
         self._steps = self._scans = 0
         self._seconds = 0.0
-        self._spent: Counter[str] = Counter()
+        # Where all is kept from earlier epochs, nothing is read.
+        self._spent = Counter({READ: 0.0, VIEW: 0.0})
         self._network: list[float] = []
 
     def _due(self, trainer: lightning.Trainer) -> bool:
