@@ -5,6 +5,7 @@ from typing import Any
 import lightning
 import numpy as np
 from lightning.pytorch.loggers import TensorBoardLogger
+from numpy.typing import NDArray
 
 from derain.evaluation.metrics import RainMetrics
 from derain.evaluation.operating_points import EVEN, OperatingPoints
@@ -98,7 +99,7 @@ def errors_by_name(metrics: RainMetrics) -> dict[str, float]:
     )
 
 
-def _of_curve(points: OperatingPoints) -> tuple[np.ndarray, ...]:
+def _of_curve(points: OperatingPoints) -> tuple[NDArray[np.float64] | NDArray[np.int64], ...]:
     """What TensorBoard wants of a curve, at thresholds from 0 to 1 in equal steps."""
     even = points.among(EVEN)
     hits, false = even.true_positive, even.false_positive

@@ -1,16 +1,16 @@
 """How fast a training is, and what its steps spend their time on, in TensorBoard."""
 
 import time
-from collections import Counter
 from typing import Any
 
 import lightning
 import torch
 
-from derain.learning.batch import READ, VIEW, Batch
+from derain.learning.batch import READ, VIEW, Batch, added_up
 
 # Groups of scalars: milliseconds of a step by what they are spent on, and scans a second.
 STEP, SPEED = "milliseconds_per_step", "speed"
+WAIT, NETWORK = "wait", "network"
 
 
 class StepTimes(lightning.Callback):
@@ -66,8 +66,7 @@ class StepTimes(lightning.Callback):
         self._steps += 1
         self._scans += len(batch.cells)
         self._seconds += now - self._asked
-        self._spent.update(batch.milliseconds)
-        self._spent["wait"] += 1e3 * self._waited
+        self._spent = added_up([self._spent, batch.milliseconds, {WAIT: 1e3 * self._waited}])
         if self._timed:
             self._network.append(1e3 * (now - self._stepped_since))
         if due:
@@ -82,7 +81,7 @@ class StepTimes(lightning.Callback):
         self._steps = self._scans = 0
         self._seconds = 0.0
         # Where all is kept from earlier epochs, nothing is read.
-        self._spent = Counter({READ: 0.0, VIEW: 0.0})
+        self._spent = {READ: 0.0, VIEW: 0.0, WAIT: 0.0}
         self._network: list[float] = []
 
     def _due(self, trainer: lightning.Trainer) -> bool:
@@ -97,7 +96,7 @@ class StepTimes(lightning.Callback):
     def _log(self, trainer: lightning.Trainer) -> None:
         values = {f"{STEP}/{name}": spent / self._steps for name, spent in self._spent.items()}
         if self._network:
-            values[f"{STEP}/network"] = sum(self._network) / len(self._network)
+            values[f"{STEP}/{NETWORK}"] = sum(self._network) / len(self._network)
         values[f"{SPEED}/scans_per_second"] = self._scans * trainer.world_size / self._seconds
         for logger in trainer.loggers:
             logger.log_metrics(values, trainer.global_step)

@@ -182,7 +182,7 @@ def test_intensities_of_another_unit_are_warned_of_and_scaled(
     )
     np.testing.assert_array_equal(again, whole)
     assert (small != whole).any()
-    quick = ["--panels.scans", "0", "--trainer.fast_dev_run", "true"]
+    quick = ["--panels.scans", "0", "--errors.pictures", "0", "--trainer.fast_dev_run", "true"]
     for command, sequence in {"fit": "00", "validate": "01", "test": "02"}.items():
         options = quick if command == "fit" else ["--ckpt_path", checkpoint]
         (warning,) = scan_warnings(run_derain(command, *wads, *options))
@@ -209,7 +209,16 @@ def test_nothing_but_derain_reports_on_a_run(
     run_derain, wads: list[str], checkpoint: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level("INFO", "lightning.pytorch.utilities.rank_zero"):
-        trained = run_derain("fit", *wads, "--trainer.max_epochs", "1", "--panels.scans", "0")
+        trained = run_derain(
+            "fit",
+            *wads,
+            "--trainer.max_epochs",
+            "1",
+            "--panels.scans",
+            "0",
+            "--errors.pictures",
+            "0",
+        )
         tested = run_derain("test", *wads, "--ckpt_path", checkpoint)
     assert (trained.code, tested.code) == (0, 0)
     said = trained.out + trained.err + tested.out + tested.err
@@ -222,7 +231,7 @@ def test_nothing_but_derain_reports_on_a_run(
 
 def test_training_goes_on_from_a_checkpoint(run_derain, wads: list[str]) -> None:
     last = Path("runs/outdet_wads/version_0/checkpoints/last.ckpt")
-    short = ["--panels.scans", "0", "--trainer.max_epochs"]
+    short = ["--panels.scans", "0", "--errors.pictures", "0", "--trainer.max_epochs"]
     assert run_derain("fit", *wads, *short, "1").code == 0
     assert run_derain("fit", *wads, *short, "2", "--ckpt_path", last).code == 0
     first = torch.load(last, weights_only=True)
@@ -235,7 +244,16 @@ def test_training_goes_on_from_a_checkpoint(run_derain, wads: list[str]) -> None
 def test_a_run_that_goes_on_keeps_what_was_best_before(run_derain, wads: list[str]) -> None:
     first, second = (Path(f"runs/outdet_wads/version_{n}/checkpoints") for n in (0, 1))
     # The earlier the better, as where a training goes wrong.
-    earliest = ["--checkpoint.monitor", "epoch", "--checkpoint.mode", "min", "--panels.scans", "0"]
+    earliest = [
+        "--checkpoint.monitor",
+        "epoch",
+        "--checkpoint.mode",
+        "min",
+        "--panels.scans",
+        "0",
+        "--errors.pictures",
+        "0",
+    ]
     fit = ["fit", *wads, *earliest, "--trainer.max_epochs"]
     assert run_derain(*fit, "1").code == 0
     outcome = run_derain(*fit, "2", "--ckpt_path", first / "last.ckpt")
