@@ -9,7 +9,7 @@ from torch.utils.tensorboard.summary import hparams
 from derain.evaluation.counts import SCORES
 
 # By what the table ranks runs: the IoU of the latest validation, and the scores of the test.
-COLUMNS = ("hp_metric", *(f"test/{score}" for score in SCORES), "test/average_precision")
+COLUMNS = ("hp_metric", *(f"test/{score}" for score in reversed(SCORES)), "test/average_precision")
 
 
 def enter(loggers: Iterable[Logger], parameters: Mapping[str, Any]) -> None:
