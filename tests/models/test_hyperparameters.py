@@ -5,6 +5,7 @@ from typing import Any
 
 from lightning.pytorch.loggers import CSVLogger, TensorBoardLogger
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from tensorboard.plugins.hparams.metadata import EXPERIMENT_TAG, SESSION_START_INFO_TAG
 from tensorboard.plugins.hparams.plugin_data_pb2 import HParamsPluginData
 
 from derain.models.hyperparameters import enter
@@ -13,14 +14,15 @@ from derain.models.hyperparameters import enter
 def entered(folder: Path) -> Any:
     """The run's values, the names of the columns for scores, and the scalars that were logged."""
     events = EventAccumulator(str(folder)).Reload()
-    found = HParamsPluginData()
-    for content in events.PluginTagToContent("hparams").values():
-        found.MergeFrom(HParamsPluginData.FromString(content))
-    values = {
-        name: getattr(value, value.WhichOneof("kind"))
-        for name, value in found.session_start_info.hparams.items()
+    found = {
+        tag: HParamsPluginData.FromString(content)
+        for tag, content in events.PluginTagToContent("hparams").items()
     }
-    columns = [info.name.tag for info in found.experiment.metric_infos]
+    values = {
+        name: getattr(value, str(value.WhichOneof("kind")))
+        for name, value in found[SESSION_START_INFO_TAG].session_start_info.hparams.items()
+    }
+    columns = [info.name.tag for info in found[EXPERIMENT_TAG].experiment.metric_infos]
     return values, columns, events.Tags()["scalars"]
 
 
