@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from lightning.pytorch.loggers import Logger, TensorBoardLogger
+from lightning.pytorch.loggers import TensorBoardLogger
 from torch.utils.tensorboard.summary import hparams
 
 from derain.evaluation.counts import SCORES
@@ -12,7 +12,7 @@ from derain.evaluation.counts import SCORES
 COLUMNS = ("hp_metric", *(f"test/{score}" for score in reversed(SCORES)), "test/average_precision")
 
 
-def enter(loggers: Iterable[Logger], parameters: Mapping[str, Any]) -> None:
+def enter(loggers: Iterable[object], parameters: Mapping[str, Any]) -> None:
     """Enters a run. What is not logged yet stays blank in the table, a test above all.
 
     Args:
@@ -28,8 +28,8 @@ def enter(loggers: Iterable[Logger], parameters: Mapping[str, Any]) -> None:
     for logger in loggers:
         # TensorBoard takes the columns of all runs from one of them, so that each must name those
         # of the test, too. Lightning would log a score of 0 for each column, which nobody measured.
-        writer = logger.experiment.file_writer if isinstance(logger, TensorBoardLogger) else None
-        if hasattr(writer, "add_summary"):  # the first process's, and where something is written
+        writer: Any = logger.experiment.file_writer if isinstance(logger, TensorBoardLogger) else 0
+        if hasattr(writer, "add_summary"):  # as of the first process
             for summary in hparams(shown, dict.fromkeys(COLUMNS, 0.0)):
                 writer.add_summary(summary)
 

@@ -81,7 +81,7 @@ class StepTimes(lightning.Callback):
         self._steps = self._scans = 0
         self._seconds = 0.0
         # Where all is kept from earlier epochs, nothing is read.
-        self._spent = {READ: 0.0, VIEW: 0.0, WAIT: 0.0}
+        self._spent: dict[str, float] = {READ: 0.0, VIEW: 0.0, WAIT: 0.0}
         self._network: list[float] = []
 
     def _due(self, trainer: lightning.Trainer) -> bool:
