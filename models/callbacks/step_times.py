@@ -26,6 +26,8 @@ class StepTimes(lightning.Callback):
     is the one whose ``network`` is timed, for which it is waited: to wait at each would slow all.
     """
 
+    _spent: dict[str, float]  # milliseconds of the steps since the last log
+
     def on_train_start(self, *_: Any) -> None:
         """Begins anew."""
         self._begin()
@@ -81,7 +83,7 @@ class StepTimes(lightning.Callback):
         self._steps = self._scans = 0
         self._seconds = 0.0
         # Where all is kept from earlier epochs, nothing is read.
-        self._spent: dict[str, float] = {READ: 0.0, VIEW: 0.0, WAIT: 0.0}
+        self._spent = {READ: 0.0, VIEW: 0.0, WAIT: 0.0}
         self._network: list[float] = []
 
     def _due(self, trainer: lightning.Trainer) -> bool:
