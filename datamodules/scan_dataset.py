@@ -12,12 +12,13 @@ from derain.datamodules.kept import Kept
 from derain.datamodules.order import Pick
 from derain.datamodules.windows import seen
 from derain.errors import InputError
-from derain.learning.batch import Batch, Sample
+from derain.learning.batch import READ, VIEW, Batch, Sample, added_up
 from derain.learning.seeds import Draw, generator_of
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.spread import evenly_spaced
+from derain.system.stopwatch import Stopwatch
 from derain.views.view import View
 
 
@@ -85,19 +86,31 @@ class ScanDataset(Dataset[Sample | InputError]):
         return map(self.reader.read, evenly_spaced(self.frames, most))
 
     def _sample(self, pick: Pick) -> Sample:
-        number, frame = pick.number, self.frames[pick.number]
-        if self.augmentation is None:
-            sample = self._samples.get(number, lambda: self._viewed(self.read(frame), number))
-        else:
-            scan = self._scans.get(number, lambda: self.read(frame))
-            # The first time is drawn as where there is no second one.
-            drawn = (number, pick.again) if pick.again else (number,)
-            generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, *drawn)
-            sample = self._viewed(self.augmentation(scan, generator, self.view.azimuth), number)
-        return replace(sample, measured=pick.measured)
+        stopwatch, number, frame = Stopwatch(), pick.number, self.frames[pick.number]
 
-    def _viewed(self, scan: Scan, number: int) -> Sample:
-        view = seen(self.view, scan, self.frames, number, self.reader.read_unlabelled)
+        def read() -> Scan:
+            with stopwatch.stage(READ):
+                return self.read(frame)
+
+        with stopwatch.stage(VIEW):
+            if self.augmentation is None:
+                made = self._samples.get(number, lambda: self._viewed(read(), number, stopwatch))
+            else:
+                scan = self._scans.get(number, read)
+                # The first time is drawn as where there is no second one.
+                drawn = (number, pick.again) if pick.again else (number,)
+                generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, *drawn)
+                scan = self.augmentation(scan, generator, self.view.azimuth)
+                made = self._viewed(scan, number, stopwatch)
+        # Of a sample that was kept, what this epoch took, which is next to nothing.
+        return replace(made, measured=pick.measured, milliseconds=stopwatch.milliseconds)
+
+    def _viewed(self, scan: Scan, number: int, stopwatch: Stopwatch) -> Sample:
+        def read_around(frame: Frame) -> Scan:
+            with stopwatch.stage(READ):
+                return self.reader.read_unlabelled(frame)
+
+        view = seen(self.view, scan, self.frames, number, read_around)
         return Sample.of(scan, view, self.card, key=self.frames[number].key)
 
 
@@ -120,4 +133,7 @@ def packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:
     for error in samples:
         if isinstance(error, InputError):
             return error
-    return Batch.of([sample for sample in samples if isinstance(sample, Sample)])
+    stopwatch = Stopwatch()
+    with stopwatch.stage(VIEW):
+        batch = Batch.of([sample for sample in samples if isinstance(sample, Sample)])
+    return replace(batch, milliseconds=added_up([batch.milliseconds, stopwatch.milliseconds]))

@@ -5,18 +5,19 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import torch
-from lightning.pytorch.loggers import TensorBoardLogger
 from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor, nn
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.metrics import RainMetrics
+from derain.evaluation.operating_points import ThresholdCounts
 from derain.files.documents import Entry, shown
 from derain.learning.batch import Batch
 from derain.learning.seeds import Draw, generator_of, run_seed
 from derain.learning.start import Start
 from derain.learning.task import Task, TrainingData, agree
+from derain.models.hyperparameters import enter
 from derain.models.measured import MeasuredModule
 from derain.scan import Scan
 from derain.spec import Spec
@@ -228,6 +229,7 @@ class DerainingModule(MeasuredModule):
         self.card = task.card
         metrics = RainMetrics(self.card.classes, self.card.rain, unknown=self.card.unknown)
         self.metrics = metrics.to(self.device)
+        self.threshold_counts = ThresholdCounts([task.spec.threshold]).to(self.device)
 
     def setup(self, stage: str) -> None:
         """Agrees with the data, unless the Spec is still to come: from a checkpoint.
@@ -256,6 +258,7 @@ class DerainingModule(MeasuredModule):
         if spec is None:
             raise InputError("checkpoint", "it has no Spec", "Give a checkpoint of derain.")
         agreed = self._spec
+        self.trained_steps = checkpoint.get("global_step")
         self.adopt(spec)
         data = getattr(self._trainer, "datamodule", None)
         if isinstance(data, TrainingData):
@@ -269,14 +272,11 @@ class DerainingModule(MeasuredModule):
 
     def on_train_start(self) -> None:
         """Enters the run in TensorBoard's table of hyper-parameters, to be ranked by its IoU."""
-        parameters = {
-            name: value
-            for name, value in self.hparams.items()
-            if name != "spec" and not name.startswith("_")
-        }
-        for logger in self.loggers:
-            if isinstance(logger, TensorBoardLogger):
-                logger.log_hyperparams(parameters, {"hp_metric": 0.0})
+        enter(self.loggers, {"network": self.NAME, "data": self.card.name, **self.hparams})
+
+    def on_test_start(self) -> None:
+        """Enters a tested model likewise: its training may have entered it elsewhere, or not."""
+        self.on_train_start()
 
     def on_train_batch_start(self, batch: Batch, batch_idx: int) -> None:
         """Draws dropout by seed, epoch, step and process, so that a resume changes nothing."""

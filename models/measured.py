@@ -14,6 +14,7 @@ from torch import Tensor
 from derain.cards.card import DataCard
 from derain.evaluation.counts import SCORES, Counts
 from derain.evaluation.metrics import RainMetrics
+from derain.evaluation.operating_points import ThresholdCounts
 from derain.learning.batch import Batch
 from derain.learning.mean_losses import MeanLosses
 from derain.learning.task import ReadableScans
@@ -34,16 +35,20 @@ class MeasuredModule(lightning.LightningModule, ABC):
         LEARNS_FROM_LABELS: Whether it does; where not, none is read in its training.
         card: Data card of what is measured, once that is agreed with the data.
         metrics: Counts of the points of the epoch, made when the data are known.
+        threshold_counts: Their probabilities, counted between thresholds.
         mean_losses: Sums of the epoch's losses.
     """
 
     LEARNS_FROM_LABELS: ClassVar[bool] = True
     card: DataCard
     metrics: RainMetrics
+    threshold_counts: ThresholdCounts
 
     def __init__(self) -> None:
         super().__init__()
         self.mean_losses = MeanLosses()
+        # Of the checkpoint that is tested: where its scores stand in the log of its training.
+        self.trained_steps: int | None = None
 
     @property
     @abstractmethod
@@ -105,6 +110,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
         """Forgets losses and scores of the last epoch, or of the sanity check."""
         self.mean_losses.reset()
         self.metrics.reset()
+        self.threshold_counts.reset()
 
     def on_validation_epoch_end(self) -> None:
         """Logs losses and scores of the epoch."""
@@ -117,9 +123,12 @@ class MeasuredModule(lightning.LightningModule, ABC):
     def on_test_epoch_start(self) -> None:
         """Forgets the scores of another test."""
         self.metrics.reset()
+        self.threshold_counts.reset()
 
     def on_test_epoch_end(self) -> None:
         """Logs the scores of the test; the metrics keep their counts for whoever reports them."""
+        if self.trained_steps is not None and not self.trainer.global_step:
+            self._log_alike({"step": torch.tensor(float(self.trained_steps))})
         self._log_scores("test")
 
     def probabilities(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
@@ -142,14 +151,18 @@ class MeasuredModule(lightning.LightningModule, ABC):
     def _count(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
         probabilities = self.probabilities(batch, logits)
         for measured, probability in zip(batch.measured, probabilities, strict=True):
-            if measured.scan.label is not None:
-                self.metrics.update_scan(measured.scan, probability > self.spec.threshold)
+            scan = measured.scan
+            if scan.label is not None:
+                self.metrics.update_scan(scan, probability > self.spec.threshold)
+                known = ~self.card.unknown_of(scan)
+                rain = self.card.rain_of(scan)
+                self.threshold_counts.update(probability[known], rain[known])
         return probabilities
 
     def _log_scores(self, part: str) -> None:
         if not self.metrics.per_scan():  # scans without labels measure nothing
             return
-        scores = self.metrics.compute()
+        scores = self.metrics.compute() | self.threshold_counts.compute()
         self._log_alike({f"{part}/{name}": score for name, score in scores.items()})
         self._log_alike({f"{part}_iou": scores["iou"]}, prog_bar=True, logger=False)
         for name, ids in self.card.parts.items():

@@ -38,6 +38,21 @@ class ClassCounts:
         """
         return float(ratio(self.called_rain, self.points, undefined=float(self.rain)))
 
+    @property
+    def wrong(self) -> int:
+        """Points judged wrongly: rain that was left, or others that were called rain."""
+        return self.points - self.called_rain if self.rain else self.called_rain
+
+    @property
+    def share_wrong(self) -> float:
+        """Share of the class judged wrongly; 0 of no points."""
+        return float(ratio(self.wrong, self.points, undefined=0.0))
+
+    def __add__(self, other: "ClassCounts") -> "ClassCounts":
+        """Counts of the points of two classes, or of two parts of one."""
+        called_rain = self.called_rain + other.called_rain
+        return ClassCounts(self.points + other.points, called_rain, self.rain)
+
 
 class RainMetrics(Metric):
     """Precision, recall, F1 and IoU of rain, with exact counts by scan, class and range.
@@ -189,12 +204,27 @@ class RainMetrics(Metric):
         }
 
     def by_range(self) -> dict[str, Counts]:
-        """Counts of each range band, by names such as ``0-10 m`` and ``80+ m``."""
-        names = [f"{start:g}-{end:g} m" for start, end in pairwise(self.range_edges)]
-        names.append(f"{self.range_edges[-1]:g}+ m")
+        """Counts of each range band, by ``band_names``."""
         with self.sync_context():
             tables = self.cells.unbind(dim=1)
-        return {name: self._counts(table) for name, table in zip(names, tables, strict=True)}
+        return {
+            name: self._counts(table) for name, table in zip(self.band_names, tables, strict=True)
+        }
+
+    def by_class_and_range(self) -> dict[str, list[ClassCounts]]:
+        """What became of each semantic class in each of the bands of ``band_names``, by name."""
+        with self.sync_context():
+            tables = self.cells.tolist()
+        return {
+            name: [ClassCounts(kept + called_rain, called_rain, rain) for kept, called_rain in row]
+            for name, rain, row in zip(self.names, self.is_rain.tolist(), tables, strict=True)
+        }
+
+    @property
+    def band_names(self) -> list[str]:
+        """Names of the range bands, such as ``0-10 m`` and, of the last, ``80+ m``."""
+        names = [f"{start:g}-{end:g} m" for start, end in pairwise(self.range_edges)]
+        return [*names, f"{self.range_edges[-1]:g}+ m"]
 
     def _class_rows(self, label: Tensor) -> Tensor:
         row = torch.searchsorted(self.ids, label).clamp(max=len(self.ids) - 1)

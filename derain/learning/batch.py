@@ -1,7 +1,7 @@
 """Several scans on their way through a network."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import torch
 from torch import Tensor
@@ -9,6 +9,10 @@ from torch import Tensor
 from derain.cards.card import DataCard
 from derain.scan import Scan
 from derain.views.view import IGNORED, BackProjection, SeenScan
+
+# What is timed of the making of a batch: reading files, and viewing what was read, its augmentation
+# and packing included.
+READ, VIEW = "read", "view"
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +26,7 @@ class Sample:
         measured: Whether what the network says is counted or written. It is not in training, nor
             of a scan that is only read again so that all processes take as many steps.
         key: What is made of the scan is named by this: the key of its frame.
+        milliseconds: How long it took to make, by ``READ`` and ``VIEW``, wall time.
     """
 
     scan: Scan
@@ -29,6 +34,7 @@ class Sample:
     target: Tensor | None
     measured: bool = True
     key: str = ""
+    milliseconds: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -70,12 +76,15 @@ class Batch:
         cells: How many cells each scan has, in order.
         measured: The scans, in order, where what the network says of them is counted or written;
             else none, so that no worker sends what nobody asks for.
+        milliseconds: How long its scans took to make, one after the other, by ``READ`` and
+            ``VIEW``, wall time of the process that made them.
     """
 
     inputs: dict[str, Tensor]
     target: Tensor | None
     cells: Sequence[int]
     measured: Sequence[MeasuredScan]
+    milliseconds: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, samples: Sequence[Sample]) -> "Batch":
@@ -94,6 +103,7 @@ class Batch:
                 for sample in samples
                 if sample.measured
             ],
+            milliseconds=added_up([sample.milliseconds for sample in samples]),
         )
 
     def to(self, device: torch.device, non_blocking: bool = False) -> "Batch":
@@ -105,8 +115,16 @@ class Batch:
         target = self.target
         if target is not None:
             target = target.to(device, non_blocking=non_blocking)
-        return Batch(inputs, target, self.cells, self.measured)
+        return replace(self, inputs=inputs, target=target)
 
     def split(self, scores: Tensor) -> list[Tensor]:
         """Takes scores of all cells, (M, ...), apart into those of each scan."""
         return list(torch.split(scores, list(self.cells)))
+
+
+def added_up(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Adds up how long several things took, by the names of what is timed of them."""
+    return {
+        name: sum(part.get(name, 0.0) for part in parts)
+        for name in dict.fromkeys(name for part in parts for name in part)
+    }

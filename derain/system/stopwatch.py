@@ -6,19 +6,22 @@ from contextlib import contextmanager
 
 
 class Stopwatch:
-    """Adds up the wall time of named stages.
+    """Adds up the wall time of named stages; that of a stage within a stage is the inner one's.
 
     Attributes:
-        milliseconds: Time spent so far, by stage, in the order the stages first came.
+        milliseconds: Time spent so far, by stage, in the order the stages first came to an end.
     """
 
     def __init__(self) -> None:
         self.milliseconds: dict[str, float] = {}
+        self._within = 0.0  # spent in stages within the one that goes on
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Times what happens inside the ``with`` block."""
+        outer, self._within = self._within, 0.0
         start = time.perf_counter()
         yield
         elapsed = 1e3 * (time.perf_counter() - start)
-        self.milliseconds[name] = self.milliseconds.get(name, 0.0) + elapsed
+        self.milliseconds[name] = self.milliseconds.get(name, 0.0) + elapsed - self._within
+        self._within = outer + elapsed

@@ -3,12 +3,11 @@
 from typing import Any
 
 import lightning
-import numpy as np
 from lightning.pytorch.loggers import TensorBoardLogger
-from lightning.pytorch.trainer.states import TrainerFn
 
 from derain.learning.batch import Batch
 from derain.models.base import DerainingModule
+from derain.models.callbacks.drawn_epochs import DrawnEpochs
 from derain.pictures.scan_pictures import judgement_figure
 
 
@@ -18,8 +17,7 @@ class ScanPanels(lightning.Callback):
     Of several processes the first draws, of the scans that it measures.
 
     A picture costs as much as a step of training and more, and of each scan TensorBoard shows ten
-    pictures. So ten of the epochs that end in a validation are drawn, spread from the first to the
-    last; all where nobody says how many epochs there are.
+    pictures. So ten of the epochs are drawn, chosen as :class:`DrawnEpochs` says.
 
     Args:
         scans: How many scans to show; 0 shows none.
@@ -28,13 +26,13 @@ class ScanPanels(lightning.Callback):
 
     def __init__(self, scans: int = 2, pictures: int = 10) -> None:
         self.scans = scans
-        self.pictures = pictures
+        self.epochs = DrawnEpochs(pictures)
         self.left = 0
 
     def on_validation_epoch_start(self, trainer: lightning.Trainer, *_: Any) -> None:
         """Starts counting anew; the order of validation scans is fixed."""
-        draws = trainer.is_global_zero and not trainer.sanity_checking
-        self.left = self.scans if draws and self._shows(trainer) else 0
+        draws = self.epochs.begins(trainer) and trainer.is_global_zero
+        self.left = self.scans if draws else 0
 
     def on_validation_batch_end(
         self,
@@ -58,12 +56,3 @@ class ScanPanels(lightning.Callback):
             name = f"validation scan {self.scans - self.left}"
             trainer.logger.experiment.add_figure(name, figure, trainer.global_step)
             self.left -= 1
-
-    def _shows(self, trainer: lightning.Trainer) -> bool:
-        """Whether the epoch is one that is drawn."""
-        epochs = trainer.max_epochs
-        if trainer.state.fn != TrainerFn.FITTING or epochs is None or epochs < 1:
-            return True
-        every = trainer.check_val_every_n_epoch or 1
-        validation = (trainer.current_epoch + 1) // every - 1
-        return validation in np.linspace(0, epochs // every - 1, self.pictures).round()

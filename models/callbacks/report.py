@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import lightning
+from lightning.pytorch.loggers import TensorBoardLogger
 
 from derain.errors import printable
 from derain.evaluation.counts import SCORES
@@ -13,23 +14,35 @@ from derain.models.base import DerainingModule
 
 
 class TestReport(lightning.Callback):
-    """Prints the scores by average, semantic class and range, and writes them as ``test.json``."""
+    """Prints the scores by average, semantic class and range, and writes them as ``test.json``.
+
+    TensorBoard shows the report, too. One that is in the folder already is replaced.
+    """
 
     __test__ = False  # not a test of pytest's
 
     def on_test_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
         """Prints the report, and writes it beside the run's log where there is one."""
         # Counts and folder are put together by all processes, the report is the first one's.
-        text, scores = as_text(model.metrics, model.card.name), as_dict(model.metrics)
+        text = as_text(model.metrics, model.card.name)
+        scores = {"data": model.card.name, "checkpoint": _tested(trainer), **as_dict(model.metrics)}
         folder = trainer.log_dir
         if not trainer.is_global_zero:
             return
         print(text)
+        for logger in trainer.loggers:
+            if isinstance(logger, TensorBoardLogger):
+                as_code = text.replace("\n", "\n    ")  # of Markdown, whose columns line up
+                logger.experiment.add_text("test", f"    {as_code}", model.trained_steps)
         if folder is not None:
             path = Path(folder) / "test.json"
             with replacing(path) as temporary:
                 temporary.write_text(json.dumps(scores, indent=2) + "\n")
             print(printable(f"Written to {path}"))
+
+
+def _tested(trainer: lightning.Trainer) -> str | None:
+    return None if trainer.ckpt_path is None else str(trainer.ckpt_path)
 
 
 def as_dict(metrics: RainMetrics) -> dict[str, object]:

@@ -101,3 +101,15 @@ def test_scans_are_read_once_where_there_is_room(
     monkeypatch.setattr(FrameReader, "read_unlabelled", counted)
     list(epochs(data, part, Loading(augmentation=EVERYTHING, kept_megabytes=megabytes)))
     assert len(read) == reads
+
+
+@pytest.mark.parametrize("augmentation", [NOTHING, EVERYTHING])
+def test_what_is_kept_takes_no_time_to_read(data: Folder, augmentation: Augmentation) -> None:
+    loading = Loading(batch_size=2, augmentation=augmentation)
+    task = data.task
+    assert task is not None
+    loader = scan_loader(data.source("train"), "train", task, loading)
+    first, second = ([batch.milliseconds for batch in loader] for _ in range(2))
+    assert len(first) == len(second) == 2
+    assert all(times["read"] > 0 and times["view"] > 0 for times in first)
+    assert all("read" not in times and times["view"] > 0 for times in second)

@@ -18,9 +18,15 @@ REFUSALS = (
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.ENAMETOOLONG),
 )
 
+# Where a training's folder has its checkpoints, and its configuration.
+CHECKPOINTS, CONFIGURATION = "checkpoints", "config.yaml"
+
 
 class WholeConfig(SaveConfigCallback):
-    """Writes the configuration of a run as ``config.yaml``, whole or not at all."""
+    """Writes the configuration of a run as ``config.yaml``, whole or not at all.
+
+    That of a test, which writes into the folder of the training, goes beside it, as ``test.yaml``.
+    """
 
     def setup(
         self, trainer: lightning.Trainer, pl_module: lightning.LightningModule, stage: str
@@ -30,9 +36,17 @@ class WholeConfig(SaveConfigCallback):
         if folder is None or "://" in folder:
             super().setup(trainer, pl_module, stage)
         elif trainer.is_global_zero and not self.already_saved:
-            with replacing(Path(folder) / self.config_filename) as temporary:
+            name = "test.yaml" if stage == "test" else self.config_filename
+            with replacing(Path(folder) / name) as temporary:
                 self.parser.save(self.config, temporary, skip_none=False, overwrite=True)
             self.already_saved = True
+
+
+def folder_of_run(checkpoint: Path) -> Path | None:
+    """The folder of the training that a checkpoint was saved in; None where it lies elsewhere."""
+    folder = checkpoint.resolve().parent.parent
+    saved = checkpoint.resolve().parent.name == CHECKPOINTS
+    return folder if saved and (folder / CONFIGURATION).is_file() else None
 
 
 @contextmanager

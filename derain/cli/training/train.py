@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from jsonargparse import DefaultHelpFormatter
+from jsonargparse import DefaultHelpFormatter, Namespace
 from lightning.fabric.utilities.exceptions import MisconfigurationException
 from lightning.pytorch import Trainer
 from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
@@ -19,7 +19,11 @@ from derain.cli.training.errors import as_input_error, read_configuration
 from derain.cli.training.help import ALL, EXAMPLES
 from derain.cli.training.lightning_silence import silence_advertisements
 from derain.cli.training.options import known_options
-from derain.cli.training.run_folder import WholeConfig, writing_to_the_run_folder
+from derain.cli.training.run_folder import (
+    WholeConfig,
+    folder_of_run,
+    writing_to_the_run_folder,
+)
 
 # Imported so that a configuration may name them without their modules.
 from derain.datamodules.base import ScanDataModule
@@ -34,9 +38,12 @@ from derain.datamodules.wads import Wads
 from derain.errors import InputError
 from derain.models.base import DerainingModule
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
+from derain.models.callbacks.dashboard import Dashboard
+from derain.models.callbacks.errors import ErrorPanels
 from derain.models.callbacks.panels import ScanPanels
 from derain.models.callbacks.prediction import PredictionWriter
 from derain.models.callbacks.report import TestReport
+from derain.models.callbacks.step_times import StepTimes
 from derain.models.callbacks.whole_checkpoints import save_whole
 from derain.models.checkpoint import check_resumable, load_model
 from derain.models.measured import MONITOR
@@ -89,6 +96,9 @@ class DerainCLI(LightningCLI):
         parser.add_lightning_class_args(ModelCheckpoint, "last")
         parser.add_lightning_class_args(LearningRateMonitor, "learning_rate")
         parser.add_lightning_class_args(ScanPanels, "panels")
+        parser.add_lightning_class_args(ErrorPanels, "errors")
+        parser.add_lightning_class_args(StepTimes, "step_times")
+        parser.add_lightning_class_args(Dashboard, "dashboard")
         parser.add_lightning_class_args(PredictionWriter, "predictions")
         parser.add_lightning_class_args(TestReport, "report")
         parser.add_lightning_class_args(ScanCheck, "scan_check")
@@ -122,6 +132,19 @@ class DerainCLI(LightningCLI):
             raise InputError(path, "is an address", "Download it and give the file.")
         check = check_resumable if self.config.subcommand == "fit" else load_model
         check(Path(path))
+        if self.config.subcommand == "test":
+            self._log_beside(Path(path), arguments)
+
+    def _log_beside(self, checkpoint: Path, arguments: list[str]) -> None:
+        """Has a test log into the folder of its training, unless it was told where to."""
+        told = any(argument.startswith("--trainer.logger") for argument in arguments)
+        folder, logger = folder_of_run(checkpoint), self.config.test.trainer.logger
+        if folder is None or told or not isinstance(logger, Namespace):
+            return
+        if logger.class_path.endswith(TensorBoardLogger.__name__):
+            place = {"save_dir": str(folder.parent), "name": "", "version": folder.name}
+            for name, value in place.items():
+                logger.init_args[name] = value
 
     def instantiate_trainer(self, **kwargs: Any) -> Trainer:
         """Makes the trainer, which writes its checkpoints whole or not at all."""

@@ -1,5 +1,6 @@
 """``derain fit|validate|test|predict``: Lightning's command line, and what it cannot use."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+import yaml
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from derain.cli.training.configurations import packaged_configs, with_packaged_configs
 from derain.errors import InputError
@@ -182,7 +185,7 @@ def test_intensities_of_another_unit_are_warned_of_and_scaled(
     )
     np.testing.assert_array_equal(again, whole)
     assert (small != whole).any()
-    quick = ["--panels.scans", "0", "--trainer.fast_dev_run", "true"]
+    quick = ["--panels.scans", "0", "--errors.pictures", "0", "--trainer.fast_dev_run", "true"]
     for command, sequence in {"fit": "00", "validate": "01", "test": "02"}.items():
         options = quick if command == "fit" else ["--ckpt_path", checkpoint]
         (warning,) = scan_warnings(run_derain(command, *wads, *options))
@@ -209,7 +212,16 @@ def test_nothing_but_derain_reports_on_a_run(
     run_derain, wads: list[str], checkpoint: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level("INFO", "lightning.pytorch.utilities.rank_zero"):
-        trained = run_derain("fit", *wads, "--trainer.max_epochs", "1", "--panels.scans", "0")
+        trained = run_derain(
+            "fit",
+            *wads,
+            "--trainer.max_epochs",
+            "1",
+            "--panels.scans",
+            "0",
+            "--errors.pictures",
+            "0",
+        )
         tested = run_derain("test", *wads, "--ckpt_path", checkpoint)
     assert (trained.code, tested.code) == (0, 0)
     said = trained.out + trained.err + tested.out + tested.err
@@ -222,7 +234,7 @@ def test_nothing_but_derain_reports_on_a_run(
 
 def test_training_goes_on_from_a_checkpoint(run_derain, wads: list[str]) -> None:
     last = Path("runs/outdet_wads/version_0/checkpoints/last.ckpt")
-    short = ["--panels.scans", "0", "--trainer.max_epochs"]
+    short = ["--panels.scans", "0", "--errors.pictures", "0", "--trainer.max_epochs"]
     assert run_derain("fit", *wads, *short, "1").code == 0
     assert run_derain("fit", *wads, *short, "2", "--ckpt_path", last).code == 0
     first = torch.load(last, weights_only=True)
@@ -235,7 +247,16 @@ def test_training_goes_on_from_a_checkpoint(run_derain, wads: list[str]) -> None
 def test_a_run_that_goes_on_keeps_what_was_best_before(run_derain, wads: list[str]) -> None:
     first, second = (Path(f"runs/outdet_wads/version_{n}/checkpoints") for n in (0, 1))
     # The earlier the better, as where a training goes wrong.
-    earliest = ["--checkpoint.monitor", "epoch", "--checkpoint.mode", "min", "--panels.scans", "0"]
+    earliest = [
+        "--checkpoint.monitor",
+        "epoch",
+        "--checkpoint.mode",
+        "min",
+        "--panels.scans",
+        "0",
+        "--errors.pictures",
+        "0",
+    ]
     fit = ["fit", *wads, *earliest, "--trainer.max_epochs"]
     assert run_derain(*fit, "1").code == 0
     outcome = run_derain(*fit, "2", "--ckpt_path", first / "last.ckpt")
@@ -269,3 +290,45 @@ def test_a_data_set_of_any_layout_is_trained_on_with_a_card_alone(
     assert (spec.data, spec.rain, spec.training) == ("drives", (7,), {"sequences": ("monday",)})
     assert run_derain("predict", *options, "--ckpt_path", last).code == 0
     assert [path.name for path in Path("predictions").iterdir()] == ["0.label"]
+
+
+SCALARS = {"test/iou", "test/f1", "test/precision", "test/recall", "test/average_precision"}
+
+
+def test_a_test_is_logged_into_the_folder_of_its_training(run_derain, wads: list[str]) -> None:
+    quick = ["--panels.scans", "0", "--trainer.max_epochs", "2"]
+    assert run_derain("fit", *wads, *quick, "--errors.pictures", "0").code == 0
+    run = Path("runs/outdet_wads/version_0")
+    best = run / "checkpoints/best.ckpt"
+    kept = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    outcome = run_derain("test", *wads, "--ckpt_path", best)
+    assert outcome.code == 0
+    assert [path.name for path in run.parent.iterdir()] == ["version_0"]
+    assert all(path.read_bytes() == content for path, content in kept.items())
+    assert f"Written to {run.resolve()}/test.json" in outcome.out
+    assert yaml.safe_load((run / "test.yaml").read_text())["ckpt_path"] == str(best)
+    report = json.loads((run / "test.json").read_text())
+    assert (report["data"], report["checkpoint"]) == ("WADS", str(best))
+
+    events = EventAccumulator(str(run)).Reload()
+    assert set(events.Tags()["scalars"]) >= SCALARS | {"val/iou", "hp_metric"}
+    (iou,) = events.Scalars("test/iou")
+    assert iou.value == pytest.approx(report["scores"]["iou"])
+    assert iou.step == torch.load(best, weights_only=True)["global_step"]
+    assert set(events.Tags()["images"]) == {"test: errors by class and range", "test: threshold"}
+    assert "test/text_summary" in events.Tags()["tensors"]
+
+
+def test_a_test_that_is_told_where_to_log_does_so(
+    run_derain, wads: list[str], checkpoint: Path
+) -> None:
+    quick = ["--panels.scans", "0", "--errors.pictures", "0", "--trainer.max_epochs", "1"]
+    assert run_derain("fit", *wads, *quick).code == 0
+    best = Path("runs/outdet_wads/version_0/checkpoints/best.ckpt")
+    elsewhere = ["--trainer.logger.save_dir", "tests", "--errors.pictures", "0"]
+    assert run_derain("test", *wads, *elsewhere, "--ckpt_path", best).code == 0
+    assert Path("tests/outdet_wads/version_0/test.json").is_file()
+    assert not (best.parent.parent / "test.json").exists()
+    # A checkpoint that lies in no run has a folder of its own for its test.
+    assert run_derain("test", *wads, "--errors.pictures", "0", "--ckpt_path", checkpoint).code == 0
+    assert Path("runs/outdet_wads/version_1/test.json").is_file()

@@ -8,7 +8,6 @@ import lightning
 import numpy as np
 import pytest
 from lightning.pytorch.loggers import TensorBoardLogger
-from lightning.pytorch.trainer.states import TrainerFn
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
@@ -93,36 +92,6 @@ def test_the_first_rainy_scans_are_drawn_after_every_epoch(
     assert sorted(events.Tags()["images"]) == names
     for name in names:
         assert [event.step for event in events.Images(name)] == [1, 2]  # one batch an epoch
-
-
-@pytest.mark.parametrize(
-    ("epochs", "every", "pictures", "drawn"),
-    [
-        (3, 1, 10, [0, 1, 2]),
-        (60, 1, 4, [0, 20, 39, 59]),
-        (60, 10, 10, [9, 19, 29, 39, 49, 59]),
-        (60, 10, 2, [9, 59]),
-        (60, None, 2, [0, 59]),
-        (5, 1, 1, [0]),
-        (5, 1, 0, []),
-        (-1, 1, 2, [*range(7)]),
-    ],
-    ids=str,
-)
-def test_the_epochs_that_are_drawn_are_spread_over_the_training(
-    make_trainer: MakeTrainer, epochs: int, every: int | None, pictures: int, drawn: list[int]
-) -> None:
-    trainer, panel = make_trainer(epochs), ScanPanels(1, pictures)
-    trainer.check_val_every_n_epoch = every
-    trainer.state.fn = TrainerFn.FITTING
-    begun = []
-    step = every or 1
-    for epoch in range(step - 1, epochs if epochs > 0 else 7, step):
-        trainer.fit_loop.epoch_progress.current.completed = epoch
-        panel.on_validation_epoch_start(trainer)
-        if panel.left:
-            begun.append(epoch)
-    assert begun == drawn
 
 
 def test_without_tensorboard_nothing_is_drawn(

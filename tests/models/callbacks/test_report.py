@@ -22,8 +22,12 @@ def test_the_folder_is_printed_with_escapes(
     metrics = RainMetrics(card.classes, card.rain)
     rain = np.arange(100) < 50
     metrics.update_scan(Scan.of(scene(100)).with_label(np.where(rain, 110, 0)), rain)
-    trainer = SimpleNamespace(log_dir=str(folder), is_global_zero=True)
+    trainer = SimpleNamespace(
+        log_dir=str(folder), is_global_zero=True, loggers=[], ckpt_path="runs/last.ckpt"
+    )
     TestReport().on_test_end(trainer, SimpleNamespace(metrics=metrics, card=card))
     last = capsys.readouterr().out.splitlines()[-1]
     assert last == f"Written to {tmp_path}/run\\n\\u202e/test.json"
-    assert json.loads((folder / "test.json").read_text())["scores"]["iou"] == 1
+    report = json.loads((folder / "test.json").read_text())
+    assert report["scores"]["iou"] == 1
+    assert (report["data"], report["checkpoint"]) == ("WADS", "runs/last.ckpt")

@@ -1,0 +1,155 @@
+"""What a method would find at other thresholds: precision and recall, counted at many at once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torchmetrics import Metric
+
+from derain.errors import InputError
+from derain.evaluation.counts import Counts, intersection_over_union, ratio
+
+# Thresholds from 0 to 1 in equal steps, as TensorBoard's curves have them: no more than 127.
+EVEN = np.linspace(0, 1, 101)
+
+# Near 0 and 1, where networks that are sure put most points, they lie closer.
+CLOSE = np.array([digit * 10.0**-power for power in (6, 5, 4, 3) for digit in (1, 2, 5)])
+
+
+@dataclass(frozen=True, eq=False)
+class OperatingPoints:
+    """Points by what they are and what they would be called, at each of many thresholds.
+
+    A point is called rain where its probability is greater than the threshold; at the first
+    threshold, 0, all are, those without any probability of rain, too.
+
+    Attributes:
+        thresholds: Rising from 0 to 1, float64 (T,).
+        true_positive: Rain called rain, int64 (T,).
+        false_positive: Other points called rain, int64 (T,).
+        rain: Points that are rain.
+        other: Points that are not.
+    """
+
+    thresholds: NDArray[np.float64]
+    true_positive: NDArray[np.int64]
+    false_positive: NDArray[np.int64]
+    rain: int
+    other: int
+
+    @property
+    def precision(self) -> NDArray[np.float64]:
+        """Share of rain among what is called rain, float64 (T,); 1 where nothing is."""
+        return ratio(self.true_positive, self.true_positive + self.false_positive)
+
+    @property
+    def recall(self) -> NDArray[np.float64]:
+        """Share of the rain that is called rain, float64 (T,); 1 where there is none."""
+        return ratio(self.true_positive, self.rain)
+
+    @property
+    def iou(self) -> NDArray[np.float64]:
+        """IoU of rain, float64 (T,)."""
+        missed = self.rain - self.true_positive
+        return intersection_over_union(self.true_positive, self.false_positive + missed)
+
+    @property
+    def average_precision(self) -> float:
+        """Mean of the precision over the recall, in steps from one threshold to the next.
+
+        Source: the sum over thresholds of (R_n - R_{n-1}) P_n, as scikit-learn's
+        ``average_precision_score`` defines it.
+        """
+        gained = self.recall - np.append(self.recall[1:], 0)
+        return float(gained @ self.precision)
+
+    @property
+    def best(self) -> int:
+        """Number of the threshold with the greatest IoU; of equal ones, that of the middle."""
+        best = np.flatnonzero(self.iou == self.iou.max())
+        return int(best[len(best) // 2])
+
+    def at(self, threshold: float) -> int:
+        """Number of the threshold that is nearest to one."""
+        return int(np.abs(self.thresholds - threshold).argmin())
+
+    def counts(self, number: int) -> Counts:
+        """Counts at one of the thresholds, given its number."""
+        hits, false = int(self.true_positive[number]), int(self.false_positive[number])
+        return Counts(hits, false, self.rain - hits, self.other - false)
+
+    def among(self, thresholds: NDArray[np.float64]) -> "OperatingPoints":
+        """The same counts at some of the thresholds alone.
+
+        Args:
+            thresholds: Some of them, rising, float64 (S,).
+        """
+        rows = np.searchsorted(self.thresholds, thresholds)
+        return OperatingPoints(
+            self.thresholds[rows],
+            self.true_positive[rows],
+            self.false_positive[rows],
+            self.rain,
+            self.other,
+        )
+
+
+class ThresholdCounts(Metric):
+    """Counts probabilities of rain between thresholds: int64, the same memory for any data.
+
+    Counts add up across processes. As :meth:`points` gathers them, each process must call it.
+
+    Args:
+        chosen: Thresholds that are wanted exactly, besides ``EVEN`` and ``CLOSE``.
+
+    Raises:
+        InputError: One that is not between 0 and 1.
+    """
+
+    full_state_update = False
+    bins: Tensor
+
+    def __init__(self, chosen: Sequence[float] = ()) -> None:
+        super().__init__()
+        if not all(0 <= threshold <= 1 for threshold in chosen):
+            raise InputError(
+                "threshold", f"{list(chosen)} is not within 0 and 1", "Give a probability."
+            )
+        self.thresholds = np.unique([*EVEN, *CLOSE, *(1 - CLOSE), *chosen])
+        # Whether points are rain, and how many of the thresholds their probability exceeds.
+        bins = torch.zeros(2, len(self.thresholds) + 1, dtype=torch.int64)
+        self.add_state("bins", bins, dist_reduce_fx="sum")
+
+    def update(self, probability: NDArray[np.float32], rain: NDArray[np.bool_]) -> None:
+        """Counts the points of a scan.
+
+        Args:
+            probability: Probability of rain of every point, float32 (N,), 0 to 1.
+            rain: Points that are rain, bool (N,).
+        """
+        # As a threshold is compared with them: in their own precision.
+        exceeded = np.searchsorted(self.thresholds.astype(probability.dtype), probability)
+        cell = rain * self.bins.shape[1] + exceeded
+        counted = np.bincount(cell, minlength=self.bins.numel()).reshape(self.bins.shape)
+        self.bins += torch.from_numpy(counted).to(self.device)
+
+    def compute(self) -> dict[str, Tensor]:
+        """The average precision, a float32 scalar by that name."""
+        score = self._points().average_precision
+        return {"average_precision": torch.tensor(score, dtype=torch.float32, device=self.device)}
+
+    def points(self) -> OperatingPoints:
+        """What was counted, at each threshold."""
+        with self.sync_context():
+            return self._points()
+
+    def _points(self) -> OperatingPoints:
+        bins = self.bins.cpu().numpy()
+        exceeding = bins[:, ::-1].cumsum(axis=1)[:, ::-1]
+        other, rain = exceeding[:, 0].tolist()
+        called = exceeding[:, 1:].copy()
+        called[:, 0] = other, rain
+        return OperatingPoints(self.thresholds, called[1], called[0], rain, other)

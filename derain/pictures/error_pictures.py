@@ -1,0 +1,163 @@
+"""Pictures of where a derainer errs: by class and range, and at which threshold."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from derain.evaluation.metrics import ClassCounts
+from derain.evaluation.operating_points import OperatingPoints
+
+# Classes that a table has rows for; what is left of the others stands in one row.
+MOST_CLASSES = 14
+
+# Shares that are drawn as darkly as can be, and as lightly: errors of a class span decades.
+DARKEST, LIGHTEST = 1.0, 1e-4
+
+# Of the cells: rain that is left, and others that are removed. As in the pictures of scans.
+LEFT = LinearSegmentedColormap.from_list("left", ["#fffdf3", "#ffd23f"])
+LOST = LinearSegmentedColormap.from_list("lost", ["#fff8f8", "#ff5d5d"])
+
+PRECISION, RECALL, IOU = "#d98200", "#1f77b4", "#111827"
+FAINT = "#9ca3af"
+
+# IoU of the lines in the background of a precision-recall curve.
+LINES_OF_IOU = (0.2, 0.4, 0.6, 0.8, 0.9)
+
+
+def errors_figure(
+    counts: Mapping[str, Sequence[ClassCounts]], bands: Sequence[str], title: str
+) -> Figure:
+    """A table of the share of each class that is judged wrongly, by range.
+
+    Rain comes first, then what has most points judged wrongly.
+
+    Args:
+        counts: What became of the points of each class in each band, by the class's name.
+        bands: Names of the bands.
+        title: Heading.
+    """
+    rows = _rows(counts)
+    figure = Figure(figsize=(9, 1.5 + 0.42 * len(rows)), layout="constrained")
+    axes = figure.add_subplot()
+    axes.set_title(title, fontsize=11)
+    axes.imshow([[_colour(cell) for cell in row] for row in rows.values()], aspect="auto")
+    for y, row in enumerate(rows.values()):
+        for x, cell in enumerate(row):
+            axes.text(x, y, _text(cell), ha="center", va="center", fontsize=7.5)
+    axes.set_xticks(range(len(bands) + 1), [*bands, "all ranges"])
+    axes.set_yticks(range(len(rows)), list(rows))
+    axes.xaxis.tick_top()
+    axes.tick_params(length=0)
+    axes.axvline(len(bands) - 0.5, color="black", linewidth=0.8)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    figure.legend(
+        handles=[
+            Patch(color=LEFT(0.8), label="rain that is left"),
+            Patch(color=LOST(0.8), label="solid that is lost"),
+        ],
+        title="share of the class judged wrongly, and how many points that is",
+        loc="outside lower center",
+        ncols=2,
+        frameon=False,
+        fontsize=9,
+        title_fontsize=9,
+    )
+    return figure
+
+
+def operating_points_figure(points: OperatingPoints, threshold: float, title: str) -> Figure:
+    """Precision over recall with the chosen threshold marked, and both over the threshold.
+
+    Args:
+        points: Counts at many thresholds, of data with rain in them.
+        threshold: The one that is chosen.
+        title: Heading.
+    """
+    figure = Figure(figsize=(12, 4.8), layout="constrained")
+    figure.suptitle(title, fontsize=11)
+    curve, thresholds = figure.subplots(1, 2)
+    chosen, best = points.at(threshold), points.best
+    _draw_curve(curve, points, chosen, best)
+    _draw_over_threshold(thresholds, points, chosen, best)
+    return figure
+
+
+def _rows(counts: Mapping[str, Sequence[ClassCounts]]) -> dict[str, list[ClassCounts]]:
+    """The rows of the table, each with its total at the end; classes without points have none."""
+    rows = {name: [*cells, _total(cells)] for name, cells in counts.items()}
+    filled = {name: row for name, row in rows.items() if row[-1].points}
+    order = sorted(filled, key=lambda name: (not filled[name][-1].rain, -filled[name][-1].wrong))
+    if len(order) > MOST_CLASSES:
+        order, others = order[: MOST_CLASSES - 1], order[MOST_CLASSES - 1 :]
+        columns = zip(*(filled[name] for name in others), strict=True)
+        filled[f"{len(others)} others"] = [_total(column) for column in columns]
+        order.append(f"{len(others)} others")
+    return {_title(name, filled[name][-1]): filled[name] for name in order}
+
+
+def _title(name: str, total: ClassCounts) -> str:
+    return f"{name} (rain)" if total.rain and name != "rain" else name
+
+
+def _total(cells: Sequence[ClassCounts]) -> ClassCounts:
+    first, *others = cells
+    return sum(others, first)
+
+
+def _colour(cell: ClassCounts) -> tuple[float, ...]:
+    if not cell.wrong:
+        return (1.0, 1.0, 1.0, 1.0)
+    depth = np.log(cell.share_wrong / LIGHTEST) / np.log(DARKEST / LIGHTEST)
+    return (LEFT if cell.rain else LOST)(float(np.clip(depth, 0, 1)))
+
+
+def _text(cell: ClassCounts) -> str:
+    if not cell.points:
+        return "-"
+    return f"{cell.share_wrong:.2%}\n{cell.wrong:,} of {cell.points:,}"
+
+
+def _draw_curve(axes: Axes, points: OperatingPoints, chosen: int, best: int) -> None:
+    for iou in LINES_OF_IOU:
+        recall = np.linspace(iou, 1, 100)
+        # From IoU = 1 / (1 / precision + 1 / recall - 1).
+        axes.plot(recall, 1 / (1 / iou - 1 / recall + 1), color="#d1d5db", linewidth=1, zorder=0)
+        axes.text(1.005, iou, f" IoU {iou:g}", color=FAINT, fontsize=8, va="center")
+    axes.plot(points.recall, points.precision, color=RECALL, linewidth=1.8, zorder=2)
+    for number, name, face in ((best, "most IoU", "white"), (chosen, "chosen", IOU)):
+        counts, threshold = points.counts(number), points.thresholds[number]
+        axes.plot(
+            counts.recall,
+            counts.precision,
+            marker="o",
+            color=IOU,
+            markerfacecolor=face,
+            markersize=8,
+            linestyle="none",
+            zorder=3,
+            label=f"{name}: threshold {threshold:.4g}\nprecision {counts.precision:.3f}, "
+            f"recall {counts.recall:.3f}, IoU {counts.iou:.3f}",
+        )
+    axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="recall", ylabel="precision")
+    axes.set_title(f"average precision {points.average_precision:.3f}", fontsize=10)
+    axes.legend(loc="lower left", fontsize=8.5)
+
+
+def _draw_over_threshold(axes: Axes, points: OperatingPoints, chosen: int, best: int) -> None:
+    for name, values, colour in (
+        ("precision", points.precision, PRECISION),
+        ("recall", points.recall, RECALL),
+        ("IoU", points.iou, IOU),
+    ):
+        axes.plot(points.thresholds, values, color=colour, linewidth=1.8, label=name)
+    axes.axvline(points.thresholds[chosen], color=IOU, linewidth=1.2, label="chosen")
+    axes.axvline(points.thresholds[best], color=IOU, linewidth=1.2, linestyle=":", label="most IoU")
+    axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="threshold: rain is what is more probable")
+    axes.set_title("what another threshold would give", fontsize=10)
+    axes.grid(color="#e5e7eb", linewidth=0.6)
+    axes.legend(loc="lower center", fontsize=8.5, ncols=3)

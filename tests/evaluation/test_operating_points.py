@@ -1,0 +1,89 @@
+"""Precision and recall at many thresholds: against counting each of them alone."""
+
+import numpy as np
+import pytest
+
+from derain.errors import InputError
+from derain.evaluation.counts import Counts
+from derain.evaluation.operating_points import EVEN, ThresholdCounts
+
+
+def drawn(seed: int, points: int = 500) -> tuple[np.ndarray, np.ndarray]:
+    """Probabilities, some on thresholds and at both ends, and whether it is rain."""
+    rng = np.random.default_rng(seed)
+    rain = rng.random(points) < 0.2
+    probability = np.clip(rng.normal(np.where(rain, 0.9, 0.05), 0.3), 0, 1).astype(np.float32)
+    probability[::10] = rng.choice(EVEN, len(probability[::10]))
+    probability[5::50] = 1 - 1e-6
+    return probability, rain
+
+
+def counted(*scans: tuple[np.ndarray, np.ndarray], chosen: float = 0.37) -> ThresholdCounts:
+    metric = ThresholdCounts([chosen])
+    for probability, rain in scans:
+        metric.update(probability, rain)
+    return metric
+
+
+def test_every_threshold_counts_as_it_would_alone() -> None:
+    scans = [drawn(0), drawn(1, 300), drawn(2, 0)]
+    points = counted(*scans, chosen=1 / 3).points()
+    probability, rain = (np.concatenate(part) for part in zip(*scans, strict=True))
+    assert points.thresholds[0] == 0
+    assert points.thresholds[-1] == 1
+    assert (np.diff(points.thresholds) > 0).all()
+    assert points.thresholds[points.at(1 / 3)] == 1 / 3
+    assert points.counts(0) == Counts.of(np.ones(len(rain), bool), rain)
+    for number, threshold in enumerate(points.thresholds.tolist()[1:], 1):
+        counts = Counts.of(probability > threshold, rain)
+        assert points.counts(number) == counts
+        for score in ("precision", "recall", "iou"):
+            assert getattr(points, score)[number] == pytest.approx(getattr(counts, score))
+    best = points.counts(points.best)
+    assert best.iou == max(points.counts(n).iou for n in range(len(points.thresholds)))
+
+
+def test_the_average_precision_is_that_of_the_definition() -> None:
+    points = counted(drawn(3)).points()
+    # Sum of (R_n - R_{n-1}) P_n from the greatest threshold to the smallest.
+    area, recall = 0.0, 0.0
+    for number in reversed(range(len(points.thresholds))):
+        counts = points.counts(number)
+        area += (counts.recall - recall) * counts.precision
+        recall = counts.recall
+    assert points.average_precision == pytest.approx(area)
+    assert float(counted(drawn(3)).compute()["average_precision"]) == pytest.approx(area)
+
+
+def test_a_perfect_and_a_useless_answer() -> None:
+    rain = np.arange(1000) < 100
+    perfect = counted((rain.astype(np.float32), rain)).points()
+    assert perfect.average_precision == 1
+    assert 0 < perfect.thresholds[perfect.best] < 1
+    constant = counted((np.full(1000, 0.25, np.float32), rain)).points()
+    assert constant.average_precision == pytest.approx(0.1)  # the share of rain
+
+
+def test_some_of_the_thresholds_alone_keep_their_counts() -> None:
+    points = counted(drawn(4)).points()
+    even = points.among(EVEN)
+    np.testing.assert_array_equal(even.thresholds, EVEN)
+    for number, threshold in enumerate(EVEN):
+        assert even.counts(number) == points.counts(points.at(threshold))
+
+
+def test_memory_does_not_grow_and_nothing_is_left_after_a_reset() -> None:
+    metric = counted(drawn(5))
+    size = metric.bins.shape
+    for _ in range(3):
+        metric.update(*drawn(6))
+    assert metric.bins.shape == size
+    assert int(metric.bins.sum()) == 2000
+    metric.reset()
+    assert int(metric.bins.sum()) == 0
+
+
+@pytest.mark.parametrize("threshold", [-0.1, 1.5, float("nan")])
+def test_a_threshold_that_is_no_probability_is_refused(threshold: float) -> None:
+    with pytest.raises(InputError, match="not within 0 and 1"):
+        ThresholdCounts([threshold])
