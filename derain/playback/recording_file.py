@@ -75,6 +75,8 @@ def recording_file(path: Path, name: str, blueprint: Blueprint) -> Iterator[Reco
     """
     with replacing(path) as temporary:
         stream = rerun.RecordingStream("derain")
+        stream.set_log_time_enabled(False)  # when it was written tells nothing of the scans
+        stream.set_log_tick_enabled(False)
         stream.save(temporary, default_blueprint=blueprint)
         file = RecordingFile(path, stream)
         try:

@@ -39,7 +39,7 @@ class SensorLook:
     """How scans of one sensor are drawn.
 
     Attributes:
-        points: Points of a scan, on average.
+        points: Points of a scan that can be judged, on average.
         brightest: Intensity that is shown as white, in the unit of the scans.
         farthest: Range that is shown as white, metres.
         view: Their range image; None where there is nothing to make one of.
@@ -65,7 +65,7 @@ class SensorLook:
         except InputError:  # not one point that can be judged
             view = None
         return cls(
-            points=round(sum(map(len, scans)) / max(len(scans), 1)),
+            points=round(sum(map(len, ranges)) / max(len(scans), 1)),
             brightest=_nearly_all(intensities),
             farthest=_nearly_all(ranges),
             view=view,
