@@ -13,19 +13,18 @@ NAMES = {SOLID: "grey", RAIN: "blue", MISSED: "yellow", LOST: "red"}
 _COLOURS = "\n".join(f"- {NAMES[colour]}: {outcome}" for outcome, colour in OUTCOMES.items())
 
 
-def caption(frame: Frame, scan: Scan, labels: str | None) -> str:
+def caption(frame: Frame, scan: Scan, labels: str | None, held_out: bool) -> str:
     """The text of one scan, in Markdown.
 
     Args:
         frame: The frame.
         scan: Its scan.
         labels: What labels are called by which rain is known; None where there are none.
+        held_out: Whether nothing was learnt from it, where something was.
     """
     by = f"Rain is what the {labels} calls so" if labels else "Whatever a method removes is rain"
-    return (
-        f"**{_plain(frame.key)}**, {len(scan):,} points\n\n{_COLOURS}\n\n{by}. Probability: the "
-        "brighter, the more.\n"
-    )
+    which = f"**{_plain(frame.key)}**, {len(scan):,} points" + ", held out" * held_out
+    return f"{which}\n\n{_COLOURS}\n\n{by}. Probability: the brighter, the more.\n"
 
 
 def file_name(frame: Frame) -> str:

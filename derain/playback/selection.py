@@ -22,6 +22,7 @@ class Selection:
     Attributes:
         source: All of them.
         numbers: The places of those that are shown, ascending.
+        held_out: Keys of scans from which nothing was learnt, where something was.
 
     Raises:
         InputError: None is shown.
@@ -29,6 +30,7 @@ class Selection:
 
     source: Source
     numbers: Sequence[int]
+    held_out: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if not self.numbers:

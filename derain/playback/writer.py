@@ -62,7 +62,7 @@ class PlaybackWriter:
         labelled = None if self.labels is None else self.labels.of(frame, scan)
         self._at(frame)
         by = None if self.labels is None or labelled is None else self.labels.name
-        text = caption(frame, scan, by)
+        text = caption(frame, scan, by, frame.key in self.selection.held_out)
         self.file.log(CAPTION, rerun.TextDocument(text, media_type="text/markdown"))
         if frame.key in self.selection.poses:
             pose = self.selection.poses[frame.key]
