@@ -68,7 +68,7 @@ def layout(titles: Sequence[str], labels: Labels | None, placed: bool) -> Bluepr
                 views.TextDocumentView(origin=CAPTION, name="Scan"),
                 column_shares=[3, 1],
             ),
-            row_shares=[6, 1.4, 2.2],
+            row_shares=[5.5, 1.3, 2.6],
         ),
         views.TimePanel(timeline=FRAME, state="collapsed"),
         views.SelectionPanel(state="hidden"),
