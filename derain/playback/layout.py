@@ -70,7 +70,7 @@ def layout(titles: Sequence[str], labels: Labels | None, placed: bool) -> Bluepr
             ),
             row_shares=[5.5, 1.3, 2.6],
         ),
-        views.TimePanel(timeline=FRAME, state="collapsed"),
+        views.TimePanel(timeline=FRAME, state="collapsed", fps=10),
         views.SelectionPanel(state="hidden"),
         views.BlueprintPanel(state="hidden"),
         auto_views=False,
