@@ -1,12 +1,13 @@
 """A method by the name that a user gives it: a model, a filter, or one that sees several scans."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from derain.default import DEFAULT
-from derain.errors import InputError
+from derain.errors import InputError, printable
 from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import Runtime
 from derain.files.reading import is_file
@@ -29,6 +30,18 @@ def named_method(text: str) -> tuple[str, dict[str, Any]]:
         InputError: A YAML file that is missing, or names no method.
     """
     return read_parameters(text) if Path(text).suffix in PARAMETER_SUFFIXES else (text, {})
+
+
+def titled(text: str) -> tuple[str, str]:
+    """What a method is called, and its name or file.
+
+    Args:
+        text: As a user writes it: the name or the file, and before it ``title=`` or nothing.
+    """
+    title, equals, name = text.partition("=")
+    if not equals or os.path.isfile(text):  # files may well have an equals sign in their names
+        title, name = Path(text).stem, text
+    return printable(title), name  # the title goes into tables and pictures
 
 
 def method_names() -> list[str]:

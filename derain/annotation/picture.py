@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from derain.annotation.scene import Scene
 from derain.fusion.label_transfer import UNKNOWN
-from derain.pictures.scan_pictures import BACKGROUND
+from derain.pictures.palette import BACKGROUND
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.views.directions import directions

@@ -14,6 +14,7 @@ from derain.cli.results import last_line, proof_of
 from derain.cli.scan_options import add_columns
 from derain.cli.start import START_HELP
 from derain.cli.training.lightning_silence import no_news
+from derain.cli.view_recording import refuse_unusable
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.odometry.posed import ODOMETRY
@@ -37,6 +38,7 @@ trust it. Every step is a command of derain, printed before it runs.
   derain learn recording/ --out model.onnx --model salsanext --blind
   derain learn recording/ --out model.onnx --teacher crf       no motion needed; dim rain only
   derain learn recording/ --out model.onnx --start default     go on from the model of derain
+  derain learn recording/ --out model.onnx --rerun report.rrd  look at teacher and student
   derain run model.onnx more_scans/ --out cleaned              what it is for
 
 The teacher is persistence by default, which judges a point by the scans before and after: solid
@@ -75,6 +77,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--card", help="measure the finished model by the labels beside the scans, which this "
         "data card explains, for the record",
     )  # fmt: skip
+    parser.add_argument(
+        "--rerun",
+        type=Path,
+        metavar="FILE",
+        help="Rerun file to write (.rrd), which shows teacher and student scan after scan; needs "
+        "derain[view]",
+    )
     add_columns(parser)
 
 
@@ -95,6 +104,7 @@ def main(arguments: argparse.Namespace) -> int:
             fit=epochs,
             card=arguments.card,
             start=arguments.start,
+            rerun=arguments.rerun,
         )
     )
     return 0
@@ -107,6 +117,7 @@ def learn(lesson: Lesson) -> None:
         InputError: Too few scans, a folder that holds something else, or nothing to be learnt.
         SystemExit: A step failed.
     """
+    from derain.cli.learning_playback import show_lesson
     from derain.cli.learning_report import LearningReport
     from derain.cli.main import main as derain
 
@@ -114,6 +125,8 @@ def learn(lesson: Lesson) -> None:
     source = named_frames(lesson.recordings, lesson.columns)
     _refuse_too_few(lesson, source)
     refuse_unwritable(lesson.out)
+    if lesson.rerun is not None:
+        refuse_unusable(lesson.rerun)
     _clear(lesson.work)
     narrator = Narrator(derain, lesson.work / "log.txt")
     say(f"{len(source):,} scans to learn from. All but the model goes to {lesson.work}/")
@@ -133,6 +146,8 @@ def learn(lesson: Lesson) -> None:
     )
     report.ask_the_student()
     report.write()
+    if lesson.rerun is not None:
+        show_lesson(report, lesson.rerun)
     say(f"\n{report.summary}\n\nReport: {report.path}")
     say(f"What the model is for: derain run {lesson.out} SCANS --out cleaned")
     say(f"Done in {narrator.elapsed}; what the commands said: {narrator.log}")

@@ -27,6 +27,7 @@ class Lesson:
         columns: Names of the columns of files that do not name them.
         fit: Further options of the training.
         card: Data card of labels that measure the finished model; None measures nothing.
+        rerun: Rerun file that shows teacher and student scan after scan; None writes none.
         start: The trained model whose weights the network begins with; None draws them at random.
     """
 
@@ -41,6 +42,7 @@ class Lesson:
     fit: Sequence[str] = ()
     card: str | None = None
     start: str | None = None
+    rerun: Path | None = None
 
     @property
     def student(self) -> str:

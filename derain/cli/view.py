@@ -1,50 +1,46 @@
-"""``derain view``: one scan as several methods clean it."""
+"""``derain view``: scans as several methods clean them, in a picture, a window or over time."""
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from derain.cards.card import DataCard, load_card
-from derain.cards.known import layouts_for
-from derain.cli.arguments import add_threads
-from derain.cli.filter_help import list_filters
-from derain.cli.outputs import say
+from derain.cli.arguments import add_threads, count
+from derain.cli.filter_help import list_methods
+from derain.cli.pose_options import add_poses
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.default import DEFAULT
 from derain.errors import InputError
-from derain.sources.folders import frame_of
-from derain.system.notices import Notices
-from derain.views.oddities import outside_view
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from derain.export.bench.contestant import Contestant
-    from derain.scan import Scan
-    from derain.sources.frame import Frame
-
-SUMMARY = "draw a scan as several methods clean it"
+SUMMARY = "look at a scan, or a recording, as several methods clean it"
 
 DESCRIPTION = """\
 Draws a scan, its truth where it has labels, and what each method makes of it, from above and as the
-sensor sees it.
+sensor sees it; or writes a whole recording, to be looked at scan after scan in Rerun's viewer.
 
   derain view scan.bin --out figure.png
   derain view scan.bin --methods default outdet.onnx dsor --out figure.png
   derain view scan.bin --card wads --methods outdet.onnx tuned=dsor.yaml dror --out figure.png
   derain view scan.bin --methods outdet.onnx --window
+  derain view recording/ --methods default dsor --rerun out.rrd    then: rerun out.rrd
+  derain view recording/ --card wads --every 10 --rerun out.rrd
+  derain view recording/ --methods persistence --poses odometry --frames 0:50 --rerun out.rrd
 
 A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), default or a filter
-(below), all or none. --card says what the scan's labels mean; without it there is no truth, and
-with it points whose label says that they are unknown are left out.
+(below); of one scan also all or none, of a recording also what sees several scans. --card says what
+the labels mean; without it there is no truth, and in a picture points whose label says that they
+are unknown are left out.
+--rerun needs derain[view]. It writes the scans, and for each method what it keeps, what it removes
+and how probable it finds rain; range images, and the share removed over time. It says before how
+large that becomes. Where poses lie beside the scans, or --poses tells them, the scans lie in the
+world. Scans that cannot be read or judged are reported and shown empty; the exit code is then 2.
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
-    parser.add_argument("scan", type=Path)
-    list_filters(parser)
+    parser.add_argument(
+        "scans", nargs="+", type=Path, metavar="SCAN", help="a scan; with --rerun, recordings"
+    )
+    list_methods(parser)
     parser.add_argument(
         "--methods",
         nargs="+",
@@ -55,68 +51,52 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, help="PNG file to write")
     parser.add_argument("--window", action="store_true", help="open a window for each method")
     parser.add_argument(
-        "--card", help="data card of the scan's labels (beside it or in ../labels), such as wads"
+        "--rerun", type=Path, metavar="FILE", help="Rerun file to write (.rrd), of a recording"
+    )
+    parser.add_argument(
+        "--frames",
+        type=_numbers,
+        default=slice(None),
+        metavar="FROM:TO",
+        help="with --rerun, show these scans only, counted from 0, without TO (default: all)",
+    )
+    parser.add_argument(
+        "--every", type=count, default=1, help="with --rerun, show one scan of so many (default: 1)"
+    )
+    parser.add_argument(
+        "--card", help="data card of the scans' labels (beside them or in ../labels), such as wads"
     )
     add_columns(parser)
     add_intensity_scale(parser)
     add_threads(parser)
+    add_poses(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    from derain.export.bench.contestants import contestants
+    if arguments.rerun is not None:
+        from derain.cli.view_recording import view_recording
 
-    if not (arguments.out or arguments.window):
-        raise InputError(arguments.scan, "nothing is to be done with it", "Give --out or --window.")
-    methods = contestants(arguments.methods)
-    card = None if arguments.card is None else load_card(arguments.card)
-    frame = frame_of(arguments.scan, arguments.columns, layouts_for(card))
-    scan = frame.with_intensity_times(arguments.intensity_scale).read()
-    notices = Notices()
-    for method in methods:
-        if method.judges_by is not None:
-            notices.tell(frame.name, method.judges_by.oddities(scan), method.title)
-    truth = None if card is None else _truth(scan, frame, card)
-    predicted = {
-        method.title: _rain(scan, method, arguments.threads, notices) for method in methods
-    }
-    title, rain = f"{arguments.scan.name}: {len(scan):,} points", None
-    if truth is not None:
-        rain, known = truth
-        scan, rain = scan.take(known), rain[known]
-        predicted = {name: called_rain[known] for name, called_rain in predicted.items()}
-    if arguments.out:
-        from derain.pictures.comparison import comparison_figure
-        from derain.pictures.scan_pictures import save
+        if arguments.out or arguments.window:
+            raise InputError(
+                "--rerun", "a recording is shown in no picture", "Leave out --out and --window."
+            )
+        return view_recording(arguments)
+    from derain.cli.view_scan import view_scan
 
-        save(comparison_figure(scan, predicted, rain, title), arguments.out)
-        say(str(arguments.out))
-    if arguments.window:
-        from derain.pictures.comparison_window import show_comparison
-
-        show_comparison(scan, predicted, rain)
+    if len(arguments.scans) > 1 or arguments.scans[0].is_dir():
+        raise InputError(
+            arguments.scans[0],
+            "is more than one scan, which no picture shows",
+            "Name one, or give --rerun out.rrd to look at all of them.",
+        )
+    view_scan(arguments)
     return 0
 
 
-def _rain(
-    scan: "Scan", method: "Contestant", threads: int, notices: Notices
-) -> "NDArray[np.bool_]":
-    """Which points a method calls rain, bool (N,); warns where a model cannot see much of them."""
-    from derain.export.runtime import Derainer
-    from derain.system.stopwatch import Stopwatch
-
-    judge = method.ready(threads)
-    if not isinstance(judge, Derainer):
-        return judge(scan, Stopwatch())
-    judgement = judge.judge(scan)
-    outside = outside_view(scan, judgement.judged, judge.spec.data)
-    notices.tell(scan.name, outside, method.title)
-    return judgement.rain
-
-
-def _truth(
-    scan: "Scan", frame: "Frame", card: DataCard
-) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]]":
-    """Which points are rain, and of which it is known."""
-    labelled = scan.with_label(frame.read_label(len(scan)))
-    return card.rain_of(labelled), ~card.unknown_of(labelled)
+def _numbers(text: str) -> slice:
+    """Places of scans, such as ``10:20``, ``10:`` or ``:20``."""
+    first, colon, end = text.partition(":")
+    if not colon:
+        raise argparse.ArgumentTypeError(f"{text} is not FROM:TO")
+    return slice(*(int(part) if part else None for part in (first, end)))

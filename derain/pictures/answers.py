@@ -23,7 +23,8 @@ from derain.evaluation.answers import (
     total,
 )
 from derain.evaluation.counts import ratio
-from derain.pictures.scan_pictures import OUTCOMES, draw_from_above
+from derain.pictures.palette import OUTCOMES
+from derain.pictures.scan_pictures import draw_from_above
 from derain.scan import Scan
 
 # Told apart by colour-blind eyes and in grey.

@@ -8,12 +8,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from derain.evaluation.counts import Counts
+from derain.pictures.palette import outcomes
 from derain.pictures.scan_pictures import (
     draw_as_seen,
     draw_from_above,
     explain_colours,
     label_once,
-    outcomes,
 )
 from derain.scan import Scan
 

@@ -9,7 +9,7 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.pictures.scan_pictures import BACKGROUND, OUTCOMES, outcomes
+from derain.pictures.palette import BACKGROUND, OUTCOMES, outcomes
 from derain.scan import Scan
 from derain.system.open3d_import import import_open3d
 

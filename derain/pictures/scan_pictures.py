@@ -12,25 +12,11 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError, printable
 from derain.files.atomic import replacing
+from derain.pictures.palette import BACKGROUND, OUTCOMES, SOLID, outcomes
 from derain.scan import Scan
-
-# Bright on dark, and told apart by colour-blind eyes.
-BACKGROUND = "#10151c"
-SOLID = "#7d8a99"
-RAIN = "#39c5ff"
-MISSED = "#ffd23f"
-LOST = "#ff5d5d"
 
 # Steps of brightness that intensity is shown in.
 SHADES = 64
-
-# What a point is and what it was called, as a number and a colour.
-OUTCOMES = {
-    "solid, kept": SOLID,
-    "rain, removed": RAIN,
-    "rain, left": MISSED,
-    "solid, lost": LOST,
-}
 
 
 def judgement_figure(
@@ -100,16 +86,6 @@ def save(figure: Figure, path: Path) -> None:
         text.set_parse_math(False)
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=110)
-
-
-def outcomes(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """What became of each point, as a number of ``OUTCOMES``, int64 (N,).
-
-    Args:
-        predicted: Points called rain, bool (N,).
-        rain: Points that are rain, bool (N,).
-    """
-    return np.select([rain & predicted, rain & ~predicted, predicted], [1, 2, 3], default=0)
 
 
 def explain_colours(figure: Figure) -> None:

@@ -36,7 +36,7 @@ class FrameReader:
         """
         scan = self.read_unlabelled(frame)
         wanted = frame.label_path is not None or frame.has_labels
-        return self._with_labels(scan, frame) if wanted else scan
+        return self.with_labels(scan, frame) if wanted else scan
 
     def read_unlabelled(self, frame: Frame) -> Scan:
         """Reads all rows of a scan, whether or not there are labels.
@@ -56,7 +56,7 @@ class FrameReader:
         scan = self.read(frame)
         return scan.take(first_rows(scan))
 
-    def _with_labels(self, scan: Scan, frame: Frame) -> Scan:
+    def with_labels(self, scan: Scan, frame: Frame) -> Scan:
         """The scan with the labels of its frame, none of which the data card does not know."""
         label = frame.read_label(len(scan))
         if frame.label_map is not None:

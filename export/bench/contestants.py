@@ -3,7 +3,6 @@
 Nothing here loads torch, so that a process that measures a method's memory holds little else.
 """
 
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -21,7 +20,7 @@ from derain.evaluation.intensity_rule import IntensityRule
 from derain.export.bench.contestant import FILE_SIZE, Contestant
 from derain.export.bench.functions import TimedFunction
 from derain.export.bench.other_runtime import beside_themselves, run_by
-from derain.export.methods import load_method_of_one_scan, named_method, require_one_scan
+from derain.export.methods import load_method_of_one_scan, named_method, require_one_scan, titled
 from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import Runtime
 from derain.filters import FilterDerainer, PointFilter
@@ -104,10 +103,7 @@ def _contestant(method: GivenMethod, learn_from: LearnFrom | None) -> Contestant
 
 
 def _named(text: str, learn_from: LearnFrom | None) -> Contestant:
-    title, equals, name = text.partition("=")
-    if not equals or os.path.isfile(text):  # files may well have an equals sign in their names
-        title, name = Path(text).stem, text
-    title = printable(title)  # it goes into tables and pictures
+    title, name = titled(text)
     if name in TRIVIAL:
         return Contestant(title, name, TimedFunction(TRIVIAL[name]).ready)
     if name in LEARNT:

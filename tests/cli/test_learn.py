@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from recording_read_back import ReadBack
 
 from derain.cli import learn, learning_report, learning_text, narration
 from derain.cli.lesson import Lesson
@@ -15,7 +16,8 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.runtime import Derainer
-from derain.files.labels import write_labels
+from derain.files import read_scan
+from derain.files.labels import read_labels, write_labels
 from derain.scan import Scan
 
 QUICK = ("--teacher", "dror", "--epochs", "1")
@@ -86,11 +88,37 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
         label = recording.parent / "labels" / f"{number:06d}.label"
         write_labels(label, np.where(np.arange(600) < 540, 110, 65535))
     (work / "left.txt").touch()
-    outcome = run_derain(*command, "--card", "wads")
+    outcome = run_derain(*command, "--card", "wads", "--rerun", "report.rrd")
     assert outcome.code == 0, outcome.err
     assert weights(Path("model.onnx")) == without_labels
     assert "Nothing could be measured" in (work / "report.md").read_text()
     assert not (work / "left.txt").exists()
+    shows_teacher_and_student(ReadBack(Path("report.rrd")), recording, work)
+
+
+def shows_teacher_and_student(found: ReadBack, recording: Path, work: Path) -> None:
+    """What the viewer is given is what the teacher's labels and the finished model say."""
+    teacher, student = found.points("/sensor/scan/teacher"), Derainer("model.onnx")
+    removed = found.points("/sensor/methods/student/removed")
+    probability = found.points("/sensor/methods/student/probability")
+    assert list(teacher) == list(removed) == list(range(5))
+    for number in range(5):
+        scan = read_scan(recording / f"{number:06d}.bin")
+        labels = read_labels(work / f"taught/labels/{number:06d}.label", 600)
+        np.testing.assert_array_equal(teacher[number], scan.xyz[(labels != 0) & scan.valid])
+        np.testing.assert_array_equal(removed[number], scan.xyz[student(scan)])
+        probable = student.probability(scan) >= 0.01
+        np.testing.assert_array_equal(probability[number], scan.xyz[probable])
+        shares = {
+            "/share/scan/teacher": labels == 1,
+            "/share/scan/teacher_not_known": labels == 255,
+            "/share/methods/student": student(scan),
+        }
+        for entity, part in shares.items():
+            share = 100 * (part & scan.valid).sum() / scan.valid.sum()
+            assert found.numbers(entity)[number] == pytest.approx(share)
+    captions = found.values("/caption", "TextDocument:text")
+    assert [number for number, text in captions.items() if ", held out" in text[0]] == [4]
 
 
 def test_a_folder_of_something_else_is_not_cleared(run_derain, write: WriteRecording) -> None:

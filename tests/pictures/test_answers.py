@@ -14,7 +14,7 @@ from derain.pictures.answers import (
     removed_figure,
     teacher_figure,
 )
-from derain.pictures.scan_pictures import OUTCOMES
+from derain.pictures.palette import OUTCOMES
 from derain.scan import Scan
 
 CARD = DataCard("taught", {0: "not rain", 1: "rain", 255: "not known"}, (1,), unknown=(255,))

@@ -13,7 +13,7 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.pictures.comparison import MOST_PANELS_IN_A_ROW, comparison_figure
 from derain.pictures.comparison_window import show_comparison
-from derain.pictures.scan_pictures import OUTCOMES
+from derain.pictures.palette import OUTCOMES
 from derain.scan import Scan
 
 

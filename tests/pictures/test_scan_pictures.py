@@ -12,7 +12,8 @@ from matplotlib.image import imread
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.pictures.scan_pictures import OUTCOMES, before_after_figure, judgement_figure, save
+from derain.pictures.palette import OUTCOMES
+from derain.pictures.scan_pictures import before_after_figure, judgement_figure, save
 from derain.scan import Scan
 
 

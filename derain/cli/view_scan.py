@@ -1,0 +1,86 @@
+"""Draws one scan as several methods clean it."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from derain.cards.card import DataCard, load_card
+from derain.cards.known import layouts_for
+from derain.cli.outputs import say
+from derain.errors import InputError
+from derain.sources.folders import frame_of
+from derain.system.notices import Notices
+from derain.views.oddities import outside_view
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from derain.export.bench.contestant import Contestant
+    from derain.scan import Scan
+    from derain.sources.frame import Frame
+
+
+def view_scan(arguments: argparse.Namespace) -> None:
+    """Draws the scan.
+
+    Raises:
+        InputError: A scan or labels that cannot be read, a method that there is not, or an output
+            that cannot be written.
+    """
+    from derain.export.bench.contestants import contestants
+
+    path: Path = arguments.scans[0]
+    if not (arguments.out or arguments.window):
+        raise InputError(path, "nothing is to be done with it", "Give --out, --window or --rerun.")
+    methods = contestants(arguments.methods)
+    card = None if arguments.card is None else load_card(arguments.card)
+    frame = frame_of(path, arguments.columns, layouts_for(card))
+    scan = frame.with_intensity_times(arguments.intensity_scale).read()
+    notices = Notices()
+    for method in methods:
+        if method.judges_by is not None:
+            notices.tell(frame.name, method.judges_by.oddities(scan), method.title)
+    truth = None if card is None else _truth(scan, frame, card)
+    predicted = {
+        method.title: _rain(scan, method, arguments.threads, notices) for method in methods
+    }
+    title, rain = f"{path.name}: {len(scan):,} points", None
+    if truth is not None:
+        rain, known = truth
+        scan, rain = scan.take(known), rain[known]
+        predicted = {name: called_rain[known] for name, called_rain in predicted.items()}
+    if arguments.out:
+        from derain.pictures.comparison import comparison_figure
+        from derain.pictures.scan_pictures import save
+
+        save(comparison_figure(scan, predicted, rain, title), arguments.out)
+        say(str(arguments.out))
+    if arguments.window:
+        from derain.pictures.comparison_window import show_comparison
+
+        show_comparison(scan, predicted, rain)
+
+
+def _rain(
+    scan: "Scan", method: "Contestant", threads: int, notices: Notices
+) -> "NDArray[np.bool_]":
+    """Which points a method calls rain, bool (N,); warns where a model cannot see much of them."""
+    from derain.export.runtime import Derainer
+    from derain.system.stopwatch import Stopwatch
+
+    judge = method.ready(threads)
+    if not isinstance(judge, Derainer):
+        return judge(scan, Stopwatch())
+    judgement = judge.judge(scan)
+    outside = outside_view(scan, judgement.judged, judge.spec.data)
+    notices.tell(scan.name, outside, method.title)
+    return judgement.rain
+
+
+def _truth(
+    scan: "Scan", frame: "Frame", card: DataCard
+) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]]":
+    """Which points are rain, and of which it is known."""
+    labelled = scan.with_label(frame.read_label(len(scan)))
+    return card.rain_of(labelled), ~card.unknown_of(labelled)

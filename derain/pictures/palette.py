@@ -1,0 +1,60 @@
+"""The colours of everything that shows scans: pictures, windows and recordings to look at.
+
+It loads nothing that draws.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Bright on dark, and told apart by colour-blind eyes.
+BACKGROUND = "#10151c"
+SOLID = "#7d8a99"
+RAIN = "#39c5ff"
+MISSED = "#ffd23f"
+LOST = "#ff5d5d"
+
+# What a point is and what it was called, as a number and a colour.
+OUTCOMES = {
+    "solid, kept": SOLID,
+    "rain, removed": RAIN,
+    "rain, left": MISSED,
+    "solid, lost": LOST,
+}
+
+# A probability from 0 to 1: dark, the colour of rain, white, ever brighter.
+PROBABILITY = ("#2b3440", RAIN, "#ffffff")
+
+# Lines of several methods in one plot, told apart by colour-blind eyes; after the last, again.
+# Source: M. Okabe and K. Ito, "Color Universal Design", 2008; without its black and yellow, which
+# do not show on dark and on light ground alike.
+LINES = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#0072b2", "#d55e00")
+
+
+def outcomes(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """What became of each point, as a number of ``OUTCOMES``, int64 (N,).
+
+    Args:
+        predicted: Points called rain, bool (N,).
+        rain: Points that are rain, bool (N,).
+    """
+    return np.select([rain & predicted, rain & ~predicted, predicted], [1, 2, 3], default=0)
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue, 0 to 255, of a colour such as ``#39c5ff``."""
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+    return red, green, blue
+
+
+def shades(colours: tuple[str, ...], share: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Colours between some, uint8 (N, 3).
+
+    Args:
+        colours: Two or more, evenly spread from 0 to 1.
+        share: Where each point lies between the first and the last, (N,); beyond them counts as at
+            them.
+    """
+    places = np.linspace(0, 1, len(colours))
+    table = np.array([rgb(colour) for colour in colours])
+    channels = [np.interp(share, places, channel) for channel in table.T]
+    return np.stack(channels, axis=-1).round().astype(np.uint8)

@@ -1,0 +1,252 @@
+"""``derain view RECORDING --rerun``: what the viewer is given is what ``derain run`` finds."""
+
+import resource
+import signal
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recording_read_back import ReadBack
+
+from derain.evaluation.hard_cases import scene
+from derain.export.runtime import Derainer
+from derain.files import read_scan
+from derain.files.labels import read_labels, write_labels
+from derain.playback.entities import KEPT, NOT_KNOWN, RAIN
+
+SCANS = 4
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """Scans of 300 points of which some cannot be judged, with labels of rain in the last 30."""
+    folder = tmp_path / "drive/velodyne"
+    folder.mkdir(parents=True)
+    for number in range(SCANS):
+        points = scene(300, seed=number)
+        points[number] = np.nan
+        points.tofile(folder / f"{number:03}.bin")
+        label = tmp_path / f"drive/labels/{number:03}.label"
+        write_labels(label, np.repeat([0, 110], [270, 30]))
+    return folder
+
+
+def test_what_is_kept_and_removed_is_what_run_says(
+    run_derain, recording: Path, tmp_path: Path, onnx_model: Path
+) -> None:
+    out = tmp_path / "out.rrd"
+    methods = {"net": str(onnx_model), "dror": "dror", "persistence": "persistence"}
+    given = [f"{title}={name}" for title, name in methods.items()]
+    poses = ["--poses", "standing"]
+    outcome = run_derain("view", recording, "--methods", *given, *poses, "--rerun", out)
+    assert outcome.code == 0, outcome.err
+    found = ReadBack(out)
+    assert found.blueprints == 1
+    scans = [read_scan(recording / f"{number:03}.bin") for number in range(SCANS)]
+    points = found.points("/sensor/scan/points")
+    assert list(points) == list(range(SCANS))
+    for number, scan in enumerate(scans):
+        np.testing.assert_array_equal(points[number], scan.xyz[scan.valid])
+    for title, name in methods.items():
+        assert run_derain("run", name, recording, "--out", tmp_path / title, *poses).code == 0
+        kept = found.points(f"/sensor/methods/{title}/kept")
+        removed = found.points(f"/sensor/methods/{title}/removed")
+        shares = found.numbers(f"/share/methods/{title}")
+        for number, scan in enumerate(scans):
+            rain = read_labels(tmp_path / title / f"{number:03}.label", len(scan)) == 1
+            np.testing.assert_array_equal(removed[number], scan.xyz[rain])
+            np.testing.assert_array_equal(kept[number], scan.xyz[scan.valid & ~rain])
+            assert shares[number] == pytest.approx(100 * rain.sum() / scan.valid.sum())
+    assert outcome.out.splitlines()[0].startswith(
+        f"4 scans of about 299 points, methods: net, dror, persistence. {out} will take about "
+    )
+    size = f"{out.stat().st_size / 1e6:,.1f} MB"
+    assert outcome.out.splitlines()[-1] == f"{out}: {size}. Look at it: rerun {out}"
+
+
+def test_probabilities_are_those_of_the_model_where_rain_is_not_ruled_out(
+    run_derain, recording: Path, tmp_path: Path, onnx_model: Path
+) -> None:
+    out = tmp_path / "out.rrd"
+    options = ["--methods", f"net={onnx_model}", "dror", "--rerun", out]
+    assert run_derain("view", recording, *options).code == 0
+    found = ReadBack(out)
+    for number, shown in found.points("/sensor/methods/net/probability").items():
+        scan = read_scan(recording / f"{number:03}.bin")
+        probable = Derainer(onnx_model).probability(scan) >= 0.01
+        np.testing.assert_array_equal(shown, scan.xyz[probable])
+    # A filter says yes or no: there is nothing to shade.
+    assert not found.points("/sensor/methods/dror/probability")
+
+
+def test_truth_colours_what_methods_do(run_derain, recording: Path, tmp_path: Path) -> None:
+    card = tmp_path / "card.yaml"
+    card.write_text("{name: ours, classes: {0: a, 110: b, 9: c}, rain: [110], unknown: [9]}")
+    labels = np.repeat([9, 0, 110], [100, 170, 30])
+    write_labels(recording.parent / "labels/000.label", labels)
+    (recording.parent / "labels/002.label").unlink()
+    out = tmp_path / "out.rrd"
+    outcome = run_derain(
+        "view", recording, "--card", card, "--methods", "dror", "--frames", "0:3", "--rerun", out
+    )
+    assert outcome.code == 0, outcome.err
+    found = ReadBack(out)
+    scan = read_scan(recording / "000.bin")
+    told = np.flatnonzero(scan.valid & (labels != 0))
+    np.testing.assert_array_equal(found.points("/sensor/scan/truth")[0], scan.xyz[told])
+    classed = found.values("/sensor/scan/truth", "Points3D:class_ids")
+    assert classed[0] == np.where(labels[told] == 110, RAIN, NOT_KNOWN).tolist()
+    assert found.numbers("/share/scan/truth")[0] == pytest.approx(100 * 30 / scan.valid.sum())
+    assert found.numbers("/share/scan/truth_not_known")[0] == pytest.approx(100 * 99 / 299)
+    # The scan without labels does not show those of the one before.
+    assert found.cleared("/sensor/scan/truth") == {2}
+    run_derain("run", "dror", recording, "--out", tmp_path / "dror")
+    called = read_labels(tmp_path / "dror/000.label", 300) == 1
+    rain = np.where(labels == 9, called, labels == 110)
+    outcome_of = np.select([rain & called, rain, called], [1, 2, 3], default=0) + KEPT
+    kept = found.values("/sensor/methods/dror/kept", "Points3D:class_ids")[0]
+    assert kept == outcome_of[scan.valid & ~called].tolist()
+    removed = found.values("/sensor/methods/dror/removed", "Points3D:class_ids")[0]
+    assert removed == outcome_of[called].tolist()
+
+
+def test_without_labels_there_is_no_truth(run_derain, recording: Path, tmp_path: Path) -> None:
+    for label in (recording.parent / "labels").iterdir():
+        label.unlink()
+    out = tmp_path / "out.rrd"
+    options = ["--card", "wads", "--methods", "dror", "--rerun", out]
+    outcome = run_derain("view", recording, *options)
+    assert outcome.code == 0
+    first = recording / "000.bin"
+    assert outcome.said == [
+        f"derain: warning: {first}: no scan has labels, and so there is no truth"
+    ]
+    assert not any("truth" in entity for entity in ReadBack(out).entities)
+
+
+def test_some_scans_are_shown_and_a_method_of_several_scans_sees_all(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    whole, some = tmp_path / "whole.rrd", tmp_path / "some.rrd"
+    options = ["--poses", "standing", "--methods", "persistence", "dror", "--rerun"]
+    run_derain("view", recording, *options, whole)
+    assert run_derain("view", recording, "--every", "2", "--frames", "1:", *options, some).code == 0
+    of_all, of_some = ReadBack(whole), ReadBack(some)
+    assert list(of_some.points("/sensor/scan/points")) == [1, 3]
+    for title in ("persistence", "dror"):
+        removed = of_some.points(f"/sensor/methods/{title}/removed")
+        assert list(removed) == [1, 3]
+        for number, points in removed.items():
+            expected = of_all.points(f"/sensor/methods/{title}/removed")[number]
+            np.testing.assert_array_equal(points, expected)
+
+
+def test_scans_lie_where_and_when_they_were_taken(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    poses = np.tile(np.eye(4)[:3], (SCANS, 1, 1))
+    poses[:, 0, 3] = 4_000_000 + np.arange(SCANS)  # as maps count, where float32 knows no metres
+    np.savetxt(recording.parent / "poses.txt", poses.reshape(SCANS, 12))
+    np.savetxt(recording.parent / "times.txt", 1e9 + 0.1 * np.arange(SCANS))
+    out = tmp_path / "out.rrd"
+    assert run_derain("view", recording, "--methods", "dror", "--rerun", out).code == 0
+    found = ReadBack(out)
+    moved = found.values("/sensor", "Transform3D:translation")
+    assert {n: value[0] for n, value in moved.items()} == {n: [n, 0, 0] for n in range(SCANS)}
+    assert found.values("/trajectory", "LineStrips3D:strips")[None] == [
+        [[n, 0, 0] for n in range(SCANS)]
+    ]
+    assert found.seconds == pytest.approx({n: 0.1 * n for n in range(SCANS)}, abs=1e-6)
+    assert found.timelines == {"frame", "time"}
+
+
+def test_a_scan_that_cannot_be_read_is_told_of_once_and_shown_empty(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    (recording / "002.bin").write_bytes(b"no scan")
+    out = tmp_path / "out.rrd"
+    options = ["--methods", "dror", "persistence", "--poses", "standing", "--rerun", out]
+    outcome = run_derain("view", recording, *options)
+    assert outcome.code == 2
+    assert outcome.err.count("002.bin") == 1
+    assert outcome.err.splitlines()[-1] == "derain: of 4 scans not all could be shown"
+    found = ReadBack(out)
+    assert list(found.points("/sensor/scan/points")) == [0, 1, 3]
+    assert list(found.points("/sensor/methods/dror/kept")) == [0, 1, 3]
+    for entity in ("/sensor/scan", "/sensor/methods/dror", "/sensor/methods/persistence"):
+        assert found.cleared(entity) == {2}
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--rerun", "out.png"], "is no name that Rerun's viewer opens. Let it end in .rrd."),
+        (["--rerun", "out.rrd", "--frames", "9:"], "none of them is among the 4 scans"),
+        (["--rerun", "out.rrd", "--methods", "nothing"], "nothing: no such file"),
+        (["--rerun", "out.rrd", "--methods", "dror", "dror"], "dror: two methods are called so"),
+        (["--rerun", "out.rrd", "--out", "out.png"], "Leave out --out and --window."),
+        (["--out", "out.png"], "is more than one scan, which no picture shows"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_and_nothing_is_written(
+    run_derain,
+    recording: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    options: list[str],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = run_derain("view", recording, *options)
+    assert outcome.code == 2
+    assert said in outcome.err
+    assert len(outcome.err.splitlines()) == 1
+    assert [file.name for file in tmp_path.iterdir()] == ["drive"]
+
+
+def test_without_rerun_it_is_said_what_installs_it(
+    run_derain, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    outcome = run_derain("view", recording, "--rerun", tmp_path / "out.rrd")
+    assert outcome.code == 2
+    assert "pip install 'derain[view]'." in outcome.err
+    assert not (tmp_path / "out.rrd").exists()
+
+
+def test_a_file_that_is_there_stays_until_the_new_one_is_whole(
+    run_derain, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out.rrd"
+    out.write_bytes(b"as it was")
+    usual = Derainer.push
+
+    def interrupted(self: Derainer, frame, stopwatch=None):
+        if frame.key == "002":
+            raise KeyboardInterrupt
+        return usual(self, frame, stopwatch)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Derainer, "push", interrupted)
+        assert run_derain("view", recording, "--rerun", out).code == 130
+    assert out.read_bytes() == b"as it was"
+    assert [file.name for file in tmp_path.iterdir() if file.is_file()] == ["out.rrd"]
+    assert run_derain("view", recording, "--rerun", out).code == 0
+    assert len(ReadBack(out).points("/sensor/methods/default/kept")) == SCANS
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
+def test_a_disk_that_is_full_leaves_nothing(run_derain, recording: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.rrd"
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    try:
+        outcome = run_derain("view", recording, "--methods", "dror", "--rerun", out)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert outcome.code == 2
+    assert f"{out}: cannot be written whole" in outcome.err
+    assert [file.name for file in tmp_path.iterdir()] == ["drive"]
