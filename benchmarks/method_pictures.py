@@ -1,8 +1,6 @@
 """Draws one scan as each method cleans it, a picture a method, for the pages of docs/methods.
 
-    derain simulate --out drive --layout street --speed 6 --traffic 4 --sensor spinning_64 \
-        --rain 25 --sequences 1 --scans 3 --seed 3
-    python -m benchmarks.method_pictures drive/sequences/000/lidar_radar_pcd --out docs/methods
+How the scan is made and what is called for the networks stands in docs/methods/index.md.
 """
 
 import argparse
@@ -15,7 +13,7 @@ from PIL import Image
 
 from derain.cards.card import load_card
 from derain.evaluation.counts import Counts
-from derain.export.methods import method_of
+from derain.export.methods import load_method
 from derain.pictures.scan_pictures import (
     draw_as_seen,
     draw_from_above,
@@ -29,11 +27,11 @@ from derain.sources.source import Source
 
 METHODS = ("default", "persistence", "crf", "dror", "dsor", "ror", "sor", "ssr")
 
-# Metres that the picture from above shows to each side; most rain is met nearer.
-HALF_WIDTH = 25.0
+# Metres that the picture from above shows: to each side, and ahead. Most rain is met nearer.
+ASIDE, AHEAD = 10.0, 20.0
 
-# Colours in a file: what the pictures hold, and shades between them.
-COLOURS = 32
+# Colours in a file: those of the points, and shades between them.
+COLOURS = 64
 
 
 def main() -> None:
@@ -59,15 +57,13 @@ def main() -> None:
 
 def judged(name: str, frames: Source, number: int) -> NDArray[np.bool_]:
     """What a method calls rain in one scan of a recording, bool (N,)."""
-    method = method_of(name)
+    method = load_method(name, {})
     judgements = [method.push(frame) for frame in frames]
     answered = [*filter(None, judgements), *method.flush()]
     return answered[number].rain
 
 
-def write(
-    scan: Scan, predicted: NDArray[np.bool_], rain: NDArray[np.bool_], path: Path
-) -> None:
+def write(scan: Scan, predicted: NDArray[np.bool_], rain: NDArray[np.bool_], path: Path) -> None:
     """Draws a scan from above and as the sensor sees it, and what became of its points."""
     figure = Figure(figsize=(10, 4.4), layout="constrained")
     counts = Counts.of(predicted, rain)
@@ -80,15 +76,14 @@ def write(
     above, ahead = pair
     outcome = outcomes(predicted, rain)
     draw_from_above(above, scan, outcome)
-    forward = max(above.get_ylim()[0], -HALF_WIDTH)
-    above.set_xlim(-HALF_WIDTH, HALF_WIDTH)
-    above.set_ylim(forward, forward + 2 * HALF_WIDTH)
+    above.set_xlim(-ASIDE, ASIDE)
+    above.set_ylim(0, AHEAD)
     draw_as_seen(ahead, scan, outcome)
     label_once(pair)
     explain_colours(figure)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=100)
-    Image.open(path).convert("RGB").quantize(COLOURS).save(path, optimize=True)
+    Image.open(path).convert("RGB").quantize(COLOURS, Image.Quantize.FASTOCTREE).save(path)
 
 
 if __name__ == "__main__":
