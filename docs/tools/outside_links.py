@@ -6,7 +6,8 @@ A hook of MkDocs: read in the repository such a link opens its file, which the s
 import re
 from typing import Any
 
-OUTSIDE = re.compile(
+FOLDERS = "examples|derain|configs|benchmarks|tests"
+OUTSIDE = re.compile(rf"\[([^]]+)\]\((?:\.\./)+(?:{FOLDERS}|\w+\.md)[^)]*\)")
     r"\[([^]]+)\]\((?:\.\./)+(?:examples|derain|configs|benchmarks|tests|\w+\.md)[^)]*\)"
 )
 
