@@ -8,8 +8,6 @@ from typing import Any
 
 FOLDERS = "examples|derain|configs|benchmarks|tests"
 OUTSIDE = re.compile(rf"\[([^]]+)\]\((?:\.\./)+(?:{FOLDERS}|\w+\.md)[^)]*\)")
-    r"\[([^]]+)\]\((?:\.\./)+(?:examples|derain|configs|benchmarks|tests|\w+\.md)[^)]*\)"
-)
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
