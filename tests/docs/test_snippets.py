@@ -11,6 +11,7 @@ import pytest
 import torch
 import yaml
 
+import derain
 from derain.cli import main as command_line
 from derain.cli import narration
 from derain.evaluation.hard_cases import scene
@@ -109,3 +110,9 @@ def test_commands_stand_in_fences(page: Path) -> None:
     """Indented, they would be run by nobody."""
     text = re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
     assert not re.findall(r"^ {4}(?:derain|pip|python3?|make|tensorboard) .*", text, re.MULTILINE)
+
+
+def test_every_name_that_derain_offers_stands_in_the_reference() -> None:
+    pages = "".join(page.read_text("utf-8") for page in PAGES[1:])
+    shown = {name.rsplit(".", 1)[-1] for name in re.findall(r"^::: ([\w.]+)$", pages, re.MULTILINE)}
+    assert {name for name in derain.__all__ if name != "__version__"} <= shown
