@@ -3,7 +3,7 @@ VENV := .venv
 PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-openvino lint types clean
+.PHONY: demo test test-openvino lint types docs clean
 
 # With SCAN=path, it ends with a scan of your own.
 demo: $(READY)
@@ -27,6 +27,10 @@ types: $(READY)
 	rm -rf build
 	$(PYTHON) -m pip install --quiet --no-deps --no-build-isolation --target build/types .
 	$(VENV)/bin/mypy build/types/derain
+
+# The site in build/site; a warning is an error.
+docs: $(READY)
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
 
 # torch first and alone: with it in place, no other package brings a build of several gigabytes.
 $(READY): pyproject.toml constraints.txt

@@ -1,4 +1,4 @@
-"""The folder and the names with which examples in docstrings and in README.md are run."""
+"""The folder and the names with which examples in docstrings are run."""
 
 import shutil
 from pathlib import Path

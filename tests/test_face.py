@@ -109,14 +109,3 @@ def test_every_name_has_an_example_which_is_true(name: str) -> None:
     for test in tests:
         runner.run(test, out=told.append)
     assert not runner.failures, "".join(told)
-
-
-@pytest.mark.usefixtures("examples_folder")
-def test_the_examples_of_the_readme_run_one_after_the_other() -> None:
-    readme = (REPOSITORY / "README.md").read_text("utf-8")
-    examples = re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
-    assert examples
-    namespace: dict[str, Any] = {}
-    for example in examples:
-        exec(example, namespace)
-    assert 0 < len(namespace["clean"]) < len(namespace["scan"])

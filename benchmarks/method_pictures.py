@@ -1,0 +1,90 @@
+"""Draws one scan as each method cleans it, a picture a method, for the pages of docs/methods.
+
+How the scan is made and what is called for the networks stands in docs/methods/index.md.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+
+from derain.cards.card import load_card
+from derain.evaluation.counts import Counts
+from derain.export.methods import load_method
+from derain.pictures.scan_pictures import (
+    draw_as_seen,
+    draw_from_above,
+    explain_colours,
+    label_once,
+    outcomes,
+)
+from derain.scan import Scan
+from derain.sources.folders import named_frames
+from derain.sources.source import Source
+
+METHODS = ("default", "persistence", "crf", "dror", "dsor", "ror", "sor", "ssr")
+
+# Metres that the picture from above shows: to each side, and ahead. Most rain is met nearer.
+ASIDE, AHEAD = 10.0, 20.0
+
+# Colours in a file: those of the points, and shades between them.
+COLOURS = 64
+
+
+def main() -> None:
+    """Draws the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("recording", type=Path, help="folder of consecutive labelled scans")
+    parser.add_argument("--card", default="rehearse3d", help="data card of their labels")
+    parser.add_argument("--methods", nargs="+", default=METHODS, metavar="[TITLE=]METHOD")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the pictures")
+    arguments = parser.parse_args()
+
+    frames = named_frames([arguments.recording], labelled=True)
+    number = len(frames) // 2
+    frame = frames[number]
+    card = load_card(arguments.card)
+    scan = frame.read()
+    labelled = scan.with_label(frame.read_label(len(scan)))
+    for named in arguments.methods:
+        title, _, method = named.rpartition("=")
+        predicted = judged(method, frames, number)
+        write(labelled, predicted, card.rain_of(labelled), arguments.out / f"{title or method}.png")
+
+
+def judged(name: str, frames: Source, number: int) -> NDArray[np.bool_]:
+    """What a method calls rain in one scan of a recording, bool (N,)."""
+    method = load_method(name, {})
+    judgements = [method.push(frame) for frame in frames]
+    answered = [*filter(None, judgements), *method.flush()]
+    return answered[number].rain
+
+
+def write(scan: Scan, predicted: NDArray[np.bool_], rain: NDArray[np.bool_], path: Path) -> None:
+    """Draws a scan from above and as the sensor sees it, and what became of its points."""
+    figure = Figure(figsize=(10, 4.4), layout="constrained")
+    counts = Counts.of(predicted, rain)
+    figure.suptitle(
+        f"{path.stem}: precision {counts.precision:.2f}, recall {counts.recall:.2f} "
+        "(simulated rain)",
+        fontsize=10,
+    )
+    pair = figure.subplots(1, 2, width_ratios=(1, 1.6))
+    above, ahead = pair
+    outcome = outcomes(predicted, rain)
+    draw_from_above(above, scan, outcome)
+    above.set_xlim(-ASIDE, ASIDE)
+    above.set_ylim(0, AHEAD)
+    draw_as_seen(ahead, scan, outcome)
+    label_once(pair)
+    explain_colours(figure)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=100)
+    Image.open(path).convert("RGB").quantize(COLOURS, Image.Quantize.FASTOCTREE).save(path)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""The folder that the snippets of a page are run in: what they take for granted."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from derain.cards.card import load_card
+from derain.cli.main import main
+from derain.evaluation.hard_cases import scene
+from derain.files.labels import read_labels, semantic, write_labels
+
+KEPT = Path(__file__).resolve().parents[1] / "export" / "kept"
+
+# Ids of rain and of the rest: of the simulation, of WADS, and of a card that a page makes.
+SIMULATED_RAIN, FALLING_SNOW, ROAD = 3, 110, 40
+
+# Two seconds, 20,000 points a scan.
+DRIVE = "--layout street --speed 6 --sensor spinning_16 --rain 25 --sequences 1 --scans 5"
+
+
+def write_drive(folder: Path) -> None:
+    """Simulates a short drive through a street in the rain."""
+    assert main(["simulate", "--out", str(folder), *DRIVE.split(), "--workers", "1"]) == 0
+
+
+def prepare(folder: Path, simulated: Path) -> None:
+    """Puts into a folder what pages name: scans, a drive, labels, a model, data sets.
+
+    Args:
+        folder: The page's own.
+        simulated: What :func:`write_drive` wrote.
+    """
+    sequence = simulated / "sequences/000"
+    scans = sorted((sequence / "lidar_radar_pcd").glob("*.bin"))
+    for name in ("drive", "scans", "labelled", "my_data/sequences/00/lidar"):
+        (folder / name).mkdir(parents=True)
+    (folder / "my_data/sequences/00/classes").mkdir()
+    for number, scan in enumerate(scans):
+        size = scan.stat().st_size // 16
+        label = semantic(read_labels(sequence / f"lidar_radar_labels/{scan.stem}.label", size))
+        rain = label == SIMULATED_RAIN
+        snow = np.where(rain, FALLING_SNOW, ROAD)
+        _put(scan, folder / "drive", snow)
+        _put(scan, folder / "labelled", rain.astype(np.int64))
+        if number < 3:
+            _put(scan, folder / "scans", snow)
+    shutil.copy(scans[0], folder / "scan.bin")
+    shutil.copy(scans[0], folder / "my_data/sequences/00/lidar")
+    shutil.copy(
+        folder / "labelled/000000.label", folder / "my_data/sequences/00/classes/000000.label"
+    )
+    points = np.fromfile(scans[0], np.float32).reshape(-1, 4)
+    rings = np.zeros((len(points), 1), np.float32)
+    np.hstack([points, rings]).tofile(folder / "rings.bin")
+    shutil.copy(KEPT / "outdet.onnx", folder / "model.onnx")
+    shutil.copy(KEPT / "outdet.ckpt", folder / "model.ckpt")
+    _put_wads(folder / "WADS")
+
+
+def _put(scan: Path, folder: Path, label: "np.ndarray[tuple[int], np.dtype[np.int64]]") -> None:
+    """Copies a scan and writes its labels beside it."""
+    shutil.copy(scan, folder)
+    write_labels(folder / f"{scan.stem}.label", label)
+
+
+def _put_wads(root: Path) -> None:
+    """One made-up scan of 300 points for each sequence of the published split of WADS."""
+    drops = np.arange(300) >= 270
+    for sequences in load_card("wads").split.values():
+        for sequence in sequences:
+            folder = root / "sequences" / sequence
+            (folder / "velodyne").mkdir(parents=True)
+            (folder / "labels").mkdir()
+            scene(300, seed=int(sequence)).tofile(folder / "velodyne/000000.bin")
+            write_labels(folder / "labels/000000.label", np.where(drops, FALLING_SNOW, ROAD))

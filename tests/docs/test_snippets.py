@@ -1,0 +1,118 @@
+"""Every command and snippet of README.md and of the documentation's pages is run."""
+
+import doctest
+import re
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+import yaml
+
+import derain
+from derain.cli import main as command_line
+from derain.cli import narration
+from derain.evaluation.hard_cases import scene
+from derain.export import onnx_file
+from derain.export.bench import bench
+from derain.export.bench.cost import timed_here
+from derain.scan import Scan
+
+from .pages import PAGES, REPOSITORY, Snippet, snippets
+from .prepared import prepare, write_drive
+from .running import run
+
+SHELL = ("bash", "console")
+
+# What is shown and not run: parts of programs of other languages, trees of files, formulas.
+SHOWN = ("text", "cpp", "toml", "json")
+
+BY_PAGE = {page: snippets(page) for page in PAGES}
+WITH_SNIPPETS = [page for page, blocks in BY_PAGE.items() if blocks]
+NOT_RUN = [block for blocks in BY_PAGE.values() for block in blocks if block.not_run]
+
+# Times, counts and checksums are of one machine.
+NUMBER = re.compile(r"\b[\da-f]{12}\b|\d[\d,.]*")
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(REPOSITORY).as_posix()
+
+
+@pytest.fixture
+def page_folder(
+    tmp_path: Path, made_once: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Path]:
+    """The folder that a page is run in, in a process which proves and times little."""
+    prepare(tmp_path, made_once("documented_drive", write_drive))
+    monkeypatch.chdir(tmp_path)
+    # How far a step is has a test of its own, and so have the whole proof and the timing.
+    monkeypatch.setattr(narration, "PERIODS", {True: 3600, False: 3600})
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
+    monkeypatch.setattr(bench, "measure_cost", timed_here)
+    with torch.random.fork_rng(devices=[]):
+        yield tmp_path
+
+
+@pytest.mark.usefixtures("one_block")
+@pytest.mark.parametrize("page", WITH_SNIPPETS, ids=name_of)
+def test_a_page_runs_from_its_first_snippet_to_its_last(page: Path, page_folder: Path) -> None:
+    namespace: dict[str, Any] = {}
+    for snippet in BY_PAGE[page]:
+        if not snippet.not_run:
+            follow(snippet, page_folder, namespace)
+
+
+def follow(snippet: Snippet, folder: Path, namespace: dict[str, Any]) -> None:
+    """Does what a snippet shows, and compares what comes of it where the page says so."""
+    if snippet.title:
+        (folder / snippet.title).write_text(snippet.code, "utf-8")
+    if snippet.language == "yaml":
+        assert yaml.safe_load(snippet.code), snippet.place
+    elif snippet.language == "python":
+        code = compile(snippet.code, snippet.place, "exec")
+        if not snippet.title:
+            exec(code, namespace)
+    elif snippet.language in SHELL:
+        expected = snippet.outputs if snippet.language == "console" else []
+        for number, line in enumerate(snippet.commands):
+            code, printed = run(snippet.arguments(line), line, folder)
+            assert code == 0, f"{snippet.place}: {line}\n{printed}"
+            if expected:
+                assert same(expected[number], printed), f"{snippet.place}: {line}\n{printed}"
+    else:
+        assert snippet.language in SHOWN, f"{snippet.place}: {snippet.language}"
+
+
+def same(expected: str, printed: str) -> bool:
+    """Whether two outputs say the same, whatever the numbers; … stands for anything."""
+    want, got = NUMBER.sub("0", expected).replace("…", "..."), NUMBER.sub("0", printed)
+    options = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    return doctest.OutputChecker().check_output(want, got, options)
+
+
+@pytest.mark.parametrize("snippet", NOT_RUN, ids=lambda snippet: snippet.place)
+def test_what_is_not_run_has_a_reason_and_options_that_there_are(snippet: Snippet) -> None:
+    for line in snippet.commands:
+        words = snippet.arguments(line)
+        if words[0] == "derain":
+            assert words[1] not in command_line.TRAINING, f"{snippet.place}: run it, shortened"
+            command_line._parser().parse_args(words[1:])
+        elif words[:2] == ["python", "-m"]:
+            assert find_spec(words[2]), f"{snippet.place}: no module {words[2]}"
+    pytest.skip(f"not run: {snippet.not_run}")
+
+
+@pytest.mark.parametrize("page", PAGES[1:], ids=name_of)
+def test_commands_stand_in_fences(page: Path) -> None:
+    """Indented, they would be run by nobody."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    assert not re.findall(r"^ {4}(?:derain|pip|python3?|make|tensorboard) .*", text, re.MULTILINE)
+
+
+def test_every_name_that_derain_offers_stands_in_the_reference() -> None:
+    pages = "".join(page.read_text("utf-8") for page in PAGES[1:])
+    shown = {name.rsplit(".", 1)[-1] for name in re.findall(r"^::: ([\w.]+)$", pages, re.MULTILINE)}
+    assert {name for name in derain.__all__ if name != "__version__"} <= shown
