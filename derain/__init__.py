@@ -14,7 +14,7 @@ table, the type stub ``__init__.pyi`` beside this file, which type checkers and 
 import sys
 from importlib import import_module
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 
 def _table() -> dict[str, str]:

@@ -24,6 +24,7 @@ from derain.files.atomic import replacing
 from derain.filters import FILTERS, filter_from
 from derain.filters.parameters import CANDIDATES
 from derain.sources.training_record import overlap
+from derain.system.extras import OPTUNA, require
 from derain.system.notices import Notices
 from derain.views.candidate_fit import RAIN_INSIDE, fit_candidates
 from derain.views.candidates import Candidates
@@ -82,6 +83,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
+    if arguments.method in FILTERS:
+        require("tune", OPTUNA)
     notices = Notices()
     data = labelled(arguments, arguments.data)
     frames = _drawn(data.frames(arguments.part), arguments.scans, arguments.seed)

@@ -13,6 +13,7 @@ from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.sources.folders import frame_of
+from derain.system.extras import MATPLOTLIB, OPEN3D, require
 from derain.system.notices import Notices
 from derain.views.oddities import outside_view
 
@@ -68,6 +69,7 @@ def main(arguments: argparse.Namespace) -> int:
 
     if not (arguments.out or arguments.window):
         raise InputError(arguments.scan, "nothing is to be done with it", "Give --out or --window.")
+    require("view", MATPLOTLIB, *((OPEN3D,) if arguments.window else ()))
     methods = contestants(arguments.methods)
     card = None if arguments.card is None else load_card(arguments.card)
     frame = frame_of(arguments.scan, arguments.columns, layouts_for(card))
