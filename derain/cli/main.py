@@ -90,7 +90,7 @@ def main(arguments: list[str] | None = None) -> int:
     except InputError as error:
         return _refused(error)
     except ModuleNotFoundError as error:
-        if (missing := missing_extra(f"derain {' '.join(arguments[:1])}", error)) is None:
+        if (missing := missing_extra(arguments[0], error)) is None:
             raise
         return _refused(missing)
     except BrokenPipeError:
