@@ -3,7 +3,7 @@ VENV := .venv
 PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-openvino lint types docs clean
+.PHONY: demo test test-openvino lint types docs dist clean
 
 # With SCAN=path, it ends with a scan of your own.
 demo: $(READY)
@@ -32,6 +32,10 @@ types: $(READY)
 docs: $(READY)
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict
 
+# The wheel and the source distribution, each built, compared, installed alone, and run.
+dist: $(READY)
+	$(PYTHON) -m release.build --out dist
+
 # torch first and alone: with it in place, no other package brings a build of several gigabytes.
 $(READY): pyproject.toml constraints.txt
 	python3 -m venv $(VENV)
@@ -41,4 +45,4 @@ $(READY): pyproject.toml constraints.txt
 	touch $@
 
 clean:
-	rm -rf $(VENV) build demo runs *.egg-info
+	rm -rf $(VENV) build dist demo runs *.egg-info

@@ -1,6 +1,5 @@
 """From a source of frames to batches of views."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
 import lightning
@@ -8,14 +7,15 @@ from torch.utils.data import DataLoader
 
 from derain.cards.card import DataCard
 from derain.datamodules.draws import Draws
-from derain.datamodules.loader import scan_loader, with_needed_labels
+from derain.datamodules.loader import scan_loader
 from derain.datamodules.loading import Loading, Part
+from derain.datamodules.needed_labels import with_needed_labels
+from derain.datamodules.scan_data import ScanData
 from derain.datamodules.statistics import measured
 from derain.errors import InputError
 from derain.learning.batch import Sample
 from derain.learning.task import Task
 from derain.scan import Scan
-from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.sources.spread import evenly_spaced
@@ -27,7 +27,7 @@ __all__ = ["Loading", "Part", "ScanDataModule"]
 MOST_MEASURED = 200
 
 
-class ScanDataModule(lightning.LightningDataModule, ABC):
+class ScanDataModule(ScanData, lightning.LightningDataModule):
     """Batches of views of scans, for training, validation, test and prediction.
 
     A data set says where its scans come from; all else is the same for every one.
@@ -41,23 +41,9 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
     """
 
     def __init__(self, card: DataCard, loading: Loading) -> None:
-        super().__init__()
-        self.card = card
-        self.loading = loading
+        lightning.LightningDataModule.__init__(self)
+        ScanData.__init__(self, card, loading)
         self.task: Task | None = None
-
-    @property
-    def distinct(self) -> bool:
-        """Whether points at one position are measured once."""
-        return self.loading.counts_once(self.card)
-
-    @abstractmethod
-    def source(self, part: Part) -> Source:
-        """The scans of a part of the data, in order, and where their labels should be.
-
-        Raises:
-            InputError: Missing folders or scans.
-        """
 
     def shown(self, part: Part) -> Source:
         """The scans that a loader of a part goes through once: by default, each of them once.
@@ -74,31 +60,6 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
             InputError: Missing folders or scans.
         """
         return None
-
-    def frames(self, part: Part) -> Source:
-        """The scans of a part of the data, in order, each with the labels that are read there.
-
-        Raises:
-            InputError: Missing folders or scans, or labels missing where they are needed.
-        """
-        reads_labels = self.task is None or self.task.reads_labels
-        return with_needed_labels(self.source(part), part, reads_labels)
-
-    def read(self, frame: Frame) -> Scan:
-        """Reads a scan with its labels; for a model, with the columns that it sees.
-
-        Raises:
-            InputError: A file that cannot be read, or labels that are not in the data card.
-        """
-        return self._reader.read(frame)
-
-    def read_measured(self, frame: Frame) -> Scan:
-        """Reads what is measured of a scan, with its labels.
-
-        Raises:
-            InputError: A file that cannot be read, or labels that are not in the data card.
-        """
-        return (self._reader.read_distinct if self.distinct else self._reader.read)(frame)
 
     def complete_card(self, columns: Sequence[str] = (), labelled: bool = True) -> None:
         """Takes from the training scans the statistics that the data card lacks.
@@ -161,6 +122,10 @@ class ScanDataModule(lightning.LightningDataModule, ABC):
         draws = self.draws() if part == "train" else None
         shown = self.shown(part)
         return scan_loader(shown, part, self.task, self.loading, processes, process, draws)
+
+    @property
+    def _reads_labels(self) -> bool:
+        return self.task is None or self.task.reads_labels
 
     @property
     def _reader(self) -> FrameReader:

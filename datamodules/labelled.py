@@ -1,4 +1,7 @@
-"""Labelled scans as a user names them: files, folders of scans, or the root of a data set."""
+"""Labelled scans as a user names them: files, folders of scans, or the root of a data set.
+
+Nothing here loads torch.
+"""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -8,9 +11,10 @@ from pathlib import Path
 from derain.cards.card import DataCard, load_card, packaged_cards
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
-from derain.datamodules.base import Loading, Part, ScanDataModule
-from derain.datamodules.sequences import SequenceDataModule
-from derain.datamodules.taught import Taught
+from derain.datamodules.loading import Loading, Part
+from derain.datamodules.scan_data import ScanData
+from derain.datamodules.sequence_data import SequenceData
+from derain.datamodules.taught_data import TaughtData
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.simulation.manifest import RAIN_RATE, manifest_of, rates_of_sequences, read_manifest
@@ -19,7 +23,7 @@ from derain.sources.source import Source
 from derain.teaching.manifest import CARD, is_taught
 
 
-class NamedScans(ScanDataModule):
+class NamedScans(ScanData):
     """Scans named one by one or by their folders, the same ones for every part.
 
     A scan's labels are ``<stem>.label`` beside it or in the sibling folder of labels.
@@ -44,7 +48,7 @@ class NamedScans(ScanDataModule):
         return named_frames(self.paths, self.loading.columns, labelled=True, layouts=layouts)
 
 
-def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> ScanDataModule:
+def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> ScanData:
     """The scans that a command's ``--data`` names.
 
     Args:
@@ -70,9 +74,9 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> S
             "Name it alone, or its sequences one by one.",
         )
     if taught:
-        return Taught(str(root), loading)
+        return TaughtData(str(root), loading)
     split = read_manifest(root).get("split")
-    return SequenceDataModule(str(root), card, _layout_of(root, card), split, loading)
+    return SequenceData(str(root), card, _layout_of(root, card), split, loading)
 
 
 def card_of(paths: Sequence[Path], name: str | None) -> DataCard:

@@ -5,13 +5,13 @@ from torch.utils.data import DataLoader, Sampler
 from derain.datamodules.draws import DrawnOrder, Draws
 from derain.datamodules.kept import MEGABYTE
 from derain.datamodules.loading import Loading, Part
+from derain.datamodules.needed_labels import with_needed_labels
 from derain.datamodules.order import MeasuringOrder, Pick, TrainingOrder
 from derain.datamodules.scan_dataset import LateLoader, ScanDataset, packed
 from derain.errors import InputError
 from derain.learning.batch import Sample
 from derain.learning.seeds import run_seed
 from derain.learning.task import Task
-from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 
@@ -105,32 +105,3 @@ def _order(
     if draws is not None:
         return DrawnOrder(draws, dataset.seed, processes, process)
     return TrainingOrder(dataset, dataset.seed, processes, process)
-
-
-def with_needed_labels(source: Source, part: Part, reads_labels: bool) -> Source:
-    """The frames of a part, each with the labels that are read there.
-
-    Prediction reads none, nor does the training of a model that does not learn from labels. In
-    such a model's validation they measure and choose nothing: there it reads those it finds.
-
-    Args:
-        source: The frames, with what labels they have.
-        part: The part.
-        reads_labels: Whether the model learns from labels.
-
-    Raises:
-        InputError: Labels missing where they are needed.
-    """
-    if part == "predict" or (part == "train" and not reads_labels):
-        return source.map(_without_labels)
-    if part == "validation" and not reads_labels:
-        return source.map(lambda frame: frame if frame.has_labels else _without_labels(frame))
-    for frame in source:
-        if not frame.has_labels:
-            where = f"its labels are not at {frame.label_path}" if frame.label_path else "no labels"
-            raise InputError(frame.name, where, "Add them or leave the scan out.")
-    return source
-
-
-def _without_labels(frame: Frame) -> Frame:
-    return frame.without_labels()

@@ -1,18 +1,12 @@
-"""The layout of SemanticKITTI and its kin: a folder of sequences, each with scans and labels."""
+"""The data modules of sequences: what any data set of that layout is trained on by."""
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-
-from derain.cards.card import DataCard, load_card
-from derain.cards.layout import Layout
-from derain.datamodules.base import Loading, Part, ScanDataModule
-from derain.errors import InputError
-from derain.sources.folders import sequence_frames
-from derain.sources.source import Source
+from derain.cards.card import load_card
+from derain.datamodules.base import Loading, ScanDataModule
+from derain.datamodules.sequence_data import SequenceData
 from derain.sources.training_record import by_name
 
 
-class SequenceDataModule(ScanDataModule):
+class SequenceDataModule(SequenceData, ScanDataModule):
     """Scans and labels in sequences, which a split assigns to train, validation and test.
 
     Args:
@@ -23,32 +17,6 @@ class SequenceDataModule(ScanDataModule):
         loading: How the scans are read and batched.
     """
 
-    def __init__(
-        self,
-        root: str,
-        card: DataCard,
-        layout: Layout,
-        split: Mapping[str, Sequence[str]] | None,
-        loading: Loading,
-    ) -> None:
-        super().__init__(card, loading)
-        self.root = Path(root)
-        self.layout = layout
-        self.split = split or card.split
-
-    def source(self, part: Part) -> Source:
-        """The scans of a part's sequences, in order; for prediction those of the test part.
-
-        Raises:
-            InputError: A missing sequence or scan folder.
-        """
-        sequences = self.split.get("test" if part == "predict" else part, ())
-        if not sequences:
-            raise InputError(self.root, f"no sequences are named for {part}", "Give a split.")
-        return sequence_frames(
-            [self._folder(name) for name in sequences], self.layout, self.loading.columns
-        )
-
     def training_record(self) -> dict[str, tuple[str, ...]]:
         """Which scans it trains on: those of whole sequences.
 
@@ -57,17 +25,6 @@ class SequenceDataModule(ScanDataModule):
         if self.card.simulated:
             return super().training_record()
         return by_name(self.split.get("train", ()))
-
-    def _folder(self, name: str) -> Path:
-        folder = self.root / self.layout.sequences / name
-        if not (folder / self.layout.scans).is_dir():
-            raise InputError(
-                folder / self.layout.scans,
-                f"no such folder, though the split names sequence {name}",
-                "Check the root. If only some sequences are there, give `derain fit` a "
-                "--data.split, and other commands the folders of scans.",
-            )
-        return folder
 
 
 class Sequences(SequenceDataModule):

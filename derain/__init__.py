@@ -9,12 +9,16 @@
 ``import derain`` by itself loads none of what it offers, so that it stays quick and needs no torch:
 a name is imported when it is first asked for. The names, and where each comes from, stand in one
 table, the type stub ``__init__.pyi`` beside this file, which type checkers and editors read too.
+
+What trains networks needs ``pip install 'derain[train]'``. Without it those names raise an
+``ImportError`` that says so, and are left out of what is listed here.
 """
 
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 
 def _table() -> dict[str, str]:
@@ -33,21 +37,39 @@ def _table() -> dict[str, str]:
 
 _MODULE_OF = _table()
 
-__all__ = ["__version__", *_MODULE_OF]
+# Packages whose modules train networks, and what they are made of.
+_TRAINING, _TORCH = ("derain.models.", "derain.datamodules."), "torch"
 
 
 def __getattr__(name: str) -> object:
     """Imports a name of the table when it is first asked for."""
+    if name == "__all__":
+        return ["__version__", *_importable()]
     if name not in _MODULE_OF:
         # Given the name and the module, Python itself proposes a similar name in its message.
         raise AttributeError(
             f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__]
         )
-    value: object = getattr(import_module(_MODULE_OF[name]), name)
+    try:
+        value: object = getattr(import_module(_MODULE_OF[name]), name)
+    except ModuleNotFoundError as error:
+        from derain.system.extras import missing_extra
+
+        missing = missing_extra(f"derain.{name}", error)
+        if missing is None:
+            raise
+        raise missing from error
     globals()[name] = value  # the next time Python finds it without asking here
     return value
 
 
 def __dir__() -> list[str]:
     """What stands in this module, with the names that are not imported yet."""
-    return sorted({*globals(), *_MODULE_OF})
+    return sorted({*globals(), "__all__", *_importable()})
+
+
+def _importable() -> list[str]:
+    """The names of the table, those that train networks only where they can be imported."""
+    if find_spec(_TORCH) is not None:
+        return [*_MODULE_OF]
+    return [name for name, module in _MODULE_OF.items() if not module.startswith(_TRAINING)]

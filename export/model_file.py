@@ -6,6 +6,7 @@ The file is not trusted: all that derain asks of it is looked at before a networ
 from collections.abc import Iterator
 from dataclasses import dataclass
 from hashlib import sha256
+from math import prod
 from pathlib import Path
 from typing import Any, Self
 
@@ -39,6 +40,7 @@ PARTS = {
     "sparse tensor": {1: "tensor", 2: "tensor"},
     "tensor": {},
 }
+GRAPH, INITIALIZER, DIMENSIONS = 7, 5, 1
 METADATA_PROPS, PROP_KEY, PROP_VALUE = 14, 1, 2
 EXTERNAL_DATA, DATA_LOCATION = 13, 14
 
@@ -97,6 +99,36 @@ def sealed(content: bytes) -> bytes:
     place = content.rindex(NO_CHECKSUM.encode())
     digest = _checksum(content, place).encode()
     return content[:place] + digest + content[place + len(digest) :]
+
+
+def number_of_weights(content: bytes) -> int:
+    """Numbers that an exported graph holds: weights, and in eight bits their scales.
+
+    Args:
+        content: A whole ONNX file that has been read as a :class:`ModelFile`.
+    """
+    graphs = _parts(memoryview(content), GRAPH)
+    tensors = [tensor for graph in graphs for tensor in _parts(graph, INITIALIZER)]
+    return sum(prod(_dimensions(tensor)) for tensor in tensors)
+
+
+def _parts(message: memoryview, of_number: int) -> Iterator[memoryview]:
+    """The messages within a message that stand in one field."""
+    for number, value in _fields(message):
+        if number == of_number and isinstance(value, memoryview):
+            yield value
+
+
+def _dimensions(tensor: memoryview) -> Iterator[int]:
+    """The sizes of a tensor, which writers give one a field, or all in one."""
+    for number, value in _fields(tensor):
+        if number == DIMENSIONS and isinstance(value, int):
+            yield value
+        elif number == DIMENSIONS and isinstance(value, memoryview):
+            place = 0
+            while place < len(value):
+                size, place = _varint(value, place)
+                yield size
 
 
 def _refuse_changed(path: Path, content: bytes, checksum: Any) -> None:

@@ -23,6 +23,7 @@ from derain.sources.frame import Frame
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
 from derain.sources.spread import evenly_spaced
+from derain.system.extras import MATPLOTLIB, OPEN3D, require
 
 if TYPE_CHECKING:
     from derain.annotation.plane import Plane
@@ -95,6 +96,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     from derain.annotation.scene_file import read_scene
 
+    require("annotate", OPEN3D, MATPLOTLIB)
     folders = map(_folder_of_scans, arguments.scans)
     source = named_frames(folders, arguments.columns, layouts=())  # one sequence, no data set
     sequence = arguments.sequence or _sequence_of(Path(source[0].name))

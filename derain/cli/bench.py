@@ -22,8 +22,8 @@ from derain.evaluation.published_tables import (
 from derain.files.atomic import replacing
 
 if TYPE_CHECKING:
-    from derain.datamodules.base import ScanDataModule
     from derain.datamodules.loading import Part
+    from derain.datamodules.scan_data import ScanData
     from derain.export.bench.bench import Bench
     from derain.export.bench.contestant import Contestant
     from derain.export.bench.contestants import LearnFrom
@@ -140,7 +140,7 @@ def _bench(
     return bench
 
 
-def _frames(data: "ScanDataModule", part: "Part") -> "Frames":
+def _frames(data: "ScanData", part: "Part") -> "Frames":
     """The scans of a part; one that is named twice is one."""
     from derain.sources.source import Frames
 
@@ -148,7 +148,7 @@ def _frames(data: "ScanDataModule", part: "Part") -> "Frames":
 
 
 def _labelled_frames(
-    data: "ScanDataModule", frames: Sequence["Frame"], rates: Mapping[str, float]
+    data: "ScanData", frames: Sequence["Frame"], rates: Mapping[str, float]
 ) -> "LabelledFrames":
     """Scans of a data set, read and counted as the data module would."""
     from derain.export.bench.labelled_frames import LabelledFrames
@@ -156,12 +156,12 @@ def _labelled_frames(
     return LabelledFrames(data.card, frames, data.loading.intensity_scale, data.distinct, rates)
 
 
-def _learn_from(arguments: argparse.Namespace, data: "ScanDataModule") -> "LearnFrom | None":
+def _learn_from(arguments: argparse.Namespace, data: "ScanData") -> "LearnFrom | None":
     """What gives the training scans; None where none are named."""
-    from derain.datamodules.sequences import SequenceDataModule
-    from derain.datamodules.taught import Taught
+    from derain.datamodules.sequence_data import SequenceData
+    from derain.datamodules.taught_data import TaughtData
 
-    if arguments.train is None and not isinstance(data, SequenceDataModule | Taught):
+    if arguments.train is None and not isinstance(data, SequenceData | TaughtData):
         return None
 
     training = data if arguments.train is None else labelled(arguments, arguments.train)
@@ -169,10 +169,10 @@ def _learn_from(arguments: argparse.Namespace, data: "ScanDataModule") -> "Learn
     return lambda: _labelled_frames(training, _frames(training, "train"), {}).truths()
 
 
-def _require_split(arguments: argparse.Namespace, data: "ScanDataModule") -> None:
-    from derain.datamodules.sequences import SequenceDataModule
+def _require_split(arguments: argparse.Namespace, data: "ScanData") -> None:
+    from derain.datamodules.sequence_data import SequenceData
 
-    if not isinstance(data, SequenceDataModule):
+    if not isinstance(data, SequenceData):
         raise InputError(
             arguments.data[0], "has no split, which the paper's tables ask for", "Name the root."
         )

@@ -13,6 +13,7 @@ from derain.cli.scan_options import add_columns
 from derain.default import DEFAULT
 from derain.files import DEFAULT_COLUMNS
 from derain.sources.folders import named_frames
+from derain.system.extras import OF_EXPORT, OF_TRAINING, OPEN3D, OPTUNA, require
 
 SUMMARY = "the whole story on simulated rain, in about six minutes"
 
@@ -82,6 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
+    require("demo", *OF_TRAINING, *OF_EXPORT, OPTUNA, OPEN3D)
     epochs = ("--trainer.max_epochs", str(arguments.epochs)) if arguments.epochs else ()
     if arguments.scan is not None:
         # Minutes before it is its turn: what cannot be read is told now.

@@ -10,6 +10,7 @@ from derain.cli.arguments import count, share, threads
 from derain.cli.outputs import say
 from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_options import add_columns, add_intensity_scale
+from derain.system.extras import OF_EXPORT, require
 from derain.system.notices import Notices
 from derain.views.candidate_fit import RAIN_INSIDE
 from derain.views.channels import extra_channels, with_columns
@@ -79,6 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
+    require("export", *OF_EXPORT)
     from derain.errors import InputError
     from derain.export.latency import measure_latency
     from derain.export.onnx_file import export

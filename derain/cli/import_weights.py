@@ -6,6 +6,7 @@ from pathlib import Path
 
 from derain.cli.outputs import say
 from derain.errors import InputError
+from derain.system.extras import OF_CHECKPOINTS, require
 
 SUMMARY = "make a checkpoint from published weights"
 
@@ -45,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
+    require("import-weights", *OF_CHECKPOINTS)
     from derain.cards.card import load_card
     from derain.models.checkpoint import save_model
     from derain.models.published import Published, read_state_dict

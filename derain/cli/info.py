@@ -24,6 +24,7 @@ from derain.files.labels import read_labels, semantic
 from derain.files.reading import reading
 from derain.scan import Scan
 from derain.sources.folders import frame_of, named_frames
+from derain.system.extras import MATPLOTLIB, OF_CHECKPOINTS, require
 from derain.views.candidates import candidates_at
 from derain.views.directions import directions
 from derain.views.grid_fit import fit_grid
@@ -110,6 +111,8 @@ def _refuse_unclear_picture(arguments: argparse.Namespace) -> None:
         arguments.grid or len(arguments.files) > 1 or not os.path.isdir(arguments.files[0])
     ):
         raise InputError("--picture", "shows one folder's statistics", "Name one folder alone.")
+    if arguments.picture:
+        require("--picture", MATPLOTLIB)
 
 
 def _describe_default(arguments: argparse.Namespace) -> None:
@@ -147,6 +150,7 @@ def _facts(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
 
             return Derainer(path, threads=1).metadata
         case ".ckpt":
+            require(path, *OF_CHECKPOINTS)
             from derain.models.checkpoint import load_model
 
             model = load_model(path)

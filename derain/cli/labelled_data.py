@@ -8,7 +8,7 @@ from derain.cards.card import packaged_cards
 from derain.cli.scan_options import add_columns, add_intensity_scale
 
 if TYPE_CHECKING:
-    from derain.datamodules.base import ScanDataModule
+    from derain.datamodules.scan_data import ScanData
 
 
 def add_data_arguments(parser: argparse.ArgumentParser, part: str) -> None:
@@ -41,14 +41,14 @@ def add_data_arguments(parser: argparse.ArgumentParser, part: str) -> None:
     add_intensity_scale(parser)
 
 
-def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanDataModule":
+def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanData":
     """The labelled scans that these arguments, and some paths, name.
 
     Raises:
         InputError: Data whose labels nothing explains, or a root without sequences.
     """
-    from derain.datamodules.base import Loading
     from derain.datamodules.labelled import card_of, labelled_scans
+    from derain.datamodules.loading import Loading
 
     loading = Loading(
         columns=arguments.columns,

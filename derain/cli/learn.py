@@ -22,6 +22,7 @@ from derain.sources.folders import named_frames
 from derain.sources.recordings import recordings_of
 from derain.sources.records import POSES
 from derain.sources.source import Source
+from derain.system.extras import OF_EXPORT, OF_TRAINING, require
 from derain.teaching.held_out import FEWEST_SCANS
 from derain.teaching.manifest import TAUGHT_MANIFEST, Manifest
 
@@ -89,6 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
+    require("learn", *OF_TRAINING, *OF_EXPORT)
     out: Path = arguments.out
     epochs = ("--trainer.max_epochs", str(arguments.epochs)) if arguments.epochs else ()
     learn(

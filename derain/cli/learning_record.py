@@ -11,7 +11,7 @@ from derain.cards.known import label_of, layouts_for
 from derain.errors import InputError
 from derain.evaluation.answers import NOT_KNOWN, RAIN, answer_of
 from derain.evaluation.counts import SCORES
-from derain.evaluation.metrics import RainMetrics
+from derain.evaluation.rain_counts import RainCounts
 from derain.evaluation.text_tables import markdown_table
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
@@ -47,10 +47,10 @@ def record_of(frames: Sequence[Frame], taught: DataCard, name: str, student: Stu
 
 def _measured(
     frames: Sequence[Frame], taught: DataCard, card: DataCard, student: Student
-) -> dict[str, RainMetrics]:
+) -> dict[str, RainCounts]:
     """Teacher and student beside the labels, over all points and where the teacher is sure."""
     titles = ("teacher", SURE, "student")
-    metrics = {t: RainMetrics(card.classes, card.rain, unknown=card.unknown) for t in titles}
+    metrics = {t: RainCounts(card.classes, card.rain, unknown=card.unknown) for t in titles}
     reader, layouts = FrameReader(taught), layouts_for(card)
     for frame in frames:
         assert isinstance(frame, FileFrame)  # what is taught lies in files
@@ -60,13 +60,13 @@ def _measured(
         rows = first_rows(scan) if card.deduplicate else np.flatnonzero(scan.valid)
         sure = rows[answer[rows] != NOT_KNOWN]
         truth = scan.with_label(labelled)
-        metrics["teacher"].update_scan(truth.take(rows), answer[rows] == RAIN)
-        metrics[SURE].update_scan(truth.take(sure), answer[sure] == RAIN)
-        metrics["student"].update_scan(truth.take(rows), called_rain[rows])
+        metrics["teacher"].add(truth.take(rows), answer[rows] == RAIN)
+        metrics[SURE].add(truth.take(sure), answer[sure] == RAIN)
+        metrics["student"].add(truth.take(rows), called_rain[rows])
     return metrics
 
 
-def _tables(card: DataCard, metrics: Mapping[str, RainMetrics]) -> str:
+def _tables(card: DataCard, metrics: Mapping[str, RainCounts]) -> str:
     """Scores over the points of all scans, and what was called rain of each class."""
     scores = [
         [title, *(f"{getattr(measured.pooled(), score):.3f}" for score in SCORES)]

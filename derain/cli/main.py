@@ -28,6 +28,7 @@ from derain.cli.signals import interrupting
 from derain.cli.training.configurations import require_configuration
 from derain.cli.training.help import short_help
 from derain.errors import InputError
+from derain.system.extras import OF_TRAINING, missing_extra, require
 
 DESCRIPTION = """\
 Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
@@ -88,6 +89,10 @@ def main(arguments: list[str] | None = None) -> int:
             return code
     except InputError as error:
         return _refused(error)
+    except ModuleNotFoundError as error:
+        if (missing := missing_extra(arguments[0], error)) is None:
+            raise
+        return _refused(missing)
     except BrokenPipeError:
         # Whoever read our output has had enough; Python must not try to flush the rest.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -129,6 +134,7 @@ def _run(arguments: list[str]) -> int:
             print(short_help(arguments[0]))
             return 0
         require_configuration(arguments)
+        require(arguments[0], *OF_TRAINING)
         from derain.cli.training.train import train
 
         train(arguments)

@@ -11,6 +11,7 @@ from derain.cli.scan_options import add_columns
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.system.cores import usable_cores
+from derain.system.extras import MATPLOTLIB, OPEN3D, require
 
 SUMMARY = "make a data set of simulated rain, or let it rain on clean scans"
 
@@ -153,7 +154,10 @@ def main(arguments: argparse.Namespace) -> int:
 
         foreign = [*OF_DATA_SETS, "world"]
         _settle(arguments, OF_SCANS, foreign, needs="without --on")
+        if arguments.picture:
+            require("--picture", MATPLOTLIB)
         return rain_on_scans(arguments)
+    require("simulate", OPEN3D)
     if arguments.world is not None:
         foreign = [name for name in (*OF_DATA_SETS, *OF_SCANS) if name not in OF_WORLDS]
         foreign += ["rain", "sensor"]  # of which a world has its own

@@ -24,13 +24,14 @@ from derain.files.atomic import replacing
 from derain.filters import FILTERS, filter_from
 from derain.filters.parameters import CANDIDATES
 from derain.sources.training_record import overlap
+from derain.system.extras import OPTUNA, require
 from derain.system.notices import Notices
 from derain.views.candidate_fit import RAIN_INSIDE, fit_candidates
 from derain.views.candidates import Candidates
 from derain.views.oddities import Examiner, outside_view
 
 if TYPE_CHECKING:
-    from derain.datamodules.base import ScanDataModule
+    from derain.datamodules.scan_data import ScanData
     from derain.export.tuning import Tuned
     from derain.scan import Scan
     from derain.sources.frame import Frame
@@ -82,6 +83,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
+    if arguments.method in FILTERS:
+        require("tune", OPTUNA)
     notices = Notices()
     data = labelled(arguments, arguments.data)
     frames = _drawn(data.frames(arguments.part), arguments.scans, arguments.seed)
@@ -103,7 +106,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _tuned_filter(
     arguments: argparse.Namespace,
-    data: "ScanDataModule",
+    data: "ScanData",
     frames: list["Frame"],
     notices: Notices,
 ) -> "Tuned":
@@ -135,7 +138,7 @@ def _tuned_filter(
 
 
 def _candidates(
-    arguments: argparse.Namespace, data: "ScanDataModule", frames: list["Frame"]
+    arguments: argparse.Namespace, data: "ScanData", frames: list["Frame"]
 ) -> Candidates | None:
     """Bounds of the scans' rain, where they are asked for and there are any."""
     if arguments.candidates is None:
@@ -154,7 +157,7 @@ def _candidates(
 
 def _tuned_model(
     arguments: argparse.Namespace,
-    data: "ScanDataModule",
+    data: "ScanData",
     frames: list["Frame"],
     notices: Notices,
 ) -> "Tuned":
@@ -185,7 +188,7 @@ def _tuned_model(
     return tune_threshold(scans, derainer.spec.threshold)
 
 
-def _read(data: "ScanDataModule", examiner: Examiner, notices: Notices, frame: "Frame") -> "Scan":
+def _read(data: "ScanData", examiner: Examiner, notices: Notices, frame: "Frame") -> "Scan":
     """Reads a scan, and warns of what is odd about it for the method."""
     scan = data.read_measured(frame)
     notices.tell(frame.name, examiner.oddities(scan))
@@ -199,7 +202,7 @@ def _drawn(frames: Sequence["Frame"], most: int, seed: int) -> list["Frame"]:
     return [frames[number] for number in np.sort(chosen)]
 
 
-def _no_rain(data: "ScanDataModule") -> InputError:
+def _no_rain(data: "ScanData") -> InputError:
     rain = ", ".join(data.card.classes[id_] for id_ in data.card.rain) or "rain"
     return InputError(
         "--data", f"no point of these scans is {rain}", "Tune on scans with rain, and their --card."

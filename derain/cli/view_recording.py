@@ -15,13 +15,13 @@ from derain.cli.outputs import refuse_unwritable, say
 from derain.cli.pose_options import placed
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method, titled
-from derain.files.extras import Extra
 from derain.files.reading import reading
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
+from derain.system.extras import RERUN
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from derain.playback.labels import Labels
     from derain.playback.selection import Selection
 
-VIEW = Extra("view", "rerun")
 SUFFIX = ".rrd"
 
 
@@ -78,7 +77,7 @@ def refuse_unusable(out: Path) -> None:
     Raises:
         InputError: Rerun is not installed, another suffix, or a folder that is not writable.
     """
-    VIEW.load(out)
+    RERUN.load(out)
     if out.suffix.lower() != SUFFIX:
         raise InputError(out, "is no name that Rerun's viewer opens", f"Let it end in {SUFFIX}.")
     refuse_unwritable(out)

@@ -9,6 +9,7 @@ from derain.cards.known import layouts_for
 from derain.cli.outputs import say
 from derain.errors import InputError
 from derain.sources.folders import frame_of
+from derain.system.extras import MATPLOTLIB, OPEN3D, require
 from derain.system.notices import Notices
 from derain.views.oddities import outside_view
 
@@ -33,6 +34,7 @@ def view_scan(arguments: argparse.Namespace) -> None:
     path: Path = arguments.scans[0]
     if not (arguments.out or arguments.window):
         raise InputError(path, "nothing is to be done with it", "Give --out, --window or --rerun.")
+    require("view", MATPLOTLIB, *((OPEN3D,) if arguments.window else ()))
     methods = contestants(arguments.methods)
     card = None if arguments.card is None else load_card(arguments.card)
     frame = frame_of(path, arguments.columns, layouts_for(card))

@@ -1,8 +1,6 @@
-"""How well a method finds rain, counted over points: of all scans together and scan by scan."""
+"""How well a network finds rain while it is trained and tested: counts of batches, as a metric."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import torch
@@ -12,46 +10,15 @@ from torchmetrics import Metric
 from torchmetrics.utilities import dim_zero_cat
 
 from derain.errors import InputError
-from derain.evaluation.counts import SCORES, Counts, mean_over_scans, ratio
+from derain.evaluation.counts import SCORES, Counts, mean_over_scans
+from derain.evaluation.rain_counts import (
+    RANGE_EDGES,
+    ClassCounts,
+    band_names,
+    check_classes,
+    unknown_class,
+)
 from derain.scan import Scan
-
-
-@dataclass(frozen=True)
-class ClassCounts:
-    """What became of the points of one semantic class.
-
-    Attributes:
-        points: Points of the class.
-        called_rain: Those called rain.
-        rain: Whether the class counts as rain.
-    """
-
-    points: int
-    called_rain: int
-    rain: bool
-
-    @property
-    def share_lost(self) -> float:
-        """Share of the class called rain: its recall if it is rain, else its false positives.
-
-        A class without points has the share of a perfect answer: 1 if it is rain, else 0.
-        """
-        return float(ratio(self.called_rain, self.points, undefined=float(self.rain)))
-
-    @property
-    def wrong(self) -> int:
-        """Points judged wrongly: rain that was left, or others that were called rain."""
-        return self.points - self.called_rain if self.rain else self.called_rain
-
-    @property
-    def share_wrong(self) -> float:
-        """Share of the class judged wrongly; 0 of no points."""
-        return float(ratio(self.wrong, self.points, undefined=0.0))
-
-    def __add__(self, other: "ClassCounts") -> "ClassCounts":
-        """Counts of the points of two classes, or of two parts of one."""
-        called_rain = self.called_rain + other.called_rain
-        return ClassCounts(self.points + other.points, called_rain, self.rain)
 
 
 class RainMetrics(Metric):
@@ -85,12 +52,12 @@ class RainMetrics(Metric):
         self,
         classes: Mapping[int, str],
         rain: Collection[int],
-        range_edges: Sequence[float] = (0, 10, 20, 40, 80),
+        range_edges: Sequence[float] = RANGE_EDGES,
         unknown: Collection[int] = (),
     ) -> None:
         super().__init__()
         classes = {id_: name for id_, name in classes.items() if id_ not in unknown}
-        _check(classes, rain, range_edges)
+        check_classes(classes, rain, range_edges)
         ids = sorted(classes)
         self.names = [classes[id_] for id_ in ids]
         self.range_edges = tuple(range_edges)
@@ -207,9 +174,8 @@ class RainMetrics(Metric):
         """Counts of each range band, by ``band_names``."""
         with self.sync_context():
             tables = self.cells.unbind(dim=1)
-        return {
-            name: self._counts(table) for name, table in zip(self.band_names, tables, strict=True)
-        }
+        names = band_names(self.range_edges)
+        return {name: self._counts(table) for name, table in zip(names, tables, strict=True)}
 
     def by_class_and_range(self) -> dict[str, list[ClassCounts]]:
         """What became of each semantic class in each of the bands of ``band_names``, by name."""
@@ -220,21 +186,11 @@ class RainMetrics(Metric):
             for name, rain, row in zip(self.names, self.is_rain.tolist(), tables, strict=True)
         }
 
-    @property
-    def band_names(self) -> list[str]:
-        """Names of the range bands, such as ``0-10 m`` and, of the last, ``80+ m``."""
-        names = [f"{start:g}-{end:g} m" for start, end in pairwise(self.range_edges)]
-        return [*names, f"{self.range_edges[-1]:g}+ m"]
-
     def _class_rows(self, label: Tensor) -> Tensor:
         row = torch.searchsorted(self.ids, label).clamp(max=len(self.ids) - 1)
         unknown = label[self.ids[row] != label]
         if len(unknown):
-            raise InputError(
-                "labels",
-                f"id {int(unknown[0])} is no known class",
-                "Name it among the data card's classes.",
-            )
+            raise unknown_class(int(unknown[0]))
         return row
 
     def _bands(self, range: Tensor) -> Tensor:
@@ -253,16 +209,3 @@ class RainMetrics(Metric):
         false_negative, true_positive = table[self.is_rain].sum(dim=0).tolist()
         true_negative, false_positive = table[~self.is_rain].sum(dim=0).tolist()
         return Counts(true_positive, false_positive, false_negative, true_negative)
-
-
-def _check(classes: Mapping[int, str], rain: Collection[int], range_edges: Sequence[float]) -> None:
-    if len(set(classes.values())) < len(classes):
-        raise InputError("classes", "two ids have the same name", "Give each a name of its own.")
-    if not set(rain) <= set(classes):
-        raise InputError(
-            "rain", f"{sorted(rain)} are not ids of classes", "Give ids that the classes name."
-        )
-    if list(range_edges[:1]) != [0] or not all(a < b for a, b in pairwise(range_edges)):
-        raise InputError(
-            "range_edges", f"{list(range_edges)} do not rise from 0", "Give rising metres from 0."
-        )

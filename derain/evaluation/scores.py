@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from derain.cards.card import DataCard
 from derain.errors import reason_of
 from derain.evaluation.counts import Counts
-from derain.evaluation.metrics import ClassCounts, RainMetrics
+from derain.evaluation.rain_counts import ClassCounts, RainCounts
 from derain.scan import Scan
 from derain.views.morton import first_rows
 
@@ -78,7 +78,7 @@ class _Scoring:
 
     def __init__(self, card: DataCard) -> None:
         self.card = card
-        self.metrics = RainMetrics(card.classes, card.rain, unknown=card.unknown)
+        self.counts = RainCounts(card.classes, card.rain, unknown=card.unknown)
         self.by_sensor: dict[str, list[Counts]] = {}
         self.failures: dict[str, str] = {}
 
@@ -90,7 +90,7 @@ class _Scoring:
             self.failures[scan.name] = reason_of(error)
             predicted = np.zeros(len(scan), bool)
         scan, predicted = scan.take(counted), predicted[counted]
-        self.metrics.update_scan(scan, predicted)
+        self.counts.add(scan, predicted)
         if scan.radar is not None:
             rain, known = self.card.rain_of(scan), ~self.card.unknown_of(scan)
             for sensor, points in {"LiDAR": ~scan.radar, "radar": scan.radar}.items():
@@ -99,17 +99,17 @@ class _Scoring:
 
     def scores(self, rain_rates: Sequence[float | None] | None) -> Scores:
         """The counts so far, given the rain rate of each scan in mm/h."""
-        per_scan = self.metrics.per_scan()
+        per_scan = self.counts.per_scan()
         rain_rates = [None] * len(per_scan) if rain_rates is None else rain_rates
         by_rate: dict[float, list[Counts]] = {}
         for rate, counts in zip(rain_rates, per_scan, strict=True):
             if rate is not None:
                 by_rate.setdefault(rate, []).append(counts)
         return Scores(
-            self.metrics.pooled(),
+            self.counts.pooled(),
             per_scan,
-            self.metrics.by_class(),
-            self.metrics.by_range(),
+            self.counts.by_class(),
+            self.counts.by_range(),
             {f"{rate:g} mm/h": sum(by_rate[rate], Counts()) for rate in sorted(by_rate)},
             {sensor: sum(parts, Counts()) for sensor, parts in self.by_sensor.items()},
             self.failures,

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from derain.errors import InputError
 from derain.files.content import Content
-from derain.files.extras import Extra
 from derain.files.names import scan_suffix
 from derain.scan import Scan
+from derain.system.extras import Extra
 from derain.system.registry import Registry
 
 

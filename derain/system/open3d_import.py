@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
-from derain.errors import InputError
+from derain.system.extras import OPEN3D
 
 # What Open3D links against, as the dynamic linker calls it.
 LIBUSB = "libusb-1.0.so.0"
@@ -21,23 +21,11 @@ def import_open3d() -> ModuleType:
         The module open3d.
 
     Raises:
-        InputError: Open3D is not installed, or a library it links against is missing.
+        MissingExtraError: Open3D is not installed.
+        InputError: A library that it links against is missing.
     """
     make_open3d_loadable()
-    try:
-        import open3d
-    except ModuleNotFoundError as error:
-        if error.name != "open3d":
-            raise _broken(error) from error
-        raise InputError(
-            "open3d",
-            "is not installed, and this command casts rays or shows a window with it",
-            "pip install 'derain[scene]'",
-        ) from error
-    except (ImportError, OSError) as error:
-        raise _broken(error) from error
-    module: ModuleType = open3d
-    return module
+    return OPEN3D.load("what casts rays or shows a window")
 
 
 def make_open3d_loadable() -> None:
@@ -73,9 +61,3 @@ def _lay_beside(folder: Path, library: Path) -> None:
         pass  # another process has just made it
     except OSError:
         ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
-
-
-def _broken(error: Exception) -> InputError:
-    return InputError(
-        "open3d", f"cannot be imported ({error})", "Install the system library that it names."
-    )

@@ -3,7 +3,7 @@
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import Counts
-from derain.evaluation.metrics import RainMetrics
+from derain.evaluation.rain_counts import RainCounts
 from derain.evaluation.text_tables import plain_table
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -24,7 +24,7 @@ class TruthRecord:
         self.card = card
         self.scans = 0
         self._all, self._sure = (
-            RainMetrics(card.classes, card.rain, unknown=card.unknown) for _ in range(2)
+            RainCounts(card.classes, card.rain, unknown=card.unknown) for _ in range(2)
         )
 
     def add(self, frame: Frame, judgement: Judgement) -> None:
@@ -48,9 +48,9 @@ class TruthRecord:
                 "Name them in the data card.",
             )
         rows = first_rows(scan) if self.card.deduplicate else scan.valid.nonzero()[0]
-        self._all.update_scan(scan.with_label(label).take(rows), judgement.rain[rows])
+        self._all.add(scan.with_label(label).take(rows), judgement.rain[rows])
         sure = rows[judgement.answered[rows]]
-        self._sure.update_scan(scan.with_label(label).take(sure), judgement.rain[sure])
+        self._sure.add(scan.with_label(label).take(sure), judgement.rain[sure])
         self.scans += 1
 
     def __str__(self) -> str:

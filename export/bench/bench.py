@@ -29,7 +29,8 @@ from derain.sources.given import GivenScans, source_of
 from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import overlap
 from derain.spec import Spec
-from derain.system.notices import Notices
+from derain.system.extras import MATPLOTLIB, MissingExtraError, require
+from derain.system.notices import Notices, warn
 
 
 @dataclass(frozen=True)
@@ -61,16 +62,25 @@ class Bench:
     def write(self, folder: str | Path) -> None:
         """Writes ``bench.md``, ``bench.csv``, ``bench.json`` and ``speed_error.png``.
 
+        Without matplotlib there is no picture, which a warning says.
+
         Args:
             folder: Where to, made if missing.
 
         Raises:
             InputError: A folder that cannot be written.
         """
+        picture = Path(folder) / "speed_error.png"
+        write_report(self.rows, self.facts, Path(folder))
+        try:
+            require(picture, MATPLOTLIB)
+        except MissingExtraError as error:
+            warn(str(error))
+            picture.unlink(missing_ok=True)  # of an earlier bench, which is not this one
+            return
         from derain.export.bench.speed_error import draw_speed_error
 
-        write_report(self.rows, self.facts, Path(folder))
-        draw_speed_error(self.rows, self.facts, Path(folder) / "speed_error.png")
+        draw_speed_error(self.rows, self.facts, picture)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from hashlib import sha256
-from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from derain.export.bench.contestant import FILE_SIZE, Contestant
 from derain.export.bench.functions import TimedFunction
 from derain.export.bench.other_runtime import beside_themselves, run_by
 from derain.export.methods import load_method_of_one_scan, named_method, require_one_scan, titled
+from derain.export.model_file import number_of_weights
 from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import Runtime
 from derain.filters import FilterDerainer, PointFilter
@@ -134,23 +134,16 @@ def _model(
     title: str, name: str, derainer: Derainer, ready: Callable[[int], FilterDerainer | Derainer]
 ) -> Contestant:
     require_one_scan(derainer)
-    spec = derainer.spec
+    spec, content = derainer.spec, derainer.path.read_bytes()
     facts = {
         "model": name,
-        "sha256": sha256(derainer.path.read_bytes()).hexdigest(),
-        FILE_SIZE: derainer.path.stat().st_size,
-        "weights": _weights(derainer.path),
+        "sha256": sha256(content).hexdigest(),
+        FILE_SIZE: len(content),
+        "weights": number_of_weights(content),
         "trained_on": spec.data,
         "threshold": spec.threshold,
     }
     return Contestant(title, spec.network, ready, facts, judges_by=spec)
-
-
-def _weights(path: Path) -> int:
-    """Numbers that an exported graph holds: weights, and in eight bits their scales."""
-    import onnx  # here: it is not to be in the memory that is measured
-
-    return sum(prod(tensor.dims) for tensor in onnx.load(path).graph.initializer)
 
 
 def _learnt(title: str, name: str, learn_from: LearnFrom | None) -> Contestant:

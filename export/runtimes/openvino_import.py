@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from derain.errors import InputError
+from derain.system.extras import OPENVINO
 
 TELEMETRY = "openvino_telemetry"
 
@@ -17,20 +17,11 @@ def import_openvino() -> Any:
         The module openvino.
 
     Raises:
-        InputError: OpenVINO is not installed, or a library it links against is missing.
+        MissingExtraError: OpenVINO is not installed.
+        InputError: A library that it links against is missing.
     """
-    try:
-        with _without_telemetry():
-            import openvino
-    except ModuleNotFoundError as error:
-        if error.name != "openvino":
-            raise _broken(error) from error
-        raise InputError(
-            "openvino", "this runtime is not installed", "pip install 'derain[openvino]'"
-        ) from error
-    except (ImportError, OSError) as error:
-        raise _broken(error) from error
-    return openvino
+    with _without_telemetry():
+        return OPENVINO.load("this runtime")
 
 
 @contextmanager
@@ -56,9 +47,3 @@ def _without_telemetry() -> Iterator[None]:
 
 def _is_telemetry(name: str) -> bool:
     return name == TELEMETRY or name.startswith(f"{TELEMETRY}.")
-
-
-def _broken(error: Exception) -> InputError:
-    return InputError(
-        "openvino", f"cannot be imported ({error})", "Install it anew, or what it names."
-    )

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from derain.evaluation.metrics import RainMetrics
 from derain.evaluation.operating_points import EVEN, OperatingPoints
+from derain.evaluation.rain_counts import band_names
 from derain.models.base import DerainingModule
 from derain.models.callbacks.drawn_epochs import DrawnEpochs
 from derain.pictures.error_pictures import errors_figure, operating_points_figure
@@ -72,7 +73,7 @@ class ErrorPanels(lightning.Callback):
             if not isinstance(logger, TensorBoardLogger) or not trainer.is_global_zero:
                 continue
             writer = logger.experiment
-            figure = errors_figure(table, metrics.band_names, title)
+            figure = errors_figure(table, band_names(metrics.range_edges), title)
             writer.add_figure(f"{part}: errors by class and range", figure, step)
             if points.rain:
                 figure = operating_points_figure(points, model.spec.threshold, title)

@@ -10,6 +10,7 @@ from window_method import Between
 from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.labelled import card_of, labelled_scans
 from derain.datamodules.taught import Taught
+from derain.datamodules.taught_data import TaughtData
 from derain.errors import InputError
 from derain.evaluation.baselines import no_points
 from derain.evaluation.hard_cases import scene
@@ -93,7 +94,7 @@ def test_commands_that_measure_know_the_folder(root: Path) -> None:
     card = card_of([root], None)
     assert card.name.endswith("taught by between")
     data = labelled_scans([root], card, Loading())
-    assert isinstance(data, Taught)
+    assert isinstance(data, TaughtData)
     with pytest.raises(InputError, match="is a data set, of which no part can be taken"):
         labelled_scans([root, root], card, Loading())
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import onnx
 import pytest
 from onnx import TensorProto, helper
 
+from derain.default import default_model
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import model_file
@@ -18,6 +20,7 @@ from derain.export.model_file import (
     METADATA_KEY,
     PARTS,
     ModelFile,
+    number_of_weights,
     sealed,
 )
 from derain.export.runtime import Derainer
@@ -263,3 +266,19 @@ def test_a_file_of_any_size_is_not_read_whole(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(model_file, "LARGEST_MODEL", KEPT.stat().st_size - 1)
     with pytest.raises(InputError, match=r"outdet\.onnx: not an ONNX model \(more than 35,000"):
         Derainer(KEPT)
+
+
+@pytest.mark.parametrize("model", [KEPT, default_model()], ids=["kept", "default"])
+def test_weights_are_counted_as_onnx_counts_them(model: Path) -> None:
+    tensors = onnx.load(model).graph.initializer
+    assert number_of_weights(model.read_bytes()) == sum(prod(tensor.dims) for tensor in tensors) > 0
+
+
+def test_sizes_of_tensors_are_read_in_one_field_and_in_several() -> None:
+    tensor = helper.make_tensor("weights", TensorProto.FLOAT, [300, 2], np.zeros(600))
+    graph = helper.make_graph([], "graph", [], [], [tensor])
+    content = helper.make_model(graph).SerializeToString()
+    sizes = b"\x08\xac\x02\x08\x02"  # each with the tag of field 1, as a number
+    assert sizes in content
+    packed = content.replace(sizes, b"\x0a\x03\xac\x02\x02")  # the same bytes, in one field
+    assert number_of_weights(content) == number_of_weights(packed) == 600

@@ -58,4 +58,6 @@ def test_an_installation_that_is_broken_is_one_line(
         "try:\n    import_openvino()\nexcept InputError as error:\n    print(error)"
     )
     finished = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert finished.stdout.startswith(f"openvino: {line}"), finished.stderr
+    assert finished.stdout.startswith(f"this runtime: needs openvino, which {line}"), (
+        finished.stderr
+    )

@@ -60,7 +60,7 @@ def test_openvino_is_asked_for_by_the_extra_that_installs_it(
     with pytest.raises(InputError) as refusal:
         Derainer(KEPT, 1, "openvino")
     assert str(refusal.value) == (
-        "openvino: this runtime is not installed. pip install 'derain[openvino]'"
+        "this runtime: needs openvino, which is not installed. pip install 'derain[openvino]'"
     )
 
 

@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.files.columns import columns_of, scan_of
 from derain.files.content import Content, check_columns
-from derain.files.extras import Extra
 from derain.files.format import FORMATS, Format
 from derain.files.reading import reading
 from derain.scan import Scan
-
-PYARROW = Extra("feather", "pyarrow")
+from derain.system.extras import FLATBUFFERS, PYARROW, require
 
 # What the file begins with; what follows is a stream of messages.
 _MAGIC = b"ARROW1\0\0"
@@ -65,6 +63,7 @@ class Feather(Format):
             InputError: A file that is damaged, or has no coordinates; PyArrow is not installed.
         """
         arrow = PYARROW.load(content.path)
+        require(content.path, FLATBUFFERS)
         from derain.files.formats.feather.arrow_messages import check_messages
 
         with reading(content.path, Exception):

@@ -18,14 +18,12 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.files.columns import columns_of, scan_of
 from derain.files.content import Content
-from derain.files.extras import Extra
 from derain.files.format import FORMATS, Format
 from derain.files.formats.las.laz_chunks import check_chunks
 from derain.files.names import scan_suffix
 from derain.files.reading import reading
 from derain.scan import LARGEST_COORDINATE, Scan
-
-LASPY = Extra("las", "laspy")
+from derain.system.extras import LASPY
 
 # Sizes of the header, up to version 1.3 and from 1.4 on.
 _HEADER, _HEADER_1_4 = 227, 375

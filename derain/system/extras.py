@@ -1,0 +1,128 @@
+"""Libraries that derain works without: what needs one says which of derain's extras brings it.
+
+Plain ``pip install derain`` brings what a robot needs. Everything else is in an extra, such as
+``pip install 'derain[train]'``, and is imported where it is used.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+
+from derain.errors import InputError, reason_of
+
+
+class MissingExtraError(InputError, ModuleNotFoundError):
+    """A library of one of derain's extras is not installed.
+
+    To the command line it is what the user can mend; in Python it is also what an ``import`` of
+    something missing raises.
+    """
+
+
+@dataclass(frozen=True)
+class Extra:
+    """A library of one of derain's extras, as in ``pip install 'derain[las]'``.
+
+    Attributes:
+        name: Name of the extra.
+        library: Name of the module that it installs.
+    """
+
+    name: str
+    library: str
+
+    @property
+    def installed(self) -> bool:
+        """Whether the library is there; it is not imported."""
+        return find_spec(self.library) is not None
+
+    def load(self, subject: str | Path, submodule: str = "") -> ModuleType:
+        """Imports the library.
+
+        Args:
+            subject: What needs it, for the message: a file, a command.
+            submodule: Name of a module within it, where that is wanted.
+
+        Raises:
+            MissingExtraError: It is not installed.
+            InputError: It is installed, and cannot be imported.
+        """
+        name = f"{self.library}.{submodule}" if submodule else self.library
+        try:
+            return import_module(name)
+        except (ImportError, OSError) as error:
+            if isinstance(error, ModuleNotFoundError) and error.name in (self.library, name):
+                raise _missing(subject, [self]) from error
+            raise InputError(
+                subject,
+                f"needs {name}, which cannot be imported ({reason_of(error)})",
+                "Install what it names, or the library anew.",
+            ) from error
+
+
+TORCH = Extra("train", "torch")
+LIGHTNING = Extra("train", "lightning")
+TORCHMETRICS = Extra("train", "torchmetrics")
+JSONARGPARSE = Extra("train", "jsonargparse")
+TENSORBOARD = Extra("train", "tensorboard")
+MATPLOTLIB = Extra("train", "matplotlib")
+ONNX = Extra("train", "onnx")
+ONNXSCRIPT = Extra("train", "onnxscript")
+OPTUNA = Extra("train", "optuna")
+OPEN3D = Extra("scene", "open3d")
+PYARROW = Extra("feather", "pyarrow")
+FLATBUFFERS = Extra("feather", "flatbuffers")
+LASPY = Extra("las", "laspy")
+OPENVINO = Extra("openvino", "openvino")
+ROSBAGS = Extra("ros", "rosbags")
+RERUN = Extra("view", "rerun")
+
+EXTRAS = (
+    *(TORCH, LIGHTNING, TORCHMETRICS, JSONARGPARSE, TENSORBOARD, MATPLOTLIB),
+    *(ONNX, ONNXSCRIPT, OPTUNA, OPEN3D, PYARROW, FLATBUFFERS, LASPY, OPENVINO, ROSBAGS, RERUN),
+)
+
+# What is needed to read a checkpoint, to make an ONNX file of it, and to train it.
+OF_CHECKPOINTS = (TORCH, LIGHTNING, TORCHMETRICS)
+OF_EXPORT = (*OF_CHECKPOINTS, ONNX, ONNXSCRIPT)
+OF_TRAINING = (*OF_CHECKPOINTS, JSONARGPARSE, TENSORBOARD, MATPLOTLIB)
+
+
+def require(subject: str | Path, *extras: Extra) -> None:
+    """Refuses work, before any is done, where libraries that it needs are not installed.
+
+    Args:
+        subject: What needs them, for the message: a command, an option, a file.
+        extras: The libraries; none is imported.
+
+    Raises:
+        MissingExtraError: One or more of them are not installed.
+    """
+    missing = [extra for extra in dict.fromkeys(extras) if not extra.installed]
+    if missing:
+        raise _missing(subject, missing)
+
+
+def missing_extra(subject: str | Path, error: ModuleNotFoundError) -> MissingExtraError | None:
+    """What to tell of an import that has failed; None where no extra of derain's would mend it."""
+    library = (error.name or "").partition(".")[0]
+    found = [extra for extra in EXTRAS if extra.library == library and not extra.installed]
+    return _missing(subject, found) if found else None
+
+
+def _missing(subject: str | Path, extras: Sequence[Extra]) -> MissingExtraError:
+    libraries = " and ".join(
+        filter(None, (", ".join(extra.library for extra in extras[:-1]), extras[-1].library))
+    )
+    names = ",".join(dict.fromkeys(extra.name for extra in extras))
+    is_or_are = "is" if len(extras) == 1 else "are"
+    error = MissingExtraError(
+        subject,
+        f"needs {libraries}, which {is_or_are} not installed",
+        f"pip install 'derain[{names}]'",
+    )
+    error.name = extras[0].library
+    return error
