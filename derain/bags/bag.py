@@ -38,6 +38,10 @@ class Topic:
     type: str
     messages: int
 
+    def has(self, connection: Any) -> bool:
+        """Whether a connection of the library is one of its; one may have several publishers."""
+        return bool(connection.topic == self.name and connection.msgtype == self.type)
+
     def __str__(self) -> str:
         return f"{self.name} ({self.type}, {self.messages:,})"
 
@@ -148,19 +152,32 @@ class Bag:
                 "saved by " + self._rescuer,
             ) from error
 
-    def messages(self, topics: Iterable[str] = (), start: int | None = None) -> Iterator[Message]:
+    def messages(self, topic: Topic | None = None, start: int | None = None) -> Iterator[Message]:
         """Its messages in time order, read while they are asked for.
 
         Args:
-            topics: Names of the topics; none means all.
+            topic: The topic; None means all of them.
             start: The first time of interest, nanoseconds; None for the beginning.
 
         Raises:
             InputError: A bag that cannot be read.
         """
-        wanted = set(topics)
         with self.opened() as reader:
-            chosen = [c for c in reader.connections if not wanted or c.topic in wanted]
+            yield from self.messages_of(reader, topic, start)
+
+    def messages_of(
+        self, reader: Any, topic: Topic | None = None, start: int | None = None
+    ) -> Iterator[Message]:
+        """The same by a reader that is open already.
+
+        Args:
+            reader: What :meth:`opened` lends; one asked for messages anew has done with those
+                before.
+            topic: As for :meth:`messages`.
+            start: As for :meth:`messages`.
+        """
+        with self.reading():
+            chosen = [c for c in reader.connections if topic is None or topic.has(c)]
             if not chosen:
                 return
             for connection, time, data in reader.messages(chosen, start=start):

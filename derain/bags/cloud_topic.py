@@ -7,6 +7,7 @@ times of all, has the topic gone through once; what is kept of it is two numbers
 import os
 import threading
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any
@@ -114,7 +115,7 @@ class CloudTopic:
         if self._stamps is None:
             times = [
                 (message.time, self._taken(number, message))
-                for number, message in enumerate(self.bag.messages([self.topic.name]))
+                for number, message in enumerate(self.bag.messages(self.topic))
             ]
             both = np.array(times, np.int64).reshape(-1, 2)
             self._stamps = Stamps(both[:, 0], both[:, 1])
@@ -123,6 +124,8 @@ class CloudTopic:
     def _forget(self) -> None:
         self._lock = threading.Lock()
         self._process = os.getpid()
+        self._open = ExitStack()  # left when nobody asks for clouds any more
+        self._reader: Any = None
         self._messages: Iterator[Message] = iter(())
         self._next: int | None = None
         self._last: tuple[int, Message] | None = None
@@ -147,7 +150,9 @@ class CloudTopic:
             # Several may have been recorded at one time.
             start = int(self.stamps.recorded[self._known(number)])
             first = int(np.searchsorted(self.stamps.recorded, start))
-        self._messages = self.bag.messages([self.topic.name], start)
+        if self._reader is None:
+            self._reader = self._open.enter_context(self.bag.opened())
+        self._messages = self.bag.messages_of(self._reader, self.topic, start)
         self._next = first
 
     def _taken(self, number: int, message: Message) -> int:

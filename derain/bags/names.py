@@ -1,7 +1,8 @@
 """Paths that lead to bags, and into them.
 
-A bag is named like a folder of its topics, and those like folders of their clouds: of ``drive.mcap``
-may be named ``drive.mcap/velodyne_points``, and of that ``drive.mcap/velodyne_points/000012``.
+A bag is named like a folder of its topics, and those like folders of their clouds: in
+``drive.mcap`` there may be ``drive.mcap/points``, and ``drive.mcap/points/000012``
+in that.
 """
 
 import os

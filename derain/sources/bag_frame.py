@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from derain.bags.bag import Bag
 from derain.bags.cloud_scan import scan_of_cloud
 from derain.bags.cloud_topic import CloudTopic, damaged_cloud
-from derain.bags.names import split, stem
+from derain.bags.names import bags_at, split, stem
 from derain.errors import InputError
 from derain.files.labels import LABEL
+from derain.files.reading import reading
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 
@@ -71,7 +72,8 @@ class BagFrame(FileFrame):
         """SHA-256 of its message and of its file of labels, in hexadecimal digits."""
         if self.label_path is None:
             return self._checksum(), None
-        return self._checksum(), sha256(self.label_path.read_bytes()).hexdigest()
+        with reading(self.label_path):
+            return self._checksum(), sha256(self.label_path.read_bytes()).hexdigest()
 
     def _checksum(self) -> str:
         return sha256(self.clouds.message(self.number).data).hexdigest()
@@ -90,32 +92,59 @@ def bag_frames(path: Path, labelled: bool = False, by_name: bool = False) -> lis
         InputError: A path that leads into no bag; a bag that cannot be read; no such topic or
             cloud; several topics of clouds, of which none is named.
     """
-    found = split(path)
-    if found is None:
-        raise InputError(path, "there is no such file or folder", "Check the path.")
-    bag, inner = found
-    topic_name, number = _topic_and_number(Bag(bag), inner)
-    clouds = CloudTopic(Bag(bag), Bag(bag).cloud_topic(topic_name))
+    clouds, number = _clouds_at(path)
     numbers = range(len(clouds)) if number is None else [number]
-    if numbers[-1] >= len(clouds):
+    if not len(clouds) or numbers[-1] >= len(clouds):
         raise InputError(
             path,
             f"there is no such cloud: {clouds.topic.name} has {len(clouds):,}",
-            "Count from 000000.",
+            "Name another topic, or count from 000000.",
         )
-    labels = bag.with_name(stem(bag) + LABELS)
-    folder = f"{stem(bag)}/" if by_name else ""
-    return [
-        BagFrame(
-            key=f"{folder}{each:06d}",
-            sequence=str(Path(clouds.name_of(each)).parent),
-            number=each,
-            label_path=labels / f"{each:06d}{LABEL}" if labelled else None,
-            path=Path(clouds.name_of(each)),
-            clouds=clouds,
-        )
-        for each in numbers
-    ]
+    folder = f"{stem(clouds.bag.path)}/" if by_name else ""
+    frames = (bag_frame(clouds, each, f"{folder}{each:06d}") for each in numbers)
+    return list(frames) if labelled else [frame.without_labels() for frame in frames]
+
+
+def bag_frame(clouds: CloudTopic, number: int, key: str) -> BagFrame:
+    """One of the clouds of a topic.
+
+    Args:
+        clouds: The clouds.
+        number: Which of them, from 0.
+        key: What is made of it is named by this.
+    """
+    bag = clouds.bag.path
+    return BagFrame(
+        key=key,
+        sequence=stem(bag),
+        number=number,
+        label_path=bag.with_name(stem(bag) + LABELS) / f"{number:06d}{LABEL}",
+        path=Path(clouds.name_of(number)),
+        clouds=clouds,
+    )
+
+
+def clouds_at(path: Path) -> CloudTopic:
+    """The clouds of a topic in a bag.
+
+    Args:
+        path: The topic, or one of its clouds, as if the bag were a folder; or the bag, if it has
+            only one topic of clouds.
+
+    Raises:
+        InputError: As for :func:`bag_frames`.
+    """
+    return _clouds_at(path)[0]
+
+
+def _clouds_at(path: Path) -> tuple[CloudTopic, int | None]:
+    """The clouds that a path leads to, and which of them it names."""
+    found = split(path)
+    if found is None:
+        raise InputError(path, "there is no such file or folder", "Check the path.")
+    bag = Bag(found[0])
+    topic, number = _topic_and_number(bag, found[1])
+    return CloudTopic(bag, bag.cloud_topic(topic)), number
 
 
 def _topic_and_number(bag: Bag, inner: str) -> tuple[str, int | None]:
@@ -124,3 +153,16 @@ def _topic_and_number(bag: Bag, inner: str) -> tuple[str, int | None]:
     if match is None or any(topic.name.strip("/") == inner for topic in bag.topics):
         return inner, None
     return match["topic"] or "", int(match["number"])
+
+
+def bag_paths(path: Path) -> list[Path]:
+    """The paths into bags that a path stands for.
+
+    Args:
+        path: What a user names.
+
+    Returns:
+        The path itself where it leads to a bag or into one; where it is a folder that holds bags,
+        those; none where it has nothing to do with bags.
+    """
+    return [path] if split(path) is not None else bags_at(path)
