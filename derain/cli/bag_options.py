@@ -21,7 +21,8 @@ def in_topic(paths: list[Path], arguments: argparse.Namespace) -> list[Path]:
     Raises:
         InputError: A topic, and no bag.
     """
-    return within(paths, arguments.topic)
+    # Commands that have no such option take the topic in the path.
+    return within(paths, getattr(arguments, "topic", None))
 
 
 def add_cleaned_bags(parser: argparse.ArgumentParser) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import layouts_for
 from derain.cli.arguments import add_threads
+from derain.cli.bag_options import add_topic, in_topic
 from derain.cli.filter_help import list_filters
 from derain.cli.outputs import say
 from derain.cli.scan_options import add_columns, add_intensity_scale
@@ -34,6 +35,7 @@ sensor sees it.
   derain view scan.bin --methods default outdet.onnx dsor --out figure.png
   derain view scan.bin --card wads --methods outdet.onnx tuned=dsor.yaml dror --out figure.png
   derain view scan.bin --methods outdet.onnx --window
+  derain view drive.mcap/velodyne_points/000012 --out figure.png
 
 A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), default or a filter
 (below), all or none. --card says what the scan's labels mean; without it there is no truth, and
@@ -60,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_columns(parser)
     add_intensity_scale(parser)
     add_threads(parser)
+    add_topic(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -70,7 +73,8 @@ def main(arguments: argparse.Namespace) -> int:
         raise InputError(arguments.scan, "nothing is to be done with it", "Give --out or --window.")
     methods = contestants(arguments.methods)
     card = None if arguments.card is None else load_card(arguments.card)
-    frame = frame_of(arguments.scan, arguments.columns, layouts_for(card))
+    path = in_topic([arguments.scan], arguments)[0]
+    frame = frame_of(path, arguments.columns, layouts_for(card))
     scan = frame.with_intensity_times(arguments.intensity_scale).read()
     notices = Notices()
     for method in methods:
