@@ -52,6 +52,15 @@ class CloudTopic:
         topic: The topic, one of point clouds.
     """
 
+    # What only this process knows: the open bag, the number of the cloud that it gives next, the
+    # one that it gave last, and what was found out about all of them.
+    _reader: Any
+    _messages: Iterator[Message]
+    _next: int | None
+    _last: tuple[int, Message] | None
+    _stamps: Stamps | None
+    _layouts: set[tuple[PointField, ...]]
+
     def __init__(self, bag: Bag, topic: Topic) -> None:
         self.bag = bag
         self.topic = topic
@@ -125,12 +134,12 @@ class CloudTopic:
         self._lock = threading.Lock()
         self._process = os.getpid()
         self._open = ExitStack()  # left when nobody asks for clouds any more
-        self._reader: Any = None
-        self._messages: Iterator[Message] = iter(())
-        self._next: int | None = None
-        self._last: tuple[int, Message] | None = None
-        self._stamps: Stamps | None = None
-        self._layouts: set[tuple[PointField, ...]] = set()
+        self._reader = None
+        self._messages = iter(())
+        self._next = None
+        self._last = None
+        self._stamps = None
+        self._layouts = set()
 
     def _read(self, number: int) -> Message:
         if self._next is None or not 0 <= number - self._next <= NEAR:

@@ -36,11 +36,11 @@ SUMMARY = "say what is in a scan, a label file, a model or a data set"
 
 DESCRIPTION = """\
 Says what is in a scan, a label file, a bag, an exported model or a checkpoint, what range image
-fits a scan, and how many of its rays have two returns; with --card, also how often the second one of a
-labelled scan gives back what lies behind rain. And how many scans and points, by class and by rain
-rate, are in a data set: a folder of sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated), one
-sequence, or a folder of scans. With --grid, fits one grid to all the scans, to be written into a
-configuration. Of the model that comes with derain (default) it prints the card: what it is, how
+fits a scan, and how many of its rays have two returns; with --card, also how often the second one
+of a labelled scan gives back what lies behind rain. And how many scans and points, by class and by
+rain rate, are in a data set: a folder of sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated),
+one sequence, or a folder of scans. With --grid, fits one grid to all the scans, to be written into
+a configuration. Of the model that comes with derain (default) it prints the card: what it is, how
 good, and when not to use it.
 
   derain info default

@@ -17,6 +17,7 @@ from derain.files.names import scan_stem, scan_suffix
 from derain.files.reading import reading
 from derain.sources.bag_frame import bag_frames, bag_paths
 from derain.sources.file_frame import FileFrame
+from derain.sources.frame import Frame
 from derain.sources.records import Records
 from derain.sources.source import Frames
 
@@ -234,7 +235,7 @@ def _with_bags(
 ) -> Frames:
     """Frames of bags, and of whatever else is named between them, in that order."""
     several = len(paths) > 1 or len(in_bags[paths[0]]) > 1
-    frames: list[FileFrame] = []
+    frames: list[Frame] = []
     for of_bags, group in groupby(paths, lambda path: bool(in_bags[path])):
         if of_bags:
             for path in (each for named in group for each in in_bags[named]):
