@@ -25,7 +25,7 @@ from benchmarks.recorded_bags import (
 from derain.bags.cloud_message import CDR, ROS1, CloudMessage
 from derain.files.labels import read_labels
 
-RUN = ("run", "ror", "--set", "radius=2", "--set", "min_neighbors=3")
+RUN = ("run", "ror", "--set", "radius=2", "--set", "neighbours=3")
 
 
 @pytest.fixture(params=STORAGES)
