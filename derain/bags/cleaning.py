@@ -38,16 +38,13 @@ def cleaned(
     Args:
         message: The cloud.
         rain: Which of its points are rain, bool (N,).
-        columns: Fields to be added: name → float32 (N,).
+        columns: Fields to be added, or given other values: name → float32 (N,).
         keep_shape: Whether an organised cloud stays one.
 
     Raises:
-        ValueError: A field that the cloud has already, or coordinates that cannot be blank.
+        ValueError: A field of that name and another type, or coordinates that cannot be blank.
     """
     columns = columns or {}
-    there = columns.keys() & {field.name for field in message.cloud.fields}
-    if there:
-        raise ValueError(f"it has a field {', '.join(sorted(there))} already")
     if keep_shape and message.cloud.is_organised:
         clean = message.cloud.blank(rain).with_columns(columns)
     else:

@@ -181,23 +181,32 @@ class PointCloud:
     def with_columns(self, columns: Mapping[str, NDArray[np.float32]]) -> Self:
         """The same points with fields of float32 after those that they have.
 
+        One that is there already, as in a bag that was cleaned before, takes the new values.
         Padding at the end of rows goes, for there is none that would still be right.
 
         Args:
-            columns: Name → float32 (N,); names that no field has.
+            columns: Name → float32 (N,).
+
+        Raises:
+            ValueError: A field of one of the names that is not float32.
         """
         if not columns:
             return self
-        step = self.point_step + 4 * len(columns)
+        there = {field.name: field for field in self.fields if field.name in columns}
+        fields, step = list(self.fields), self.point_step
+        for name in columns.keys() - there.keys():
+            fields.append(PointField(name, step, FLOAT32, 1))
+            step += 4
+        for field in there.values():
+            if field.datatype != FLOAT32 or field.count > 1:
+                raise ValueError(f"it has another field '{field.name}' already")
         wider = np.empty((len(self), step), np.uint8)
         if len(self):
             wider[:, : self.point_step] = self._points
-        fields, offset = list(self.fields), self.point_step
-        for name, values in columns.items():
-            fields.append(PointField(name, offset, FLOAT32, 1))
-            ordered = np.ascontiguousarray(values, f"{self._order}f4")
-            wider[:, offset : offset + 4] = ordered.view(np.uint8).reshape(-1, 4)
-            offset += 4
+        for field in fields:
+            if field.name in columns:
+                values = np.ascontiguousarray(columns[field.name], f"{self._order}f4")
+                wider[:, field.offset : field.offset + 4] = values.view(np.uint8).reshape(-1, 4)
         return replace(
             self,
             fields=tuple(fields),

@@ -33,7 +33,7 @@ def add_cleaned_bags(parser: argparse.ArgumentParser) -> None:
         help="of a bag, leave its clouds and add a topic of clean ones (default: in their place)",
     )
     parser.add_argument(
-        "--removed", action="store_true", help="of a bag, add a topic of what was removed"
+        "--removed-topic", metavar="NAME", help="of a bag, add a topic of what was removed"
     )
     parser.add_argument(
         "--probability", action="store_true", help="add the probability of rain as a field"
@@ -56,7 +56,7 @@ def cleaned_bags(arguments: argparse.Namespace, source: Source) -> CleanedBags:
         source,
         BagOptions(
             arguments.cleaned_topic,
-            arguments.removed,
+            arguments.removed_topic,
             arguments.probability,
             arguments.keep_shape,
         ),

@@ -47,7 +47,7 @@ rain, in the input's format with every field kept.
   derain run best.yaml scans/ --out cleaned
   derain run dsor scans/ --out cleaned --parameters best.yaml --set range_multiplier=0.08
   derain run persistence recording/ --out cleaned --poses poses.txt
-  derain run drive.mcap --out cleaned --topic /velodyne_points --removed
+  derain run drive.mcap --out cleaned --removed-topic /rain
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
 or a name (below).

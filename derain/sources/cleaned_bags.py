@@ -19,7 +19,8 @@ from derain.sources.bag_frame import BagFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 
-PROBABILITY = "probability"
+# The same column as in cleaned files.
+PROBABILITY = "rain_probability"
 
 
 @dataclass(frozen=True)
@@ -29,13 +30,13 @@ class BagOptions:
     Attributes:
         cleaned_topic: Name of the topic of clean clouds, beside the one that there is; None puts
             them in its place.
-        removed: Whether what was removed is a topic too: ``<topic>/removed``.
+        removed_topic: Name of a topic of what was removed; None where nobody asks for it.
         probability: Whether points have a field of their probability to be rain.
         keep_shape: Whether organised clouds stay organised.
     """
 
     cleaned_topic: str | None = None
-    removed: bool = False
+    removed_topic: str | None = None
     probability: bool = False
     keep_shape: bool = False
 
@@ -100,7 +101,7 @@ class CleanedBags:
 
     def _write(self, copy: BagCopy, frame: BagFrame, judgement: Judgement) -> None:
         recorded = copy.forward_to(frame.number)
-        options, topic = self.options, frame.clouds.topic.name
+        options = self.options
         columns = {PROBABILITY: judgement.probability} if options.probability else {}
         try:
             message = CloudMessage.parse(recorded.data, frame.clouds.bag.encoding)
@@ -113,8 +114,8 @@ class CleanedBags:
             copy.write(recorded, new.clean, options.cleaned_topic)
         else:
             copy.write(recorded, new.clean)
-        if options.removed:
-            copy.write(recorded, new.removed, f"{topic}/removed")
+        if options.removed_topic:
+            copy.write(recorded, new.removed, options.removed_topic)
 
     def _copy_of(self, clouds: CloudTopic) -> BagCopy:
         """The copy of a bag, begun with its first cloud; that of the bag before it is ended."""
@@ -160,7 +161,7 @@ class CleanedBags:
         names = {topic.name for topic in clouds.bag.topics}
         for option, name in (
             ("--cleaned-topic", self.options.cleaned_topic),
-            ("--removed", f"{clouds.topic.name}/removed" if self.options.removed else None),
+            ("--removed-topic", self.options.removed_topic),
         ):
             if name in names:
                 raise InputError(option, f"{bag} has a topic {name} already", "Name another.")

@@ -138,3 +138,13 @@ def test_columns_become_a_cloud_and_columns_again() -> None:
         assert list(back) == list(columns)
         for name, column in columns.items():
             np.testing.assert_array_equal(back[name], column)
+
+
+def test_a_field_that_is_there_takes_the_new_values() -> None:
+    cloud = cloud_of_columns({"p": np.zeros(3, "f4"), "x": np.arange(3, dtype="f4")})
+    again = cloud.with_columns({"p": np.ones(3, np.float32)})
+    assert again.fields == cloud.fields
+    assert again.columns()["p"].tolist() == [1, 1, 1]
+    assert again.columns()["x"].tolist() == [0, 1, 2]
+    with pytest.raises(ValueError, match="another field 'p'"):
+        cloud_of_columns({"p": np.zeros(3, "u2")}).with_columns({"p": np.ones(3, np.float32)})
