@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from derain.bags.names import within
+from derain.errors import InputError
 from derain.sources.cleaned_bags import BagOptions, CleanedBags
 from derain.sources.source import Source
 
@@ -49,15 +50,10 @@ def cleaned_bags(arguments: argparse.Namespace, source: Source) -> CleanedBags:
     """What takes the clouds of whole bags, and writes the bags without rain.
 
     Raises:
-        InputError: Something is in the way of a bag.
+        InputError: Something is in the way of a bag, or options that contradict each other.
     """
-    return CleanedBags(
-        arguments.out,
-        source,
-        BagOptions(
-            arguments.cleaned_topic,
-            arguments.removed_topic,
-            arguments.probability,
-            arguments.keep_shape,
-        ),
-    )
+    cleaned, removed = arguments.cleaned_topic, arguments.removed_topic
+    if cleaned and cleaned == removed:
+        raise InputError("--removed-topic", f"{removed} is --cleaned-topic too", "Name another.")
+    options = BagOptions(cleaned, removed, arguments.probability, arguments.keep_shape)
+    return CleanedBags(arguments.out, source, options)

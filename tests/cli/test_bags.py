@@ -72,18 +72,21 @@ def test_a_taught_bag_is_read_again_with_its_labels(tmp_path: Path, run_derain) 
         assert len(frame.read_label(len(scan))) == len(scan)
 
 
-def test_bench_measures_by_the_labels_beside_a_bag(tmp_path: Path, run_derain) -> None:
+def test_labels_beside_a_bag_measure_methods(tmp_path: Path) -> None:
+    """What bench and tune measure by, without their processes."""
+    from derain.cards.card import load_card
+    from derain.datamodules.base import Loading
+    from derain.datamodules.labelled import labelled_scans
+
     bag = small_bag(tmp_path, "sqlite3")
+    label = np.where(np.arange(300) >= 270, 110, 0)
     for number in range(3):
-        label = np.where(np.arange(300) >= 270, 110, 0)
         write_labels(tmp_path / "drive.labels" / f"{number:06d}.label", label)
-    outcome = run_derain(
-        *("bench", "--data", bag, "--card", "wads", "--methods", "ror", "all"),
-        *("--out", tmp_path / "bench", "--timed", "1", "--repeats", "1"),
-    )
-    assert outcome.code == 0, outcome.err
-    rows = json.loads((tmp_path / "bench" / "bench.json").read_text())
-    assert "3" in json.dumps(rows)
+    card = load_card("wads")
+    data = labelled_scans([bag], card, Loading())
+    scans = [data.read_measured(frame) for frame in data.frames("test")]
+
+    assert [int(card.rain_of(scan).sum()) for scan in scans] == [30, 30, 30]
 
 
 def test_without_the_library_the_extra_is_named(tmp_path: Path) -> None:
