@@ -7,7 +7,7 @@ from typing import Any
 import yaml
 
 from derain.bags.bag import ROSBAGS, Bag
-from derain.bags.names import METADATA, stem
+from derain.bags.names import BAG_METADATA, stem
 from derain.files.reading import reading
 
 # Versions of metadata.yaml that the library writes. The newer one spells quality of service in
@@ -162,7 +162,7 @@ def _chunks(file: Any) -> list[Any]:
 
 def _version(bag: Bag) -> int:
     """Version of a folder's metadata.yaml; 0 of a file without one."""
-    path = bag.path / METADATA
+    path = bag.path / BAG_METADATA
     if not os.path.isfile(path):
         return 0
     with reading(path, yaml.YAMLError, UnicodeDecodeError):

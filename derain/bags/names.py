@@ -20,7 +20,7 @@ SUFFIXES = (ROS1_SUFFIX, ".mcap", ".db3")
 COMPRESSED_SUFFIXES = (".mcap.zstd", ".db3.zstd")
 
 # The file that makes a folder a bag of ROS 2, and the word in it that says so.
-METADATA, METADATA_WORD = "metadata.yaml", b"rosbag2_bagfile_information"
+BAG_METADATA, METADATA_WORD = "metadata.yaml", b"rosbag2_bagfile_information"
 
 
 def bags_at(path: Path) -> list[Path]:
@@ -55,7 +55,7 @@ def is_bag(path: Path) -> bool:
                 path, "is compressed, as its bag's metadata.yaml tells", "Name the bag's folder."
             )
         return path.suffix.lower() in SUFFIXES
-    metadata = path / METADATA
+    metadata = path / BAG_METADATA
     if not os.path.isfile(metadata):
         return False
     with reading(metadata), metadata.open("rb") as file:

@@ -18,7 +18,7 @@ from derain.files.content import check_columns
 
 # PointField's datatypes, in NumPy's spelling.
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
-FLOAT32 = 7
+FLOAT32_DATATYPE = 7
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ class PointCloud:
         data = bytearray(self.data)
         for field in self.fields:
             if field.name.lower() in ("x", "y", "z"):
-                if field.datatype not in (FLOAT32, 8):
+                if field.datatype not in (FLOAT32_DATATYPE, 8):
                     raise ValueError(f"field '{field.name}' cannot hold what is no number")
                 values: NDArray[Any] = np.ndarray(
                     (self.height, self.width),
@@ -195,10 +195,10 @@ class PointCloud:
         there = {field.name: field for field in self.fields if field.name in columns}
         fields, step = list(self.fields), self.point_step
         for name in columns.keys() - there.keys():
-            fields.append(PointField(name, step, FLOAT32, 1))
+            fields.append(PointField(name, step, FLOAT32_DATATYPE, 1))
             step += 4
         for field in there.values():
-            if field.datatype != FLOAT32 or field.count > 1:
+            if field.datatype != FLOAT32_DATATYPE or field.count > 1:
                 raise ValueError(f"it has another field '{field.name}' already")
         wider = np.empty((len(self), step), np.uint8)
         if len(self):

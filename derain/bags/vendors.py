@@ -5,7 +5,7 @@ alone, for it is smaller.
 """
 
 # The package of a message's type, and its name where the package has others → what decodes it.
-DECODERS = {
+PACKET_DECODERS = {
     "velodyne_msgs/VelodyneScan": "velodyne_pointcloud's transform node",
     "ouster_sensor_msgs/PacketMsg": "ouster_ros (os_cloud, or its replay launch file)",
     "ouster_msgs/PacketMsg": "ouster_ros (os_cloud, or its replay launch file)",
@@ -29,4 +29,4 @@ def decoder_of(message_type: str) -> str | None:
     Args:
         message_type: Its type, such as ``velodyne_msgs/msg/VelodyneScan``.
     """
-    return DECODERS.get(message_type.replace("/msg/", "/"))
+    return PACKET_DECODERS.get(message_type.replace("/msg/", "/"))

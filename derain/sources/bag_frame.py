@@ -19,7 +19,7 @@ from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 
 # Beside a bag, the folder of the labels of its clouds is called so after its stem.
-LABELS = ".labels"
+LABELS_SUFFIX = ".labels"
 
 NUMBER = re.compile(r"(?:(?P<topic>.*)/)?(?P<number>[0-9]{6,9})")
 
@@ -118,7 +118,7 @@ def bag_frame(clouds: CloudTopic, number: int, key: str) -> BagFrame:
         key=key,
         sequence=stem(bag),
         number=number,
-        label_path=bag.with_name(stem(bag) + LABELS) / f"{number:06d}{LABEL}",
+        label_path=bag.with_name(stem(bag) + LABELS_SUFFIX) / f"{number:06d}{LABEL}",
         path=Path(clouds.name_of(number)),
         clouds=clouds,
     )

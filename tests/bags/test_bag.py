@@ -21,7 +21,7 @@ from benchmarks.recorded_bags import (
     Storage,
     write_bag,
 )
-from derain.bags.vendors import DECODERS, decoder_of
+from derain.bags.vendors import PACKET_DECODERS, decoder_of
 from derain.errors import InputError
 from derain.sources.folders import named_frames
 
@@ -106,7 +106,7 @@ def test_packets_of_a_vendor_name_what_decodes_them(
 
 
 def test_vendors_are_known_in_ros_1_and_ros_2() -> None:
-    for type_, decoder in DECODERS.items():
+    for type_, decoder in PACKET_DECODERS.items():
         assert decoder_of(type_) == decoder_of(type_.replace("/", "/msg/")) == decoder
     assert decoder_of("sensor_msgs/msg/Imu") is None
 
