@@ -11,7 +11,7 @@ from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import Runtime
 from derain.export.timing import RunTimes, timed_runs
 from derain.files import DEFAULT_COLUMNS
-from derain.sources.file_frame import FileFrame
+from derain.sources.folders import frame_of
 
 PERCENTILES = (50, 90, 99)
 
@@ -70,7 +70,7 @@ def measure_latency(
             scan, columns = Path(folder) / "scene.bin", DEFAULT_COLUMNS
             scene(100_000).tofile(scan)
         derainer = Derainer(model, threads, runtime.name, runtime.precision)
-        frame = FileFrame(key=scan.stem, path=scan, columns=tuple(columns))
+        frame = frame_of(scan, columns)
         times = timed_runs(derainer.probability, [frame], repeats)
         software = versions([runtime.name])
         return Latency(times, frame.count_points(), derainer.threads, software)

@@ -81,13 +81,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     require("export", *OF_EXPORT)
+    from derain.bags.names import split
     from derain.errors import InputError
     from derain.export.latency import measure_latency
     from derain.export.onnx_file import export
     from derain.files.reading import is_file
     from derain.models.checkpoint import load_model
 
-    if arguments.scan is not None and not is_file(arguments.scan):
+    if arguments.scan is not None and not (is_file(arguments.scan) or split(arguments.scan)):
         raise InputError(arguments.scan, "there is no such file", "Check --scan.")
     if arguments.inside is not None and not arguments.candidates:
         raise InputError("--inside", "bounds candidates, and there are none", "Give --candidates.")

@@ -10,8 +10,11 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from derain.bags.names import is_bag, split
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
+from derain.cli.bag_options import add_topic, in_topic
+from derain.cli.info_bag import facts_of_bag
 from derain.cli.info_default import card_as_text
 from derain.cli.info_folder import draw, facts_of_folder
 from derain.cli.info_returns import facts_of_returns
@@ -33,12 +36,12 @@ from derain.views.morton import distinct_rows
 SUMMARY = "say what is in a scan, a label file, a model or a data set"
 
 DESCRIPTION = """\
-Says what is in a scan, a label file, an exported model or a checkpoint, what range image fits a
-scan, and how many of its rays have two returns; with --card, also how often the second one of a
-labelled scan gives back what lies behind rain. And how many scans and points, by class and by rain
-rate, are in a data set: a folder of sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated), one
-sequence, or a folder of scans. With --grid, fits one grid to all the scans, to be written into a
-configuration. Of the model that comes with derain (default) it prints the card: what it is, how
+Says what is in a scan, a label file, a bag, an exported model or a checkpoint, what range image
+fits a scan, and how many of its rays have two returns; with --card, also how often the second one
+of a labelled scan gives back what lies behind rain. And how many scans and points, by class and by
+rain rate, are in a data set: a folder of sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated),
+one sequence, or a folder of scans. With --grid, fits one grid to all the scans, to be written into
+a configuration. Of the model that comes with derain (default) it prints the card: what it is, how
 good, and when not to use it.
 
   derain info default
@@ -48,6 +51,8 @@ good, and when not to use it.
   derain info labels/000000.label
   derain info model.onnx
   derain info --grid scans
+  derain info drive.mcap
+  derain info drive.mcap/velodyne_points/000012
   derain info REHEARSE3D_PUBLIC --picture statistics.png
   derain info WADS --json
   derain info my_data --layout lidar,classes --card my_card.yaml
@@ -57,7 +62,7 @@ good, and when not to use it.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument(
-        "files", nargs="+", help="scans, labels, models, checkpoints, folders, or default"
+        "files", nargs="+", help="scans, labels, models, checkpoints, folders, bags, or default"
     )
     parser.add_argument("--grid", action="store_true", help="fit one grid to all the scans")
     parser.add_argument(
@@ -78,13 +83,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--formats", action=ListFormats, nargs=0, help="list the formats of scans, and end"
     )
     add_columns(parser)
+    add_topic(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     _refuse_unclear_picture(arguments)
     if arguments.grid:
-        frames = named_frames([Path(name) for name in arguments.files], arguments.columns)
+        paths = in_topic([Path(name) for name in arguments.files], arguments)
+        frames = named_frames(paths, arguments.columns)
         fit = fit_grid([frame.read() for frame in frames]).as_dict()
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0
@@ -92,8 +99,8 @@ def main(arguments: argparse.Namespace) -> int:
         if name == DEFAULT:  # ./default is another thing, and a Path would not tell them apart
             _describe_default(arguments)
             continue
-        path = Path(name)
-        if os.path.isdir(path):
+        path = in_topic([Path(name)], arguments)[0]
+        if os.path.isdir(path) and not is_bag(path):
             _describe_folder(path, arguments)
             continue
         facts = _facts(path, arguments)
@@ -138,8 +145,10 @@ def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
 
 
 def _facts(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
+    if is_bag(path):
+        return facts_of_bag(path)
     with reading(path):
-        exists = path.exists()
+        exists = path.exists() or split(path) is not None
     if not exists:
         raise InputError(path, "there is no such file or folder", "Check the path.")
     match path.suffix.lower():

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cards.card import packaged_cards
+from derain.cli.bag_options import add_topic, in_topic
 from derain.cli.scan_options import add_columns, add_intensity_scale
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def add_data_arguments(parser: argparse.ArgumentParser, part: str) -> None:
     )
     add_columns(parser)
     add_intensity_scale(parser)
+    add_topic(parser)
 
 
 def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanData":
@@ -55,4 +57,5 @@ def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanData":
         intensity_scale=arguments.intensity_scale,
         deduplicate=getattr(arguments, "distinct", None),
     )
+    paths = in_topic(paths, arguments)
     return labelled_scans(paths, card_of(paths, arguments.card), loading)

@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 from derain.cli.arguments import count
+from derain.cli.bag_options import add_topic, in_topic
 from derain.cli.learning_student import STUDENTS, network_options, with_network, without_intensity
 from derain.cli.lesson import PERSISTENCE, Lesson
 from derain.cli.narration import Narrator
@@ -40,6 +41,7 @@ trust it. Every step is a command of derain, printed before it runs.
   derain learn recording/ --out model.onnx --teacher crf       no motion needed; dim rain only
   derain learn recording/ --out model.onnx --start default     go on from the model of derain
   derain learn recording/ --out model.onnx --rerun report.rrd  look at teacher and student
+  derain learn drive.mcap --out model.onnx --topic /velodyne_points
   derain run model.onnx more_scans/ --out cleaned              what it is for
 
 The teacher is persistence by default, which judges a point by the scans before and after: solid
@@ -55,7 +57,10 @@ MARK = "learning.txt"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument(
-        "recording", nargs="+", type=Path, help="folders of consecutive scans, in time order"
+        "recording",
+        nargs="+",
+        type=Path,
+        help="folders of consecutive scans, or bags, in order",
     )
     parser.add_argument("--out", type=Path, required=True, help="the ONNX file to write")
     parser.add_argument("--model", choices=STUDENTS, help="(default: outdet, or that of --start)")
@@ -86,6 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "derain[view]",
     )
     add_columns(parser)
+    add_topic(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -95,7 +101,7 @@ def main(arguments: argparse.Namespace) -> int:
     epochs = ("--trainer.max_epochs", str(arguments.epochs)) if arguments.epochs else ()
     learn(
         Lesson(
-            recordings=arguments.recording,
+            recordings=in_topic(arguments.recording, arguments),
             out=out,
             work=arguments.work or out.with_name(f"{out.stem}_learning"),
             model=arguments.model,

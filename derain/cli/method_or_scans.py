@@ -4,6 +4,7 @@ import argparse
 import os
 from pathlib import Path
 
+from derain.bags.names import split
 from derain.cli.method_options import add_method
 from derain.default import DEFAULT
 from derain.errors import InputError
@@ -48,7 +49,10 @@ def method_and_scans(arguments: argparse.Namespace) -> tuple[str, list[Path]]:
             without scans.
     """
     first, others = arguments.method, arguments.scans or []
-    named, there = _names_method(first), os.path.isdir(first) or is_file(Path(first))
+    named, there = (
+        _names_method(first),
+        os.path.isdir(first) or is_file(Path(first)) or _in_bag(first),
+    )
     if not (named or there):
         raise InputError(
             first,
@@ -73,7 +77,12 @@ def method_and_scans(arguments: argparse.Namespace) -> tuple[str, list[Path]]:
 
 def _may_be_scans(word: str) -> bool:
     """Whether a folder or a file, which is no method by its name, may be scans by its name."""
-    return os.path.isdir(word) or scan_suffix(Path(word)) in FORMATS
+    return os.path.isdir(word) or scan_suffix(Path(word)) in FORMATS or _in_bag(word)
+
+
+def _in_bag(word: str) -> bool:
+    """Whether a word is a bag, or leads into one."""
+    return split(Path(word)) is not None
 
 
 def _names_method(word: str) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from tqdm import tqdm
 
 from derain.cli.arguments import add_threads
+from derain.cli.bag_options import add_topic, in_topic
 from derain.cli.outputs import say, tell
 from derain.cli.pose_files import files_of, tell_whose_poses
 from derain.cli.scan_by_scan import ScanByScan
@@ -105,12 +106,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object a scan")
     add_threads(parser)
     add_columns(parser)
+    add_topic(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
-    source = named_frames(arguments.sequences, arguments.columns)
+    source = named_frames(in_topic(arguments.sequences, arguments), arguments.columns)
     recordings = recordings_of(source)
     files = files_of(recordings, arguments.out, arguments.replace)
     times = [_times(recording, arguments.format) for recording in recordings]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from derain.cli.arguments import add_threads, share
+from derain.cli.bag_options import add_cleaned_bags, add_topic, cleaned_bags, in_topic
 from derain.cli.method_options import add_parameters, method_of
 from derain.cli.method_or_scans import RULE, add_method_and_scans, method_and_scans
 from derain.cli.outputs import folder_sink, say, tell
@@ -16,6 +17,7 @@ from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError, printable
+from derain.sources.cleaned_bags import CleanedBags
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -23,6 +25,7 @@ from derain.sources.judging import judgements
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.sources.sink import Sink
+from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
@@ -44,6 +47,7 @@ rain, in the input's format with every field kept.
   derain run best.yaml scans/ --out cleaned
   derain run dsor scans/ --out cleaned --parameters best.yaml --set range_multiplier=0.08
   derain run persistence recording/ --out cleaned --poses poses.txt
+  derain run drive.mcap --out cleaned --removed-topic /rain
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
 or a name (below).
@@ -51,6 +55,8 @@ or a name (below).
 For a method that sees several scans, those of a recording have to come in time order. Where a
 method is not sure of a point, its best guess decides. Of a data set, results are named by their
 paths in it.
+Of a bag (.bag of ROS 1; .mcap, .db3 or the folder of ROS 2), a bag of its name is written, in which
+the clouds of one topic have no rain and everything else is as it was, byte for byte.
 What is odd about a scan is warned of, each fault once. One of which more than --most-removed is
 called rain is left alone. It and a scan that cannot be read are reported and passed over; the exit
 code is then 2.
@@ -114,6 +120,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_parameters(parser)
     add_poses(parser)
+    add_topic(parser)
+    add_cleaned_bags(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -121,8 +129,16 @@ def main(arguments: argparse.Namespace) -> int:
     keep_freed_memory()
     arguments.method, arguments.scans = method_and_scans(arguments)
     method = method_of(arguments)
-    source = placed(named_frames(arguments.scans, arguments.columns), arguments)
-    cleaning = _Cleaning(method, folder_sink(arguments.out, source), arguments)
+    scans = in_topic(arguments.scans, arguments)
+    source = placed(named_frames(scans, arguments.columns), arguments)
+    sink = folder_sink(arguments.out, source)
+    with cleaned_bags(arguments, source) as bags:
+        return _clean(source, _Cleaning(method, sink, bags, arguments), arguments)
+
+
+def _clean(source: Source, cleaning: "_Cleaning", arguments: argparse.Namespace) -> int:
+    """Cleans every scan, and gives the exit code."""
+    method = cleaning.method
     stream = sys.stderr if arguments.json else sys.stdout
     if arguments.method == DEFAULT:
         say(
@@ -146,9 +162,12 @@ def main(arguments: argparse.Namespace) -> int:
 class _Cleaning:
     """What writes the clean scans, and remembers what was done."""
 
-    def __init__(self, method: Method, sink: Sink, arguments: argparse.Namespace) -> None:
+    def __init__(
+        self, method: Method, sink: Sink, bags: CleanedBags, arguments: argparse.Namespace
+    ) -> None:
         self.method = method
         self.sink = sink
+        self.bags = bags
         self.arguments = arguments
         self.notices = Notices()
         self.done: list[Cleaned] = []
@@ -171,7 +190,10 @@ class _Cleaning:
                 "See whether the method suits it, or raise --most-removed.",
             )
         with stopwatch.stage("write"):
-            self.sink.write(frame, scan.take(~rain), rain)
+            if self.bags.takes(frame):
+                self.bags.write(judgement)
+            else:
+                self.sink.write(frame, scan.take(~rain), rain)
         told = [oddity.detail for oddity in odd]
         times = dict(stopwatch.milliseconds)
         unsure = None if judgement.known is None else int((scan.valid & ~judgement.answered).sum())

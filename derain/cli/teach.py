@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from derain.cards.card import DataCard, load_card, packaged_cards
 from derain.cards.known import layouts_for
 from derain.cli.arguments import add_threads
+from derain.cli.bag_options import add_topic, in_topic
 from derain.cli.method_options import add_method, add_parameters, method_of
 from derain.cli.outputs import say, tell
 from derain.cli.pose_options import add_poses, placed
@@ -96,6 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_runtime(parser, help="what runs a model")
     parser.add_argument("--json", action="store_true", help="print one JSON object a scan")
     add_columns(parser)
+    add_topic(parser)
     add_intensity_scale(parser)
     add_parameters(parser)
     add_poses(parser)
@@ -109,7 +111,7 @@ def main(arguments: argparse.Namespace) -> int:
     method = method_of(arguments)
     card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
-        arguments.scans,
+        in_topic(arguments.scans, arguments),
         arguments.columns,
         labelled=True,
         layouts=layouts_for(card),

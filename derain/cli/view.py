@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from derain.cli.arguments import add_threads, count
+from derain.cli.bag_options import add_topic
 from derain.cli.filter_help import list_methods
 from derain.cli.pose_options import add_poses
 from derain.cli.scan_options import add_columns, add_intensity_scale
@@ -23,6 +24,7 @@ sensor sees it; or writes a whole recording, to be looked at scan after scan in 
   derain view recording/ --methods default dsor --rerun out.rrd    then: rerun out.rrd
   derain view recording/ --card wads --every 10 --rerun out.rrd
   derain view recording/ --methods persistence --poses odometry --frames 0:50 --rerun out.rrd
+  derain view drive.mcap/velodyne_points/000012 --out figure.png
 
 A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), default or a filter
 (below); of one scan also all or none, of a recording also what sees several scans. --card says what
@@ -70,6 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_intensity_scale(parser)
     add_threads(parser)
     add_poses(parser)
+    add_topic(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:

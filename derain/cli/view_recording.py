@@ -11,6 +11,7 @@ from tqdm import tqdm
 
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
+from derain.cli.bag_options import in_topic
 from derain.cli.outputs import refuse_unwritable, say
 from derain.cli.pose_options import placed
 from derain.errors import InputError
@@ -51,7 +52,7 @@ def view_recording(arguments: argparse.Namespace) -> int:
     methods = _methods(arguments.methods, arguments.threads)
     card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
-        arguments.scans,
+        in_topic(arguments.scans, arguments),
         arguments.columns,
         labelled=card is not None,
         layouts=layouts_for(card),

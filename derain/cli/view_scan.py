@@ -1,11 +1,11 @@
 """Draws one scan as several methods clean it."""
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import layouts_for
+from derain.cli.bag_options import in_topic
 from derain.cli.outputs import say
 from derain.errors import InputError
 from derain.sources.folders import frame_of
@@ -31,7 +31,7 @@ def view_scan(arguments: argparse.Namespace) -> None:
     """
     from derain.export.bench.contestants import contestants
 
-    path: Path = arguments.scans[0]
+    path = in_topic(arguments.scans, arguments)[0]
     if not (arguments.out or arguments.window):
         raise InputError(path, "nothing is to be done with it", "Give --out, --window or --rerun.")
     require("view", MATPLOTLIB, *((OPEN3D,) if arguments.window else ()))

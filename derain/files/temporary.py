@@ -2,6 +2,7 @@
 
 import os
 import secrets
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -43,6 +44,35 @@ def temporary_beside(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+@contextmanager
+def temporary_folder(folder: Path) -> Iterator[Path]:
+    """Lends an empty hidden folder in another, which is made if missing.
+
+    It is gone when the block ends, with what is in it then. A process that is killed leaves it; it
+    is locked, so that others can tell.
+
+    Args:
+        folder: The other folder.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    remove_abandoned(folder)
+    temporary = folder / f"{PREFIX}{secrets.token_hex(8)}"
+    temporary.mkdir()
+    try:
+        descriptor = os.open(temporary, os.O_RDONLY)
+        try:
+            with suppress(OSError):  # a file system without locks, where nobody removes it either
+                lock(descriptor, wait=True)
+            yield temporary
+        finally:
+            os.close(descriptor)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
 def _made(file: Path) -> int | None:
     """Makes a file and holds it locked; None without locks, where nobody removes it either."""
     while True:
@@ -66,9 +96,10 @@ def remove_abandoned(folder: Path) -> None:
     """
     for file in folder.glob(f"{PREFIX}*"):
         with suppress(OSError):  # somebody else's, or gone, or on a file system without locks
-            descriptor = os.open(file, os.O_RDWR)
+            is_folder = file.is_dir()
+            descriptor = os.open(file, os.O_RDONLY if is_folder else os.O_RDWR)
             try:
                 if lock(descriptor, wait=False):
-                    file.unlink()
+                    shutil.rmtree(file) if is_folder else file.unlink()
             finally:
                 os.close(descriptor)

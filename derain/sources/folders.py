@@ -2,18 +2,22 @@
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from glob import escape, glob
+from itertools import groupby
 from pathlib import Path
 
+from derain.bags.names import split
 from derain.cards.known import known_layouts, label_of
 from derain.cards.layout import Layout, sequence_of
 from derain.files import DEFAULT_COLUMNS, find_scans
 from derain.files.format import FORMATS
 from derain.files.names import scan_stem, scan_suffix
 from derain.files.reading import reading
+from derain.sources.bag_frame import bag_frames, bag_paths
 from derain.sources.file_frame import FileFrame
+from derain.sources.frame import Frame
 from derain.sources.records import Records
 from derain.sources.source import Frames
 
@@ -36,8 +40,9 @@ def named_frames(
         [('scan', 820, True)]
 
     Args:
-        paths: Scans, folders with scans directly in them, and data sets or parts of them whose
-            folders are called as a layout says.
+        paths: Scans, folders with scans directly in them, data sets or parts of them whose folders
+            are called as a layout says, bags, and paths into bags
+            (:func:`~derain.sources.bag_frame.bag_frames`).
         columns: Names of the columns of files that do not name them.
         labelled: Whether labels are to be read, from where :func:`~derain.cards.known.label_of`
             finds them by the layouts.
@@ -51,8 +56,13 @@ def named_frames(
         all scans lie below.
 
     Raises:
-        InputError: A path that does not exist, or a folder without scans.
+        InputError: A path that does not exist, a folder without scans, or a bag that cannot be
+            read.
     """
+    paths = list(paths)
+    in_bags = {path: _paths_into_bags(path, layouts) for path in paths}
+    if any(in_bags.values()):
+        return _with_bags(paths, in_bags, columns, labelled, layouts, recordings)
     scans: list[Path] = []
     of_data_set = False
     for path in paths:
@@ -72,10 +82,15 @@ def frame_of(
     """The frame of one file, whose labels are looked for; whether it is there shows in reading.
 
     Args:
-        scan: The file.
+        scan: The file, or a path into a bag, of which the first cloud is taken that it leads to.
         columns: Names of its columns, where it does not name them itself.
         layouts: By which its labels are looked for; by default those of the packaged data cards.
+
+    Raises:
+        InputError: A bag that cannot be read.
     """
+    if split(scan) is not None:
+        return bag_frames(scan, labelled=True)[0]
     return FileFrame(
         key=scan_stem(scan),
         sequence=sequence_of(scan),
@@ -200,6 +215,34 @@ def _holds_scans(folder: Path) -> bool:
             and entry.is_file()
             for entry in entries
         )
+
+
+def _paths_into_bags(path: Path, layouts: Sequence[Layout] | None) -> list[Path]:
+    """The paths into bags that a path stands for; of a folder of scans or of a data set, none."""
+    folder = os.path.isdir(path)
+    if folder and (_holds_scans(path) or find_layout(path, layouts) is not None):
+        return []
+    return bag_paths(path)
+
+
+def _with_bags(
+    paths: Sequence[Path],
+    in_bags: Mapping[Path, Sequence[Path]],
+    columns: Sequence[str],
+    labelled: bool,
+    layouts: Sequence[Layout] | None,
+    recordings: bool,
+) -> Frames:
+    """Frames of bags, and of whatever else is named between them, in that order."""
+    several = len(paths) > 1 or len(in_bags[paths[0]]) > 1
+    frames: list[Frame] = []
+    for of_bags, group in groupby(paths, lambda path: bool(in_bags[path])):
+        if of_bags:
+            for path in (each for named in group for each in in_bags[named]):
+                frames += bag_frames(path, labelled, by_name=several)
+        else:
+            frames += named_frames(group, columns, labelled, layouts, recordings)
+    return Frames(frames)
 
 
 def _nowhere(scan: Path) -> Path | None:

@@ -7,19 +7,21 @@ can be moved together.
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Self
 
 import yaml
 
 from derain import __version__
+from derain.bags.names import split
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.files.atomic import replacing
 from derain.files.documents import Entry, shown
 from derain.files.labels import LABEL
 from derain.files.reading import is_file, reading
+from derain.sources.bag_frame import bag_frame, clouds_at
 from derain.sources.file_frame import FileFrame
 from derain.sources.records import Records
 from derain.sources.source import Frames
@@ -138,8 +140,16 @@ class Manifest:
         """The scans of a part, in order, each with the labels that it was given."""
         folders = {scan.scan.parent for scan in self.scans}
         records = {folder: Records(folder) for folder in folders}
+        clouds = {folder: clouds_at(folder) for folder in folders if split(folder) is not None}
         return Frames(
-            FileFrame(
+            replace(
+                bag_frame(clouds[scan.scan.parent], scan.number, scan.key),
+                sequence=scan.sequence,
+                label_path=label_path(root, scan.key),
+                intensity_scale=self.intensity_scale,
+            )
+            if scan.scan.parent in clouds
+            else FileFrame(
                 key=scan.key,
                 sequence=scan.sequence,
                 number=scan.number,

@@ -1,0 +1,130 @@
+"""A bag written anew, message by message, with other clouds in one of its topics."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Self
+
+from derain.bags.bag import Bag, Message, Topic
+from derain.bags.bag_writer import BagWriter
+from derain.errors import InputError, reason_of
+
+
+class BagCopy:
+    """A copy of a bag that is being written, up to one of the clouds of a topic.
+
+    It goes through the bag by itself, next to whoever reads the clouds: so it holds one message at
+    a time, however far a method looks ahead. What is not replaced is copied byte for byte.
+
+    Args:
+        bag: The bag.
+        topic: Its topic of clouds.
+        folder: Where the copy is written; what is not whole at the end is for the caller to remove.
+
+    Raises:
+        InputError: A bag that cannot be read, or a copy that cannot be written.
+    """
+
+    def __init__(self, bag: Bag, topic: Topic, folder: Path) -> None:
+        self.bag = bag
+        self.topic = topic
+        self._stack = ExitStack()
+        reader = self._stack.enter_context(bag.opened())
+        with self._writing():
+            self._writer = BagWriter(bag, reader, folder)
+        self._messages = bag.messages_of(reader)
+        self._clouds = 0
+        for connection in reader.connections:  # as many, and in the same order
+            with self._writing():
+                self._writer.connection(connection)
+
+    @property
+    def path(self) -> Path:
+        """The copy: a file of ROS 1, a folder of ROS 2."""
+        return self._writer.path
+
+    def forward_to(self, number: int) -> Message:
+        """Copies what comes before one of the clouds.
+
+        Args:
+            number: Which cloud, from 0: one after those of earlier calls.
+
+        Returns:
+            The cloud's message, which is not written yet.
+
+        Raises:
+            InputError: The bag cannot be read on, has no such cloud, or the copy cannot be written.
+        """
+        for message in self._messages:
+            if self.topic.has(message.connection):
+                self._clouds += 1
+                if self._clouds > number:
+                    return message
+            self.write(message)
+        raise InputError(
+            self.bag.path,
+            f"has {self._clouds:,} messages of {self.topic.name}, fewer than its index says",
+            "Have its index made anew by `ros2 bag reindex` or `rosbag reindex`.",
+        )
+
+    def write(self, message: Message, data: bytes | None = None, topic: str | None = None) -> None:
+        """Writes a message, or another in its place in time.
+
+        Args:
+            message: The message of the bag.
+            data: Other bytes; None for its own.
+            topic: Another topic of the same kind; None for its own.
+
+        Raises:
+            InputError: The copy cannot be written.
+        """
+        with self._writing():
+            connection = self._writer.connection(message.connection, topic)
+            self._writer.write(connection, message.time, message.data if data is None else data)
+
+    def finish(self) -> Path:
+        """Copies the rest.
+
+        Returns:
+            The copy, whole.
+
+        Raises:
+            InputError: The bag cannot be read on, has more clouds than its index says, or the copy
+                cannot be written.
+        """
+        for message in self._messages:
+            self._clouds += self.topic.has(message.connection)
+            self.write(message)
+        if self._clouds > self.topic.messages:
+            raise InputError(
+                self.bag.path,
+                f"has {self._clouds:,} messages of {self.topic.name}, more than its index says, "
+                "and the last ones were not looked at",
+                "Have its index made anew by `ros2 bag reindex` or `rosbag reindex`.",
+            )
+        with self._writing():
+            self._writer.close()
+        self._stack.close()
+        return self.path
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._writing():
+            self._writer.abort()  # does nothing to a copy that is whole
+        self._stack.close()
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Tells what goes wrong while the copy is written."""
+        try:
+            yield
+        except (InputError, BrokenPipeError):
+            raise
+        except Exception as error:  # the library checks little of what it is given
+            raise InputError(
+                self.bag.path,
+                f"its copy cannot be written ({reason_of(error)})",
+                "Choose a folder that is writable and has room.",
+            ) from error

@@ -1,0 +1,210 @@
+"""Bags that cannot be used, each with the reason: one InputError, whatever is wrong."""
+
+import os
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from small_bags import bag_path, small_bag, storage_file, tables
+
+from benchmarks.recorded_bags import (
+    CLOUD_TYPE,
+    START,
+    STORAGES,
+    TEXT_TYPE,
+    Recorded,
+    Ros,
+    Storage,
+    write_bag,
+)
+from derain.bags.vendors import PACKET_DECODERS, decoder_of
+from derain.errors import InputError
+from derain.sources.folders import named_frames
+
+
+@pytest.fixture(params=STORAGES)
+def storage(request: pytest.FixtureRequest) -> Storage:
+    kind: Storage = request.param
+    return kind
+
+
+def read_all(bag: Path) -> int:
+    """Reads a bag to its end, and counts the clouds."""
+    return sum(frame.read() is not None for frame in named_frames([bag]))
+
+
+def refusal(act: Callable[[], Any]) -> str:
+    with pytest.raises(InputError) as error:
+        act()
+    return str(error.value)
+
+
+def test_several_topics_are_listed(tmp_path: Path, storage: Storage) -> None:
+    ros, (table,) = Ros(storage), tables(1)
+    rear = Recorded("/rear/points", CLOUD_TYPE, START + 5, ros.cloud(table, START))
+    bag = small_bag(tmp_path, storage, more=[rear])
+
+    told = refusal(lambda: named_frames([bag]))
+    assert "/rear/points" in told
+    assert "/velodyne_points" in told
+    assert "--topic" in told
+    assert len(named_frames([bag / "rear" / "points"])) == 1
+
+
+def test_a_topic_of_another_type_is_refused(tmp_path: Path, storage: Storage) -> None:
+    bag = small_bag(tmp_path, storage)
+    told = refusal(lambda: named_frames([bag / "imu" / "data"]))
+    assert "/imu/data is sensor_msgs/msg/Imu" in told
+
+
+def test_an_unknown_topic_is_refused_with_those_there_are(tmp_path: Path, storage: Storage) -> None:
+    bag = small_bag(tmp_path, storage)
+    told = refusal(lambda: named_frames([bag / "points"]))
+    assert "no topic points" in told
+    assert "/velodyne_points" in told
+
+
+def test_a_bag_without_clouds_is_refused(tmp_path: Path, storage: Storage) -> None:
+    bag = small_bag(tmp_path, storage, clouds=[], more=[
+        Recorded("/driver", TEXT_TYPE, START, Ros(storage).text("no cloud"))
+    ])  # fmt: skip
+    told = refusal(lambda: named_frames([bag]))
+    assert "no point clouds" in told
+    assert "/driver (std_msgs/msg/String, 1)" in told
+
+
+@pytest.mark.parametrize(
+    ("type_", "decoder"),
+    [
+        ("velodyne_msgs/msg/VelodyneScan", "velodyne_pointcloud"),
+        ("ouster_sensor_msgs/msg/PacketMsg", "ouster_ros"),
+        ("livox_ros_driver2/msg/CustomMsg", "livox_ros_driver2"),
+    ],
+)
+def test_packets_of_a_vendor_name_what_decodes_them(
+    tmp_path: Path, storage: Storage, type_: str, decoder: str
+) -> None:
+    path = bag_path(tmp_path, storage)
+    from rosbags import rosbag1, rosbag2
+
+    writer: Any
+    if storage == "ros1":
+        writer, details = rosbag1.Writer(path), {"md5sum": "0" * 32}
+    else:
+        plugin = rosbag2.StoragePlugin[storage.upper()]
+        writer, details = rosbag2.Writer(path, version=8, storage_plugin=plugin), {"rihs01": "x"}
+    with writer:
+        connection = writer.add_connection("/packets", type_, msgdef="uint8[] data", **details)
+        writer.write(connection, START, bytes(40))
+
+    assert decoder in refusal(lambda: named_frames([path]))
+    assert decoder in refusal(lambda: named_frames([path / "packets"]))
+
+
+def test_vendors_are_known_in_ros_1_and_ros_2() -> None:
+    for type_, decoder in PACKET_DECODERS.items():
+        assert decoder_of(type_) == decoder_of(type_.replace("/", "/msg/")) == decoder
+    assert decoder_of("sensor_msgs/msg/Imu") is None
+
+
+def test_an_empty_bag_is_refused(tmp_path: Path, storage: Storage) -> None:
+    bag = write_bag(bag_path(tmp_path, storage), storage, [])
+    assert "no point clouds" in refusal(lambda: named_frames([bag]))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 0.9, 0.999])
+def test_a_bag_that_is_cut_off_is_refused(tmp_path: Path, storage: Storage, share: float) -> None:
+    bag = small_bag(tmp_path, storage)
+    file = storage_file(bag)
+    os.truncate(file, int(share * file.stat().st_size))
+    told = refusal(lambda: read_all(bag))
+    assert "\n" not in told
+    assert "cannot be read as a bag" in told
+
+
+def test_an_encrypted_bag_is_refused(tmp_path: Path) -> None:
+    bag = small_bag(tmp_path, "ros1")
+    content = bag.read_bytes()
+    header, size = content[13:17], int.from_bytes(content[13:17], "little")
+    field = b"encryptor=rosbag/AesCbcEncryptor"
+    longer = (size + 4 + len(field)).to_bytes(4, "little") + content[17 : 17 + size]
+    longer += len(field).to_bytes(4, "little") + field
+    rest = content[17 + size :]
+    padding = int.from_bytes(rest[:4], "little") - 4 - len(field)
+    bag.write_bytes(
+        content[:13] + longer + padding.to_bytes(4, "little") + rest[4 + 4 + len(field) :]
+    )
+    assert header != longer[:4]
+    assert "AesCbcEncryptor" in refusal(lambda: named_frames([bag]))
+
+
+def test_a_database_that_is_encrypted_is_refused(tmp_path: Path) -> None:
+    bag = small_bag(tmp_path, "sqlite3")
+    file = storage_file(bag)
+    file.write_bytes(np.random.default_rng(0).bytes(file.stat().st_size))
+    assert "not a database" in refusal(lambda: named_frames([bag]))
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"compression_mode": "FILE", "compression_format": "lz4"}, "lz4"),
+        ({"storage_identifier": "rocksdb"}, "rocksdb"),
+        ({"version": 99}, "99"),
+        ({"relative_file_paths": ["missing.mcap"]}, "missing"),
+        ({"topics_with_message_count": 3}, "cannot be read as a bag"),
+    ],
+)
+def test_metadata_that_the_library_does_not_know_is_refused(
+    tmp_path: Path, change: dict[str, Any], reason: str
+) -> None:
+    bag = small_bag(tmp_path, "mcap")
+    metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
+    metadata["rosbag2_bagfile_information"] |= change
+    (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
+    assert reason in refusal(lambda: named_frames([bag]))
+
+
+def test_a_file_compressed_as_a_whole_is_named_by_its_folder(tmp_path: Path) -> None:
+    (tmp_path / "drive_0.db3.zstd").write_bytes(b"zstd")
+    assert "Name the bag's folder" in refusal(lambda: named_frames([tmp_path / "drive_0.db3.zstd"]))
+
+
+def say_there_are(bag: Path, clouds: int) -> None:
+    """Has the index of a bag of ROS 2 name another number of clouds."""
+    metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
+    for topic in metadata["rosbag2_bagfile_information"]["topics_with_message_count"]:
+        if topic["topic_metadata"]["name"] == "/velodyne_points":
+            topic["message_count"] = clouds
+    (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
+
+
+def test_a_bag_with_fewer_clouds_than_it_says_is_refused(tmp_path: Path) -> None:
+    bag = small_bag(tmp_path, "mcap")
+    say_there_are(bag, 5)
+    assert "says that it has 5 messages" in refusal(lambda: read_all(bag))
+
+
+def test_a_damaged_bag_is_read_or_refused(tmp_path: Path, storage: Storage) -> None:
+    """Whatever is wrong with its bytes, there is one line about it, and no other error."""
+    bag = small_bag(tmp_path, storage, clouds=tables(2, points=30))
+    file, draw = storage_file(bag), random.Random(len(storage))
+    content = file.read_bytes()
+    outcomes = set()
+    for _ in range(60):
+        damaged = bytearray(content)
+        for _ in range(draw.choice((1, 1, 3, 30))):
+            # Half of them near the ends, where headers and indices are.
+            near = draw.choice((len(content), 400))
+            damaged[draw.choice((1, -1)) * draw.randrange(1, near)] = draw.randrange(256)
+        file.write_bytes(damaged[: draw.choice((len(content), draw.randrange(len(content))))])
+        try:
+            outcomes.add(read_all(bag) > 0)
+        except InputError as error:
+            outcomes.add("\n" in str(error))
+    assert outcomes <= {True, False}
+    assert False in outcomes

@@ -1,0 +1,115 @@
+"""Messages of clouds, beside those that the library of bags writes."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from benchmarks.recorded_bags import CLOUD_TYPE, START, Ros, table_of
+from derain.bags.cloud_message import CDR, ROS1, CloudMessage, message_of, stamp_of
+
+ROS = {ROS1: Ros("ros1"), CDR: Ros("mcap")}
+
+
+def made_by_library(encoding: str, points: int = 5, frame: str = "velodyne") -> bytes:
+    """A message of the library, of a cloud with padding within and after its fields."""
+    table = np.zeros(
+        points,
+        np.dtype(
+            {
+                "names": ["x", "y", "z", "intensity", "ring", "time"],
+                "formats": ["<f4", "<f4", "<f4", "<f4", "<u2", "<f8"],
+                "offsets": [0, 4, 8, 16, 20, 24],
+                "itemsize": 37,
+            }
+        ),
+    )
+    table["x"], table["ring"] = np.arange(points), np.arange(points)[::-1]
+    ros = ROS[encoding]
+    cloud = ros.cloud(table, START)
+    cloud.header.frame_id = frame
+    return ros.to_bytes(cloud, CLOUD_TYPE)
+
+
+@pytest.mark.parametrize("encoding", [ROS1, CDR])
+@pytest.mark.parametrize("frame", ["", "a", "ab", "abc", "lidar_é"])
+def test_a_message_of_the_library_is_read_and_written_alike(encoding: str, frame: str) -> None:
+    message = made_by_library(encoding, frame=frame)
+    parsed = CloudMessage.parse(message, encoding)
+
+    assert parsed.to_bytes() == message
+    assert parsed.stamp == stamp_of(message, encoding) == START
+    columns = parsed.cloud.columns()
+    assert list(columns) == ["x", "y", "z", "intensity", "ring", "time"]
+    assert columns["ring"].tolist() == [4, 3, 2, 1, 0]
+
+
+@pytest.mark.parametrize("encoding", [ROS1, CDR])
+def test_the_library_reads_what_is_left_of_a_message(encoding: str) -> None:
+    parsed = CloudMessage.parse(made_by_library(encoding), encoding)
+    keep = np.array([True, False, True, True, False])
+    cloud = parsed.cloud.take(keep).with_columns({"probability": np.float32([0.1, 0.2, 0.3])})
+    store = ROS[encoding].store
+    read = store.deserialize_ros1 if encoding == ROS1 else store.deserialize_cdr
+    message = read(parsed.with_cloud(cloud).to_bytes(), CLOUD_TYPE)
+
+    assert (message.height, message.width, message.point_step) == (1, 3, 41)
+    assert [field.name for field in message.fields][-1] == "probability"
+    table = np.frombuffer(
+        message.data,
+        np.dtype(
+            {"names": ["x", "p"], "formats": ["<f4", "<f4"], "offsets": [0, 37], "itemsize": 41}
+        ),
+    )
+    assert table["x"].tolist() == [0, 2, 3]
+    np.testing.assert_array_equal(table["p"], np.float32([0.1, 0.2, 0.3]))
+
+
+def test_big_endian_cdr_is_read_and_written_alike() -> None:
+    ros = ROS[CDR]
+    cloud = ros.cloud(table_of({axis: np.arange(3, dtype=">f4") for axis in "xyz"}), START)
+    message = bytes(ros.store.serialize_cdr(cloud, CLOUD_TYPE, little_endian=False))
+    parsed = CloudMessage.parse(message, CDR)
+
+    assert (parsed.order, parsed.cloud.is_bigendian) == (">", True)
+    assert parsed.cloud.columns()["x"].tolist() == [0, 1, 2]
+    assert parsed.to_bytes() == message
+
+
+@pytest.mark.parametrize("encoding", [ROS1, CDR])
+def test_a_message_made_anew_is_the_librarys(encoding: str) -> None:
+    parsed = CloudMessage.parse(made_by_library(encoding), encoding)
+    new = message_of(parsed.cloud, START, "velodyne", encoding).to_bytes()
+    ours, theirs = (CloudMessage.parse(m, encoding) for m in (new, parsed.to_bytes()))
+
+    # All but the counter of messages, which ROS 1 has in its header.
+    assert ours.head[8 if encoding == ROS1 else 0 :] == theirs.head[8 if encoding == ROS1 else 0 :]
+    assert new[len(ours.head) :] == parsed.to_bytes()[len(theirs.head) :]
+
+
+@pytest.mark.parametrize("encoding", [ROS1, CDR])
+def test_a_message_that_is_cut_off_is_refused(encoding: str) -> None:
+    message = made_by_library(encoding)
+    for end in range(len(message)):
+        with pytest.raises(ValueError, match=r"ends too early|plain CDR|does not end"):
+            CloudMessage.parse(message[:end], encoding)
+
+
+@given(st.data(), st.sampled_from([ROS1, CDR]))
+def test_a_damaged_message_is_read_or_refused(data: st.DataObject, encoding: str) -> None:
+    message = bytearray(made_by_library(encoding))
+    for _ in range(data.draw(st.integers(1, 4))):
+        place = data.draw(st.integers(0, len(message) - 1))
+        message[place] = data.draw(st.integers(0, 255))
+    try:
+        parsed = CloudMessage.parse(bytes(message), encoding)
+    except ValueError:
+        return
+    parsed.cloud.columns()
+    parsed.cloud.take(np.zeros(len(parsed.cloud), bool)).columns()
+
+
+def test_cdr_of_another_kind_is_refused() -> None:
+    message = b"\x00\x03\x00\x00" + made_by_library(CDR)[4:]
+    with pytest.raises(ValueError, match="plain CDR"):
+        CloudMessage.parse(message, CDR)

@@ -1,0 +1,150 @@
+"""Clouds of any fields: what is kept, what goes, and what is refused."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from derain.bags.point_cloud import DATATYPES, PointCloud, PointField, cloud_of_columns
+
+
+@st.composite
+def clouds(draw: st.DrawFn) -> PointCloud:
+    """Clouds of fields anywhere in a point, overlapping or not, with padding of any bytes."""
+    fields = []
+    for number in range(draw(st.integers(1, 5))):
+        datatype, count = draw(st.sampled_from(list(DATATYPES))), draw(st.integers(0, 3))
+        fields.append(PointField(f"f{number}", draw(st.integers(0, 12)), datatype, count))
+    ends = [field.offset + field.dtype("<").itemsize for field in fields]
+    step = max(ends) + draw(st.integers(0, 7))
+    height, width = draw(st.integers(1, 3)), draw(st.integers(0, 5))
+    row = width * step + (draw(st.integers(0, 9)) if height > 1 else 0)
+    data = draw(st.binary(min_size=height * row, max_size=height * row))
+    return PointCloud(
+        height, width, tuple(fields), draw(st.booleans()), step, row, data, draw(st.booleans())
+    )
+
+
+def points_of(cloud: PointCloud) -> list[bytes]:
+    """The bytes of each point, cut out one by one."""
+    row_step = cloud.row_step if cloud.height > 1 else cloud.width * cloud.point_step
+    starts = [
+        row * row_step + column * cloud.point_step
+        for row in range(cloud.height)
+        for column in range(cloud.width)
+    ]
+    return [bytes(cloud.data[start : start + cloud.point_step]) for start in starts]
+
+
+@given(clouds(), st.data())
+def test_taking_points_keeps_every_byte_of_them(cloud: PointCloud, data: st.DataObject) -> None:
+    rows = np.array(data.draw(st.lists(st.booleans(), min_size=len(cloud), max_size=len(cloud))))
+    taken = cloud.take(rows.astype(bool))
+
+    assert points_of(taken) == [p for p, keep in zip(points_of(cloud), rows, strict=True) if keep]
+    assert (taken.fields, taken.is_bigendian) == (cloud.fields, cloud.is_bigendian)
+    assert taken is cloud or (taken.height, taken.row_step) == (1, len(taken) * cloud.point_step)
+
+
+@given(clouds())
+def test_columns_are_what_the_bytes_say(cloud: PointCloud) -> None:
+    order, points = ">" if cloud.is_bigendian else "<", points_of(cloud)
+    for field in cloud.fields:
+        dtype = np.dtype(order + DATATYPES[field.datatype])
+        expected = [np.frombuffer(p, dtype, max(field.count, 1), field.offset) for p in points]
+        column = cloud.columns()[field.name]
+        assert column.dtype.isnative
+        assert column.astype(dtype).tobytes() == b"".join(map(bytes, expected))
+
+
+@given(clouds())
+def test_a_column_more_leaves_the_others_in_their_place(cloud: PointCloud) -> None:
+    values = np.linspace(0, 1, len(cloud), dtype=np.float32)
+    wider = cloud.with_columns({"probability": values})
+
+    np.testing.assert_array_equal(wider.columns()["probability"], values)
+    assert [p[: cloud.point_step] for p in points_of(wider)] == points_of(cloud)
+    assert (wider.height, wider.width) == (cloud.height, cloud.width)
+
+
+@pytest.mark.parametrize("big", [False, True])
+def test_an_organised_cloud_can_keep_its_shape(big: bool) -> None:
+    columns = {name: np.arange(6, dtype="f4") for name in "xyz"} | {
+        "ring": np.arange(6, dtype="u2")
+    }
+    packed = cloud_of_columns(columns, big)
+    rows = np.frombuffer(packed.data, np.uint8).reshape(2, -1)
+    padded = np.pad(rows, ((0, 0), (0, 5)), constant_values=7).tobytes()
+    cloud = replace(packed, height=2, width=3, row_step=3 * packed.point_step + 5, data=padded)
+    rain = np.array([False, True, False, False, False, True])
+    blank = cloud.blank(rain)
+
+    assert (blank.height, blank.width, blank.row_step) == (2, 3, cloud.row_step)
+    assert blank.is_dense is False
+    for axis in "xyz":
+        values = blank.columns()[axis]
+        assert np.isnan(values[rain]).all()
+        np.testing.assert_array_equal(values[~rain], columns[axis][~rain])
+    np.testing.assert_array_equal(blank.columns()["ring"], columns["ring"])
+    changed = np.flatnonzero(
+        np.frombuffer(blank.data, np.uint8) != np.frombuffer(cloud.data, np.uint8)
+    )
+    assert set(changed // cloud.row_step * 3 + changed % cloud.row_step // cloud.point_step) <= {
+        1,
+        5,
+    }
+
+
+def test_a_count_of_none_means_one_value() -> None:
+    cloud = PointCloud(1, 1, (PointField("x", 0, 7, 0),), False, 4, 4, b"\0\0\x80?", True)
+    assert cloud.columns()["x"].tolist() == [1.0]
+
+
+def test_one_row_needs_no_step() -> None:
+    cloud = PointCloud(1, 1, (PointField("x", 0, 7, 1),), False, 4, 0, b"\0\0\x80?", True)
+    assert cloud.columns()["x"].tolist() == [1.0]
+
+
+X = (PointField("x", 0, 7, 1),)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ((1, 2, (*X, *X), False, 4, 8, bytes(8), True), "comes twice"),
+        ((1, 2, (PointField("x", 2, 7, 1),), False, 4, 8, bytes(8), True), "ends at byte 6"),
+        ((1, 2, (PointField("x", 0, 9, 1),), False, 4, 8, bytes(8), True), "datatype 9"),
+        ((1, 3, X, False, 4, 12, bytes(11), True), "11 bytes where 1 rows of 12"),
+        ((2, 3, X, False, 4, 11, bytes(24), True), "rows of 11 bytes"),
+        ((1, 3, (), False, 0, 0, b"", True), "points of no bytes"),
+        ((2**31, 2**31, X, False, 4, 2**32 - 1, b"", True), "rows of"),
+    ],
+)
+def test_contradictions_are_refused(arguments: tuple[Any, ...], reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        PointCloud(*arguments)
+
+
+def test_columns_become_a_cloud_and_columns_again() -> None:
+    columns: dict[str, NDArray[Any]] = {
+        code: np.arange(4, dtype=code) for code in DATATYPES.values()
+    } | {"pair": np.ones((4, 2), "f4")}
+    for big in (False, True):
+        back = cloud_of_columns(columns, big).columns()
+        assert list(back) == list(columns)
+        for name, column in columns.items():
+            np.testing.assert_array_equal(back[name], column)
+
+
+def test_a_field_that_is_there_takes_the_new_values() -> None:
+    cloud = cloud_of_columns({"p": np.zeros(3, "f4"), "x": np.arange(3, dtype="f4")})
+    again = cloud.with_columns({"p": np.ones(3, np.float32)})
+    assert again.fields == cloud.fields
+    assert again.columns()["p"].tolist() == [1, 1, 1]
+    assert again.columns()["x"].tolist() == [0, 1, 2]
+    with pytest.raises(ValueError, match="another field 'p'"):
+        cloud_of_columns({"p": np.zeros(3, "u2")}).with_columns({"p": np.ones(3, np.float32)})

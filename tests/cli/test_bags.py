@@ -1,0 +1,101 @@
+"""Commands that read bags: they say what is in one, draw, teach and measure by its clouds."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_bags import small_bag, tables
+
+from benchmarks.recorded_bags import CLOUD_TYPE, START, STORAGES, Recorded, Ros, Storage
+from derain.files.labels import write_labels
+from derain.teaching.manifest import HELD_OUT_PART, TRAINING_PART, Manifest
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_info_says_what_is_in_a_bag(tmp_path: Path, storage: Storage, run_derain) -> None:
+    bag = small_bag(tmp_path, storage)
+    facts = json.loads(run_derain("info", bag, "--json").out)
+
+    assert (facts["bag"], facts["messages"], facts["seconds"]) == (storage, 12, 0.3)
+    assert facts["from"] == "2023-11-14T22:13:20.023+00:00"
+    assert facts["topics"]["/imu/data"] == "sensor_msgs/msg/Imu, 6 messages"
+    clouds = facts["point clouds"]["/velodyne_points"]
+    assert clouds["points of the first"] == 300
+    assert clouds["fields"]["ring"] == "u2 at 16"
+    assert "/velodyne_points" in run_derain("info", bag).out
+    cloud = json.loads(run_derain("info", bag / "000002", "--json").out)
+    assert cloud["points"] == 300
+
+
+def test_a_topic_is_named_by_an_option(tmp_path: Path, run_derain) -> None:
+    ros, (table,) = Ros("mcap"), tables(1)
+    rear = Recorded("/rear", CLOUD_TYPE, START + 5, ros.cloud(table[:200], START))
+    bag = small_bag(tmp_path, "mcap", more=[rear])
+
+    assert "--topic" in run_derain("run", "ror", bag, "--out", tmp_path / "out").err
+    outcome = run_derain("run", "ror", bag, "--out", tmp_path / "out", "--topic", "/rear")
+    assert (outcome.code, "rear/000000: 200 points" in outcome.out) == (0, True)
+    assert json.loads(run_derain("info", bag, "--json", "--topic", "rear").out)["points"] == 200
+    told = run_derain("run", "ror", tmp_path / "out", bag, "--out", tmp_path / "o", "--topic", "/x")
+    assert told.code == 2
+    assert "/rear" in told.err
+
+
+def test_a_topic_without_a_bag_is_refused(tmp_path: Path, run_derain) -> None:
+    np.save(tmp_path / "scan.npy", tables(1)[0])
+    outcome = run_derain("run", "ror", tmp_path, "--out", tmp_path / "out", "--topic", "/points")
+    assert outcome.code == 2
+    assert "no bag is named" in outcome.err
+
+
+def test_view_draws_a_cloud_of_a_bag(tmp_path: Path, run_derain) -> None:
+    bag, picture = small_bag(tmp_path, "ros1"), tmp_path / "figure.png"
+    outcome = run_derain("view", bag / "000001", "--methods", "ror", "--out", picture)
+    assert (outcome.code, picture.stat().st_size > 10_000) == (0, True)
+
+
+def test_a_taught_bag_is_read_again_with_its_labels(tmp_path: Path, run_derain) -> None:
+    bag = small_bag(tmp_path, "mcap", clouds=tables(5))
+    root = tmp_path / "taught"
+    assert run_derain("teach", "ror", bag, "--out", root).code == 0
+    manifest = Manifest.read(root)
+
+    assert [scan.number for scan in manifest.scans] == list(range(5))
+    parts = [manifest.frames(root, part) for part in (TRAINING_PART, HELD_OUT_PART)]
+    frames = [frame for part in parts for frame in part]
+    for frame, table in zip(frames, tables(5), strict=True):
+        scan = frame.read()
+        np.testing.assert_array_equal(scan.xyz[:, 0], table["x"])
+        assert len(frame.read_label(len(scan))) == len(scan)
+
+
+def test_labels_beside_a_bag_measure_methods(tmp_path: Path) -> None:
+    """What bench and tune measure by, without their processes."""
+    from derain.cards.card import load_card
+    from derain.datamodules.base import Loading
+    from derain.datamodules.labelled import labelled_scans
+
+    bag = small_bag(tmp_path, "sqlite3")
+    label = np.where(np.arange(300) >= 270, 110, 0)
+    for number in range(3):
+        write_labels(tmp_path / "drive.labels" / f"{number:06d}.label", label)
+    card = load_card("wads")
+    data = labelled_scans([bag], card, Loading())
+    scans = [data.read_measured(frame) for frame in data.frames("test")]
+
+    assert [int(card.rain_of(scan).sum()) for scan in scans] == [30, 30, 30]
+
+
+def test_without_the_library_the_extra_is_named(tmp_path: Path) -> None:
+    bag = small_bag(tmp_path, "ros1")
+    program = (
+        "import sys; sys.modules['rosbags'] = None; from derain.cli.main import main; "
+        f"sys.exit(main(['info', {str(bag)!r}]))"
+    )
+    outcome = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert outcome.returncode == 2
+    assert "pip install 'derain[ros]'" in outcome.stderr
+    assert len(outcome.stderr.splitlines()) == 1

@@ -1,0 +1,187 @@
+"""Clouds of bags as frames: read in order, out of it, by other processes, and by their paths."""
+
+import pickle
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_bags import small_bag, tables
+
+from benchmarks.recorded_bags import (
+    CLOUD_TYPE,
+    PERIOD,
+    POINTS,
+    START,
+    STORAGES,
+    Recorded,
+    Ros,
+    Storage,
+    table_of,
+)
+from derain.errors import InputError
+from derain.files.labels import write_labels
+from derain.sources.folders import frame_of, named_frames
+
+XYZI = ("x", "y", "z", "intensity")
+
+
+@pytest.fixture(params=STORAGES)
+def storage(request: pytest.FixtureRequest) -> Storage:
+    kind: Storage = request.param
+    return kind
+
+
+def test_frames_are_the_clouds_in_order(tmp_path: Path, storage: Storage) -> None:
+    bag = small_bag(tmp_path, storage)
+    source = named_frames([bag])
+
+    assert [frame.key for frame in source] == ["000000", "000001", "000002"]
+    assert source[2].follows(source[1])
+    assert not source[2].follows(source[0])
+    assert {frame.sequence for frame in source} == {"drive"}
+    for frame, table in zip(source, tables(), strict=True):
+        scan = frame.read()
+        np.testing.assert_array_equal(np.column_stack([table[a] for a in "xyz"]), scan.xyz)
+        np.testing.assert_array_equal(scan.intensity, table["intensity"])
+        assert list(scan.fields) == [*XYZI, "ring"]
+        np.testing.assert_array_equal(scan.fields["ring"], table["ring"])
+        assert frame.count_points() == len(table)
+
+
+def test_time_is_when_the_cloud_was_taken(tmp_path: Path, storage: Storage) -> None:
+    source = named_frames([small_bag(tmp_path, storage)])
+    taken = 1e-9 * (START - 1000 + PERIOD * np.arange(3))
+    assert [frame.time for frame in source] == pytest.approx(taken, abs=1e-6)
+    source[1].read()
+    assert source[1].time == pytest.approx(taken[1], abs=1e-6)
+
+
+def test_a_cloud_without_a_stamp_was_taken_when_it_was_recorded(tmp_path: Path) -> None:
+    ros = Ros("mcap")
+    cloud = ros.cloud(tables(1)[0], 0)
+    bag = small_bag(tmp_path, "mcap", clouds=[], more=[Recorded(POINTS, CLOUD_TYPE, START, cloud)])
+    assert named_frames([bag])[0].time == pytest.approx(1e-9 * START, abs=1e-6)
+
+
+def test_any_order_gives_the_same_clouds(tmp_path: Path, storage: Storage) -> None:
+    clouds = tables(24, points=20)
+    source = named_frames([small_bag(tmp_path, storage, clouds=clouds)])
+    order = [23, 0, 12, 11, 12, 20, *range(24)]
+    random.Random(1).shuffle(order)
+    for number in order:
+        np.testing.assert_array_equal(source[number].read().xyz[:, 0], clouds[number]["x"])
+
+
+def test_clouds_of_one_stamp_are_all_there_in_their_order(tmp_path: Path, storage: Storage) -> None:
+    ros, clouds = Ros(storage), tables(24, points=20)
+    same = [Recorded(POINTS, CLOUD_TYPE, START, ros.cloud(cloud, START)) for cloud in clouds]
+    source = named_frames([small_bag(tmp_path, storage, clouds=[], more=same)])
+
+    assert len({frame.key for frame in source}) == 24
+    for number in (*range(24), 20, 3, 15):
+        np.testing.assert_array_equal(source[number].read().xyz[:, 0], clouds[number]["x"])
+
+
+def test_another_process_reads_the_same(tmp_path: Path, storage: Storage) -> None:
+    frame = named_frames([small_bag(tmp_path, storage)])[1]
+    scan = frame.read()
+    again = pickle.loads(pickle.dumps(frame))
+    np.testing.assert_array_equal(again.read().xyz, scan.xyz)
+    assert (
+        again.fingerprint()
+        == frame.fingerprint()
+        != named_frames([frame.path.parent])[2].fingerprint()
+    )
+
+
+def test_a_path_leads_into_a_bag(tmp_path: Path, storage: Storage) -> None:
+    bag = small_bag(tmp_path, storage)
+    for path in (bag / "velodyne_points" / "000002", bag / "000002"):
+        (frame,) = named_frames([path])
+        assert frame.number == 2
+        np.testing.assert_array_equal(frame.read().xyz[:, 0], tables()[2]["x"])
+        assert frame_of(path).name == frame.name == str(bag / "velodyne_points" / "000002")
+    assert len(named_frames([bag / "velodyne_points"])) == 3
+
+
+def test_the_single_file_of_a_folder_is_a_bag_too(tmp_path: Path) -> None:
+    for storage, name in (("mcap", "a.mcap"), ("sqlite3", "b.db3")):
+        bag = small_bag(tmp_path, storage, Path(name).stem)  # type: ignore[arg-type]
+        assert len(named_frames([bag / name])) == 3
+
+
+def test_a_folder_of_bags_stands_for_them(tmp_path: Path) -> None:
+    for name in ("b", "a"):
+        small_bag(tmp_path, "ros1", name)
+    source = named_frames([tmp_path])
+    assert [frame.key for frame in source][2:4] == ["a/000002", "b/000000"]
+    assert not source[3].follows(source[2])
+
+
+def test_labels_lie_beside_the_bag(tmp_path: Path, storage: Storage) -> None:
+    bag = small_bag(tmp_path, storage)
+    label = np.arange(300) % 2
+    write_labels(tmp_path / "drive.labels" / "000001.label", label)
+    source = named_frames([bag], labelled=True)
+
+    assert [frame.has_labels for frame in source] == [False, True, False]
+    np.testing.assert_array_equal(source[1].read_label(300), label)
+    assert not any(frame.has_labels for frame in named_frames([bag]))
+
+
+def test_organised_big_endian_clouds_of_doubles_are_read(tmp_path: Path, storage: Storage) -> None:
+    ros, (table,) = Ros(storage), tables(1)
+    doubles = table_of({name: table[name].astype(">f8") for name in XYZI})
+    cloud = ros.cloud(doubles, START, shape=(10, 30))
+    bag = small_bag(tmp_path, storage, clouds=[], more=[Recorded(POINTS, CLOUD_TYPE, START, cloud)])
+    scan = named_frames([bag])[0].read()
+
+    assert scan.shape == (10, 30)
+    np.testing.assert_array_equal(scan.xyz[:, 1], table["y"])
+    np.testing.assert_array_equal(scan.intensity, table["intensity"])
+
+
+@pytest.mark.parametrize("name", ["intensity", "intensities", "reflectivity", "i"])
+def test_intensity_has_several_names(tmp_path: Path, name: str) -> None:
+    (table,) = tables(1)
+    named = table_of({"x": table["x"], "y": table["y"], "z": table["z"], name: table["intensity"]})
+    bag = small_bag(tmp_path, "mcap", clouds=[named])
+    np.testing.assert_array_equal(named_frames([bag])[0].read().intensity, table["intensity"])
+
+
+@pytest.mark.parametrize(
+    ("columns", "reason"),
+    [
+        ({"x": "f4", "y": "f4"}, "no x, y and z"),
+        ({"x": "i2", "y": "i2", "z": "i2"}, "x is int16"),
+        ({"x": "(2,)f4", "y": "f4", "z": "f4"}, "float32 of 2 values"),
+    ],
+)
+def test_clouds_without_coordinates_are_refused(
+    tmp_path: Path, columns: dict[str, str], reason: str
+) -> None:
+    bag = small_bag(tmp_path, "mcap", clouds=[np.ones(4, list(columns.items()))])
+    with pytest.raises(InputError, match=reason) as error:
+        named_frames([bag])[0].read()
+    assert str(error.value.subject).endswith("velodyne_points/000000")
+
+
+def test_other_fields_on_the_way_are_told_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, *others = tables(4)
+    fewer = table_of({name: first[name] for name in "xyz"})
+    source = named_frames([small_bag(tmp_path, "mcap", clouds=[fewer, *others])])
+    intensities = [frame.read().intensity is None for frame in source]
+
+    assert intensities == [True, False, False, False]
+    told = capsys.readouterr().err
+    assert told.count("its fields are others") == 1
+    assert "000001" in told
+
+
+def test_no_such_cloud(tmp_path: Path, storage: Storage) -> None:
+    bag = small_bag(tmp_path, storage)
+    with pytest.raises(InputError, match="/velodyne_points has 3"):
+        named_frames([bag / "000003"])

@@ -1,0 +1,255 @@
+"""Bags without their rain: what `derain run` writes of them, and what it leaves as it is."""
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from numpy.typing import NDArray
+from small_bags import bag_path, small_bag, storage_file, tables
+
+from benchmarks.recorded_bags import (
+    CLOUD_TYPE,
+    PERIOD,
+    POINTS,
+    START,
+    STORAGES,
+    Recorded,
+    Ros,
+    Storage,
+    connections_of,
+    read_bag,
+)
+from derain.bags.cloud_message import CDR, ROS1, CloudMessage
+from derain.files.labels import read_labels
+
+RUN = ("run", "ror", "--set", "radius=2", "--set", "neighbours=3")
+
+
+@pytest.fixture(params=STORAGES)
+def storage(request: pytest.FixtureRequest) -> Storage:
+    kind: Storage = request.param
+    return kind
+
+
+def cloud_of(message: bytes, storage: Storage) -> CloudMessage:
+    return CloudMessage.parse(message, ROS1 if storage == "ros1" else CDR)
+
+
+@pytest.fixture
+def rain_of_files(tmp_path: Path, run_derain) -> list[NDArray[np.bool_]]:
+    """What the same method calls rain in the same scans as files."""
+    folder = tmp_path / "files"
+    folder.mkdir()
+    for number, table in enumerate(tables()):
+        np.save(folder / f"{number}.npy", table)
+    assert run_derain(*RUN, folder, "--out", tmp_path / "masks").code == 0
+    return [
+        read_labels(tmp_path / "masks" / f"{n}.label", len(t)) == 1 for n, t in enumerate(tables())
+    ]
+
+
+def test_only_the_clouds_change_and_as_files_do(
+    tmp_path: Path, storage: Storage, run_derain, rain_of_files: list[NDArray[np.bool_]]
+) -> None:
+    bag = small_bag(tmp_path, storage)
+    outcome = run_derain(*RUN, bag, "--out", tmp_path / "out")
+    made = bag_path(tmp_path / "out", storage)
+
+    assert (outcome.code, outcome.said) == (0, [])
+    assert sorted(os.listdir(tmp_path / "out")) == [made.name]
+    before, after = read_bag(bag), read_bag(made)
+    assert [m[:3] for m in after] == [m[:3] for m in before]
+    assert connections_of(made) == connections_of(bag)
+    masks = iter(rain_of_files)
+    for old, new in zip(before, after, strict=True):
+        if old[0] != POINTS:
+            assert new == old
+            continue
+        rain = next(masks)
+        assert rain.any()
+        was, now = cloud_of(old[3], storage), cloud_of(new[3], storage)
+        points = np.frombuffer(was.cloud.data, np.uint8).reshape(len(rain), -1)
+        assert points[~rain].tobytes() == bytes(now.cloud.data)
+        assert (now.head, now.cloud.fields) == (was.head, was.cloud.fields)
+
+
+def test_what_was_removed_and_its_probability_can_be_kept(
+    tmp_path: Path, storage: Storage, run_derain, rain_of_files: list[NDArray[np.bool_]]
+) -> None:
+    bag = small_bag(tmp_path, storage)
+    topic = ("--cleaned-topic", "/points_clean", "--removed-topic", "/rain", "--probability")
+    assert run_derain(*RUN, bag, "--out", tmp_path / "out", *topic).code == 0
+    after = read_bag(bag_path(tmp_path / "out", storage))
+
+    # What there was is as it was, in its order.
+    added = ("/points_clean", "/rain")
+    assert [m for m in after if m[0] not in added] == read_bag(bag)
+    for name, value in zip(added, (0.0, 1.0), strict=True):
+        for (_, _, time, message), rain, table, number in zip(
+            [m for m in after if m[0] == name], rain_of_files, tables(), range(3), strict=True
+        ):
+            assert time == START + number * PERIOD
+            columns = cloud_of(message, storage).cloud.columns()
+            np.testing.assert_array_equal(columns["x"], table["x"][rain == bool(value)])
+            assert set(columns["rain_probability"]) == {value}
+            assert columns["rain_probability"].dtype == np.float32
+
+
+def test_an_organised_cloud_can_keep_its_shape(
+    tmp_path: Path, storage: Storage, run_derain, rain_of_files: list[NDArray[np.bool_]]
+) -> None:
+    ros = Ros(storage)
+    cloud = ros.cloud(tables()[0], START, shape=(10, 30))
+    bag = small_bag(tmp_path, storage, clouds=[], more=[Recorded(POINTS, CLOUD_TYPE, START, cloud)])
+    shapes = []
+    for out, options in (("flat", []), ("whole", ["--keep-shape"])):
+        assert run_derain(*RUN, bag, "--out", tmp_path / out, *options).code == 0
+        (message,) = read_bag(bag_path(tmp_path / out, storage))
+        now = cloud_of(message[3], storage).cloud
+        shapes.append((now.height, now.width, int(np.isfinite(now.columns()["x"]).sum())))
+    clean = int((~rain_of_files[0]).sum())
+    assert shapes == [(1, clean, clean), (10, 30, clean)]
+
+
+def test_a_cloud_that_cannot_be_cleaned_stays_and_is_told(
+    tmp_path: Path, storage: Storage, run_derain
+) -> None:
+    ros, good = Ros(storage), tables(3)
+    lost = np.ones(4, [("a", "f4")])
+    bag = small_bag(tmp_path, storage, clouds=[good[0], lost, good[2][:0], good[2]])
+    outcome = run_derain(*RUN, bag, "--out", tmp_path / "out")
+    before, after = read_bag(bag), read_bag(bag_path(tmp_path / "out", storage))
+
+    assert outcome.code == 2
+    assert outcome.err.count("no x, y and z") == 1
+    assert "1 of 4 scans could not be cleaned" in outcome.err
+    assert [m[:3] for m in after] == [m[:3] for m in before]
+    clouds = [(b, a) for b, a in zip(before, after, strict=True) if b[0] == POINTS]
+    assert [b == a for b, a in clouds] == [False, True, True, False]
+    assert len(cloud_of(clouds[2][1][3], storage).cloud) == 0
+    assert ros.is_ros1 == (storage == "ros1")
+
+
+def test_nothing_is_left_of_a_bag_that_breaks_off(
+    tmp_path: Path, run_derain, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosbags import rosbag2
+
+    bag = small_bag(tmp_path, "mcap")
+    messages = rosbag2.Reader.messages
+
+    def breaking_off(self, *arguments, **options):
+        for number, message in enumerate(messages(self, *arguments, **options)):
+            if number == 2:
+                raise rosbag2.ReaderError("Chunk checksum mismatch.")
+            yield message
+
+    monkeypatch.setattr(rosbag2.Reader, "messages", breaking_off)
+    outcome = run_derain(*RUN, bag, "--out", tmp_path / "out")
+    assert outcome.code == 2
+    assert "Chunk checksum mismatch" in outcome.err
+    assert os.listdir(tmp_path / "out") == []
+
+
+def test_a_bag_is_written_in_place_of_an_earlier_one_and_of_nothing_else(
+    tmp_path: Path, storage: Storage, run_derain
+) -> None:
+    bag, out = small_bag(tmp_path, storage), tmp_path / "out"
+    for _ in range(2):
+        assert run_derain(*RUN, bag, "--out", out).code == 0
+    assert len(read_bag(bag_path(out, storage))) == len(read_bag(bag))
+    assert len(os.listdir(out)) == 1
+
+    assert f"would overwrite {bag}" in run_derain(*RUN, bag, "--out", tmp_path).err
+    if storage != "ros1":
+        shutil.rmtree(out / "drive")
+        (out / "drive").mkdir()
+        (out / "drive" / "notes.txt").write_text("mine")
+        assert "is there already, and no bag" in run_derain(*RUN, bag, "--out", out).err
+        assert (out / "drive" / "notes.txt").read_text() == "mine"
+
+
+def test_one_cloud_of_a_bag_is_written_as_a_file(tmp_path: Path, run_derain) -> None:
+    bag = small_bag(tmp_path, "mcap")
+    assert run_derain(*RUN, bag / "000001", "--out", tmp_path / "out").code == 0
+    assert sorted(os.listdir(tmp_path / "out")) == ["000001.label", "000001.pcd"]
+
+
+def test_several_bags_and_scans_are_cleaned_in_one_run(tmp_path: Path, run_derain) -> None:
+    bags = [small_bag(tmp_path, "mcap", "a"), small_bag(tmp_path, "ros1", "b")]
+    np.save(tmp_path / "scan.npy", tables(1)[0])
+    outcome = run_derain(*RUN, *bags, tmp_path / "scan.npy", "--out", tmp_path / "out")
+    assert (outcome.code, outcome.said) == (0, [])
+    assert sorted(os.listdir(tmp_path / "out")) == ["a", "b.bag", "scan.label", "scan.npy"]
+
+
+@pytest.mark.parametrize(
+    "compression",
+    [("mcap", "storage"), ("mcap", "message"), ("mcap", "file"), ("sqlite3", "message"),
+     ("sqlite3", "file"), ("ros1", "bz2"), ("ros1", "lz4")],
+)  # fmt: skip
+def test_compressed_bags_are_read_and_stay_compressed(
+    tmp_path: Path, run_derain, compression: tuple[Storage, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rosbags import rosbag1, rosbag2
+
+    from benchmarks import recorded_bags
+
+    storage, mode = compression
+    writer_of = recorded_bags._writer
+
+    def compressing(path: Path, storage: Storage) -> object:
+        writer = writer_of(path, storage)
+        if storage == "ros1":
+            writer.set_compression(rosbag1.Writer.CompressionFormat[mode.upper()])
+        else:
+            zstd = rosbag2.CompressionFormat.ZSTD
+            writer.set_compression(rosbag2.CompressionMode[mode.upper()], zstd)
+        return writer
+
+    monkeypatch.setattr(recorded_bags, "_writer", compressing)
+    bag = small_bag(tmp_path, storage)
+    assert run_derain(*RUN, bag, "--out", tmp_path / "out").code == 0
+    made = bag_path(tmp_path / "out", storage)
+    assert [m[:3] for m in read_bag(made)] == [m[:3] for m in read_bag(bag)]
+    if storage == "ros1":
+        assert f"compression={mode}".encode() in made.read_bytes()
+    else:
+        assert storage_file(made).suffixes == storage_file(bag).suffixes
+        key = "rosbag2_bagfile_information"
+        old, new = (yaml.safe_load((b / "metadata.yaml").read_text())[key] for b in (bag, made))
+        assert new["compression_mode"] == old["compression_mode"]
+    assert storage_file(made).stat().st_size < 1.5 * storage_file(bag).stat().st_size
+
+
+def test_topics_without_definition_or_hash_are_copied(tmp_path: Path, run_derain) -> None:
+    """As ROS 2 before Iron records them, in a database without definitions."""
+    import sqlite3
+
+    bag = small_bag(tmp_path, "sqlite3")
+    file = storage_file(bag)
+    with sqlite3.connect(file) as database:
+        database.execute("UPDATE topics SET type_description_hash = ''")
+        database.execute("DELETE FROM message_definitions")
+    database.close()
+    metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
+    for topic in metadata["rosbag2_bagfile_information"]["topics_with_message_count"]:
+        del topic["topic_metadata"]["type_description_hash"]
+    (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
+    assert run_derain(*RUN, bag, "--out", tmp_path / "out").code == 0
+    made = tmp_path / "out" / "drive"
+    assert connections_of(made) == connections_of(bag)
+    assert [m for m in read_bag(made) if m[0] != POINTS] == [
+        m for m in read_bag(bag) if m[0] != POINTS
+    ]
+
+
+def test_a_name_of_a_topic_that_is_taken_is_refused(tmp_path: Path, run_derain) -> None:
+    bag = small_bag(tmp_path, "mcap")
+    outcome = run_derain(*RUN, bag, "--out", tmp_path / "out", "--cleaned-topic", "/imu/data")
+    assert outcome.code == 2
+    assert "has a topic /imu/data already" in outcome.err
+    assert not (tmp_path / "out").exists()
