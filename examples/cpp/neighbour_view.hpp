@@ -55,8 +55,8 @@ inline std::uint64_t spread(std::uint64_t value) {
   return result;
 }
 
-// Each row's cell along a Morton curve through the cube around the valid rows. Any order gives the
-// same answers; along this one the search and the network run about twice as fast.
+// Each row's cell along a Morton curve through the cube around the valid rows. The order matters:
+// the model that comes with derain takes every n-th point along it for a fair sample of the scan.
 inline std::vector<std::uint64_t> morton_codes(const Scan& scan,
                                                const std::vector<std::int64_t>& rows) {
   Position least{INFINITY, INFINITY, INFINITY};
