@@ -16,7 +16,7 @@ from derain.scan import Scan, to_float32
 DEFAULT_COLUMNS = ("x", "y", "z", "intensity")
 
 # What files call the strength of a return; the first that is present counts.
-INTENSITY_NAMES = ("intensity", "i", "reflectivity", "remission", "signal")
+INTENSITY_NAMES = ("intensity", "i", "intensities", "reflectivity", "remission", "signal")
 
 
 def name_columns(

@@ -1,0 +1,1 @@
+"""Recordings of ROS: point clouds in bags, read as scans and written without their rain."""

@@ -1,0 +1,231 @@
+"""The bytes of a ``sensor_msgs/PointCloud2`` message, as ROS 1 and ROS 2 write them.
+
+What stands before and after the cloud is kept as it is: a message whose cloud does not change is
+written back byte for byte. Written here and not by the library that reads bags, which makes objects
+of whole messages and needs the definitions of their types, which bags of older ROS 2 do not hold.
+
+Source: of ROS 1, http://wiki.ros.org/msg ("Fields", little-endian, nothing aligned). Of ROS 2, CDR
+of DDSI-RTPS 2.5, 10.2 (encapsulation) and CORBA 3.3 part 2, 9.3 (alignment from the end of the
+encapsulation header).
+"""
+
+import struct
+from dataclasses import dataclass, replace
+from typing import Self
+
+from derain.bags.point_cloud import PointCloud, PointField
+
+# What an encapsulation begins with: plain CDR in big- and little-endian byte order.
+CDR_ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
+CDR_HEADER = 4
+
+# How messages of ROS 1 and ROS 2 are written.
+ROS1, CDR = "ros1", "cdr"
+
+# In ROS 1 a header begins with a counter of messages, in ROS 2 with the stamp.
+STAMP_AT = {ROS1: 4, CDR: CDR_HEADER}
+
+# Strings of ROS may be any bytes.
+TEXT = ("utf-8", "surrogateescape")
+
+
+@dataclass(frozen=True, eq=False)
+class CloudMessage:
+    """A PointCloud2 message.
+
+    Attributes:
+        encoding: ``ros1`` or ``cdr``.
+        order: Byte order of the message, ``<`` or ``>``, whatever that of its points.
+        head: Its bytes up to the cloud: the header with stamp and frame.
+        cloud: The cloud.
+        tail: Its bytes after the cloud, which nobody reads.
+        stamp: When the cloud was taken, nanoseconds; 0 where the driver does not say.
+    """
+
+    encoding: str
+    order: str
+    head: bytes
+    cloud: PointCloud
+    tail: bytes
+    stamp: int
+
+    @classmethod
+    def parse(cls, message: bytes, encoding: str) -> Self:
+        """Reads a message.
+
+        Args:
+            message: Its bytes.
+            encoding: ``ros1`` or ``cdr``.
+
+        Raises:
+            ValueError: Bytes that are no PointCloud2, or one that contradicts itself.
+        """
+        order = order_of(message, encoding)
+        read = _Reader(message, encoding, order)
+        try:
+            read.skip(STAMP_AT[encoding] - read.position + 8)  # the stamp
+            read.string()  # the frame
+            head = message[: read.position]
+            height, width = read.number("I"), read.number("I")
+            fields = tuple(
+                PointField(read.string(), read.number("I"), read.number("B"), read.number("I"))
+                for _ in range(read.number("I"))
+            )
+            is_bigendian = bool(read.number("B"))
+            point_step, row_step = read.number("I"), read.number("I")
+            data = read.take(read.number("I"))
+            is_dense = bool(read.number("B"))
+        except struct.error as error:
+            raise ValueError("the message ends too early") from error
+        cloud = PointCloud(
+            height, width, fields, is_bigendian, point_step, row_step, data, is_dense
+        )
+        tail = message[read.position :]
+        return cls(encoding, order, head, cloud, tail, stamp_of(message, encoding))
+
+    def with_cloud(self, cloud: PointCloud) -> Self:
+        """The same message of another cloud."""
+        return replace(self, cloud=cloud)
+
+    def to_bytes(self) -> bytes:
+        """The message as it is sent."""
+        cloud, write = self.cloud, _Writer(self.head, self.encoding, self.order)
+        write.number("I", cloud.height)
+        write.number("I", cloud.width)
+        write.number("I", len(cloud.fields))
+        for field in cloud.fields:
+            write.string(field.name)
+            write.number("I", field.offset)
+            write.number("B", field.datatype)
+            write.number("I", field.count)
+        write.number("B", cloud.is_bigendian)
+        write.number("I", cloud.point_step)
+        write.number("I", cloud.row_step)
+        write.number("I", len(cloud.data))
+        write.append(cloud.data)
+        write.number("B", cloud.is_dense)
+        write.append(self.tail)
+        return bytes(write.message)
+
+
+def header_of(stamp: int, frame: str, encoding: str) -> bytes:
+    """The bytes that a message begins with, for one that is made anew.
+
+    Args:
+        stamp: When the cloud was taken, nanoseconds.
+        frame: Name of the sensor's frame.
+        encoding: ``ros1`` or ``cdr``, which is written in little-endian order.
+    """
+    first = b"\x00\x01\x00\x00" if encoding == CDR else struct.pack("<I", 0)
+    write = _Writer(first, encoding, "<")
+    write.number("I", stamp // 10**9)
+    write.number("I", stamp % 10**9)
+    write.string(frame)
+    return bytes(write.message)
+
+
+def message_of(cloud: PointCloud, stamp: int, frame: str, encoding: str) -> CloudMessage:
+    """A message of a cloud, which came from none.
+
+    Args:
+        cloud: The cloud.
+        stamp: When it was taken, nanoseconds.
+        frame: Name of the sensor's frame.
+        encoding: ``ros1`` or ``cdr``.
+    """
+    return CloudMessage(encoding, "<", header_of(stamp, frame, encoding), cloud, b"", stamp)
+
+
+def stamp_of(message: bytes, encoding: str) -> int:
+    """When the cloud of a message was taken, nanoseconds, without reading the cloud.
+
+    Args:
+        message: The bytes of a message that begins with a header.
+        encoding: ``ros1`` or ``cdr``.
+
+    Raises:
+        ValueError: Bytes that are no such message.
+    """
+    order, start = order_of(message, encoding), STAMP_AT[encoding]
+    if len(message) < start + 8:
+        raise ValueError("the message ends too early")
+    # Seconds are signed in ROS 2.
+    seconds, nanoseconds = struct.unpack_from(
+        order + ("iI" if encoding == CDR else "II"), message, start
+    )
+    return int(seconds) * 10**9 + int(nanoseconds)
+
+
+def order_of(message: bytes, encoding: str) -> str:
+    """Byte order of a message, ``<`` or ``>``.
+
+    Raises:
+        ValueError: CDR of a kind that ROS 2 does not write.
+    """
+    if encoding == ROS1:
+        return "<"
+    order = CDR_ORDERS.get(bytes(message[:2]))
+    if order is None or len(message) < CDR_HEADER:
+        raise ValueError(f"it begins with {bytes(message[:4]).hex()}, which is no plain CDR")
+    return order
+
+
+def _aligned(position: int, size: int, encoding: str) -> int:
+    """Where a number of so many bytes may stand."""
+    return position if encoding == ROS1 else position + (CDR_HEADER - position) % size
+
+
+class _Reader:
+    """Goes through the bytes of a message."""
+
+    def __init__(self, message: bytes, encoding: str, order: str) -> None:
+        self.message = memoryview(message)
+        self.encoding = encoding
+        self.order = order
+        self.position = 0
+
+    def skip(self, size: int) -> None:
+        self.take(size)
+
+    def number(self, kind: str) -> int:
+        layout = struct.Struct(self.order + kind)
+        self.position = _aligned(self.position, layout.size, self.encoding)
+        (value,) = layout.unpack_from(self.message, self.position)
+        self.position += layout.size
+        return int(value)
+
+    def string(self) -> str:
+        text = bytes(self.take(self.number("I")))
+        if self.encoding == CDR and text:
+            if text[-1]:
+                raise ValueError("a text in it does not end as CDR has it")
+            text = text[:-1]
+        return text.decode(*TEXT)
+
+    def take(self, size: int) -> memoryview:
+        start, self.position = self.position, self.position + size
+        if self.position > len(self.message):
+            raise ValueError("the message ends too early")
+        return self.message[start : self.position]
+
+
+class _Writer:
+    """Puts the bytes of a message together."""
+
+    def __init__(self, head: bytes, encoding: str, order: str) -> None:
+        self.message = bytearray(head)
+        self.encoding = encoding
+        self.order = order
+
+    def number(self, kind: str, value: int) -> None:
+        layout = struct.Struct(self.order + kind)
+        place = _aligned(len(self.message), layout.size, self.encoding)
+        self.message += bytes(place - len(self.message)) + layout.pack(value)
+
+    def string(self, text: str) -> None:
+        content = text.encode(*TEXT) + (b"\0" if self.encoding == CDR else b"")
+        self.number("I", len(content))
+        self.append(content)
+
+    def append(self, content: bytes | memoryview) -> None:
+        self.message += content

@@ -1,0 +1,185 @@
+"""The point clouds of one topic of a bag, by their numbers.
+
+Read one after the other, they are read as they stand in the bag. Who asks for others, or for the
+times of all, has the topic gone through once; what is kept of it is two numbers a cloud.
+"""
+
+import os
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.bags.bag import Bag, Message, Topic
+from derain.bags.cloud_message import CloudMessage, stamp_of
+from derain.bags.point_cloud import PointField
+from derain.errors import InputError
+from derain.system.notices import warn
+
+# So many clouds ahead, going on is quicker than looking up where they are.
+NEAR = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Stamps:
+    """When the clouds of a topic were recorded and taken.
+
+    Attributes:
+        recorded: Nanoseconds, int64 (M,), of the bag's clock.
+        taken: Nanoseconds, int64 (M,), of the clock of whoever published them; as ``recorded``
+            where a cloud says nothing.
+    """
+
+    recorded: NDArray[np.int64]
+    taken: NDArray[np.int64]
+
+    @property
+    def in_order(self) -> bool:
+        """Whether none was recorded before the one that it follows."""
+        return bool((np.diff(self.recorded) >= 0).all())
+
+
+class CloudTopic:
+    """The clouds of a topic.
+
+    Args:
+        bag: The bag.
+        topic: The topic, one of point clouds.
+    """
+
+    def __init__(self, bag: Bag, topic: Topic) -> None:
+        self.bag = bag
+        self.topic = topic
+        self._forget()
+
+    def __len__(self) -> int:
+        return self.topic.messages
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Other processes open the bag themselves.
+        return {"bag": self.bag, "topic": self.topic}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.bag, self.topic = state["bag"], state["topic"]
+        self._forget()
+
+    def name_of(self, number: int) -> str:
+        """What messages call one of the clouds: the path that leads to it."""
+        return f"{self.bag.path}/{self.topic.name.strip('/')}/{number:06d}"
+
+    def message(self, number: int) -> Message:
+        """One of the messages, from 0.
+
+        Raises:
+            InputError: A bag that cannot be read, or one that has fewer clouds than it says.
+        """
+        with self._lock:
+            if self._process != os.getpid():  # an open file of a process before the fork
+                self._forget()
+            if self._last is None or self._last[0] != number:
+                self._last = number, self._read(number)
+            return self._last[1]
+
+    def cloud(self, number: int) -> CloudMessage:
+        """One of the clouds, from 0, with what stands around it in its message.
+
+        Raises:
+            InputError: As for :meth:`message`, or a damaged cloud.
+        """
+        message = self.message(number)
+        try:
+            cloud = CloudMessage.parse(message.data, self.bag.encoding)
+        except ValueError as error:
+            raise damaged_cloud(self.name_of(number), error) from error
+        self._tell_of_other_fields(number, cloud.cloud.fields)
+        return cloud
+
+    def seconds(self, number: int) -> float:
+        """When one of the clouds was taken, seconds.
+
+        Raises:
+            InputError: As for :meth:`message`, or a damaged cloud.
+        """
+        if self._stamps is None and self._last is not None and self._last[0] == number:
+            return 1e-9 * self._taken(number, self._last[1])
+        return 1e-9 * float(self.stamps.taken[self._known(number)])
+
+    @property
+    def stamps(self) -> Stamps:
+        """When all the clouds were recorded and taken; the topic is gone through for it once."""
+        if self._stamps is None:
+            times = [
+                (message.time, self._taken(number, message))
+                for number, message in enumerate(self.bag.messages([self.topic.name]))
+            ]
+            both = np.array(times, np.int64).reshape(-1, 2)
+            self._stamps = Stamps(both[:, 0], both[:, 1])
+        return self._stamps
+
+    def _forget(self) -> None:
+        self._lock = threading.Lock()
+        self._process = os.getpid()
+        self._messages: Iterator[Message] = iter(())
+        self._next: int | None = None
+        self._last: tuple[int, Message] | None = None
+        self._stamps: Stamps | None = None
+        self._layouts: set[tuple[PointField, ...]] = set()
+
+    def _read(self, number: int) -> Message:
+        if self._next is None or not 0 <= number - self._next <= NEAR:
+            self._begin_near(number)
+        assert self._next is not None
+        ahead, self._next = number - self._next, None  # until it went well
+        message = next(islice(self._messages, ahead, None), None)
+        if message is None:
+            raise self._too_few()
+        self._next = number + 1
+        return message
+
+    def _begin_near(self, number: int) -> None:
+        """Goes to a place in the bag from which a cloud is not far ahead."""
+        first, start = 0, None
+        if number > NEAR and self.stamps.in_order:
+            # Several may have been recorded at one time.
+            start = int(self.stamps.recorded[self._known(number)])
+            first = int(np.searchsorted(self.stamps.recorded, start))
+        self._messages = self.bag.messages([self.topic.name], start)
+        self._next = first
+
+    def _taken(self, number: int, message: Message) -> int:
+        try:
+            return stamp_of(message.data, self.bag.encoding) or message.time
+        except ValueError:  # who reads the cloud is told
+            return message.time
+
+    def _known(self, number: int) -> int:
+        if number >= len(self.stamps.recorded):
+            raise self._too_few()
+        return number
+
+    def _too_few(self) -> InputError:
+        return InputError(
+            self.bag.path,
+            f"says that it has {len(self):,} messages of {self.topic.name}, and has fewer",
+            "Its index is damaged: have it made anew by `ros2 bag reindex` or `rosbag reindex`.",
+        )
+
+    def _tell_of_other_fields(self, number: int, fields: tuple[PointField, ...]) -> None:
+        if self._layouts and fields not in self._layouts:
+            names = ", ".join(field.name for field in fields)
+            warn(
+                f"{self.name_of(number)}: its fields are others than those of clouds before it; "
+                f"it is read by its own ({names})"
+            )
+        self._layouts.add(fields)
+
+
+def damaged_cloud(name: str, error: ValueError) -> InputError:
+    """What to tell of a cloud whose message cannot be read."""
+    return InputError(
+        name, f"is a damaged PointCloud2: {error}", "See what published it; the others are read."
+    )

@@ -1,0 +1,112 @@
+"""Paths that lead to bags, and into them.
+
+A bag is named like a folder of its topics, and those like folders of their clouds: of ``drive.mcap``
+may be named ``drive.mcap/velodyne_points``, and of that ``drive.mcap/velodyne_points/000012``.
+"""
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from derain.errors import InputError
+from derain.files.reading import reading
+
+# Files that are bags by themselves, of ROS 1 and of ROS 2.
+ROS1_SUFFIX = ".bag"
+SUFFIXES = (ROS1_SUFFIX, ".mcap", ".db3")
+
+# Files of ROS 2 that are compressed as a whole are read by way of their folder.
+COMPRESSED_SUFFIXES = (".mcap.zstd", ".db3.zstd")
+
+# The file that makes a folder a bag of ROS 2, and the word in it that says so.
+METADATA, METADATA_WORD = "metadata.yaml", b"rosbag2_bagfile_information"
+
+
+def bags_at(path: Path) -> list[Path]:
+    """The bags that a path stands for.
+
+    Args:
+        path: A bag, or a folder with bags and no scans in it.
+
+    Returns:
+        The bag; or those that lie directly in the folder, sorted by name; none where it is neither.
+
+    Raises:
+        InputError: A part of a bag that cannot be read without the others.
+    """
+    if is_bag(path):
+        return [path]
+    if not os.path.isdir(path):
+        return []
+    with reading(path):
+        return sorted(each for each in path.iterdir() if _is_visible(each) and is_bag(each))
+
+
+def is_bag(path: Path) -> bool:
+    """Whether something is a bag: a file by its suffix, a folder by what it holds.
+
+    Raises:
+        InputError: A file of ROS 2 that is compressed as a whole, which its folder tells.
+    """
+    if os.path.isfile(path):
+        if path.name.lower().endswith(COMPRESSED_SUFFIXES):
+            raise InputError(
+                path, "is compressed, as its bag's metadata.yaml tells", "Name the bag's folder."
+            )
+        return path.suffix.lower() in SUFFIXES
+    metadata = path / METADATA
+    if not os.path.isfile(metadata):
+        return False
+    with reading(metadata), metadata.open("rb") as file:
+        return METADATA_WORD in file.read(2**12)
+
+
+def split(path: Path) -> tuple[Path, str] | None:
+    """The bag that a path leads to or into, and what it names there.
+
+    Args:
+        path: The path.
+
+    Returns:
+        The bag, and ``""``, ``"topic"``, ``"number"`` or ``"topic/number"``; None where the path
+        leads into none.
+    """
+    inner: list[str] = []
+    for place in (path, *path.parents):
+        if os.path.lexists(place):
+            return (place, "/".join(reversed(inner))) if is_bag(place) else None
+        inner.append(place.name)
+    return None
+
+
+def within(paths: Iterable[Path], topic: str | None) -> list[Path]:
+    """The same paths, of which those to bags lead to a topic of theirs.
+
+    Args:
+        paths: Bags and whatever else.
+        topic: The topic; None leaves the paths as they are.
+
+    Raises:
+        InputError: A topic, and no bag that could have it.
+    """
+    paths = list(paths)
+    if topic is None:
+        return paths
+    found = {path: bags_at(path) for path in paths}
+    if not any(found.values()):
+        raise InputError("--topic", "no bag is named that could have it", "Leave it out.")
+    return [
+        each
+        for path in paths
+        for each in ([bag / topic.strip("/") for bag in found[path]] or [path])
+    ]
+
+
+def stem(bag: Path) -> str:
+    """The name of a bag without the suffix of its storage."""
+    path = Path(os.path.abspath(bag))
+    return path.stem if path.suffix.lower() in SUFFIXES else path.name
+
+
+def _is_visible(path: Path) -> bool:
+    return not path.name.startswith(".")

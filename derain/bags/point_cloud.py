@@ -1,0 +1,260 @@
+"""The cloud of a ``sensor_msgs/PointCloud2``: bytes, and the fields that say what they mean.
+
+Points are removed and fields are added without looking at the other bytes, so that padding, byte
+order and fields of any type stay what they are.
+
+Source: sensor_msgs/msg/PointCloud2 and PointField of ROS, the same in ROS 1 and ROS 2.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.files.content import check_columns
+
+# PointField's datatypes, in NumPy's spelling.
+DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+FLOAT32 = 7
+
+
+@dataclass(frozen=True)
+class PointField:
+    """One field of every point.
+
+    Attributes:
+        name: Its name; one without a name is padding.
+        offset: Bytes from the start of a point.
+        datatype: One of DATATYPES.
+        count: Values per point; 0, which some drivers write, means 1 as it does to PCL.
+    """
+
+    name: str
+    offset: int
+    datatype: int
+    count: int
+
+    def dtype(self, order: str) -> np.dtype[Any]:
+        """Its type in an array.
+
+        Args:
+            order: Byte order, ``<`` or ``>``.
+
+        Raises:
+            ValueError: PointCloud2 has no such datatype.
+        """
+        if self.datatype not in DATATYPES:
+            raise ValueError(f"field '{self.name}' has the unknown datatype {self.datatype}")
+        value = np.dtype(order + DATATYPES[self.datatype])
+        return value if self.count < 2 else np.dtype((value, (self.count,)))
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """The part of a PointCloud2 that is about points.
+
+    Attributes:
+        height: Rows of an organised cloud; 1 of any other.
+        width: Points in a row.
+        fields: What the bytes of a point mean, in the order of the message.
+        is_bigendian: Whether numbers are in big-endian byte order.
+        point_step: Bytes of a point.
+        row_step: Bytes of a row, with padding at its end if it has any.
+        data: Bytes of all rows.
+        is_dense: Whether all points are finite, as the driver says.
+
+    Raises:
+        ValueError: Fields, steps and bytes that contradict each other.
+    """
+
+    height: int
+    width: int
+    fields: tuple[PointField, ...]
+    is_bigendian: bool
+    point_step: int
+    row_step: int
+    data: bytes | memoryview
+    is_dense: bool
+
+    def __post_init__(self) -> None:
+        check_columns(len(self.fields))
+        names = [field.name for field in self.fields if field.name]
+        if len(set(names)) < len(names):
+            raise ValueError(f"a field comes twice among {', '.join(names)}")
+        for field in self.fields:
+            end = field.offset + field.dtype("<").itemsize
+            if end > self.point_step:
+                raise ValueError(
+                    f"field '{field.name}' ends at byte {end:,} of points of {self.point_step:,}"
+                )
+        if not len(self):
+            return
+        if self.point_step == 0:
+            raise ValueError(f"{len(self):,} points of no bytes")
+        if self.height > 1 and self.row_step < self.width * self.point_step:
+            raise ValueError(
+                f"rows of {self.row_step:,} bytes hold no {self.width:,} points of "
+                f"{self.point_step:,}"
+            )
+        if len(self.data) < self.height * self._step_of_rows:
+            raise ValueError(
+                f"{len(self.data):,} bytes where {self.height:,} rows of "
+                f"{self._step_of_rows:,} are announced"
+            )
+
+    def __len__(self) -> int:
+        return self.height * self.width
+
+    @property
+    def is_organised(self) -> bool:
+        """Whether its rows are rows of the sensor."""
+        return self.height > 1
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Name → its values, (N,) or (N, count), row after row, in the byte order of the machine.
+
+        Read-only views of the bytes where that order is the cloud's own; padding is left out.
+        """
+        named = [field for field in self.fields if field.name]
+        table = np.dtype(
+            {
+                "names": [field.name for field in named],
+                "formats": [field.dtype(self._order) for field in named],
+                "offsets": [field.offset for field in named],
+                "itemsize": self.point_step,
+            }
+        )
+        if not named or not len(self):
+            return {f.name: np.empty((0, *f.dtype("=").shape), f.dtype("=").base) for f in named}
+        points = self._points.view(table)[:, 0]
+        return {name: _native(points[name]) for name in table.names or ()}
+
+    def take(self, rows: NDArray[np.bool_]) -> Self:
+        """Some of its points only, every byte of each as it was, as an unorganised cloud.
+
+        Where all of an unorganised cloud are taken, it stays as it is.
+
+        Args:
+            rows: Which points, bool (N,).
+        """
+        if rows.all():
+            return self
+        # One item a point, which is several times faster to choose from than bytes.
+        taken = self._points.view(f"V{self.point_step}")[:, 0][rows]
+        return replace(
+            self,
+            height=1,
+            width=len(taken),
+            row_step=len(taken) * self.point_step,
+            data=taken.tobytes(),
+        )
+
+    def blank(self, rows: NDArray[np.bool_]) -> Self:
+        """The same cloud in its shape, where x, y and z of some points are no numbers.
+
+        Args:
+            rows: Which points, bool (N,).
+
+        Raises:
+            ValueError: No x, y and z that can hold what is no number.
+        """
+        if not rows.any():
+            return self
+        data = bytearray(self.data)
+        for field in self.fields:
+            if field.name.lower() in ("x", "y", "z"):
+                if field.datatype not in (FLOAT32, 8):
+                    raise ValueError(f"field '{field.name}' cannot hold what is no number")
+                values: NDArray[Any] = np.ndarray(
+                    (self.height, self.width),
+                    field.dtype(self._order),
+                    data,
+                    field.offset,
+                    (self._step_of_rows, self.point_step),
+                )
+                values[rows.reshape(values.shape)] = np.nan
+        return replace(self, data=bytes(data), is_dense=False)
+
+    def with_columns(self, columns: Mapping[str, NDArray[np.float32]]) -> Self:
+        """The same points with fields of float32 after those that they have.
+
+        Padding at the end of rows goes, for there is none that would still be right.
+
+        Args:
+            columns: Name → float32 (N,); names that no field has.
+        """
+        if not columns:
+            return self
+        step = self.point_step + 4 * len(columns)
+        wider = np.empty((len(self), step), np.uint8)
+        if len(self):
+            wider[:, : self.point_step] = self._points
+        fields, offset = list(self.fields), self.point_step
+        for name, values in columns.items():
+            fields.append(PointField(name, offset, FLOAT32, 1))
+            ordered = np.ascontiguousarray(values, f"{self._order}f4")
+            wider[:, offset : offset + 4] = ordered.view(np.uint8).reshape(-1, 4)
+            offset += 4
+        return replace(
+            self,
+            fields=tuple(fields),
+            point_step=step,
+            row_step=self.width * step,
+            data=wider.tobytes(),
+        )
+
+    @property
+    def _order(self) -> str:
+        return ">" if self.is_bigendian else "<"
+
+    @property
+    def _step_of_rows(self) -> int:
+        """Bytes from row to row; of one row alone, which some drivers write as 0, its points'."""
+        return self.row_step if self.is_organised else self.width * self.point_step
+
+    @cached_property
+    def _points(self) -> NDArray[np.uint8]:
+        """Bytes of every point, uint8 (N, point_step)."""
+        rows = np.frombuffer(self.data, np.uint8, self.height * self._step_of_rows)
+        within = rows.reshape(self.height, -1)[:, : self.width * self.point_step]
+        return np.ascontiguousarray(within).reshape(-1, self.point_step)
+
+
+def cloud_of_columns(columns: Mapping[str, NDArray[Any]], is_bigendian: bool = False) -> PointCloud:
+    """A cloud of columns, packed one after the other.
+
+    Args:
+        columns: Name → its values, (N,) or (N, count), of types that PointCloud2 has.
+        is_bigendian: Whether its numbers are to be in big-endian byte order.
+
+    Raises:
+        ValueError: A type that PointCloud2 has not.
+    """
+    codes = {name: code for code, name in DATATYPES.items()}
+    fields: list[PointField] = []
+    offset = 0
+    for name, column in columns.items():
+        if column.dtype.str[1:] not in codes:
+            raise ValueError(f"'{name}' is {column.dtype}, which PointCloud2 has not")
+        count = column.shape[1] if column.ndim > 1 else 1
+        fields.append(PointField(name, offset, codes[column.dtype.str[1:]], count))
+        offset += fields[-1].dtype("<").itemsize
+    order = ">" if is_bigendian else "<"
+    table = np.empty(_rows(columns.values()), [(f.name, f.dtype(order)) for f in fields])
+    for name, column in columns.items():
+        table[name] = column
+    size = len(table)
+    return PointCloud(
+        1, size, tuple(fields), is_bigendian, offset, size * offset, table.tobytes(), True
+    )
+
+
+def _rows(columns: Iterable[NDArray[Any]]) -> int:
+    return len(next(iter(columns), ()))
+
+
+def _native(column: NDArray[Any]) -> NDArray[Any]:
+    return column if column.dtype.isnative else column.astype(column.dtype.newbyteorder("="))

@@ -1,0 +1,126 @@
+"""Point clouds in bags as frames."""
+
+import re
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.bags.bag import Bag
+from derain.bags.cloud_scan import scan_of_cloud
+from derain.bags.cloud_topic import CloudTopic, damaged_cloud
+from derain.bags.names import split, stem
+from derain.errors import InputError
+from derain.files.labels import LABEL
+from derain.scan import Scan
+from derain.sources.file_frame import FileFrame
+
+# Beside a bag, the folder of the labels of its clouds is called so after its stem.
+LABELS = ".labels"
+
+NUMBER = re.compile(r"(?:(?P<topic>.*)/)?(?P<number>[0-9]{6,9})")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BagFrame(FileFrame):
+    """A cloud in a bag, at a path as if the bag were a folder of its topics.
+
+    Attributes:
+        clouds: The clouds of its topic, of which it is the one of its number.
+    """
+
+    clouds: CloudTopic
+
+    @property
+    def suffix(self) -> str:
+        """Nothing: there is no file that what is made of it could be like."""
+        return ""
+
+    @property
+    def time(self) -> float:
+        """When it was taken, seconds: by its header, or where that says nothing, by the bag."""
+        return self.clouds.seconds(self.number)
+
+    @property
+    def pose(self) -> NDArray[np.float64] | None:
+        """Sensor to world, float64 (4, 4), where it was told."""
+        return self.sensor_to_world
+
+    def read(self) -> Scan:
+        """Reads the scan, without labels."""
+        cloud = self.clouds.cloud(self.number).cloud
+        try:
+            scan = scan_of_cloud(self.path, cloud)
+        except ValueError as error:
+            if isinstance(error, InputError):
+                raise
+            raise damaged_cloud(self.name, error) from error
+        return scan.with_intensity_times(self.intensity_scale)
+
+    def count_points(self) -> int:
+        """Number of points of the cloud."""
+        return len(self.clouds.cloud(self.number).cloud)
+
+    def fingerprint(self) -> str:
+        """What tells its message from others, 16 hexadecimal digits."""
+        return self._checksum()[:16]
+
+    def checksums(self) -> tuple[str, str | None]:
+        """SHA-256 of its message and of its file of labels, in hexadecimal digits."""
+        if self.label_path is None:
+            return self._checksum(), None
+        return self._checksum(), sha256(self.label_path.read_bytes()).hexdigest()
+
+    def _checksum(self) -> str:
+        return sha256(self.clouds.message(self.number).data).hexdigest()
+
+
+def bag_frames(path: Path, labelled: bool = False, by_name: bool = False) -> list[BagFrame]:
+    """The clouds that a path into a bag stands for, in the order in which they were recorded.
+
+    Args:
+        path: A bag; a topic in it, ``bag/topic``; or one of its clouds, ``bag/topic/000012`` or
+            ``bag/000012``.
+        labelled: Whether labels are to be read: from ``<stem of the bag>.labels/000012.label``.
+        by_name: Whether keys begin with the stem of the bag, as where several are named.
+
+    Raises:
+        InputError: A path that leads into no bag; a bag that cannot be read; no such topic or
+            cloud; several topics of clouds, of which none is named.
+    """
+    found = split(path)
+    if found is None:
+        raise InputError(path, "there is no such file or folder", "Check the path.")
+    bag, inner = found
+    topic_name, number = _topic_and_number(Bag(bag), inner)
+    clouds = CloudTopic(Bag(bag), Bag(bag).cloud_topic(topic_name))
+    numbers = range(len(clouds)) if number is None else [number]
+    if numbers[-1] >= len(clouds):
+        raise InputError(
+            path,
+            f"there is no such cloud: {clouds.topic.name} has {len(clouds):,}",
+            "Count from 000000.",
+        )
+    labels = bag.with_name(stem(bag) + LABELS)
+    folder = f"{stem(bag)}/" if by_name else ""
+    return [
+        BagFrame(
+            key=f"{folder}{each:06d}",
+            sequence=str(Path(clouds.name_of(each)).parent),
+            number=each,
+            label_path=labels / f"{each:06d}{LABEL}" if labelled else None,
+            path=Path(clouds.name_of(each)),
+            clouds=clouds,
+        )
+        for each in numbers
+    ]
+
+
+def _topic_and_number(bag: Bag, inner: str) -> tuple[str, int | None]:
+    """The topic and the cloud that are named within a bag; a topic may be called like a number."""
+    match = NUMBER.fullmatch(inner)
+    if match is None or any(topic.name.strip("/") == inner for topic in bag.topics):
+        return inner, None
+    return match["topic"] or "", int(match["number"])
