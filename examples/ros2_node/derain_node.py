@@ -11,7 +11,7 @@ Parameters:
 - ``model``: an ONNX file of ``derain export``; empty for the model that comes with derain.
 - ``threads``: threads for each cloud; 0 takes every core.
 - ``queue``: how many clouds may wait while one is cleaned (1). Where clouds come faster than they
-  are cleaned, older ones are let go of: what is published is late by one cloud at most.
+  are cleaned, older ones are let go of: the next to be cleaned is the newest that there is.
 - ``organised``: keep rows and columns of a cloud, with NaN where rain was (false).
 
 Stamp, frame, order of the points and all of their fields stay as they are. Once a second it says on

@@ -4,10 +4,8 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from copy import deepcopy
+from collections.abc import Iterator
 from dataclasses import fields, replace
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -21,10 +19,9 @@ from derain.default import default_model
 from derain.evaluation.hard_cases import scene
 from derain.export.model_file import METADATA_KEY
 from derain.export.runtime import Derainer
-from derain.models.outdet import OutDet
 from derain.spec import Spec
 from derain.views.back_projection import BACK_PROJECTIONS
-from derain.views.candidates import Bound, Candidates
+from derain.views.candidates import Candidates
 from derain.views.registry import VIEWS
 
 from .hard_points import hard_points, hard_scans
@@ -33,7 +30,6 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 EXAMPLE = REPOSITORY / "examples" / "onnx_reader.py"
 CONTRACT = (REPOSITORY / "docs" / "onnx_contract.md").read_text("utf-8")
 SCANS = hard_scans()
-NEAR_AND_DIM = Candidates((Bound("range", least=2.0, most=9.0), Bound("intensity", most=99.0)))
 
 
 @pytest.fixture(scope="module")
@@ -66,18 +62,10 @@ def test_the_scan_it_is_compared_on_has_rain_and_other_points(reader: ModuleType
 
 
 @pytest.mark.parametrize("points", SCANS.values(), ids=SCANS)
-@pytest.mark.usefixtures("one_block")
 def test_it_judges_candidates_as_derain_does(
-    reader: ModuleType,
-    random_outdet: OutDet,
-    made_once: Callable[..., Path],
-    points: NDArray[np.float32],
+    reader: ModuleType, judging_candidates: Path, points: NDArray[np.float32]
 ) -> None:
-    from derain.export.onnx_file import export
-
-    model = deepcopy(random_outdet)
-    model.adopt(replace(model.spec, candidates=NEAR_AND_DIM))
-    agree(reader, made_once("contract_candidates.onnx", partial(export, model)), points)
+    agree(reader, judging_candidates, points)
 
 
 @pytest.mark.parametrize("points", SCANS.values(), ids=SCANS)
@@ -89,20 +77,20 @@ def test_of_images_it_makes_what_derain_makes(
 
 @pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
 @pytest.mark.parametrize("azimuth", [(-180.0, 180.0), (-60.0, 75.0)], ids=["circle", "sector"])
-@pytest.mark.parametrize("candidates", [None, NEAR_AND_DIM], ids=["all", "candidates"])
+@pytest.mark.parametrize("bounded", [False, True], ids=["all", "candidates"])
 def test_it_carries_scores_of_pixels_back_in_every_way(
     reader: ModuleType,
     image_onnx: Path,
     tmp_path: Path,
     way_back: str,
     azimuth: tuple[float, float],
-    candidates: Candidates | None,
+    bounded: bool,
+    candidates: Candidates,
 ) -> None:
     proto, spec = onnx.load(image_onnx), Derainer(image_onnx).spec
     grid = {**spec.view["grid"], "azimuth": azimuth}
-    changed = replace(
-        spec, view={"kind": "range", "grid": grid, "way_back": way_back}, candidates=candidates
-    )
+    view = {"kind": "range", "grid": grid, "way_back": way_back}
+    changed = replace(spec, view=view, candidates=candidates if bounded else None)
     onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps({"spec": changed.as_dict()})})
     onnx.save(proto, tmp_path / "changed.onnx")
     agree(reader, tmp_path / "changed.onnx", np.concatenate([hard_points(), scene(800)]))
