@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
 import pytest
 from numpy.typing import NDArray
 
@@ -215,24 +216,24 @@ def test_it_judges_candidates_as_well(
     assert 0 < label.sum() < len(label)
 
 
-def test_a_file_that_is_no_model_of_derain_is_refused(
-    derain_onnx: Program, saying: Callable[[object], Path], tmp_path: Path
-) -> None:
+def test_a_file_that_is_no_model_of_derain_is_refused(derain_onnx: Program, tmp_path: Path) -> None:
     scene(50).tofile(tmp_path / "scan.bin")
     (tmp_path / "text.onnx").write_text("no model")
-    spec = Derainer(KEPT).spec.as_dict()  # of three neighbours, where the network takes nine
-    for model, reason in (
-        (tmp_path / "none.onnx", "there is no such file"),
-        (tmp_path / "text.onnx", ""),
-        (saying({"spec": {}}), "its Spec has no proper 'network'"),
-        (
-            saying({"spec": {**spec, "view": {"kind": "neighbours", "neighbours": 4}}}),
-            "other inputs",
-        ),
+    spec = Derainer(KEPT).spec.as_dict()
+    other = {**spec, "view": {"kind": "neighbours", "neighbours": 4}}
+    for name, metadata, reason in (
+        ("no_spec.onnx", {"spec": {}}, "its Spec has no proper 'network'"),
+        ("other.onnx", {"spec": other}, "its network takes other inputs than its Spec says"),
+        ("text.onnx", None, ""),
+        ("none.onnx", None, "there is no such file"),
     ):
-        done = derain_onnx(model, tmp_path / "out", tmp_path / "scan.bin")
+        if metadata is not None:
+            proto = onnx.load(KEPT)
+            onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps(metadata)})
+            onnx.save(proto, tmp_path / name)
+        done = derain_onnx(tmp_path / name, tmp_path / "out", tmp_path / "scan.bin")
         assert done.returncode == 2
-        assert reason in done.stderr
+        assert done.stderr.startswith(f"derain_onnx: {tmp_path / name}: {reason}")
         assert not list(tmp_path.glob("out/*"))
 
 
