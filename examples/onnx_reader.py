@@ -52,7 +52,7 @@ class Model:
     def _by_neighbours(self, points: Points) -> NDArray[np.float32]:
         inputs, inverse = neighbour_view(points, self.spec)
         of_points = np.zeros(len(inputs["points"]) + 1, np.float32)  # the last for invalid rows
-        scored = slice(0, -1)
+        scored: Any = slice(0, -1)
         if "candidates" in inputs:
             scored = inputs["neighbours"][: len(inputs["candidates"]), 0]
         of_points[scored] = self._probability(inputs)
@@ -78,12 +78,13 @@ def valid_rows(points: Points) -> NDArray[np.bool_]:
     """Rows that can be judged."""
     xyz, intensity = points[:, :3], points[:, 3]
     with np.errstate(invalid="ignore"):
-        valid = (np.abs(xyz) <= LARGEST_COORDINATE).all(axis=1)
+        valid: NDArray[np.bool_] = (np.abs(xyz) <= LARGEST_COORDINATE).all(axis=1)
         empty = (xyz == SENTINEL).all(axis=1)
         if knows_intensity(points):
             valid &= np.abs(intensity) <= LARGEST_VALUE
             empty &= intensity == SENTINEL
-    return valid & ~(xyz == 0).all(axis=1) & ~empty
+    valid &= ~(xyz == 0).all(axis=1) & ~empty
+    return valid
 
 
 def knows_intensity(points: Points) -> bool:
@@ -138,7 +139,7 @@ def neighbour_view(points: Points, spec: Spec) -> tuple[dict[str, NDArray[Any]],
     inverse[rows] = np.cumsum(elsewhere) - 1
     k = spec["view"]["neighbours"]
     neighbours, distances = nearest(points[first, :3].astype(np.float64), first, k)
-    inputs = {
+    inputs: dict[str, NDArray[Any]] = {
         "points": channels(points, first, spec),
         "neighbours": neighbours,
         "distances": distances,
@@ -225,7 +226,8 @@ def pixel_of(place: NDArray[np.float64], grid: dict[str, Any]) -> int:
     x, y, z = (place + 0.0).tolist()  # -0 becomes 0
     azimuth = math.degrees(math.atan2(y, x))
     inclination = math.degrees(math.atan2(z, math.sqrt(x * x + y * y)))
-    edges, width, (right, left) = grid["edges"], grid["columns"], grid["azimuth"]
+    edges, (right, left) = grid["edges"], grid["azimuth"]
+    width: int = grid["columns"]
     from_left = (left - azimuth) % 360.0
     if not edges[-1] <= inclination <= edges[0] or from_left > left - right:
         return -1
