@@ -1,0 +1,239 @@
+// The neighbour view: what a point network takes of a scan, and the way back to its rows.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <thread>
+#include <tuple>
+#include <vector>
+
+#include "kd_tree.hpp"
+#include "scan.hpp"
+#include "spec.hpp"
+
+namespace derain {
+
+// M points, of F of which there are neighbourhoods of k. Without candidates F = M, and each point
+// is scored; with them, J are, and `candidates` says where the neighbourhoods lie that they need.
+struct NeighbourView {
+  std::size_t k = 0;
+  std::vector<std::int64_t> first;       // (M) row of the scan that each point was taken from
+  std::vector<std::int64_t> inverse;     // (N) point of each row of the scan; -1 for invalid rows
+  std::vector<float> points;             // (M, C)
+  std::vector<std::int64_t> neighbours;  // (F, k) points, each one's own first
+  std::vector<float> distances;          // (F, k) metres
+  std::optional<std::vector<std::int64_t>> candidates;  // (J, k) rows of `neighbours`
+
+  // How many points the network scores: J, or M.
+  std::size_t scored() const { return candidates ? candidates->size() / k : first.size(); }
+
+  // One value per row of the scan from one per scored point; 0 for all that were not scored.
+  std::vector<float> to_rows(const std::vector<float>& score) const {
+    std::vector<float> of_points(first.size(), 0.0F);
+    for (std::size_t number = 0; number < score.size(); ++number) {
+      // A candidate's neighbourhood is among the first J, and begins with the candidate itself.
+      const auto point = candidates ? neighbours[number * k] : static_cast<std::int64_t>(number);
+      of_points[static_cast<std::size_t>(point)] = score[number];
+    }
+    std::vector<float> of_rows(inverse.size(), 0.0F);
+    for (std::size_t row = 0; row < inverse.size(); ++row) {
+      if (inverse[row] >= 0) of_rows[row] = of_points[static_cast<std::size_t>(inverse[row])];
+    }
+    return of_rows;
+  }
+};
+
+namespace detail {
+
+// Moves bit i of 16 to bit 3 i.
+inline std::uint64_t spread(std::uint64_t value) {
+  std::uint64_t result = 0;
+  for (int bit = 0; bit < 16; ++bit) result |= (value >> bit & 1U) << (3 * bit);
+  return result;
+}
+
+// Each row's cell along a Morton curve through the cube around the valid rows. The order matters:
+// the model that comes with derain takes every n-th point along it for a fair sample of the scan.
+inline std::vector<std::uint64_t> morton_codes(const Scan& scan,
+                                               const std::vector<std::int64_t>& rows) {
+  Position least{INFINITY, INFINITY, INFINITY};
+  for (const std::int64_t row : rows) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double value = scan.row(static_cast<std::size_t>(row))[axis];
+      least[axis] = std::min(least[axis], value);
+    }
+  }
+  double side = 0;
+  for (const std::int64_t row : rows) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double value = scan.row(static_cast<std::size_t>(row))[axis];
+      side = std::max(side, value - least[axis]);
+    }
+  }
+  const double scale = side > 0 ? 65535.0 / side : 0.0;
+  std::vector<std::uint64_t> codes(scan.size());
+  for (const std::int64_t row : rows) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double value = scan.row(static_cast<std::size_t>(row))[axis];
+      const auto cell = static_cast<std::uint64_t>((value - least[axis]) * scale);
+      codes[static_cast<std::size_t>(row)] |= spread(cell) << axis;
+    }
+  }
+  return codes;
+}
+
+// The valid rows, those at one position side by side, the lowest first.
+inline std::vector<std::int64_t> along_the_curve(const Scan& scan,
+                                                 const std::vector<bool>& valid) {
+  std::vector<std::int64_t> rows;
+  for (std::size_t row = 0; row < scan.size(); ++row) {
+    if (valid[row]) rows.push_back(static_cast<std::int64_t>(row));
+  }
+  const std::vector<std::uint64_t> codes = morton_codes(scan, rows);
+  std::sort(rows.begin(), rows.end(), [&](std::int64_t one, std::int64_t other) {
+    const auto a = static_cast<std::size_t>(one);
+    const auto b = static_cast<std::size_t>(other);
+    if (codes[a] != codes[b]) return codes[a] < codes[b];
+    const float* p = scan.row(a);
+    const float* q = scan.row(b);
+    return std::tie(p[2], p[1], p[0], one) < std::tie(q[2], q[1], q[0], other);
+  });
+  return rows;
+}
+
+// Finds which rows are at one position, and the first of them.
+inline void find_points(const Scan& scan, const std::vector<bool>& valid, NeighbourView& view) {
+  view.inverse.assign(scan.size(), -1);
+  const float* before = nullptr;
+  for (const std::int64_t row : along_the_curve(scan, valid)) {
+    const float* here = scan.row(static_cast<std::size_t>(row));
+    if (before == nullptr || !std::equal(here, here + 3, before)) view.first.push_back(row);
+    view.inverse[static_cast<std::size_t>(row)] =
+        static_cast<std::int64_t>(view.first.size()) - 1;
+    before = here;
+  }
+}
+
+inline void fill_points(const Scan& scan, const std::vector<bool>& valid, const Spec& spec,
+                        NeighbourView& view) {
+  const std::size_t width = spec.channels.size();
+  view.points.resize(view.first.size() * width);
+  for (std::size_t channel = 0; channel < width; ++channel) {
+    const auto values = channel_of(scan, valid, spec.channels[channel]);
+    for (std::size_t point = 0; point < view.first.size(); ++point) {
+      const auto row = static_cast<std::size_t>(view.first[point]);
+      const bool lacking = !values || std::isnan((*values)[row]);
+      view.points[point * width + channel] = lacking ? spec.mean[channel] : (*values)[row];
+    }
+  }
+}
+
+// Neighbourhoods of some points, behind those that the view has already.
+inline void add_neighbourhoods(const Scan& scan, const KdTree& tree,
+                               const std::vector<std::int64_t>& queries, unsigned threads,
+                               NeighbourView& view) {
+  const std::size_t begin = view.neighbours.size();
+  view.neighbours.resize(begin + queries.size() * view.k);
+  view.distances.resize(begin + queries.size() * view.k);
+  const auto work = [&](std::size_t from, std::size_t to) {
+    std::vector<Neighbour> found;
+    for (std::size_t query = from; query < to; ++query) {
+      const auto point = static_cast<std::size_t>(queries[query]);
+      const float* row = scan.row(static_cast<std::size_t>(view.first[point]));
+      tree.nearest({row[0], row[1], row[2]}, view.k, found);
+      for (std::size_t place = 0; place < view.k; ++place) {
+        // Where there are fewer points than k, the farthest fills up.
+        const Neighbour& neighbour = found[std::min(place, found.size() - 1)];
+        const std::size_t at = begin + query * view.k + place;
+        view.neighbours[at] = neighbour.point;
+        view.distances[at] = std::sqrt(static_cast<float>(neighbour.squared));
+      }
+    }
+  };
+  const std::size_t share = queries.size() / threads + 1;
+  std::vector<std::thread> workers;
+  for (std::size_t from = 0; from < queries.size(); from += share) {
+    workers.emplace_back(work, from, std::min(from + share, queries.size()));
+  }
+  for (std::thread& worker : workers) worker.join();
+}
+
+// Which points may be rain: those of which no bounded channel is known to be out of bounds.
+inline std::vector<bool> candidate_points(const Scan& scan, const std::vector<bool>& valid,
+                                          const std::vector<Bound>& bounds,
+                                          const NeighbourView& view) {
+  std::vector<bool> candidate(view.first.size(), true);
+  for (const Bound& bound : bounds) {
+    const auto values = channel_of(scan, valid, bound.channel);
+    if (!values) continue;
+    for (std::size_t point = 0; point < candidate.size(); ++point) {
+      const float value = (*values)[static_cast<std::size_t>(view.first[point])];
+      if ((bound.least && value < *bound.least) || (bound.most && value > *bound.most)) {
+        candidate[point] = false;
+      }
+    }
+  }
+  return candidate;
+}
+
+inline std::vector<std::int64_t> numbers_where(const std::vector<bool>& wanted) {
+  std::vector<std::int64_t> numbers;
+  for (std::size_t point = 0; point < wanted.size(); ++point) {
+    if (wanted[point]) numbers.push_back(static_cast<std::int64_t>(point));
+  }
+  return numbers;
+}
+
+// Neighbourhoods of the candidates, then of all points in those: what a network looks at that
+// looks at neighbours of neighbours.
+inline void add_around_candidates(const Scan& scan, const KdTree& tree,
+                                  const std::vector<bool>& candidate, unsigned threads,
+                                  NeighbourView& view) {
+  const std::vector<std::int64_t> own = numbers_where(candidate);
+  add_neighbourhoods(scan, tree, own, threads, view);
+  std::vector<bool> other(candidate.size(), false);
+  for (const std::int64_t point : view.neighbours) {
+    other[static_cast<std::size_t>(point)] = !candidate[static_cast<std::size_t>(point)];
+  }
+  const std::vector<std::int64_t> others = numbers_where(other);
+  std::vector<std::int64_t> place(candidate.size(), -1);
+  std::int64_t next = 0;
+  for (const std::int64_t point : own) place[static_cast<std::size_t>(point)] = next++;
+  for (const std::int64_t point : others) place[static_cast<std::size_t>(point)] = next++;
+  view.candidates.emplace();
+  for (const std::int64_t point : view.neighbours) {
+    view.candidates->push_back(place[static_cast<std::size_t>(point)]);
+  }
+  add_neighbourhoods(scan, tree, others, threads, view);
+}
+
+}  // namespace detail
+
+// A scan as the network of a Spec sees it; `threads` is 1 or more.
+inline NeighbourView neighbour_view(const Scan& scan, const Spec& spec, unsigned threads) {
+  NeighbourView view;
+  view.k = spec.neighbours;
+  const std::vector<bool> valid = valid_rows(scan);
+  detail::find_points(scan, valid, view);
+  detail::fill_points(scan, valid, spec, view);
+  std::vector<Position> positions;
+  positions.reserve(view.first.size());
+  for (const std::int64_t first : view.first) {
+    const float* row = scan.row(static_cast<std::size_t>(first));
+    positions.push_back({row[0], row[1], row[2]});
+  }
+  const KdTree tree(std::move(positions), view.first);
+  if (spec.candidates) {
+    const auto candidate = detail::candidate_points(scan, valid, *spec.candidates, view);
+    detail::add_around_candidates(scan, tree, candidate, threads, view);
+  } else {
+    const std::vector<bool> all(view.first.size(), true);
+    detail::add_neighbourhoods(scan, tree, detail::numbers_where(all), threads, view);
+  }
+  return view;
+}
+
+}  // namespace derain

@@ -1,0 +1,300 @@
+"""The ONNX contract in NumPy: what derain's runtime does with a model, without derain.
+
+It follows ``docs/onnx_contract.md`` step by step and searches by brute force, which takes minutes
+for a whole scan: it is there to port from, and to check a port against::
+
+    python examples/onnx_reader.py MODEL.onnx SCAN.bin OUT.label
+"""
+
+import json
+import math
+import sys
+from typing import Any
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+Points = NDArray[np.float32]  # (N, 4): x, y, z in metres, sensor frame; intensity
+Spec = dict[str, Any]
+
+LARGEST_COORDINATE, LARGEST_VALUE, SENTINEL, FEWEST_ALIKE = 1e6, 1e7, -1.0, 100
+
+# Steps within 5 × 5 pixels: to the pixel itself, then the nearest, then row by row.
+STEPS = sorted(
+    ((row, column) for row in range(-2, 3) for column in range(-2, 3)),
+    key=lambda step: (step[0] ** 2 + step[1] ** 2, step),
+)
+VOTERS, CUTOFF = 5, 1.0
+
+
+class Model:
+    """A model that ``derain export`` wrote.
+
+    Args:
+        path: The ONNX file.
+    """
+
+    def __init__(self, path: str) -> None:
+        self.session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+        metadata = self.session.get_modelmeta().custom_metadata_map
+        self.spec: Spec = json.loads(metadata["derain"])["spec"]
+        if self.spec.get("schema", 1) > 1 or "dual_return" in self.spec["channels"]:
+            raise SystemExit(f"{path}: its Spec asks for what this reader does not know")
+        self.judge = {"neighbours": self._by_neighbours, "range": self._by_image}[
+            self.spec["view"]["kind"]
+        ]
+
+    def rain(self, points: Points) -> NDArray[np.bool_]:
+        """True for rain, bool (N,), in the order of the points."""
+        return self.judge(points) > np.float32(self.spec.get("threshold", 0.5))
+
+    def _by_neighbours(self, points: Points) -> NDArray[np.float32]:
+        inputs, inverse = neighbour_view(points, self.spec)
+        of_points = np.zeros(len(inputs["points"]) + 1, np.float32)  # the last for invalid rows
+        scored: Any = slice(0, -1)
+        if "candidates" in inputs:
+            scored = inputs["neighbours"][: len(inputs["candidates"]), 0]
+        of_points[scored] = self._probability(inputs)
+        return of_points[inverse]
+
+    def _by_image(self, points: Points) -> NDArray[np.float32]:
+        inputs, pixel, winner = range_view(points, self.spec)
+        candidate = candidate_rows(points, self.spec)
+        shown_is_candidate = np.append(candidate, False)[winner]
+        score = np.where(shown_is_candidate, self._probability(inputs), np.float32(0))
+        judged = np.flatnonzero((pixel >= 0) & candidate)
+        result = np.zeros(len(points), np.float32)
+        result[judged] = back_projection(points, pixel, winner, score, self.spec)[judged]
+        return result
+
+    def _probability(self, inputs: dict[str, NDArray[Any]]) -> NDArray[np.float32]:
+        (logits,) = self.session.run(["logits"], inputs)
+        margin = logits[:, 1].astype(np.float64) - logits[:, 0]
+        return (0.5 + 0.5 * np.tanh(0.5 * margin)).astype(np.float32)
+
+
+def valid_rows(points: Points) -> NDArray[np.bool_]:
+    """Rows that can be judged."""
+    xyz, intensity = points[:, :3], points[:, 3]
+    with np.errstate(invalid="ignore"):
+        valid: NDArray[np.bool_] = (np.abs(xyz) <= LARGEST_COORDINATE).all(axis=1)
+        empty = (xyz == SENTINEL).all(axis=1)
+        if knows_intensity(points):
+            valid &= np.abs(intensity) <= LARGEST_VALUE
+            empty &= intensity == SENTINEL
+    valid &= ~(xyz == 0).all(axis=1) & ~empty
+    return valid
+
+
+def knows_intensity(points: Points) -> bool:
+    """Whether any intensity is one that a sensor can measure."""
+    with np.errstate(invalid="ignore"):
+        return bool((np.abs(points[:, 3]) <= LARGEST_VALUE).any())
+
+
+def channel(points: Points, name: str) -> NDArray[np.float32] | None:
+    """One value per row; None where the scan has no such channel."""
+    if name in ("x", "y", "z"):
+        return points[:, "xyz".index(name)]
+    if name == "range":
+        with np.errstate(invalid="ignore"):
+            x, y, z = points[:, :3].T.astype(np.float64)
+            return np.sqrt(x * x + y * y + z * z).astype(np.float32)
+    if name == "intensity" and knows_intensity(points):
+        measured = points[valid_rows(points), 3]
+        alike = len(measured) >= FEWEST_ALIKE and measured.min() == measured.max()
+        return None if alike else points[:, 3]
+    return None
+
+
+def channels(points: Points, rows: NDArray[np.int64], spec: Spec) -> NDArray[np.float32]:
+    """What the network sees of some rows, float32 (M, C): means stand in for what is missing."""
+    columns = []
+    for name, mean in zip(spec["channels"], spec["mean"], strict=True):
+        values = channel(points, name)
+        column = np.full(len(rows), np.nan, np.float32) if values is None else values[rows]
+        columns.append(np.where(np.isnan(column), np.float32(mean), column))
+    return np.stack(columns, axis=1)
+
+
+def candidate_rows(points: Points, spec: Spec) -> NDArray[np.bool_]:
+    """Rows that may be rain: all, where the Spec has no candidates."""
+    candidate = np.ones(len(points), bool)
+    for bound in (spec.get("candidates") or {"bounds": []})["bounds"]:
+        values = channel(points, bound["channel"])
+        if values is not None:
+            for limit, outside in ((bound["least"], np.less), (bound["most"], np.greater)):
+                if limit is not None:
+                    candidate &= ~outside(values, np.float32(limit))
+    return candidate
+
+
+def neighbour_view(points: Points, spec: Spec) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    """The inputs of a point network, and the point of each row, -1 for invalid rows."""
+    rows = along_the_curve(points, np.flatnonzero(valid_rows(points)))
+    elsewhere = np.ones(len(rows), bool)
+    elsewhere[1:] = (points[rows[1:], :3] != points[rows[:-1], :3]).any(axis=1)
+    first, inverse = rows[elsewhere], np.full(len(points), -1)
+    inverse[rows] = np.cumsum(elsewhere) - 1
+    k = spec["view"]["neighbours"]
+    neighbours, distances = nearest(points[first, :3].astype(np.float64), first, k)
+    inputs: dict[str, NDArray[Any]] = {
+        "points": channels(points, first, spec),
+        "neighbours": neighbours,
+        "distances": distances,
+    }
+    if spec.get("candidates"):
+        inputs |= around_candidates(candidate_rows(points, spec)[first], neighbours, distances)
+    return inputs, inverse
+
+
+def along_the_curve(points: Points, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The rows along a Morton curve; in one cell by z, y and x, and at one position by number."""
+    if not len(rows):
+        return rows
+    x, y, z = points[rows, :3].T
+    offset = np.stack([x, y, z]).astype(np.float64)
+    offset -= offset.min(axis=1, keepdims=True)
+    side = offset.max()
+    cell = (offset * (65535 / side if side > 0 else 0.0)).astype(np.int64)
+    code = np.zeros(len(rows), np.int64)
+    for bit in range(16):
+        for axis in range(3):
+            code |= (cell[axis] >> bit & 1) << (3 * bit + axis)
+    return rows[np.lexsort((rows, x, y, z, code))]
+
+
+def nearest(
+    xyz: NDArray[np.float64], rank: NDArray[np.int64], k: int
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Of every point the k nearest, itself first; of equally near ones, lower ranks first."""
+    neighbours = np.empty((len(xyz), k), np.int64)
+    squared = np.empty((len(xyz), k))
+    for number, place in enumerate(xyz):
+        away = ((xyz - place) ** 2).T
+        every = away[0] + away[1] + away[2]
+        order = np.lexsort((rank, every))[:k]
+        order = np.append(order, np.repeat(order[-1], k - len(order)))  # fewer points than k
+        neighbours[number], squared[number] = order, every[order]
+    return neighbours, np.sqrt(squared.astype(np.float32))
+
+
+def around_candidates(
+    candidate: NDArray[np.bool_], neighbours: NDArray[np.int64], distances: NDArray[np.float32]
+) -> dict[str, NDArray[Any]]:
+    """The neighbourhoods of candidates, then of the others in them, and where each one's lie."""
+    own = np.flatnonzero(candidate)
+    others = np.setdiff1d(neighbours[own], own)
+    needed = np.concatenate([own, others])
+    place = np.full(len(candidate), -1)
+    place[needed] = np.arange(len(needed))
+    return {
+        "neighbours": neighbours[needed],
+        "distances": distances[needed],
+        "candidates": place[neighbours[own]],
+    }
+
+
+def range_view(
+    points: Points, spec: Spec
+) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64], NDArray[np.int64]]:
+    """The inputs of an image network; each row's pixel; the row that each pixel shows; -1: none."""
+    grid = spec["view"]["grid"]
+    shape = len(grid["edges"]) - 1, grid["columns"]
+    pixel = np.full(len(points), -1)
+    winner = np.full(math.prod(shape), -1)
+    distance = channel(points, "range")
+    assert distance is not None
+    for row in np.flatnonzero(valid_rows(points)):
+        pixel[row] = pixel_of(points[row, :3].astype(np.float64), grid)
+        shown = winner[pixel[row]]
+        if pixel[row] >= 0 and (shown < 0 or distance[row] < distance[shown]):
+            winner[pixel[row]] = row
+    returned = winner >= 0
+    image = np.zeros((math.prod(shape), len(spec["channels"])), np.float32)
+    image[returned] = channels(points, winner[returned], spec)
+    inputs = {
+        "image": np.ascontiguousarray(image.T).reshape(1, -1, *shape),
+        "valid": returned.reshape(1, 1, *shape),
+    }
+    return inputs, pixel, winner
+
+
+def pixel_of(place: NDArray[np.float64], grid: dict[str, Any]) -> int:
+    """The pixel of a direction, row · W + column; -1 outside the grid."""
+    x, y, z = (place + 0.0).tolist()  # -0 becomes 0
+    azimuth = math.degrees(math.atan2(y, x))
+    inclination = math.degrees(math.atan2(z, math.sqrt(x * x + y * y)))
+    edges, (right, left) = grid["edges"], grid["azimuth"]
+    width: int = grid["columns"]
+    from_left = (left - azimuth) % 360.0
+    if not edges[-1] <= inclination <= edges[0] or from_left > left - right:
+        return -1
+    row = sum(inclination <= edge for edge in edges) - 1  # it holds its upper border
+    column = int(from_left * width / (left - right))
+    return min(row, len(edges) - 2) * width + min(column, width - 1)
+
+
+def back_projection(
+    points: Points,
+    pixel: NDArray[np.int64],
+    winner: NDArray[np.int64],
+    score: NDArray[np.float32],
+    spec: Spec,
+) -> NDArray[np.float32]:
+    """Scores of pixels as scores of rows, float32 (N,); of rows in no pixel it says nothing."""
+    of_rows, way_back = score[pixel], spec["view"]["way_back"]
+    distance = channel(points, "range")
+    assert distance is not None
+    shown = np.append(distance, np.float32(np.inf))[winner]
+    for row in np.flatnonzero(pixel >= 0):
+        if way_back == "vote":
+            of_rows[row] = vote(pixel[row], distance[row], shown, score, spec["view"]["grid"])
+        elif way_back == "nearest range" and distance[row] > shown[pixel[row]]:
+            around = window(pixel[row], spec["view"]["grid"])
+            unlike = [abs(shown[one] - distance[row]) for _, one in around]
+            of_rows[row] = score[around[int(np.argmin(unlike))][1]]
+    return of_rows
+
+
+def window(pixel: int, grid: dict[str, Any]) -> list[tuple[int, int]]:
+    """The pixels around one, itself first: number of the step that leads there, and the pixel."""
+    height, width = len(grid["edges"]) - 1, grid["columns"]
+    closed = grid["azimuth"][1] - grid["azimuth"][0] == 360.0
+    around = []
+    for number, (down, along) in enumerate(STEPS):
+        row, column = pixel // width + down, pixel % width + along
+        if 0 <= row < height and (closed or 0 <= column < width):
+            around.append((number, int(row * width + column % width)))
+    return around
+
+
+def vote(
+    pixel: int,
+    distance: np.float32,
+    shown: NDArray[np.float32],
+    score: NDArray[np.float32],
+    grid: dict[str, Any],
+) -> np.float32:
+    """Share of rain among the pixels most alike in range; the point's own always votes."""
+    bell = [math.exp(-(down * down + along * along) / 2) for down, along in STEPS]
+    weights = (1 - np.array(bell) / np.sum(bell)).astype(np.float32)
+    ballots = []
+    for number, one in window(pixel, grid):
+        unlike = abs(shown[one] - distance) * weights[number] if number else np.float32(0)
+        ballots.append((unlike, number, score[one] > 0.5))
+    votes = [rain for unlike, _, rain in sorted(ballots)[:VOTERS] if unlike <= CUTOFF]
+    return np.float32(sum(votes) / len(votes))
+
+
+def main(model: str, scan: str, label: str) -> None:
+    """Writes which points of a scan are rain: uint32, 1 for rain."""
+    points = np.fromfile(scan, np.float32).reshape(-1, 4)
+    Model(model).rain(points).astype(np.uint32).tofile(label)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 4:
+        raise SystemExit(f"usage: {sys.argv[0]} MODEL.onnx SCAN.bin OUT.label")
+    main(*sys.argv[1:])

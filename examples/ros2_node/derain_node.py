@@ -1,0 +1,272 @@
+"""A node of ROS 2 that takes the rain out of a topic of point clouds.
+
+It needs ROS 2 with Python 3.11 or later (Jazzy has 3.12), and ``pip install derain``::
+
+    python3 derain_node.py --ros-args -p input:=/ouster/points -p output:=/ouster/points/clean
+
+Parameters:
+
+- ``input``, ``output``: topics of ``sensor_msgs/PointCloud2`` (``points``, ``points/clean``).
+- ``removed``: topic for the points that were taken out; empty, as it is by default, for none.
+- ``model``: an ONNX file of ``derain export``; empty for the model that comes with derain.
+- ``threads``: threads for each cloud; 0 takes every core.
+- ``queue``: how many clouds may wait while one is cleaned (1). Where clouds come faster than they
+  are cleaned, older ones are let go of: the next to be cleaned is the newest that there is.
+- ``organised``: keep rows and columns of a cloud, with NaN where rain was (false).
+
+Stamp, frame, order of the points and all of their fields stay as they are. Once a second it says on
+``/diagnostics`` what share of the points was rain, and how long a cloud took.
+"""
+
+import array
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.bags.cloud_scan import scan_of_cloud
+from derain.bags.point_cloud import PointCloud, PointField
+from derain.errors import InputError
+from derain.export.runtime import Derainer, Judgement
+from derain.views.oddities import MOST_RAIN
+
+DEFAULTS = {
+    "input": "points",
+    "output": "points/clean",
+    "removed": "",
+    "model": "",
+    "threads": 0,
+    "queue": 1,
+    "organised": False,
+}
+
+# Seconds from one diagnostic to the next, as ROS's own drivers have it.
+DIAGNOSTIC_PERIOD = 1.0
+
+
+def cloud_of(message: Any) -> PointCloud:
+    """The cloud of a PointCloud2, whose bytes are not copied.
+
+    Raises:
+        ValueError: A message that contradicts itself.
+    """
+    return PointCloud(
+        message.height,
+        message.width,
+        tuple(PointField(f.name, f.offset, f.datatype, f.count) for f in message.fields),
+        message.is_bigendian,
+        message.point_step,
+        message.row_step,
+        memoryview(message.data),
+        message.is_dense,
+    )
+
+
+def message_of(cloud: PointCloud, like: Any) -> Any:
+    """A PointCloud2 of some of the points of another, with its header and its fields."""
+    message = type(like)()
+    message.header, message.fields = like.header, like.fields
+    message.is_bigendian, message.point_step = like.is_bigendian, like.point_step
+    message.height, message.width, message.row_step = cloud.height, cloud.width, cloud.row_step
+    # rclpy takes an array of bytes as it is, and looks at every byte of anything else.
+    message.data = array.array("B")
+    message.data.frombytes(cloud.data)
+    message.is_dense = cloud.is_dense
+    return message
+
+
+def cleaned(message: Any, rain: NDArray[np.bool_], organised: bool = False) -> Any:
+    """A PointCloud2 without its rain.
+
+    Args:
+        message: The message.
+        rain: True for rain, bool (N,), row after row.
+        organised: Whether rain becomes NaN in its place, instead of being left out.
+
+    Raises:
+        ValueError: Coordinates that can hold no NaN.
+    """
+    cloud = cloud_of(message)
+    return message_of(cloud.blank(rain) if organised else cloud.take(~rain), message)
+
+
+def removed(message: Any, rain: NDArray[np.bool_]) -> Any:
+    """A PointCloud2 of the rain alone."""
+    return message_of(cloud_of(message).take(rain), message)
+
+
+@dataclass
+class Tally:
+    """What became of the clouds since the last diagnostic.
+
+    Attributes:
+        clouds: How many were cleaned.
+        points: Their points.
+        rain: Those of them that were rain.
+        seconds: What cleaning them took.
+    """
+
+    clouds: int = 0
+    points: int = 0
+    rain: int = 0
+    seconds: float = 0.0
+
+    def add(self, judgement: Judgement, seconds: float) -> None:
+        """Counts a cloud."""
+        self.clouds += 1
+        self.points += len(judgement.rain)
+        self.rain += int(judgement.rain.sum())
+        self.seconds += seconds
+
+    @property
+    def share(self) -> float:
+        """Share of the points that was rain; 0 of no points."""
+        return self.rain / max(self.points, 1)
+
+    @property
+    def warning(self) -> str:
+        """What is wrong; empty where nothing is."""
+        if not self.clouds:
+            return "no clouds"
+        if self.share > MOST_RAIN:
+            return "more taken for rain than any rain has: is it the right unit and sensor?"
+        return ""
+
+    def values(self) -> dict[str, str]:
+        """What a diagnostic says, by name."""
+        return {
+            "clouds": str(self.clouds),
+            "points per cloud": f"{self.points / max(self.clouds, 1):.0f}",
+            "share of rain": f"{self.share:.4f}",
+            "milliseconds per cloud": f"{1000 * self.seconds / max(self.clouds, 1):.1f}",
+        }
+
+
+@dataclass
+class RainRemover:
+    """Judges clouds, and remembers what it has told of them.
+
+    Attributes:
+        derainer: The model.
+        tally: What became of the clouds since the last diagnostic.
+        told: What was odd about earlier clouds, which is said once.
+    """
+
+    derainer: Derainer
+    tally: Tally = field(default_factory=Tally)
+    told: set[str] = field(default_factory=set)
+
+    def judge(self, message: Any) -> Judgement:
+        """Says which points of a PointCloud2 are rain, row after row.
+
+        Raises:
+            InputError: A cloud without x, y and z, or scores that are not finite.
+            ValueError: A message that contradicts itself.
+        """
+        began = perf_counter()
+        judgement = self.derainer.judge(scan_of_cloud(Path("cloud"), cloud_of(message)))
+        self.tally.add(judgement, perf_counter() - began)
+        return judgement
+
+    def news(self, judgement: Judgement) -> list[str]:
+        """What is odd about a cloud for the model and was not about earlier ones."""
+        odd = [one for one in self.derainer.oddities(judgement) if one.kind not in self.told]
+        self.told |= {one.kind for one in odd}
+        return [one.detail for one in odd]
+
+    def tally_so_far(self) -> Tally:
+        """What became of the clouds since it was last asked."""
+        tally, self.tally = self.tally, Tally()
+        return tally
+
+
+class DerainNode:
+    """Subscribes to clouds, publishes them without rain.
+
+    Args:
+        node: A node of rclpy.
+    """
+
+    def __init__(self, node: Any) -> None:
+        from diagnostic_msgs.msg import DiagnosticArray
+        from rclpy.qos import QoSProfile, ReliabilityPolicy
+        from sensor_msgs.msg import PointCloud2
+
+        self.node = node
+        asked = {
+            name: node.declare_parameter(name, default).value for name, default in DEFAULTS.items()
+        }
+        self.organised: bool = asked["organised"]
+        self.remover = RainRemover(Derainer(asked["model"] or None, threads=asked["threads"]))
+        # A sensor's driver repeats no cloud that was lost, and asking it to would find no driver.
+        newest = QoSProfile(depth=asked["queue"], reliability=ReliabilityPolicy.BEST_EFFORT)
+        # Who listens may ask for either: a reliable publisher suits both.
+        reliable = QoSProfile(depth=asked["queue"], reliability=ReliabilityPolicy.RELIABLE)
+        self.clean = node.create_publisher(PointCloud2, asked["output"], reliable)
+        self.removed = (
+            node.create_publisher(PointCloud2, asked["removed"], reliable)
+            if asked["removed"]
+            else None
+        )
+        self.diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 1)
+        node.create_subscription(PointCloud2, asked["input"], self.take, newest)
+        node.create_timer(DIAGNOSTIC_PERIOD, self.report)
+
+    def take(self, message: Any) -> None:
+        """Cleans one cloud. What is wrong with it is logged, and the next one is waited for."""
+        try:
+            judgement = self.remover.judge(message)
+            without_rain = cleaned(message, judgement.rain, self.organised)
+        except (InputError, ValueError) as error:
+            self.node.get_logger().error(f"a cloud is left out: {error}", throttle_duration_sec=5.0)
+            return
+        self.clean.publish(without_rain)
+        if self.removed is not None:
+            self.removed.publish(removed(message, judgement.rain))
+        for text in self.remover.news(judgement):
+            self.node.get_logger().warning(text)
+
+    def report(self) -> None:
+        """Publishes the diagnostic of the last second."""
+        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+        tally = self.remover.tally_so_far()
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.WARN if tally.warning else DiagnosticStatus.OK,
+            name=f"{self.node.get_name()}: rain",
+            message=tally.warning or f"{tally.share:.1%} of the points are rain",
+            hardware_id=self.remover.derainer.name,
+            values=[KeyValue(key=key, value=value) for key, value in tally.values().items()],
+        )
+        report = DiagnosticArray(status=[status])
+        report.header.stamp = self.node.get_clock().now().to_msg()
+        self.diagnostics.publish(report)
+
+
+def main() -> int:
+    """Runs the node until it is stopped."""
+    import rclpy
+    from rclpy.executors import ExternalShutdownException
+
+    rclpy.init()
+    node = rclpy.create_node("derain")
+    try:
+        DerainNode(node)
+        rclpy.spin(node)
+    except InputError as error:
+        node.get_logger().fatal(str(error))
+        return 2
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

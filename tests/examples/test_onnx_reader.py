@@ -1,0 +1,128 @@
+"""Whoever follows the contract, as the reader in NumPy does, calls rain what derain calls rain."""
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import onnx
+import pytest
+from numpy.typing import NDArray
+
+from derain.default import default_model
+from derain.evaluation.hard_cases import scene
+from derain.export.model_file import METADATA_KEY
+from derain.export.runtime import Derainer
+from derain.spec import Spec
+from derain.views.back_projection import BACK_PROJECTIONS
+from derain.views.candidates import Candidates
+from derain.views.registry import VIEWS
+
+from .hard_points import hard_points, hard_scans
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+EXAMPLE = REPOSITORY / "examples" / "onnx_reader.py"
+CONTRACT = (REPOSITORY / "docs" / "onnx_contract.md").read_text("utf-8")
+SCANS = hard_scans()
+
+
+@pytest.fixture(scope="module")
+def reader() -> Iterator[ModuleType]:
+    """The example's module."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(EXAMPLE.parent)
+        yield import_module("onnx_reader")
+        del sys.modules["onnx_reader"]
+
+
+def agree(reader: ModuleType, path: Path, points: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Judges a scan by the reader and by derain, and gives what both call rain."""
+    theirs, ours = reader.Model(str(path)), Derainer(path, threads=1)
+    np.testing.assert_allclose(theirs.judge(points), ours.probability(points), rtol=0, atol=1e-6)
+    rain = ours(points)
+    np.testing.assert_array_equal(theirs.rain(points), rain)
+    return rain
+
+
+@pytest.mark.parametrize("points", SCANS.values(), ids=SCANS)
+def test_of_neighbours_it_makes_what_the_default_model_makes(
+    reader: ModuleType, points: NDArray[np.float32]
+) -> None:
+    agree(reader, default_model(), points)
+
+
+def test_the_scan_it_is_compared_on_has_rain_and_other_points(reader: ModuleType) -> None:
+    assert 0 < agree(reader, default_model(), hard_points()).mean() < 0.9
+
+
+@pytest.mark.parametrize("points", SCANS.values(), ids=SCANS)
+def test_it_judges_candidates_as_derain_does(
+    reader: ModuleType, judging_candidates: Path, points: NDArray[np.float32]
+) -> None:
+    agree(reader, judging_candidates, points)
+
+
+@pytest.mark.parametrize("points", SCANS.values(), ids=SCANS)
+def test_of_images_it_makes_what_derain_makes(
+    reader: ModuleType, image_onnx: Path, points: NDArray[np.float32]
+) -> None:
+    agree(reader, image_onnx, points)
+
+
+@pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
+@pytest.mark.parametrize("azimuth", [(-180.0, 180.0), (-60.0, 75.0)], ids=["circle", "sector"])
+@pytest.mark.parametrize("bounded", [False, True], ids=["all", "candidates"])
+def test_it_carries_scores_of_pixels_back_in_every_way(
+    reader: ModuleType,
+    image_onnx: Path,
+    tmp_path: Path,
+    way_back: str,
+    azimuth: tuple[float, float],
+    bounded: bool,
+    candidates: Candidates,
+) -> None:
+    proto, spec = onnx.load(image_onnx), Derainer(image_onnx).spec
+    grid = {**spec.view["grid"], "azimuth": azimuth}
+    view = {"kind": "range", "grid": grid, "way_back": way_back}
+    changed = replace(spec, view=view, candidates=candidates if bounded else None)
+    onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps({"spec": changed.as_dict()})})
+    onnx.save(proto, tmp_path / "changed.onnx")
+    agree(reader, tmp_path / "changed.onnx", np.concatenate([hard_points(), scene(800)]))
+
+
+def test_from_the_command_line_it_writes_labels(tmp_path: Path) -> None:
+    points = scene(300)
+    points.tofile(tmp_path / "scan.bin")
+    command = [sys.executable, EXAMPLE, default_model(), "scan.bin", "scan.label"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    label = np.fromfile(tmp_path / "scan.label", "<u4")
+    np.testing.assert_array_equal(label, Derainer(threads=1)(points))
+
+
+def test_it_needs_nothing_of_derain() -> None:
+    imported = re.findall(r"^(?:import|from) (\w+)", EXAMPLE.read_text("utf-8"), re.MULTILINE)
+    assert set(imported) <= {"json", "math", "sys", "typing", "numpy", "onnxruntime"}
+
+
+def test_the_contract_names_all_that_a_file_may_hold() -> None:
+    named = set(re.findall(r"`([^`]+)`", CONTRACT))
+    assert {one.name for one in fields(Spec)} <= named
+    assert {f'"kind": "{view}"' in CONTRACT for view in VIEWS} == {True}
+    assert {f'"{way}":' in CONTRACT for way in BACK_PROJECTIONS} == {True}
+    assert set(Derainer().metadata) <= named
+
+
+def test_the_python_of_the_contract_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "model.onnx").write_bytes(default_model().read_bytes())
+    monkeypatch.chdir(tmp_path)
+    (snippet,) = re.findall(r"```python\n(.*?)```", CONTRACT, re.DOTALL)
+    exec(snippet, {})
+    assert "'neighbours': 9" in capsys.readouterr().out

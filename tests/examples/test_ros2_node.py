@@ -1,0 +1,236 @@
+"""The node of ROS 2, without ROS: its messages are made up here, and so is what it hangs on."""
+
+import array
+import sys
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from derain.evaluation.hard_cases import scene
+from derain.export.runtime import Derainer
+
+from .made_up_ros import DiagnosticArray, DiagnosticStatus, Field, KeyValue, Node, PointCloud2
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "ros2_node"
+KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
+
+# x, y, z, 4 bytes of nothing, intensity, ring, and a byte more.
+POINT = np.dtype(
+    {
+        "names": ["x", "y", "z", "intensity", "ring"],
+        "formats": ["<f4", "<f4", "<f4", "<f4", "<u2"],
+        "offsets": [0, 4, 8, 16, 20],
+        "itemsize": 23,
+    }
+)
+FLOAT32, UINT16 = 7, 4
+
+
+@pytest.fixture(scope="module")
+def example() -> Iterator[ModuleType]:
+    """The example's module, imported where there is no rclpy."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(EXAMPLE)
+        patch.setitem(sys.modules, "rclpy", None)  # whoever imports it fails
+        yield import_module("derain_node")
+        del sys.modules["derain_node"]
+
+
+def message_of(points: NDArray[np.float32], height: int = 1, gap: int = 0) -> PointCloud2:
+    """A message of (N, 4) points in rows, each followed by a gap of so many bytes."""
+    table = np.frombuffer(np.random.default_rng(0).bytes(len(points) * 23), POINT).copy()
+    for place, name in enumerate(("x", "y", "z", "intensity")):
+        table[name] = points[:, place]
+    width = len(points) // height
+    rows = np.frombuffer(table.tobytes(), np.uint8).reshape(height, width * 23)
+    rows = np.pad(rows, ((0, 0), (0, gap)), constant_values=7)
+    fields = [Field(name, POINT.fields[name][1], FLOAT32, 1) for name in POINT.names[:4]]
+    return PointCloud2(
+        SimpleNamespace(stamp="now", frame_id="lidar"),
+        height,
+        width,
+        [*fields, Field("ring", 20, UINT16, 1)],
+        point_step=23,
+        row_step=width * 23 + gap,
+        data=array.array("B", rows.tobytes()),
+        is_dense=True,
+    )
+
+
+def bytes_of_points(message: PointCloud2) -> NDArray[np.void]:
+    """The bytes of every point, those between its fields as well."""
+    rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.row_step)
+    packed = np.ascontiguousarray(rows[:, : message.width * 23])
+    return packed.reshape(-1, 23).view("V23")[:, 0]
+
+
+@pytest.mark.parametrize(("height", "gap"), [(1, 0), (4, 0), (4, 9)])
+def test_every_byte_of_the_points_that_stay_stays(
+    example: ModuleType, height: int, gap: int
+) -> None:
+    message = message_of(scene(200), height, gap)
+    rain = np.random.default_rng(1).random(200) < 0.3
+    before = bytes_of_points(message)
+    for result, expected in (
+        (example.cleaned(message, rain), before[~rain]),
+        (example.removed(message, rain), before[rain]),
+    ):
+        np.testing.assert_array_equal(bytes_of_points(result), expected)
+        assert (result.height, result.width) == (1, len(expected))
+        assert result.row_step == len(result.data) == 23 * len(expected)
+        assert isinstance(result.data, array.array)
+        for name in ("header", "fields", "point_step", "is_bigendian"):
+            assert getattr(result, name) is getattr(message, name)
+
+
+def test_of_an_organised_cloud_rain_becomes_nan_in_its_place(example: ModuleType) -> None:
+    message = message_of(scene(200), height=4, gap=9)
+    rain = np.zeros(200, bool)
+    rain[[3, 70, 199]] = True
+    result = example.cleaned(message, rain, organised=True)
+    before, after = (bytes_of_points(one).view(POINT) for one in (message, result))
+    assert (result.height, result.width, result.row_step) == (4, 50, 50 * 23 + 9)
+    np.testing.assert_array_equal(bytes_of_points(result)[~rain], bytes_of_points(message)[~rain])
+    assert all(np.isnan(after[axis][rain]).all() for axis in "xyz")
+    assert not result.is_dense
+    np.testing.assert_array_equal(after["ring"], before["ring"])
+
+
+def test_a_cloud_without_rain_is_the_same_cloud(example: ModuleType) -> None:
+    message = message_of(scene(200), height=4)
+    result = example.cleaned(message, np.zeros(200, bool))
+    assert result == message
+    assert result is not message
+
+
+@pytest.mark.parametrize("model", [None, KEPT], ids=["default", "outdet"])
+def test_rain_is_what_the_model_says_of_the_same_points(
+    example: ModuleType, model: Path | None
+) -> None:
+    points = scene(600)
+    derainer = Derainer(model, threads=1)
+    judgement = example.RainRemover(derainer).judge(message_of(points, height=2, gap=5))
+    np.testing.assert_array_equal(judgement.probability, derainer.probability(points))
+
+
+def test_what_is_odd_is_told_once(example: ModuleType) -> None:
+    points = scene(600)
+    points[:, 3] = 5  # which no sensor measured
+    remover = example.RainRemover(Derainer(KEPT, threads=1))
+    news = [remover.news(remover.judge(message_of(points))) for _ in range(2)]
+    assert "stands in" in news[0][0]
+    assert news[1] == []
+
+
+@pytest.fixture
+def ros(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Modules of ROS, as much of them as the example imports."""
+    modules = {
+        "rclpy": {},
+        "rclpy.qos": {
+            "QoSProfile": SimpleNamespace,
+            "ReliabilityPolicy": SimpleNamespace(BEST_EFFORT="best effort", RELIABLE="reliable"),
+        },
+        "sensor_msgs": {},
+        "sensor_msgs.msg": {"PointCloud2": PointCloud2},
+        "diagnostic_msgs": {},
+        "diagnostic_msgs.msg": {
+            one.__name__: one for one in (DiagnosticArray, DiagnosticStatus, KeyValue)
+        },
+    }
+    for name, members in modules.items():
+        module = ModuleType(name)
+        vars(module).update(members)
+        monkeypatch.setitem(sys.modules, name, module)
+
+
+@pytest.mark.usefixtures("ros")
+def test_a_cloud_comes_in_and_goes_out_clean(example: ModuleType) -> None:
+    points = scene(600)
+    message = message_of(points)
+    node = Node(input="in", output="out", removed="gone", model=str(KEPT), threads=1)
+    example.DerainNode(node)
+    kind, call, quality = node.subscriptions["in"]
+    assert (kind, quality.depth, quality.reliability) == (PointCloud2, 1, "best effort")
+    call(message)
+    rain = Derainer(KEPT, threads=1)(points)
+    assert 0 < rain.sum() < len(rain)
+    expected = {"out": example.cleaned(message, rain), "gone": example.removed(message, rain)}
+    for topic, one in expected.items():
+        kind, published, quality = node.publishers[topic]
+        assert (kind, published, quality.reliability) == (PointCloud2, [one], "reliable")
+
+
+@pytest.mark.usefixtures("ros")
+def test_by_default_it_runs_the_packaged_model_and_publishes_no_rain(example: ModuleType) -> None:
+    node = Node()
+    made = example.DerainNode(node)
+    assert made.remover.derainer.name == "default"
+    assert set(node.publishers) == {"points/clean", "/diagnostics"}
+    assert set(node.subscriptions) == {"points"}
+
+
+@pytest.mark.usefixtures("ros")
+def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(
+    example: ModuleType,
+) -> None:
+    node = Node(model=str(KEPT), threads=1)
+    example.DerainNode(node)
+    _, call, _ = node.subscriptions["points"]
+    flat, short = message_of(scene(200)), message_of(scene(200))
+    flat.fields = [one for one in flat.fields if one.name != "z"]
+    del short.data[100:]
+    for message in (flat, short, message_of(scene(200))):
+        call(message)
+    assert len(node.logger) == 2
+    assert all(text.startswith("a cloud is left out: ") for text in node.logger)
+    assert len(node.publishers["points/clean"][1]) == 1
+
+
+@pytest.mark.usefixtures("ros")
+def test_a_cloud_of_no_points_goes_through(example: ModuleType) -> None:
+    node = Node(threads=1)
+    example.DerainNode(node)
+    message = message_of(scene(200))
+    message.width = message.row_step = 0
+    message.data = array.array("B")
+    node.subscriptions["points"][1](message)
+    assert node.publishers["points/clean"][1] == [message]
+
+
+@pytest.mark.usefixtures("ros")
+def test_once_a_second_it_says_what_share_was_rain(example: ModuleType) -> None:
+    points = scene(600)
+    node = Node(model=str(KEPT), threads=1)
+    example.DerainNode(node)
+    ((period, report),) = node.timers
+    node.subscriptions["points"][1](message_of(points))
+    report()
+    report()
+    said, silent = (one.status[0] for one in node.publishers["/diagnostics"][1])
+    values = {one.key: one.value for one in said.values}
+    share = Derainer(KEPT, threads=1)(points).mean()
+    assert period == 1.0
+    assert (values["clouds"], values["points per cloud"]) == ("1", "600")
+    assert float(values["share of rain"]) == pytest.approx(share, abs=1e-4)
+    assert (silent.level, silent.message) == (DiagnosticStatus.WARN, "no clouds")
+
+
+def test_the_messages_made_up_here_have_the_attributes_of_those_of_ros() -> None:
+    typesys = pytest.importorskip("rosbags.typesys")
+    types = typesys.get_typestore(typesys.Stores.ROS2_JAZZY).types
+    for made_up, name in (
+        (PointCloud2, "sensor_msgs/msg/PointCloud2"),
+        (Field, "sensor_msgs/msg/PointField"),
+        (DiagnosticArray, "diagnostic_msgs/msg/DiagnosticArray"),
+        (DiagnosticStatus, "diagnostic_msgs/msg/DiagnosticStatus"),
+        (KeyValue, "diagnostic_msgs/msg/KeyValue"),
+    ):
+        # The library has constants and the type's name among them.
+        real = {each for each in types[name].__dataclass_fields__ if each[0].islower()}
+        assert set(made_up.__dataclass_fields__) == real, name
