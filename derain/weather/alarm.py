@@ -100,8 +100,8 @@ class Alarm:
     """Takes the visibility of scan after scan, and says at which level it is.
 
     A level is entered after several scans in a row below its lower threshold, and left after as
-    many at its upper one or above; in between it stays as it is. The first scan of which anything is
-    known decides alone, for there is nothing to stay at.
+    many at its upper one or above; in between it stays as it is. The first scan of which anything
+    is known decides alone, for there is nothing to stay at.
 
     Example:
         >>> alarm = Alarm(hold=2)

@@ -59,7 +59,7 @@ def _numbered(
     xyz: NDArray[np.float32], reach: NDArray[np.float32], rain: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """Each return as one number, int64 (M,)."""
-    x, y, z = np.ascontiguousarray(xyz.T)
+    x, y, z = np.ascontiguousarray(xyz.T) + np.float32(0)  # -0.0 would be another way than 0.0
     azimuth = _cells(np.arctan2(y, x)) % AROUND
     inclination = _cells(np.arctan2(z, np.sqrt(x * x + y * y))) + UPWARDS // 2
     # Not above the last bin, however far.
