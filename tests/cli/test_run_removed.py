@@ -36,7 +36,7 @@ def las(path: Path) -> Scan:
     return read_scan(path)
 
 
-@pytest.mark.parametrize("suffix", (".bin", *NAMED))
+@pytest.mark.parametrize("suffix", [".bin", *NAMED])
 def test_cleaned_and_removed_together_are_the_scan(
     run_derain, onnx_model: Path, tmp_path: Path, suffix: str
 ) -> None:
@@ -58,7 +58,7 @@ def test_cleaned_and_removed_together_are_the_scan(
             np.testing.assert_array_equal(part.fields[name], column[rows], strict=True)
 
 
-@pytest.mark.parametrize("suffix", (*NAMED, ".las", ".laz"))
+@pytest.mark.parametrize("suffix", [*NAMED, ".las", ".laz"])
 def test_the_probability_is_one_more_column_of_the_files(
     run_derain, onnx_model: Path, tmp_path: Path, suffix: str
 ) -> None:
