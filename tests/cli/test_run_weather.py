@@ -7,11 +7,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
 from derain.weather.alarm import Alarm, Threshold
 from derain.weather.scan_weather import ScanWeather
+
+
+def wall(drops: int) -> NDArray[np.float32]:
+    """A wall 15 m ahead, 3,000 points, and drops in front of it; float32 (N, 4)."""
+    generator = np.random.default_rng(0)
+    y, z = np.meshgrid(np.linspace(-1.5, 1.5, 60), np.linspace(-1.2, 1.2, 50))
+    solid = np.stack([np.full(3000, 15.0), y.ravel(), z.ravel()], axis=1)
+    in_air = generator.uniform([2, -6, -2], [9, 6, 2], (drops, 3))
+    points = np.concatenate([solid, in_air])
+    return np.column_stack([points, np.full(len(points), 9)]).astype(np.float32)
 
 
 @pytest.fixture
@@ -20,9 +30,7 @@ def recording(tmp_path: Path) -> Path:
     folder = tmp_path / "recording"
     folder.mkdir()
     for number in range(6):
-        points = scene(3000, seed=1)
-        points = points if number in (2, 3) else points[:-300]
-        points.tofile(folder / f"{number:06d}.bin")
+        wall(drops=300 if number in (2, 3) else 0).tofile(folder / f"{number:06d}.bin")
     return folder
 
 
@@ -38,7 +46,7 @@ def objects(text: str) -> list[dict[str, Any]]:
     return [json.loads(line)["weather"] for line in text.splitlines()]
 
 
-def rounded(shares: np.ndarray) -> list[Any]:
+def rounded(shares: NDArray[np.float64]) -> list[Any]:
     return [None if np.isnan(share) else round(float(share), 5) for share in shares]
 
 
@@ -105,7 +113,7 @@ def test_a_table_has_a_line_a_scan_and_nothing_where_nothing_is_known(
 def test_each_recording_begins_anew(run_derain, recording: Path, tmp_path: Path) -> None:
     dry = tmp_path / "data/velodyne"  # sorted behind it, by its name
     dry.mkdir(parents=True)
-    scene(3000, seed=1)[:-300].tofile(dry / "900000.bin")
+    wall(drops=0).tofile(dry / "900000.bin")
     rainy = tmp_path / "a"
     rainy.mkdir()
     (recording / "000002.bin").rename(rainy / "000002.bin")
