@@ -42,7 +42,8 @@ PLACES = (("street", "spinning_64"), ("street", "spinning_64_far"), ("facility",
 RAINED_ON = ("clean/kitti_hdl64.bin", "spinning_64_far")
 
 # Levels that the drive crosses, so that it can be seen how they hold: the usual ones it does not.
-CROSSED = {"warning": Threshold(13.0, 14.5), "error": Threshold(11.0, 12.0)}
+CROSSED = {"warning": Threshold(12.4, 14.0), "error": Threshold(11.3, 12.0)}
+HELD = 2
 
 TITLES = ["scan", "rays", "labels", "visibility", "default", "visibility", "ahead", "behind"]
 
@@ -175,11 +176,12 @@ def _drive(data: Path, told: Told) -> Iterator[tuple[str, ScanWeather, ScanWeath
 
 def _drive_tables(drive: list[tuple[str, ScanWeather, ScanWeather]]) -> Iterator[str]:
     """The alarm on the drive, with its usual levels and with those that the drive crosses."""
-    usual, holding = Alarm(), Alarm(**CROSSED, hold=3)
+    usual, holding = Alarm(), Alarm(**CROSSED, hold=HELD)
     # Without hysteresis: the end of a level is where it begins.
     begins = {name: Threshold(t.below, np.nextafter(t.below, 99)) for name, t in CROSSED.items()}
     at_once = Alarm(**begins, hold=1)
-    rows = [["scan", "labels", "default", "usual levels", "13/14.5 11/12 hold 3", "without"]]
+    crossed = ", ".join(f"{t.below:g}/{t.above:g}" for t in CROSSED.values())
+    rows = [["scan", "labels", "default", "usual levels", crossed, "without gap and hold"]]
     for name, by_labels, by_model in drive:
         seen = by_model.visibility
         levels = [str(alarm.update(seen)) for alarm in (usual, holding, at_once)]
@@ -217,14 +219,14 @@ def _draw_rose(weather: ScanWeather, path: Path) -> None:
     figure = Figure(figsize=(6.4, 5.2), layout="constrained")
     axes = figure.add_subplot(projection="polar")
     axes.set_theta_zero_location("N")
-    turn = np.radians(30 * np.arange(13) - 15)
-    # Rings of equal width: most rain is near by.
-    drawn = axes.pcolormesh(
-        turn, np.arange(len(BANDS)), 100 * weather.shares[:, :-1].T, cmap="Blues", vmin=0, vmax=100
-    )
+    # A sector is drawn as thirty slices, which look round; rings of equal width, for most rain is
+    # near by.
+    turn = np.radians(np.arange(361) - 15)
+    shares = np.repeat(100 * weather.shares[:, :-1].T, 30, axis=1)
+    drawn = axes.pcolormesh(turn, np.arange(len(BANDS)), shares, cmap="Blues", vmin=0, vmax=100)
     axes.set_yticks(range(1, len(BANDS)), [f"{edge} m" for edge in BANDS[1:]], fontsize=8)
     axes.set_xticks(np.radians([0, 90, 180, 270]), ["ahead", "left", "behind", "right"])
-    axes.set_rlabel_position(45)
+    axes.set_rlabel_position(-75)  # between two sectors
     axes.grid(alpha=0.3)
     axes.set_title(f"Rays that end at snow; 90 % get through {weather.visibility}")
     figure.colorbar(drawn, ax=axes, label="share of the rays that end there, %", shrink=0.8)

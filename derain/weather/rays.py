@@ -23,6 +23,7 @@ BINS = 161
 # is far finer, or to millimetres, which near by is coarser: such returns count as rays of their
 # own.
 CELLS = 100
+CELLS_PER_RADIAN = np.float32(CELLS * 180 / np.pi)
 AROUND, UPWARDS = 360 * CELLS, 180 * CELLS
 
 # A ray as one number, from the top: inclination and azimuth of its cell, then what a return of it
@@ -65,12 +66,15 @@ def _numbered(
     # Not above the last bin, however far.
     place = np.minimum(reach / np.float32(BIN), np.float32(BINS - 1)).astype(np.int64)
     direction = inclination << BITS_OF_AZIMUTH | azimuth
-    return direction << BITS_OF_RETURN | np.where(rain, 0, NOT_RAIN) | place
+    what = np.where(rain, 0, NOT_RAIN)
+    numbers: NDArray[np.int64] = direction << BITS_OF_RETURN | what | place
+    return numbers
 
 
 def _cells(angle: NDArray[np.float32]) -> NDArray[np.int64]:
     """Numbers of the cells that angles lie in, from radians, int64 (M,)."""
-    return np.floor(angle * np.float32(np.degrees(1) * CELLS)).astype(np.int64)
+    cells: NDArray[np.int64] = np.floor(angle * CELLS_PER_RADIAN).astype(np.int64)
+    return cells
 
 
 def _ends_of(returns: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -81,7 +85,8 @@ def _ends_of(returns: NDArray[np.int64]) -> NDArray[np.int64]:
     changes = np.flatnonzero(direction[1:] != direction[:-1])
     first = returns[np.concatenate([[0], changes + 1])]
     last = returns[np.concatenate([changes, [len(returns) - 1]])]
-    return np.where(first & NOT_RAIN, last, first)
+    ends: NDArray[np.int64] = np.where(first & NOT_RAIN, last, first)
+    return ends
 
 
 def _counted(ends: NDArray[np.int64]) -> NDArray[np.int64]:
