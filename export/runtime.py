@@ -140,7 +140,7 @@ class Derainer(Method):
             >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)
             >>> weather = Derainer().weather(points)
             >>> weather.rays, str(weather.visibility)
-            (820, 'over 12 m')
+            (820, '42.7 m')
 
         Args:
             points: As for calling the model.

@@ -24,6 +24,11 @@ class Level(IntEnum):
 class Threshold:
     """Where a level begins, and where it ends.
 
+    Example:
+        >>> alarm = Alarm(warning=Threshold(below=50, above=60), error=Threshold(10, 12), hold=3)
+        >>> str(alarm.update(Visibility(45.0, 45.0, 10.0, 0.98)))  # the first scan decides alone
+        'warning'
+
     Attributes:
         below: The level begins where visibility is below this, metres.
         above: It ends where visibility is this or more, metres.
