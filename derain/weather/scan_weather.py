@@ -122,4 +122,6 @@ class ScanWeather:
 def _shares(ends: NDArray[np.int64]) -> NDArray[np.float64]:
     """Share of rain in numbers (2, ...), float64 (...); NaN where there are none."""
     total = ends.sum(axis=0)
-    return np.divide(ends[1], total, out=np.full(total.shape, np.nan), where=total > 0)
+    shares: NDArray[np.float64] = np.full(total.shape, np.nan)
+    np.divide(ends[1], total, out=shares, where=total > 0)
+    return shares
