@@ -32,7 +32,7 @@ from derain.simulation.rain_field import UniformRain
 from derain.simulation.recorded import rain_on_scan
 from derain.simulation.sensor_file import load_sensor
 from derain.weather.alarm import Alarm, Threshold
-from derain.weather.scan_weather import BANDS, ScanWeather
+from derain.weather.scan_weather import RANGE_BANDS, ScanWeather
 
 # Rain in mm/h, from none over light and heavy to a cloudburst.
 RATES = (0.0, 2.0, 5.0, 10.0, 25.0, 50.0, 100.0)
@@ -195,7 +195,7 @@ def _drive_tables(drive: list[tuple[str, ScanWeather, ScanWeather]]) -> Iterator
     pooled = [ScanWeather.none(), ScanWeather.none()]
     for _, *weathers in drive:
         pooled = [whole + one for whole, one in zip(pooled, weathers, strict=True)]
-    shares = [["from", *(f"{band} m" for band in BANDS)]]
+    shares = [["from", *(f"{band} m" for band in RANGE_BANDS)]]
     shares += [
         [name, *("-" if np.isnan(share) else f"{share:.2%}" for share in whole.shares_by_range)]
         for name, whole in zip(("labels", "default"), pooled, strict=True)
@@ -223,8 +223,12 @@ def _draw_rose(weather: ScanWeather, path: Path) -> None:
     # near by.
     turn = np.radians(np.arange(361) - 15)
     shares = np.repeat(100 * weather.shares[:, :-1].T, 30, axis=1)
-    drawn = axes.pcolormesh(turn, np.arange(len(BANDS)), shares, cmap="Blues", vmin=0, vmax=100)
-    axes.set_yticks(range(1, len(BANDS)), [f"{edge} m" for edge in BANDS[1:]], fontsize=8)
+    drawn = axes.pcolormesh(
+        turn, np.arange(len(RANGE_BANDS)), shares, cmap="Blues", vmin=0, vmax=100
+    )
+    axes.set_yticks(
+        range(1, len(RANGE_BANDS)), [f"{edge} m" for edge in RANGE_BANDS[1:]], fontsize=8
+    )
     axes.set_xticks(np.radians([0, 90, 180, 270]), ["ahead", "left", "behind", "right"])
     axes.set_rlabel_position(-75)  # between two sectors
     axes.grid(alpha=0.3)

@@ -18,14 +18,14 @@ from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.source import Source
 from derain.weather.alarm import ERROR, HOLD, WARNING, Alarm, Threshold
-from derain.weather.rays import SECTORS
-from derain.weather.scan_weather import BANDS, ScanWeather
+from derain.weather.rays import RAY_SECTORS
+from derain.weather.scan_weather import RANGE_BANDS, ScanWeather
 
 # Digits of shares: rays are a hundred thousand at most.
-DIGITS = 5
+SHARE_DIGITS = 5
 
-SECTOR_TITLES = [f"share_at_{360 // SECTORS * sector}_deg" for sector in range(SECTORS)]
-BAND_TITLES = [f"share_from_{band}_m" for band in BANDS]
+SECTOR_TITLES = [f"share_at_{360 // RAY_SECTORS * sector}_deg" for sector in range(RAY_SECTORS)]
+BAND_TITLES = [f"share_from_{band}_m" for band in RANGE_BANDS]
 TITLES = [
     *("scan", "time_s", "rays", "met_rain", "visibility_m", "visibility_over_m", "level"),
     *SECTOR_TITLES,
@@ -86,7 +86,7 @@ class WeatherWatch:
         self._levels = Threshold(*arguments.warning), Threshold(*arguments.error), arguments.hold
         self._alarm = Alarm(*self._levels)
         self._sequence: str | None = None
-        self._table = _Table(arguments.weather)
+        self._table = _WeatherTable(arguments.weather)
         if arguments.weather is not None:
             _refuse_scan(arguments.weather, source)
 
@@ -110,7 +110,7 @@ class WeatherWatch:
         return told
 
 
-class _Table:
+class _WeatherTable:
     """A table of the weather, a line a scan.
 
     Args:
@@ -178,7 +178,7 @@ def _refuse_scan(table: Path, source: Source) -> None:
 
 def _known(shares: NDArray[np.float64]) -> list[float | None]:
     """Shares of one row, None where they are not known."""
-    return [None if np.isnan(share) else round(float(share), DIGITS) for share in shares]
+    return [None if np.isnan(share) else round(float(share), SHARE_DIGITS) for share in shares]
 
 
 def _time(frame: Frame) -> float | None:

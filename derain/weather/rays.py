@@ -12,19 +12,19 @@ from derain.scan import Scan
 
 # Sectors of azimuth, each of 30 degrees like the hours of a clock: the first has x (ahead) in its
 # middle, the next ones follow towards y (left).
-SECTORS = 12
+RAY_SECTORS = 12
 
 # Bins of range: so many metres each, and one more for whatever is beyond them, 80 m and more.
 BIN = 0.5
-BINS = 161
+RANGE_BINS = 161
 
 # Returns are of one ray whose directions lie in one cell of so many cells a degree. Two rays that
 # are neighbours are farther apart: 0.1 degrees and more. Coordinates are rounded to float32, which
 # is far finer, or to millimetres, which near by is coarser: such returns count as rays of their
 # own.
-CELLS = 100
-CELLS_PER_RADIAN = np.float32(CELLS * 180 / np.pi)
-AROUND, UPWARDS = 360 * CELLS, 180 * CELLS
+CELLS_PER_DEGREE = 100
+CELLS_PER_RADIAN = np.float32(CELLS_PER_DEGREE * 180 / np.pi)
+AROUND, UPWARDS = 360 * CELLS_PER_DEGREE, 180 * CELLS_PER_DEGREE
 
 # A ray as one number, from the top: inclination and azimuth of its cell, then what a return of it
 # is and where it lies, so that sorting brings the returns of a ray together, rain first.
@@ -45,8 +45,8 @@ def ray_ends(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
         rain: True for rain, bool (N,).
 
     Returns:
-        Numbers of rays, int64 (2, SECTORS, BINS): those that end at something else, and those that
-        end at rain.
+        Numbers of rays, int64 (2, RAY_SECTORS, RANGE_BINS): those that end at something
+        else, and those that end at rain.
     """
     asked = scan.valid if scan.radar is None else scan.valid & ~scan.radar
     every = bool(asked.all())
@@ -64,7 +64,7 @@ def _numbered(
     azimuth = _cells(np.arctan2(y, x)) % AROUND
     inclination = _cells(np.arctan2(z, np.sqrt(x * x + y * y))) + UPWARDS // 2
     # Not above the last bin, however far.
-    place = np.minimum(reach / np.float32(BIN), np.float32(BINS - 1)).astype(np.int64)
+    place = np.minimum(reach / np.float32(BIN), np.float32(RANGE_BINS - 1)).astype(np.int64)
     direction = inclination << BITS_OF_AZIMUTH | azimuth
     what = np.where(rain, 0, NOT_RAIN)
     numbers: NDArray[np.int64] = direction << BITS_OF_RETURN | what | place
@@ -90,11 +90,11 @@ def _ends_of(returns: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _counted(ends: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers of rays by what they end at, sector and bin, int64 (2, SECTORS, BINS)."""
+    """Numbers of rays by what they end at, sector and bin, int64 (2, RAY_SECTORS, RANGE_BINS)."""
     azimuth = ends >> BITS_OF_RETURN & ((1 << BITS_OF_AZIMUTH) - 1)
-    wide = AROUND // SECTORS
+    wide = AROUND // RAY_SECTORS
     sector = (azimuth + wide // 2) % AROUND // wide
     at_rain = (ends & NOT_RAIN) == 0
-    cell = (at_rain * SECTORS + sector) * BINS + (ends & (NOT_RAIN - 1))
-    counts = np.bincount(cell, minlength=2 * SECTORS * BINS)
-    return counts.reshape(2, SECTORS, BINS).astype(np.int64)
+    cell = (at_rain * RAY_SECTORS + sector) * RANGE_BINS + (ends & (NOT_RAIN - 1))
+    counts = np.bincount(cell, minlength=2 * RAY_SECTORS * RANGE_BINS)
+    return counts.reshape(2, RAY_SECTORS, RANGE_BINS).astype(np.int64)

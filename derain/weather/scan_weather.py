@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.scan import Scan
-from derain.weather.rays import BIN, BINS, SECTORS, ray_ends
+from derain.weather.rays import BIN, RANGE_BINS, RAY_SECTORS, ray_ends
 from derain.weather.visibility import Visibility, visibility_of
 
 # Where the bands of range begin, metres: each is twice as deep as the one before, for the farther,
 # the less rain is seen. The last one has no end.
-BANDS = (0, 5, 10, 20, 40, 80)
+RANGE_BANDS = (0, 5, 10, 20, 40, 80)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,8 @@ class ScanWeather:
         (820, 20, '42.7 m')
 
     Attributes:
-        ends: int64 (2, SECTORS, BINS): rays that end at something else, and rays that end at rain;
+        ends: int64 (2, RAY_SECTORS, RANGE_BINS): rays that end at something else, and rays that
+        end at rain;
             by sector of azimuth and by bin of range (:mod:`derain.weather.rays`).
     """
 
@@ -57,7 +58,7 @@ class ScanWeather:
     @classmethod
     def none(cls) -> Self:
         """That of no scan, to which others can be added."""
-        return cls(np.zeros((2, SECTORS, BINS), np.int64))
+        return cls(np.zeros((2, RAY_SECTORS, RANGE_BINS), np.int64))
 
     def __add__(self, other: "ScanWeather") -> "ScanWeather":
         """Both together, as if of one scan."""
@@ -75,13 +76,15 @@ class ScanWeather:
 
     @cached_property  # by sector, by range and together, what is shown is made of it
     def banded(self) -> NDArray[np.int64]:
-        """The same numbers by bands of range, int64 (2, SECTORS, len(BANDS))."""
-        first_bins = [int(band / BIN) for band in BANDS]
+        """The same numbers by bands of range, int64 (2, RAY_SECTORS, len(RANGE_BANDS))."""
+        first_bins = [int(band / BIN) for band in RANGE_BANDS]
         return np.add.reduceat(self.ends, first_bins, axis=2)
 
     @property
     def shares(self) -> NDArray[np.float64]:
-        """Share of rain in the rays that end in a sector and band, float64 (SECTORS, len(BANDS)).
+        """Share of rain in the rays that end in a sector and band.
+
+        It is float64 (RAY_SECTORS, len(RANGE_BANDS)).
 
         NaN where none does: what is there is not known.
         """
@@ -89,12 +92,18 @@ class ScanWeather:
 
     @property
     def shares_by_sector(self) -> NDArray[np.float64]:
-        """Share of the rays of each sector that met rain, float64 (SECTORS,); NaN without any."""
+        """Share of the rays of each sector that met rain.
+
+        It is float64 (RAY_SECTORS,); NaN without any.
+        """
         return _shares(self.ends.sum(axis=2))
 
     @property
     def shares_by_range(self) -> NDArray[np.float64]:
-        """Share of rain in the rays that end in each band, float64 (len(BANDS),); NaN likewise."""
+        """Share of rain in the rays that end in each band.
+
+        It is float64 (len(RANGE_BANDS),); NaN likewise.
+        """
         return _shares(self.banded.sum(axis=1))
 
     @cached_property
@@ -111,10 +120,10 @@ class ScanWeather:
         Raises:
             InputError: No sector has such a number.
         """
-        odd = [number for number in sectors if not 0 <= number < SECTORS]
+        odd = [number for number in sectors if not 0 <= number < RAY_SECTORS]
         if odd or not sectors:
             raise InputError(
-                "sectors", f"{odd or 'none'}", f"Give numbers from 0 to {SECTORS - 1}."
+                "sectors", f"{odd or 'none'}", f"Give numbers from 0 to {RAY_SECTORS - 1}."
             )
         return visibility_of(*self.ends[:, list(sectors)].sum(axis=1))
 

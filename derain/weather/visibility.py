@@ -24,7 +24,7 @@ FEWEST_RAYS = 100
 MISSED_BY_CHANCE = 3.0
 
 # What is farther is as good as clear air, metres: of a hundred thousand rays, a hundred meet rain.
-FARTHEST = 1000.0
+CLEAR_AIR = 1000.0
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def visibility_of(other: NDArray[np.int64], rain: NDArray[np.int64]) -> Visibili
         return Visibility(None, 0.0, 0.0, 1.0)
     through = float(transmission(other, rain)[followed])
     metres = _range_at(looked, through)
-    can_tell = min(FARTHEST, _range_at(looked, 1 - MISSED_BY_CHANCE / int(coming[0])))
+    can_tell = min(CLEAR_AIR, _range_at(looked, 1 - MISSED_BY_CHANCE / int(coming[0])))
     if metres > can_tell:
         return Visibility(None, can_tell, looked, through)
     return Visibility(metres, metres, looked, through)

@@ -14,7 +14,7 @@ from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.scan import Scan
 from derain.views.returns import pair_returns
-from derain.weather.rays import BIN, BINS, SECTORS, ray_ends
+from derain.weather.rays import BIN, RANGE_BINS, RAY_SECTORS, ray_ends
 
 # A return: number of its ray, range in metres, and whether it is rain.
 Return = tuple[int, float, bool]
@@ -44,13 +44,13 @@ def scan_of(returns: list[Return]) -> tuple[Scan, NDArray[np.bool_]]:
 
 def counted_one_by_one(returns: list[Return]) -> NDArray[np.int64]:
     """The same by going from ray to ray."""
-    counts = np.zeros((2, SECTORS, BINS), np.int64)
+    counts = np.zeros((2, RAY_SECTORS, RANGE_BINS), np.int64)
     for ray in {ray for ray, _, _ in returns}:
         own = [(reach, rain) for number, reach, rain in returns if number == ray]
         drops = [reach for reach, rain in own if rain]
         end = min(drops) if drops else max(reach for reach, _ in own)
-        sector = round(azimuth_of(ray) % 360 / 30) % SECTORS
-        counts[int(bool(drops)), sector, min(int(np.float32(end) / BIN), BINS - 1)] += 1
+        sector = round(azimuth_of(ray) % 360 / 30) % RAY_SECTORS
+        counts[int(bool(drops)), sector, min(int(np.float32(end) / BIN), RANGE_BINS - 1)] += 1
     return counts
 
 

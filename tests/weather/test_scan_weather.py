@@ -13,8 +13,8 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.recorded import rain_on_scan
 from derain.simulation.sensor_file import load_sensor
-from derain.weather.rays import SECTORS
-from derain.weather.scan_weather import BANDS, ScanWeather
+from derain.weather.rays import RAY_SECTORS
+from derain.weather.scan_weather import RANGE_BANDS, ScanWeather
 
 RATES = (0.0, 5.0, 20.0, 80.0)
 
@@ -89,7 +89,7 @@ def test_shares_are_counts_of_rays() -> None:
     )
     weather = ScanWeather.of(points, np.array([True, False, True, False, True, False]))
     assert (weather.rays, weather.met_rain) == (6, 3)
-    shares = np.full((SECTORS, len(BANDS)), np.nan)
+    shares = np.full((RAY_SECTORS, len(RANGE_BANDS)), np.nan)
     shares[0, 0], shares[0, 1], shares[0, 5] = 0.5, 1, 0
     shares[3, 2], shares[9, 4] = 0, 1
     np.testing.assert_array_equal(weather.shares, shares)
@@ -119,7 +119,7 @@ def test_scans_add_up() -> None:
     assert pooled.ends.dtype == np.int64
     lowest, highest = sorted(part.visibility.at_least for part in parts)
     assert lowest <= pooled.visibility.at_least <= highest
-    assert pooled.visibility_in(*range(SECTORS)) == pooled.visibility
+    assert pooled.visibility_in(*range(RAY_SECTORS)) == pooled.visibility
 
 
 def test_every_hard_case_has_a_defined_weather() -> None:

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from derain.weather.rays import BIN
-from derain.weather.visibility import FARTHEST, LOOK, SHARE_THROUGH, transmission, visibility_of
+from derain.weather.visibility import CLEAR_AIR, LOOK, SHARE_THROUGH, transmission, visibility_of
 
 BINS = 40
 counts = arrays(np.int64, BINS, elements=st.integers(0, 400))
@@ -121,6 +121,6 @@ def test_what_is_told_is_finite_and_in_bounds(
     other: NDArray[np.int64], rain: NDArray[np.int64]
 ) -> None:
     seen = visibility_of(other, rain)
-    assert 0 <= seen.at_least <= FARTHEST
+    assert 0 <= seen.at_least <= CLEAR_AIR
     assert 0 <= seen.through <= 1
     assert seen.metres in (None, seen.at_least)
