@@ -41,5 +41,8 @@ from derain.odometry.odometry import Odometry as Odometry
 from derain.scan import Scan as Scan
 from derain.sources.folders import named_frames as named_frames
 from derain.sources.source import Frames as Frames
+from derain.weather.alarm import Alarm as Alarm
+from derain.weather.alarm import Threshold as Threshold
+from derain.weather.scan_weather import ScanWeather as ScanWeather
 
 __version__: str

@@ -24,6 +24,7 @@ from derain.views.oddities import Oddity, outside_view
 from derain.views.probability import probability_of_rain
 from derain.views.view import SeenScan, View
 from derain.views.window import PlacedScan, Window
+from derain.weather.scan_weather import ScanWeather
 
 __all__ = ["METADATA_KEY", "Derainer", "Judgement"]
 
@@ -129,6 +130,25 @@ class Derainer(Method):
         """
         scan = Scan.of(points)
         return self._judged(scan, lambda: self.view(scan), stopwatch or Stopwatch())
+
+    def weather(self, points: Scan | NDArray[Any]) -> ScanWeather:
+        """Says how bad the weather is that a scan shows: shares of rain, and visibility.
+
+        What was judged already has it as :attr:`Judgement.weather`.
+
+        Example:
+            >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)
+            >>> weather = Derainer().weather(points)
+            >>> weather.rays, str(weather.visibility)
+            (820, '42.7 m')
+
+        Args:
+            points: As for calling the model.
+
+        Raises:
+            InputError: A network that fails, or whose scores are not finite.
+        """
+        return self.judge(points).weather
 
     @property
     def window(self) -> Window:

@@ -37,9 +37,6 @@ def add_cleaned_bags(parser: argparse.ArgumentParser) -> None:
         "--removed-topic", metavar="NAME", help="of a bag, add a topic of what was removed"
     )
     parser.add_argument(
-        "--probability", action="store_true", help="add the probability of rain as a field"
-    )
-    parser.add_argument(
         "--keep-shape",
         action="store_true",
         help="of a bag, keep rows and columns of organised clouds: removed points become NaN",
@@ -56,4 +53,11 @@ def cleaned_bags(arguments: argparse.Namespace, source: Source) -> CleanedBags:
     if cleaned and cleaned == removed:
         raise InputError("--removed-topic", f"{removed} is --cleaned-topic too", "Name another.")
     options = BagOptions(cleaned, removed, arguments.probability, arguments.keep_shape)
-    return CleanedBags(arguments.out, source, options)
+    bags = CleanedBags(arguments.out, source, options)
+    if arguments.removed is not None and (of_bags := [f for f in source if bags.takes(f)]):
+        raise InputError(
+            "--removed",
+            f"is a folder for files, and {of_bags[0].name} is in a bag",
+            "Give --removed-topic NAME.",
+        )
+    return bags

@@ -18,17 +18,18 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 
-def folder_sink(out: Path, source: Source) -> FolderSink:
+def folder_sink(out: Path, source: Source, removed: Path | None = None) -> FolderSink:
     """The folder that a command writes to, once it is known to overwrite nothing of the source.
 
     Args:
         out: What ``--out`` names.
         source: What is read.
+        removed: Folder for what is taken away of the scans; None where nobody asks for it.
 
     Raises:
         InputError: It holds a scan or labels that would be overwritten, or two scans have one name.
     """
-    sink = FolderSink(out, again=False)
+    sink = FolderSink(out, again=False, removed=removed)
     sink.refuse_clashes(source)
     return sink
 

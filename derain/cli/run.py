@@ -12,9 +12,11 @@ from derain.cli.method_options import add_parameters, method_of
 from derain.cli.method_or_scans import RULE, add_method_and_scans, method_and_scans
 from derain.cli.outputs import folder_sink, say, tell
 from derain.cli.pose_options import add_poses, placed
+from derain.cli.probability_column import RAIN_PROBABILITY, refuse_improbable, with_probability
 from derain.cli.runtime_options import add_runtime
 from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns, add_intensity_scale
+from derain.cli.weather_options import ToldWeather, WeatherWatch, add_weather
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError, printable
 from derain.sources.cleaned_bags import CleanedBags
@@ -35,7 +37,8 @@ SUMMARY = "clean scans on a CPU, without torch"
 
 DESCRIPTION = f"""\
 Cleans scans: writes <stem>.label (1 = rain, one per row of the input) and the scan without its
-rain, in the input's format with every field kept.
+rain, in the input's format with every field kept. Says how bad the weather is: visibility, its
+level, and with --json or --weather the shares of rain by sector and range.
 
   derain run scans/ --out cleaned
   derain run model.onnx scan.bin --out cleaned
@@ -48,6 +51,8 @@ rain, in the input's format with every field kept.
   derain run dsor scans/ --out cleaned --parameters best.yaml --set range_multiplier=0.08
   derain run persistence recording/ --out cleaned --poses poses.txt
   derain run drive.mcap --out cleaned --removed-topic /rain
+  derain run scans/ --out cleaned --removed removed --probability
+  derain run scans/ --out cleaned --weather weather.csv --warning 30 40 --error 15 20 --hold 5
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
 or a name (below).
@@ -60,6 +65,8 @@ the clouds of one topic have no rain and everything else is as it was, byte for 
 What is odd about a scan is warned of, each fault once. One of which more than --most-removed is
 called rain is left alone. It and a scan that cannot be read are reported and passed over; the exit
 code is then 2.
+Visibility is the range that 90 % of the rays would get through if rain met them everywhere as often
+as in the first 10 m. It compares scans of one sensor, and is not what a weather station measures.
 """
 
 
@@ -77,6 +84,7 @@ class Cleaned:
             of that.
         milliseconds: By stage.
         warnings: What is odd about it.
+        weather: How bad the weather is that it shows.
     """
 
     scan: str
@@ -87,13 +95,14 @@ class Cleaned:
     not_known: int | None
     milliseconds: dict[str, float]
     warnings: list[str]
+    weather: ToldWeather
 
     def __str__(self) -> str:
         name, total = printable(self.scan), sum(self.milliseconds.values())
         unsure = "" if self.not_known is None else f", {self.share_not_known:.1%} not known"
         return (
             f"{name}: {self.points:,} points, {self.rain:,} of rain "
-            f"({self.share_removed:.1%}){unsure}, {total:.0f} ms"
+            f"({self.share_removed:.1%}){unsure}, {self.weather}, {total:.0f} ms"
         )
 
     @property
@@ -118,10 +127,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SHARE",
         help="leave a scan alone of which a greater share is called rain, e.g. 0.5 (default: 1)",
     )
+    parser.add_argument(
+        "--removed", type=Path, metavar="DIR", help="write what is taken away of the scans too"
+    )
+    parser.add_argument(
+        "--probability",
+        action="store_true",
+        help=f"write how probable rain is as the column {RAIN_PROBABILITY} of the scans",
+    )
     add_parameters(parser)
     add_poses(parser)
     add_topic(parser)
     add_cleaned_bags(parser)
+    add_weather(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -131,9 +149,12 @@ def main(arguments: argparse.Namespace) -> int:
     method = method_of(arguments)
     scans = in_topic(arguments.scans, arguments)
     source = placed(named_frames(scans, arguments.columns), arguments)
-    sink = folder_sink(arguments.out, source)
+    if arguments.probability:
+        refuse_improbable(method, source)
+    sink = folder_sink(arguments.out, source, arguments.removed)
+    weather = WeatherWatch(arguments, source)
     with cleaned_bags(arguments, source) as bags:
-        return _clean(source, _Cleaning(method, sink, bags, arguments), arguments)
+        return _clean(source, _Cleaning(method, sink, bags, weather, arguments), arguments)
 
 
 def _clean(source: Source, cleaning: "_Cleaning", arguments: argparse.Namespace) -> int:
@@ -150,9 +171,10 @@ def _clean(source: Source, cleaning: "_Cleaning", arguments: argparse.Namespace)
         warn(sentence)
     in_unit = source.map(lambda frame: frame.with_intensity_times(arguments.intensity_scale))
     scans = ScanByScan(in_unit)
-    for frame, judgement, stopwatch in judgements(method, scans, scans.passing_over):
-        with scans.passing_over(frame):
-            cleaning.write(frame, judgement, stopwatch)
+    with cleaning.weather.writing():
+        for frame, judgement, stopwatch in judgements(method, scans, scans.passing_over):
+            with scans.passing_over(frame):
+                cleaning.write(frame, judgement, stopwatch)
     cleaning.notices.tell_how_many_more()
     if len(cleaning.done) > 1:
         print(_summary(cleaning.done), file=stream)
@@ -163,11 +185,17 @@ class _Cleaning:
     """What writes the clean scans, and remembers what was done."""
 
     def __init__(
-        self, method: Method, sink: Sink, bags: CleanedBags, arguments: argparse.Namespace
+        self,
+        method: Method,
+        sink: Sink,
+        bags: CleanedBags,
+        weather: WeatherWatch,
+        arguments: argparse.Namespace,
     ) -> None:
         self.method = method
         self.sink = sink
         self.bags = bags
+        self.weather = weather
         self.arguments = arguments
         self.notices = Notices()
         self.done: list[Cleaned] = []
@@ -189,17 +217,29 @@ class _Cleaning:
                 f"{share_removed:.1%} of its points are called rain, and nothing was written",
                 "See whether the method suits it, or raise --most-removed.",
             )
+        with stopwatch.stage("weather"):
+            seen = judgement.weather
         with stopwatch.stage("write"):
             if self.bags.takes(frame):
                 self.bags.write(judgement)
             else:
-                self.sink.write(frame, scan.take(~rain), rain)
+                self._write_scans(frame, judgement)
+        weather = self.weather.look(frame, seen)
         told = [oddity.detail for oddity in odd]
         times = dict(stopwatch.milliseconds)
         unsure = None if judgement.known is None else int((scan.valid & ~judgement.answered).sum())
-        cleaned = Cleaned(frame.name, len(scan), valid, removed, share_removed, unsure, times, told)
+        cleaned = Cleaned(
+            frame.name, len(scan), valid, removed, share_removed, unsure, times, told, weather
+        )
         self.done.append(cleaned)
         tell(cleaned, self.arguments.json)
+
+    def _write_scans(self, frame: Frame, judgement: Judgement) -> None:
+        """Writes the cleaned scan, and what was taken away where that is asked for."""
+        rain = judgement.rain
+        scan = with_probability(frame, judgement) if self.arguments.probability else judgement.scan
+        removed = None if self.arguments.removed is None else scan.take(rain)
+        self.sink.write(frame, scan.take(~rain), rain, removed)
 
 
 def _summary(done: Sequence[Cleaned]) -> str:

@@ -1,6 +1,7 @@
 """Named columns: what every scan file holds, and the Scan they make."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -116,6 +117,20 @@ def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:
         else:
             columns[name] = column
     return columns
+
+
+def with_column(scan: Scan, name: str, column: NDArray[Any]) -> Scan:
+    """The same scan with a further column in its file; one that has this name is replaced.
+
+    Args:
+        scan: The scan, whether or not it came from a file.
+        name: Name of the column.
+        column: Its values, (N,).
+
+    Raises:
+        InputError: A column of another length.
+    """
+    return replace(scan, fields={**(scan.fields or columns_of(scan)), name: column})
 
 
 def describable_columns(path: Path, scan: Scan, types: Collection[str]) -> dict[str, NDArray[Any]]:

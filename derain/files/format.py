@@ -64,6 +64,13 @@ class Format(ABC):
             InputError: A scan that the format cannot hold.
         """
 
+    def names_columns(self, scan: Scan) -> bool:
+        """Whether a file that a scan is written to says what its columns are called.
+
+        A further column in one that does not would be taken for something else by who reads it.
+        """
+        return True
+
     def count(self, path: Path, columns: Sequence[str]) -> int | None:
         """Number of points of an uncompressed file where its size tells it, else None.
 

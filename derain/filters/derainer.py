@@ -20,6 +20,7 @@ from derain.views.candidates import Candidates
 from derain.views.oddities import Oddity
 from derain.views.one_viewpoint import unlike_one_viewpoint
 from derain.views.window import Window
+from derain.weather.scan_weather import ScanWeather
 
 
 class FilterDerainer(Method):
@@ -75,6 +76,21 @@ class FilterDerainer(Method):
         scan, stopwatch = Scan.of(points), stopwatch or Stopwatch()
         rain, judged = self.filter.judge_scan(scan, self.threads, self.candidates, stopwatch)
         return Judgement(rain.astype(np.float32), rain, judged, scan)
+
+    def weather(self, points: Scan | NDArray[Any]) -> ScanWeather:
+        """Says how bad the weather is that a scan shows.
+
+        What was judged already has it as :attr:`Judgement.weather`.
+
+        Args:
+            points: As for calling the filter.
+        """
+        return self.judge(points).weather
+
+    @property
+    def gives_probabilities(self) -> bool:
+        """No: a filter says which points are rain, and no more."""
+        return False
 
     @property
     def window(self) -> Window:

@@ -19,8 +19,8 @@ from derain.sources.bag_frame import BagFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 
-# The same column as in cleaned files.
-PROBABILITY = "rain_probability"
+# What the column of probabilities is called, of files and of clouds; its values are float32.
+RAIN_PROBABILITY = "rain_probability"
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class CleanedBags:
     def _write(self, copy: BagCopy, frame: BagFrame, judgement: Judgement) -> None:
         recorded = copy.forward_to(frame.number)
         options = self.options
-        columns = {PROBABILITY: judgement.probability} if options.probability else {}
+        columns = {RAIN_PROBABILITY: judgement.probability} if options.probability else {}
         try:
             message = CloudMessage.parse(recorded.data, frame.clouds.bag.encoding)
             new = cleaned(message, judgement.rain, columns, options.keep_shape)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from derain.scan import Scan
 from derain.sources.frame import Frame
+from derain.weather.scan_weather import ScanWeather
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,3 +37,8 @@ class Judgement:
     def answered(self) -> NDArray[np.bool_]:
         """True for rows that were judged, and for sure where the method says so, bool (N,)."""
         return self.judged if self.known is None else self.judged & self.known
+
+    @property
+    def weather(self) -> ScanWeather:
+        """How bad the weather is that the scan shows: where its rays meet rain, and how far on."""
+        return ScanWeather.of(self.scan, self.rain)

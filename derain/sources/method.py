@@ -36,6 +36,11 @@ class Method(ABC):
         """How many scans before and after the one that it judges it asks for."""
 
     @property
+    def gives_probabilities(self) -> bool:
+        """Whether it says how probable rain is, and not only which points are rain."""
+        return True
+
+    @property
     @abstractmethod
     def waiting(self) -> int:
         """How many frames were pushed and are not answered for."""

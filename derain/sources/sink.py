@@ -32,13 +32,20 @@ class Sink(ABC):
         """
 
     @abstractmethod
-    def write(self, frame: Frame, scan: Scan | None, label: NDArray[Any]) -> None:
+    def write(
+        self,
+        frame: Frame,
+        scan: Scan | None,
+        label: NDArray[Any],
+        removed: Scan | None = None,
+    ) -> None:
         """Takes what was made of one frame.
 
         Args:
             frame: The frame.
             scan: What is left of the scan; None where only labels are of interest.
             label: Class ids or a bool mask of the scan that the labels are for, (N,).
+            removed: What was taken away of the scan; None where nobody asks for it.
 
         Raises:
             InputError: It cannot be written.
@@ -52,10 +59,19 @@ class FolderSink(Sink):
         folder: The folder, made if missing.
         option: What a user calls it, for messages.
         again: Whether a source may give a scan twice, as where two patterns find it.
+        removed: Folder for what is taken away of the scans, named like these; None where nobody
+            asks for it.
     """
 
-    def __init__(self, folder: Path, option: str = "--out", again: bool = True) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        option: str = "--out",
+        again: bool = True,
+        removed: Path | None = None,
+    ) -> None:
         self.folder = folder
+        self.removed = removed
         self.option = option
         self.again = again
 
@@ -63,12 +79,24 @@ class FolderSink(Sink):
         """Where a scan is written; one that came from no file is written as a PCD."""
         return self.folder / f"{frame.key}{frame.suffix or '.pcd'}"
 
+    def removed_path(self, frame: Frame) -> Path | None:
+        """Where what is taken away of a scan is written; None where nobody asks for it."""
+        if self.removed is None:
+            return None
+        return self.removed / self.scan_path(frame).relative_to(self.folder)
+
     def path(self, frame: Frame, suffix: str) -> Path:
         """Where anything else that is made of a scan is written, such as its labels."""
         return self.folder / f"{frame.key}{suffix}"
 
     def refuse_clashes(self, source: Iterable[Frame]) -> None:
         """Refuses to overwrite a scan or labels of the source, or one result by another."""
+        if self.removed is not None and _is_same(self.removed, self.folder):
+            raise InputError(
+                self.removed,
+                f"--removed is the folder of {self.option}, where the cleaned scans go",
+                "Give it another one.",
+            )
         written: dict[str, Frame] = {}
         for frame in source:
             if isinstance(frame, FileFrame):
@@ -83,16 +111,30 @@ class FolderSink(Sink):
                     f"Take them in two runs, each to its {self.option}.",
                 )
 
-    def write(self, frame: Frame, scan: Scan | None, label: NDArray[Any]) -> None:
-        """Writes the scan, then the labels: where there are labels, the scan is complete."""
+    def write(
+        self,
+        frame: Frame,
+        scan: Scan | None,
+        label: NDArray[Any],
+        removed: Scan | None = None,
+    ) -> None:
+        """Writes the scans, then the labels: where there are labels, the scans are complete."""
+        removed_path = self.removed_path(frame)
+        if removed is not None and removed_path is not None:
+            write_scan(removed_path, removed)
         if scan is not None:
             write_scan(self.scan_path(frame), scan)
         write_labels(self.path(frame, LABEL), label)
 
     def _refuse_own_files(self, frame: FileFrame) -> None:
         remedy = f"Give {self.option} another folder."
-        if os.path.realpath(self.scan_path(frame)) == os.path.realpath(frame.path):
+        if _is_same(self.scan_path(frame), frame.path):
             raise InputError(self.folder, f"would overwrite {frame.path}", remedy)
+        removed = self.removed_path(frame)
+        if removed is not None and _is_same(removed, frame.path):
+            raise InputError(
+                removed.parent, f"would overwrite {frame.path}", "Give --removed another folder."
+            )
         target = os.path.realpath(self.path(frame, LABEL))
         places = [frame.label_path, beside(frame.path, LABEL)]
         sequence = folder_above(folder_above(frame.path))
@@ -103,6 +145,11 @@ class FolderSink(Sink):
         for labels in filter(None, places):
             if os.path.realpath(labels) == target:
                 raise InputError(self.folder, f"holds the labels of {frame.path}", remedy)
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    """Whether two paths are of one file or folder, whatever they are written like."""
+    return os.path.realpath(one) == os.path.realpath(other)
 
 
 def _is_one_file(one: Frame, other: Frame) -> bool:

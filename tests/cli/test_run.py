@@ -82,7 +82,7 @@ def test_json_is_one_object_a_scan_and_nothing_else(
     for item in objects:
         assert item["rain"] == labels(out / Path(item["scan"]).with_suffix(".label").name).sum()
         assert item["share_removed"] == item["rain"] / item["valid"]
-        assert list(item["milliseconds"]) == ["read", "view", "network", "back", "write"]
+        assert list(item["milliseconds"]) == ["read", "view", "network", "back", "weather", "write"]
         assert all(time >= 0 for time in item["milliseconds"].values())
 
 

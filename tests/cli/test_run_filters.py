@@ -35,7 +35,7 @@ def test_a_scan_gets_its_labels_and_loses_its_rain(
     assert (out / "scan.bin").read_bytes() == scene(400)[~rain].tobytes()
     item = json.loads(outcome.out)
     assert (item["points"], item["valid"], item["rain"]) == (400, 400, rain.sum())
-    assert list(item["milliseconds"]) == ["read", "view", "network", "back", "write"]
+    assert list(item["milliseconds"]) == ["read", "view", "network", "back", "weather", "write"]
 
 
 @pytest.mark.parametrize("name", FILTERS)

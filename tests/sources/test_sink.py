@@ -136,3 +136,35 @@ def test_one_scan_twice_is_refused_where_it_is_not_expected(tmp_path: Path) -> N
     FolderSink(tmp_path / "out").refuse_clashes(twice)
     with pytest.raises(InputError, match="another scan has the same name"):
         FolderSink(tmp_path / "out", again=False).refuse_clashes(twice)
+
+
+def test_what_is_taken_away_goes_to_a_folder_of_its_own(tmp_path: Path) -> None:
+    for sequence in "ab":
+        write(tmp_path / f"data/sequences/{sequence}/velodyne/0.bin")
+    source = named_frames([tmp_path / "data"])
+    sink = FolderSink(tmp_path / "out", removed=tmp_path / "removed")
+    sink.refuse_clashes(source)
+    rain = np.arange(30) < 4
+    for frame in source:
+        scan = frame.read()
+        sink.write(frame, scan.take(~rain), rain, scan.take(rain))
+    assert names(tmp_path / "removed") == ["a/velodyne/0.bin", "b/velodyne/0.bin"]
+    assert len(read_scan(tmp_path / "removed/b/velodyne/0.bin")) == 4
+
+
+def test_what_is_taken_away_is_refused_where_it_would_take_a_place(tmp_path: Path) -> None:
+    write(tmp_path / "scans/1.bin")
+    source = named_frames([tmp_path / "scans"])
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match=r"would overwrite .*1\.bin.* --removed another folder"):
+        FolderSink(out, removed=tmp_path / "scans").refuse_clashes(source)
+    with pytest.raises(InputError, match="where the cleaned scans go"):
+        FolderSink(out, removed=tmp_path / "scans/../out").refuse_clashes(source)
+
+
+def test_nobody_writes_what_nobody_asks_for(tmp_path: Path) -> None:
+    (frame,) = Frames.of_scans([Scan.of(scene(30))])
+    scan, sink = frame.read(), FolderSink(tmp_path)
+    assert sink.removed_path(frame) is None
+    sink.write(frame, scan, np.zeros(30, bool), scan)
+    assert names(tmp_path) == ["000000.label", "000000.pcd"]

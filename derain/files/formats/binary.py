@@ -93,6 +93,10 @@ class Binary(Format):
         rows, rest = divmod(size, row)
         return None if rest else rows
 
+    def names_columns(self, scan: Scan) -> bool:
+        """It does not: whoever reads it has to know them."""
+        return False
+
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as rows of float32, or of float64 if the scan comes from such a file.
 

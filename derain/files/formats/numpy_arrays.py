@@ -74,6 +74,10 @@ class Npy(Format):
         fields = _columns_of_table(content.path, array, columns)
         return scan_of(content.path, fields, shape, NpyHeader(structured=bool(array.dtype.names)))
 
+    def names_columns(self, scan: Scan) -> bool:
+        """A structured array does."""
+        return isinstance(scan.header, NpyHeader) and scan.header.structured
+
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as one array.
 

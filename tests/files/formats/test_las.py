@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from derain import InputError, Scan
 from derain.files import read_scan, write_scan
+from derain.files.columns import with_column
 
 UTM = (500_000.0, 4_100_000.0, 100.0)
 SUFFIXES = (".las", ".laz")
@@ -157,3 +158,30 @@ def test_a_library_that_is_not_installed_is_named(
     for use in (read_scan, lambda path: write_scan(path, Scan(np.ones((1, 3), np.float32)))):
         with pytest.raises(InputError, match=missing):
             use(path)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_further_column_becomes_an_extra_dimension(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"scan{suffix}"
+    las = write(path, STREET)
+    scan = read_scan(path)
+    column = np.array([0, 0.25, 0.5, 1], np.float32)
+    write_scan(tmp_path / f"more{suffix}", with_column(scan, "rain_probability", column))
+    more = laspy.read(tmp_path / f"more{suffix}")
+    np.testing.assert_array_equal(more.rain_probability, column)
+    for name in las.points.array.dtype.names:
+        np.testing.assert_array_equal(more.points.array[name], las.points.array[name])
+    assert [record.record_data for record in more.vlrs.get_by_id("derain", (7,))] == [b"kept"]
+    # The scan is as it was, and so is what is written of it.
+    write_scan(tmp_path / f"copy{suffix}", scan)
+    assert (tmp_path / f"copy{suffix}").read_bytes() == path.read_bytes()
+
+
+def test_what_no_extra_dimension_can_hold_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scan.las"
+    write(path, STREET)
+    scan = read_scan(path)
+    for name, column in (("word", np.array(["a"] * 4)), ("n" * 33, np.zeros(4))):
+        with pytest.raises(InputError, match="no extra dimension can hold the column"):
+            write_scan(tmp_path / "copy.las", with_column(scan, name, column))
+    assert not (tmp_path / "copy.las").exists()

@@ -5,8 +5,9 @@ Source: ASPRS, "LAS Specification", version 1.4 R15.
 
 import io
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -22,6 +23,7 @@ from derain.files.format import FORMATS, Format
 from derain.files.formats.las.laz_chunks import check_chunks
 from derain.files.names import scan_suffix
 from derain.files.reading import reading
+from derain.files.text import encode
 from derain.scan import LARGEST_COORDINATE, Scan
 from derain.system.extras import LASPY
 
@@ -33,6 +35,10 @@ _RECORD, _EXTENDED_RECORD = 54, 60
 
 # Beyond this from the file's offset, float32 would lose more than a few millimetres.
 _FAR = 1e5
+
+# Types of extra dimensions, in NumPy's spelling, and bytes of their names.
+EXTRA_TYPES = ("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8")
+LONGEST_NAME = 32
 
 # No survey is finer than this, in metres.
 _FINEST_SCALE = 1e-12
@@ -89,18 +95,24 @@ class Las(Format):
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as the points of the LAS file that it came from.
 
+        Columns of numbers that the file did not have become extra dimensions.
+
         Raises:
-            InputError: A scan of another format, columns that its points have no place for, or
-                coordinates beyond its reach; laspy is not installed.
+            InputError: A scan of another format, or without a column that its points need; a column
+                that is no extra dimension, or coordinates beyond its reach; laspy is not installed.
         """
         laspy = LASPY.load(path)
         columns = columns_of(scan)
         if not isinstance(scan.header, LasHeader):
             raise _refused(path)
         header, origin = scan.header.header, scan.header.origin
+        stored = {
+            name.lower() if name in ("X", "Y", "Z") else name for name in _stored_names(header)
+        }
+        further = {name: column for name, column in columns.items() if name not in stored}
+        header = _with_dimensions(laspy, path, header, further)
         points = laspy.ScaleAwarePointRecord.zeros(len(scan), header=header)
-        stored = points.array.dtype.names
-        if columns.keys() != {name.lower() if name in ("X", "Y", "Z") else name for name in stored}:
+        if not columns.keys() >= stored:
             raise _refused(path)
         for name, column in columns.items():
             if name in ("x", "y", "z"):
@@ -124,6 +136,31 @@ def _panics_as_errors() -> Iterator[None]:
         if type(error).__name__ != "PanicException":
             raise
         raise ValueError(str(error)) from error
+
+
+def _stored_names(header: Any) -> tuple[str, ...]:
+    """Names of what the points of a file store."""
+    names: tuple[str, ...] = header.point_format.dtype().names
+    return names
+
+
+def _with_dimensions(
+    laspy: ModuleType, path: Path, header: Any, columns: Mapping[str, NDArray[Any]]
+) -> Any:
+    """The header with a place for further columns; itself where there are none."""
+    if not columns:
+        return header
+    header = deepcopy(header)
+    for name, column in columns.items():
+        known = column.ndim == 1 and column.dtype.str[1:] in EXTRA_TYPES
+        if not known or len(encode(name)) > LONGEST_NAME:
+            raise InputError(
+                path,
+                f"no extra dimension can hold the column '{name}' ({column.dtype})",
+                "Write .npz.",
+            )
+        header.add_extra_dim(laspy.ExtraBytesParams(name, column.dtype))
+    return header
 
 
 def _refused(path: Path) -> InputError:

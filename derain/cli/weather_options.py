@@ -1,0 +1,189 @@
+"""Arguments of the weather that a recording shows, and what is told of it scan by scan."""
+
+import argparse
+import csv
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.cli.arguments import count
+from derain.errors import InputError
+from derain.files.atomic import replacing
+from derain.sources.file_frame import FileFrame
+from derain.sources.frame import Frame
+from derain.sources.source import Source
+from derain.weather.alarm import ERROR, HOLD, WARNING, Alarm, Threshold
+from derain.weather.rays import RAY_SECTORS
+from derain.weather.scan_weather import RANGE_BANDS, ScanWeather
+
+# Digits of shares: rays are a hundred thousand at most.
+SHARE_DIGITS = 5
+
+SECTOR_TITLES = [f"share_at_{360 // RAY_SECTORS * sector}_deg" for sector in range(RAY_SECTORS)]
+BAND_TITLES = [f"share_from_{band}_m" for band in RANGE_BANDS]
+TITLES = [
+    *("scan", "time_s", "rays", "met_rain", "visibility_m", "visibility_over_m", "level"),
+    *SECTOR_TITLES,
+    *BAND_TITLES,
+]
+
+
+@dataclass(frozen=True)
+class ToldWeather:
+    """What is told of the weather of one scan; None stands for what is not known.
+
+    Attributes:
+        rays: Its rays.
+        met_rain: Those of them that met rain.
+        visibility_m: The range that 90 % of them would get through, metres; None where it is
+            farther than the scan can tell.
+        visibility_over_m: What it then is at least.
+        level: clear, warning or error, after the scans so far.
+        shares: Share of rain in the rays that end in each sector of 30 degrees (the first ahead,
+            then towards the left) and from 0, 5, 10, 20, 40 and 80 m on.
+    """
+
+    rays: int
+    met_rain: int
+    visibility_m: float | None
+    visibility_over_m: float | None
+    level: str
+    shares: list[list[float | None]]
+
+    def __str__(self) -> str:
+        if self.visibility_over_m is not None:
+            return f"visibility over {self.visibility_over_m:,.0f} m ({self.level})"
+        known = "not known" if self.visibility_m is None else f"{self.visibility_m:,.1f} m"
+        return f"visibility {known} ({self.level})"
+
+    @classmethod
+    def of(cls, weather: ScanWeather, level: str) -> Self:
+        """What is told of the weather of a scan, and of the level after it."""
+        seen = weather.visibility
+        metres = None if seen.metres is None else round(seen.metres, 2)
+        over = round(seen.at_least, 2) if seen.known and metres is None else None
+        shares = [_known(row) for row in weather.shares]
+        return cls(weather.rays, weather.met_rain, metres, over, level, shares)
+
+
+class WeatherWatch:
+    """Says how bad the weather is, scan after scan.
+
+    Args:
+        arguments: Of the command.
+        source: What is read.
+
+    Raises:
+        InputError: Levels that cannot be, or a table that would overwrite a scan.
+    """
+
+    def __init__(self, arguments: argparse.Namespace, source: Source) -> None:
+        self._levels = Threshold(*arguments.warning), Threshold(*arguments.error), arguments.hold
+        self._alarm = Alarm(*self._levels)
+        self._sequence: str | None = None
+        self._table = _WeatherTable(arguments.weather)
+        if arguments.weather is not None:
+            _refuse_scan(arguments.weather, source)
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Writes the table, if one is asked for; it is there when the block ends well."""
+        with self._table.open():
+            yield
+
+    def look(self, frame: Frame, weather: ScanWeather) -> ToldWeather:
+        """Takes the weather of the next scan.
+
+        Args:
+            frame: The scan; of another sequence than the one before, its levels start anew.
+            weather: What it shows.
+        """
+        if frame.sequence != self._sequence:
+            self._sequence, self._alarm = frame.sequence, Alarm(*self._levels)
+        told = ToldWeather.of(weather, str(self._alarm.update(weather.visibility)))
+        self._table.add(frame, told, weather)
+        return told
+
+
+class _WeatherTable:
+    """A table of the weather, a line a scan.
+
+    Args:
+        path: The file; None where nobody asks for it.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        self._add: Callable[[list[object]], object] | None = None
+
+    @contextmanager
+    def open(self) -> Iterator[None]:
+        if self.path is None:
+            yield
+            return
+        with (
+            replacing(self.path) as temporary,
+            temporary.open("w", encoding="utf-8", newline="") as file,
+        ):
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(TITLES)
+            self._add = writer.writerow
+            yield
+
+    def add(self, frame: Frame, told: ToldWeather, weather: ScanWeather) -> None:
+        if self._add is None:
+            return
+        of_all = (told.rays, told.met_rain, told.visibility_m, told.visibility_over_m, told.level)
+        shares = _known(weather.shares_by_sector) + _known(weather.shares_by_range)
+        self._add([frame.name, _time(frame), *of_all, *shares])
+
+
+def add_weather(parser: argparse.ArgumentParser) -> None:
+    """Declares the table of the weather, and the levels of its visibility."""
+    group = parser.add_argument_group("weather")
+    group.add_argument(
+        "--weather", type=Path, metavar="CSV", help="write a table of the weather, a line a scan"
+    )
+    for name, level in (("warning", WARNING), ("error", ERROR)):
+        group.add_argument(
+            f"--{name}",
+            nargs=2,
+            type=float,
+            metavar=("BELOW", "ABOVE"),
+            default=(level.below, level.above),
+            help=f"level of visibility: from below so many metres to so many or more (default: "
+            f"{level.below:g} {level.above:g})",
+        )
+    group.add_argument(
+        "--hold",
+        type=count,
+        default=HOLD,
+        metavar="SCANS",
+        help="scans in a row that have to agree before the level changes (default: %(default)s)",
+    )
+
+
+def _refuse_scan(table: Path, source: Source) -> None:
+    """Refuses a table that would take the place of a scan."""
+    target = table.resolve()
+    for frame in source:
+        if isinstance(frame, FileFrame) and frame.path.resolve() == target:
+            raise InputError(table, "it is one of the scans", "Give --weather another file.")
+
+
+def _known(shares: NDArray[np.float64]) -> list[float | None]:
+    """Shares of one row, None where they are not known."""
+    return [None if np.isnan(share) else round(float(share), SHARE_DIGITS) for share in shares]
+
+
+def _time(frame: Frame) -> float | None:
+    """When a scan was taken; None where nobody says so, or where the record of it is damaged."""
+    try:
+        return frame.time
+    except InputError:
+        return None

@@ -1,0 +1,155 @@
+"""Levels of visibility, and an alarm that does not change its mind at every scan."""
+
+import math
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Any, Self
+
+from derain.errors import InputError
+from derain.weather.visibility import Visibility
+
+
+class Level(IntEnum):
+    """How bad the visibility is, in the numbers of ROS's diagnostics: OK, WARN and ERROR."""
+
+    CLEAR = 0
+    WARNING = 1
+    ERROR = 2
+
+    def __str__(self) -> str:
+        return self.name.lower()
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """Where a level begins, and where it ends.
+
+    Example:
+        >>> alarm = Alarm(warning=Threshold(below=50, above=60), error=Threshold(10, 12), hold=3)
+        >>> str(alarm.update(Visibility(45.0, 45.0, 10.0, 0.98)))  # the first scan decides alone
+        'warning'
+
+    Attributes:
+        below: The level begins where visibility is below this, metres.
+        above: It ends where visibility is this or more, metres.
+
+    Raises:
+        InputError: Numbers that are not finite, or do not rise from 0.
+    """
+
+    below: float
+    above: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.below < self.above < math.inf:
+            raise InputError(
+                "alarm",
+                f"a level from below {self.below:g} m to {self.above:g} m or more",
+                "Give two numbers of metres, the second one greater than the first, e.g. 30 40.",
+            )
+
+
+# What a car needs to stop from 50 and from 30 km/h: 28 and 13 m, by one second of reaction and
+# 7 m/s² on a wet road, v + v² / 14, rounded up. The gaps are a third of them.
+# Source: one second is the usual assumption of driving schools; 7 m/s² is what good tyres reach.
+WARNING = Threshold(30.0, 40.0)
+ERROR = Threshold(15.0, 20.0)
+
+# So many scans in a row have to agree: half a second of most sensors.
+HOLD = 5
+
+
+@dataclass(frozen=True)
+class Latch:
+    """One level, on or off: a state that is replaced by the one after it.
+
+    Attributes:
+        threshold: Where it begins, and where it ends.
+        hold: So many scans in a row change it.
+        on: Whether it is on.
+        against: How many of the last scans in a row speak for a change.
+    """
+
+    threshold: Threshold
+    hold: int
+    on: bool = False
+    against: int = 0
+
+    @classmethod
+    def first(cls, threshold: Threshold, hold: int) -> Self:
+        """The state before any scan, which the first one alone can change."""
+        return cls(threshold, hold, against=hold - 1)
+
+    def after(self, visibility: Visibility) -> Self:
+        """The state after a scan.
+
+        A scan that leaves open on which side its visibility lies is passed over, as is one of which
+        nothing is known: what changes the level is counted on with the scan after it.
+        """
+        least = visibility.at_least
+        most = math.inf if visibility.metres is None else visibility.metres
+        if self.on:
+            for_change, for_stay = least >= self.threshold.above, most < self.threshold.above
+        else:
+            for_change, for_stay = most < self.threshold.below, least >= self.threshold.below
+        if for_stay:
+            return replace(self, against=0)
+        if not for_change:
+            return self
+        if self.against + 1 < self.hold:
+            return replace(self, against=self.against + 1)
+        return replace(self, on=not self.on, against=0)
+
+
+class Alarm:
+    """Takes the visibility of scan after scan, and says at which level it is.
+
+    A level is entered after several scans in a row below its lower threshold, and left after as
+    many at its upper one or above; in between it stays as it is. The first scan of which anything
+    is known decides alone, for there is nothing to stay at.
+
+    Example:
+        >>> alarm = Alarm(hold=2)
+        >>> far, near = (Visibility(metres, metres, 10.0, 0.9) for metres in (100.0, 12.0))
+        >>> [str(alarm.update(each)) for each in (far, near, near, far, near, far, far)]
+        ['clear', 'clear', 'error', 'error', 'error', 'error', 'clear']
+
+    Args:
+        warning: Where the warning begins and ends.
+        error: Where the error does.
+        hold: How many scans in a row have to agree before the level changes; 1 changes at once.
+
+    Raises:
+        InputError: An error that does not begin and end below the warning, or no whole number of
+            scans.
+    """
+
+    def __init__(
+        self, warning: Threshold = WARNING, error: Threshold = ERROR, hold: int = HOLD
+    ) -> None:
+        given: Any = hold  # whatever a user gave
+        if not (isinstance(given, int) and not isinstance(given, bool) and given >= 1):
+            raise InputError("alarm", f"hold is {given}", "Give a whole number of 1 or more.")
+        if not (error.below < warning.below and error.above < warning.above):
+            raise InputError(
+                "alarm",
+                f"the error (below {error.below:g}, {error.above:g} m) does not lie below the "
+                f"warning (below {warning.below:g}, {warning.above:g} m)",
+                "Give it smaller numbers.",
+            )
+        self._latches = (Latch.first(warning, hold), Latch.first(error, hold))
+
+    @property
+    def level(self) -> Level:
+        """The level after the scans so far; clear before the first."""
+        return Level(sum(latch.on for latch in self._latches))
+
+    def update(self, visibility: Visibility) -> Level:
+        """Takes the visibility of the next scan.
+
+        Returns:
+            The level after it.
+        """
+        warning, error = self._latches
+        self._latches = (warning.after(visibility), error.after(visibility))
+        return self.level

@@ -1,0 +1,136 @@
+"""The weather that a scan shows: where its rays meet rain."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.scan import Scan
+from derain.weather.rays import BIN, RANGE_BINS, RAY_SECTORS, ray_ends
+from derain.weather.visibility import Visibility, visibility_of
+
+# Where the bands of range begin, metres: each is twice as deep as the one before, for the farther,
+# the less rain is seen. The last one has no end.
+RANGE_BANDS = (0, 5, 10, 20, 40, 80)
+
+
+@dataclass(frozen=True, eq=False)
+class ScanWeather:
+    """Numbers of rays of a scan, or of several, by where they end and at what.
+
+    Example:
+        >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)  # x, y, z, intensity
+        >>> weather = ScanWeather.of(points, derain.FilterDerainer(derain.DROR())(points))
+        >>> weather.rays, weather.met_rain, str(weather.visibility)
+        (820, 20, '42.7 m')
+
+    Attributes:
+        ends: int64 (2, RAY_SECTORS, RANGE_BINS): rays that end at something else, and rays that
+        end at rain;
+            by sector of azimuth and by bin of range (:mod:`derain.weather.rays`).
+    """
+
+    ends: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, points: Scan | NDArray[Any], rain: NDArray[np.bool_]) -> Self:
+        """What a scan shows.
+
+        Args:
+            points: A Scan, or (N, ≥ 3) numbers: x, y, z in metres, in the frame of the sensor.
+            rain: What is rain of it by labels or by any method, bool (N,).
+
+        Raises:
+            InputError: Points of another shape, or not one answer for each.
+        """
+        scan, rain = Scan.of(points), np.asarray(rain)
+        if rain.shape != (len(scan),) or rain.dtype != np.bool_:
+            raise InputError(
+                "rain",
+                f"it is {rain.dtype} of shape {rain.shape} for {len(scan):,} points",
+                "Give one truth value for each point.",
+            )
+        return cls(ray_ends(scan, rain))
+
+    @classmethod
+    def none(cls) -> Self:
+        """That of no scan, to which others can be added."""
+        return cls(np.zeros((2, RAY_SECTORS, RANGE_BINS), np.int64))
+
+    def __add__(self, other: "ScanWeather") -> "ScanWeather":
+        """Both together, as if of one scan."""
+        return ScanWeather(self.ends + other.ends)
+
+    @property
+    def rays(self) -> int:
+        """Number of rays that came back."""
+        return int(self.ends.sum())
+
+    @property
+    def met_rain(self) -> int:
+        """Number of them that met rain."""
+        return int(self.ends[1].sum())
+
+    @cached_property  # by sector, by range and together, what is shown is made of it
+    def banded(self) -> NDArray[np.int64]:
+        """The same numbers by bands of range, int64 (2, RAY_SECTORS, len(RANGE_BANDS))."""
+        first_bins = [int(band / BIN) for band in RANGE_BANDS]
+        return np.add.reduceat(self.ends, first_bins, axis=2)
+
+    @property
+    def shares(self) -> NDArray[np.float64]:
+        """Share of rain in the rays that end in a sector and band.
+
+        It is float64 (RAY_SECTORS, len(RANGE_BANDS)).
+
+        NaN where none does: what is there is not known.
+        """
+        return _shares(self.banded)
+
+    @property
+    def shares_by_sector(self) -> NDArray[np.float64]:
+        """Share of the rays of each sector that met rain.
+
+        It is float64 (RAY_SECTORS,); NaN without any.
+        """
+        return _shares(self.ends.sum(axis=2))
+
+    @property
+    def shares_by_range(self) -> NDArray[np.float64]:
+        """Share of rain in the rays that end in each band.
+
+        It is float64 (len(RANGE_BANDS),); NaN likewise.
+        """
+        return _shares(self.banded.sum(axis=1))
+
+    @cached_property
+    def visibility(self) -> Visibility:
+        """The range that 90 % of the rays get through without meeting rain."""
+        return visibility_of(*self.ends.sum(axis=1))
+
+    def visibility_in(self, *sectors: int) -> Visibility:
+        """That of some sectors alone, such as of what is ahead.
+
+        Args:
+            sectors: Their numbers: 0 is ahead, 3 left, 6 behind, 9 right.
+
+        Raises:
+            InputError: No sector has such a number.
+        """
+        odd = [number for number in sectors if not 0 <= number < RAY_SECTORS]
+        if odd or not sectors:
+            raise InputError(
+                "sectors", f"{odd or 'none'}", f"Give numbers from 0 to {RAY_SECTORS - 1}."
+            )
+        return visibility_of(*self.ends[:, list(sectors)].sum(axis=1))
+
+
+def _shares(ends: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Share of rain in numbers (2, ...), float64 (...); NaN where there are none."""
+    total = ends.sum(axis=0)
+    shares: NDArray[np.float64] = np.full(total.shape, np.nan)
+    np.divide(ends[1], total, out=shares, where=total > 0)
+    return shares

@@ -1,0 +1,133 @@
+"""The alarm holds its level against noise, never falls for worse, and starts by what it sees."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from derain.errors import InputError
+from derain.weather.alarm import Alarm, Level, Threshold
+from derain.weather.visibility import Visibility
+
+UNKNOWN = Visibility(None, 0.0, 0.0, 1.0)
+
+
+def seen(metres: float) -> Visibility:
+    return Visibility(metres, metres, 10.0, 0.95)
+
+
+def over(metres: float) -> Visibility:
+    return Visibility(None, metres, 10.0, 1.0)
+
+
+def levels(alarm: Alarm, *visibilities: Visibility) -> list[Level]:
+    return [alarm.update(each) for each in visibilities]
+
+
+ranges = st.lists(st.floats(0, 80), max_size=40)
+holds = st.integers(1, 6)
+
+
+@given(
+    st.sampled_from([(30.0, 40.0), (15.0, 20.0)]),
+    st.lists(st.floats(0, 1, exclude_max=True), min_size=1, max_size=60),
+    st.floats(1, 70),
+    holds,
+)
+def test_noise_smaller_than_the_gap_changes_a_level_once_at_most(
+    gap: tuple[float, float], noise: list[float], lowest: float, hold: int
+) -> None:
+    below, above = gap
+    never = Threshold(1e-9, 2e-9)
+    alarm = Alarm(Threshold(below, above), never, hold)
+    told = levels(alarm, *(seen(lowest + (above - below) * each) for each in noise))
+    changes = [one != other for one, other in pairwise(told)]
+    assert sum(changes) <= 1
+
+
+@given(st.lists(st.tuples(st.floats(0, 80), st.floats(0, 80)), max_size=60), holds)
+def test_worse_visibility_never_has_a_lower_level(
+    pairs: list[tuple[float, float]], hold: int
+) -> None:
+    worse = levels(Alarm(hold=hold), *(seen(min(pair)) for pair in pairs))
+    better = levels(Alarm(hold=hold), *(seen(max(pair)) for pair in pairs))
+    assert all(one >= other for one, other in zip(worse, better, strict=True))
+
+
+@given(ranges, st.lists(st.booleans(), min_size=40, max_size=40), holds)
+def test_scans_of_which_nothing_is_known_change_nothing(
+    metres: list[float], gaps: list[bool], hold: int
+) -> None:
+    without = levels(Alarm(hold=hold), *map(seen, metres))
+    alarm, told = Alarm(hold=hold), []
+    for each, gap in zip(metres, gaps, strict=False):
+        if gap:
+            before = alarm.level
+            assert alarm.update(UNKNOWN) == before
+        told.append(alarm.update(seen(each)))
+    assert told == without
+
+
+@given(ranges, st.floats(0, 80), holds)
+def test_what_stays_long_enough_decides_whatever_was_before(
+    metres: list[float], last: float, hold: int
+) -> None:
+    if 15 <= last < 20 or 30 <= last < 40:  # it may stay as it was
+        return
+    alarm = Alarm(hold=hold)
+    told = levels(alarm, *map(seen, metres), *[seen(last)] * hold)
+    assert told[-1] == (last < 15) + (last < 30)
+
+
+def test_a_level_waits_for_so_many_scans_in_a_row() -> None:
+    alarm = Alarm(hold=3)
+    far, near = seen(100), seen(25)
+    told = levels(alarm, far, near, near, far, near, near, near, far, far, near, far, far, far)
+    assert [int(level) for level in told] == [0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 0]
+
+
+def test_between_the_thresholds_it_stays_as_it_is() -> None:
+    for first, level in ((50.0, Level.CLEAR), (25.0, Level.WARNING)):
+        assert set(levels(Alarm(hold=1), seen(first), *map(seen, (35, 30, 39.9)))) == {level}
+
+
+def test_the_first_scan_decides_alone() -> None:
+    assert Alarm().level == Level.CLEAR
+    assert levels(Alarm(hold=5), UNKNOWN, seen(5), seen(5)) == [0, 2, 2]
+    assert levels(Alarm(hold=5), seen(22), seen(5)) == [1, 1]
+    assert levels(Alarm(hold=5), seen(500), seen(5)) == [0, 0]
+
+
+def test_farther_than_a_scan_can_tell_is_as_far_as_it_tells() -> None:
+    alarm = Alarm(hold=1)
+    assert alarm.update(seen(25)) == Level.WARNING
+    # It may be 36 m or any more: whether the warning is over is open.
+    assert alarm.update(over(36)) == Level.WARNING
+    assert alarm.update(over(40)) == Level.CLEAR
+    assert alarm.update(over(20)) == Level.CLEAR
+
+
+def test_levels_are_named() -> None:
+    assert [str(level) for level in Level] == ["clear", "warning", "error"]
+
+
+@pytest.mark.parametrize(
+    ("below", "above"), [(0, 5), (-1, 5), (5, 5), (6, 5), (5, math.inf), (math.nan, 5)]
+)
+def test_thresholds_rise(below: float, above: float) -> None:
+    with pytest.raises(InputError, match="Give two numbers of metres"):
+        Threshold(below, above)
+
+
+def test_an_error_lies_below_the_warning() -> None:
+    for error in (Threshold(30, 35), Threshold(20, 40), Threshold(50, 60)):
+        with pytest.raises(InputError, match="does not lie below the warning"):
+            Alarm(error=error)
+
+
+@pytest.mark.parametrize("hold", [0, -1, 1.5, True])
+def test_scans_to_hold_are_a_whole_number(hold: int) -> None:
+    with pytest.raises(InputError, match=r"hold is .* Give a whole number of 1 or more"):
+        Alarm(hold=hold)

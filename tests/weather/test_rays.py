@@ -1,0 +1,127 @@
+"""Rays are counted once, where they first meet rain or else end, in any order of the rows."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from derain.evaluation.hard_cases import hard_cases
+from derain.evaluation.ray_counts import RayCounts
+from derain.files import read_scan
+from derain.files.labels import read_labels
+from derain.scan import Scan
+from derain.views.returns import pair_returns
+from derain.weather.rays import BIN, RANGE_BINS, RAY_SECTORS, ray_ends
+
+# A return: number of its ray, range in metres, and whether it is rain.
+Return = tuple[int, float, bool]
+
+# Rays go to the middle of cells a degree apart, so that no rounding takes one to another.
+returns_of_rays = st.lists(
+    st.tuples(st.integers(0, 40), st.floats(0.5, 120), st.booleans()), max_size=120
+)
+
+
+def azimuth_of(ray: int) -> float:
+    return 9.0 * ray + 0.005 - 180
+
+
+def scan_of(returns: list[Return]) -> tuple[Scan, NDArray[np.bool_]]:
+    """The scan of some returns, and what is rain of it."""
+    azimuth = np.radians([azimuth_of(ray) for ray, _, _ in returns])
+    inclination = np.radians([ray % 7 + 0.005 for ray, _, _ in returns])
+    reach = np.array([reach for _, reach, _ in returns])
+    across = np.cos(inclination)
+    directions = np.stack(
+        [across * np.cos(azimuth), across * np.sin(azimuth), np.sin(inclination)], axis=1
+    )
+    points = (directions * reach[:, None]).reshape(-1, 3).astype(np.float32)
+    return Scan(points), np.array([rain for _, _, rain in returns], bool)
+
+
+def counted_one_by_one(returns: list[Return]) -> NDArray[np.int64]:
+    """The same by going from ray to ray."""
+    counts = np.zeros((2, RAY_SECTORS, RANGE_BINS), np.int64)
+    for ray in {ray for ray, _, _ in returns}:
+        own = [(reach, rain) for number, reach, rain in returns if number == ray]
+        drops = [reach for reach, rain in own if rain]
+        end = min(drops) if drops else max(reach for reach, _ in own)
+        sector = round(azimuth_of(ray) % 360 / 30) % RAY_SECTORS
+        counts[int(bool(drops)), sector, min(int(np.float32(end) / BIN), RANGE_BINS - 1)] += 1
+    return counts
+
+
+@settings(max_examples=200)
+@given(returns_of_rays)
+def test_a_ray_ends_at_its_first_drop_or_else_where_it_was_seen_last(returns: list[Return]) -> None:
+    # Of bins, where float32 is next to the border of one, either may be right.
+    returns = [each for each in returns if 0.01 < each[1] % BIN < BIN - 0.01]
+    np.testing.assert_array_equal(ray_ends(*scan_of(returns)), counted_one_by_one(returns))
+
+
+@given(returns_of_rays, st.randoms(use_true_random=False))
+def test_the_order_of_the_rows_does_not_matter(returns: list[Return], random: object) -> None:
+    scan, rain = scan_of(returns)
+    order = np.array(random.sample(range(len(returns)), len(returns)), int)  # type: ignore[attr-defined]
+    np.testing.assert_array_equal(ray_ends(scan.take(order), rain[order]), ray_ends(scan, rain))
+
+
+@given(returns_of_rays)
+def test_returns_that_are_written_twice_count_once(returns: list[Return]) -> None:
+    scan, rain = scan_of(returns)
+    twice = np.repeat(np.arange(len(returns)), 2)
+    np.testing.assert_array_equal(ray_ends(scan.take(twice), rain[twice]), ray_ends(scan, rain))
+
+
+def test_a_drop_in_front_of_a_wall_ends_its_ray_and_the_wall_is_not_counted() -> None:
+    ends = ray_ends(*scan_of([(20, 3.2, True), (20, 25.0, False), (21, 25.0, False)]))
+    assert ends.sum() == 2
+    assert np.argwhere(ends).tolist() == [[0, 0, 50], [1, 0, 6]]
+
+
+def test_the_first_sector_is_ahead_and_the_next_ones_go_to_the_left() -> None:
+    degrees = np.radians([0, 14.9, -14.9, 15.1, 90, 179, -179, -90, -15.1])
+    points = np.stack([np.cos(degrees), np.sin(degrees), 0 * degrees], axis=1).astype(np.float32)
+    sectors = [
+        int(np.argwhere(ray_ends(Scan(point[None]), np.zeros(1, bool)))[0, 1]) for point in points
+    ]
+    assert sectors == [0, 0, 0, 1, 3, 6, 6, 9, 11]
+
+
+def test_straight_behind_is_one_direction_whatever_sign_zero_has() -> None:
+    points = np.array([[-5, 0.0, 1], [-10, -0.0, 2]], np.float32)
+    assert ray_ends(Scan(points), np.zeros(2, bool)).sum() == 1
+
+
+def test_what_cannot_be_judged_and_what_a_radar_saw_is_of_no_ray() -> None:
+    points = np.array([[5, 0, 0], [np.nan, 1, 1], [0, 0, 0], [-1, -1, -1], [0, 7, 0]], np.float32)
+    scan = Scan(points, radar=np.array([False] * 4 + [True]))
+    ends = ray_ends(scan, np.array([False, True, True, True, True]))
+    assert np.argwhere(ends).tolist() == [[0, 0, 10]]
+
+
+def test_every_hard_case_is_counted() -> None:
+    for name, scan in hard_cases():
+        rain = np.arange(len(scan)) % 3 == 0
+        ends = ray_ends(scan, rain)
+        assert 0 <= ends.sum() <= scan.valid.sum(), name
+        assert (ends.sum() > 0) == scan.valid.any(), name
+
+
+def test_of_real_scans_as_many_rays_are_told_as_by_their_pairs_of_returns(shared: Path) -> None:
+    # One of single returns, without its copies; one of two returns as the sensor wrote it.
+    for scan_file, label_file in (
+        ("clean/kitti_front.bin", None),
+        ("wads/drive/velodyne/042223.bin", "wads/drive/labels/042223.label"),
+    ):
+        scan = read_scan(shared / "data" / scan_file)
+        rain = np.zeros(len(scan), bool)
+        if label_file is not None:
+            rain = read_labels(shared / "data" / label_file, len(scan)) == 110
+        of_pairs = RayCounts.of(scan, pair_returns(scan), rain)
+        other, met = ray_ends(scan, rain).sum(axis=(1, 2))
+        assert other + met == pytest.approx(of_pairs.rays, rel=0.005)
+        assert met == pytest.approx(of_pairs.met_rain, rel=0.01)
