@@ -16,6 +16,7 @@ class Taught(TaughtData, ScanDataModule):
     that are tested and predicted, too.
 
     Example:
+        >>> from pathlib import Path
         >>> from derain.filters import DROR, FilterDerainer
         >>> from derain.sources.folders import named_frames
         >>> from derain.teaching.teach import teach
