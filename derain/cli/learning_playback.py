@@ -14,7 +14,7 @@ from derain.sources.spread import evenly_spaced
 # Of a long recording so many scans are shown, spread over all of it.
 MOST_SHOWN = 100
 
-STUDENT = "student"
+STUDENT_TITLE = "student"
 
 
 def show_lesson(report: LearningReport, out: Path) -> None:
@@ -32,7 +32,7 @@ def show_lesson(report: LearningReport, out: Path) -> None:
     held_out = frozenset(frame.key for frame in report.held_out)
     selection = Selection(Frames(frames), shown, held_out)
     student = Derainer(report.lesson.out)
-    write_told(out, selection, {STUDENT: student}, Labels(report.data.card, "teacher"))
+    write_told(out, selection, {STUDENT_TITLE: student}, Labels(report.data.card, "teacher"))
 
 
 def _in_time(frame: Frame) -> tuple[str, int]:

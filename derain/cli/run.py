@@ -12,14 +12,14 @@ from derain.cli.method_options import add_parameters, method_of
 from derain.cli.method_or_scans import RULE, add_method_and_scans, method_and_scans
 from derain.cli.outputs import folder_sink, say, tell
 from derain.cli.pose_options import add_poses, placed
-from derain.cli.probability_column import RAIN_PROBABILITY, refuse_improbable, with_probability
+from derain.cli.probability_column import refuse_improbable, with_probability
 from derain.cli.runtime_options import add_runtime
 from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.cli.weather_options import ToldWeather, WeatherWatch, add_weather
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError, printable
-from derain.sources.cleaned_bags import CleanedBags
+from derain.sources.cleaned_bags import RAIN_PROBABILITY, CleanedBags
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement

@@ -13,7 +13,7 @@ from derain.errors import InputError
 from derain.evaluation.counts import Counts, intersection_over_union, ratio
 
 # Thresholds from 0 to 1 in equal steps, as TensorBoard's curves have them: no more than 127.
-EVEN = np.linspace(0, 1, 101)
+CURVE_THRESHOLDS = np.linspace(0, 1, 101)
 
 # Near 0 and 1, where networks that are sure put most points, they lie closer.
 CLOSE = np.array([digit * 10.0**-power for power in (6, 5, 4, 3) for digit in (1, 2, 5)])
@@ -103,7 +103,7 @@ class ThresholdCounts(Metric):
     Counts add up across processes. As :meth:`points` gathers them, each process must call it.
 
     Args:
-        chosen: Thresholds that are wanted exactly, besides ``EVEN`` and ``CLOSE``.
+        chosen: Thresholds that are wanted exactly, besides ``CURVE_THRESHOLDS`` and ``CLOSE``.
 
     Raises:
         InputError: One that is not between 0 and 1.
@@ -118,7 +118,7 @@ class ThresholdCounts(Metric):
             raise InputError(
                 "threshold", f"{list(chosen)} is not within 0 and 1", "Give a probability."
             )
-        self.thresholds = np.unique([*EVEN, *CLOSE, *(1 - CLOSE), *chosen])
+        self.thresholds = np.unique([*CURVE_THRESHOLDS, *CLOSE, *(1 - CLOSE), *chosen])
         # Whether points are rain, and how many of the thresholds their probability exceeds.
         bins = torch.zeros(2, len(self.thresholds) + 1, dtype=torch.int64)
         self.add_state("bins", bins, dist_reduce_fx="sum")

@@ -8,8 +8,8 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from derain.evaluation.metrics import ClassCounts
 from derain.evaluation.operating_points import OperatingPoints
+from derain.evaluation.rain_counts import ClassCounts
 
 # Classes that a table has rows for; what is left of the others stands in one row.
 MOST_CLASSES = 14
@@ -19,10 +19,10 @@ DARKEST, LIGHTEST = 1.0, 1e-4
 
 # Of the cells: rain that is left, and others that are removed. As in the pictures of scans.
 LEFT = LinearSegmentedColormap.from_list("left", ["#fffdf3", "#ffd23f"])
-LOST = LinearSegmentedColormap.from_list("lost", ["#fff8f8", "#ff5d5d"])
+LOST_SHADES = LinearSegmentedColormap.from_list("lost", ["#fff8f8", "#ff5d5d"])
 
 PRECISION, RECALL, IOU = "#d98200", "#1f77b4", "#111827"
-FAINT = "#9ca3af"
+FAINT_TEXT = "#9ca3af"
 
 # IoU of the lines in the background of a precision-recall curve.
 LINES_OF_IOU = (0.2, 0.4, 0.6, 0.8, 0.9)
@@ -58,7 +58,7 @@ def errors_figure(
     figure.legend(
         handles=[
             Patch(color=LEFT(0.8), label="rain that is left"),
-            Patch(color=LOST(0.8), label="solid that is lost"),
+            Patch(color=LOST_SHADES(0.8), label="solid that is lost"),
         ],
         title="share of the class judged wrongly, and how many points that is",
         loc="outside lower center",
@@ -113,7 +113,7 @@ def _colour(cell: ClassCounts) -> tuple[float, ...]:
     if not cell.wrong:
         return (1.0, 1.0, 1.0, 1.0)
     depth = np.log(cell.share_wrong / LIGHTEST) / np.log(DARKEST / LIGHTEST)
-    return (LEFT if cell.rain else LOST)(float(np.clip(depth, 0, 1)))
+    return (LEFT if cell.rain else LOST_SHADES)(float(np.clip(depth, 0, 1)))
 
 
 def _text(cell: ClassCounts) -> str:
@@ -127,7 +127,7 @@ def _draw_curve(axes: Axes, points: OperatingPoints, chosen: int, best: int) -> 
         recall = np.linspace(iou, 1, 100)
         # From IoU = 1 / (1 / precision + 1 / recall - 1).
         axes.plot(recall, 1 / (1 / iou - 1 / recall + 1), color="#d1d5db", linewidth=1, zorder=0)
-        axes.text(1.005, iou, f" IoU {iou:g}", color=FAINT, fontsize=8, va="center")
+        axes.text(1.005, iou, f" IoU {iou:g}", color=FAINT_TEXT, fontsize=8, va="center")
     axes.plot(points.recall, points.precision, color=RECALL, linewidth=1.8, zorder=2)
     for number, name, face in ((best, "most IoU", "white"), (chosen, "chosen", IOU)):
         counts, threshold = points.counts(number), points.thresholds[number]

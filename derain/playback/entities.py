@@ -33,9 +33,9 @@ FRAME, TIME = "frame", "time"
 
 # Classes of points. The first shows nothing, in images of classes; those of OUTCOMES follow.
 NOTHING = 0
-KEPT = 1
-RAIN = len(OUTCOMES) + 1
-NOT_KNOWN = len(OUTCOMES) + 2
+CLASS_KEPT = 1
+CLASS_RAIN = len(OUTCOMES) + 1
+CLASS_NOT_KNOWN = len(OUTCOMES) + 2
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def classes() -> rerun.AnnotationContext:
             rerun.AnnotationInfo(NOTHING, "", (0, 0, 0, 0)),
             *(
                 rerun.AnnotationInfo(number, name, rgb(colour))
-                for number, (name, colour) in enumerate(coloured.items(), KEPT)
+                for number, (name, colour) in enumerate(coloured.items(), CLASS_KEPT)
             ),
         ]
     )
@@ -125,4 +125,4 @@ def class_of(outcome: NDArray[np.int64]) -> NDArray[np.uint16]:
     Args:
         outcome: Numbers of ``OUTCOMES``, int64 (N,).
     """
-    return (outcome + KEPT).astype(np.uint16)
+    return (outcome + CLASS_KEPT).astype(np.uint16)

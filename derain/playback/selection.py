@@ -97,7 +97,7 @@ class Selection:
         for frame, pose in zip(self.frames, poses, strict=True):
             if pose is None:
                 return {}
-            back = to_first.setdefault(frame.sequence, np.linalg.inv(pose))
+            back = to_first.setdefault(frame.sequence, np.linalg.inv(pose).astype(np.float64))
             placed[frame.key] = back @ pose
         return placed
 

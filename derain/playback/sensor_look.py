@@ -22,7 +22,7 @@ LOOKED_AT = 4
 GREYS = ("#404040", "#f0f0f0")
 
 # Where a scan has no intensities.
-EVEN = 0.35
+EVEN_GREY = 0.35
 
 # Bytes of a point: three coordinates in float32 with its class, and its shade; what Rerun's
 # compression makes of them. Where points stand twice in a scan, it becomes less.
@@ -87,7 +87,7 @@ class SensorLook:
     def colours(self, scan: Scan) -> NDArray[np.uint8]:
         """Shades of grey by intensity, uint8 (N, 3)."""
         if scan.intensity is None:
-            return shades(GREYS, np.full(len(scan), EVEN))
+            return shades(GREYS, np.full(len(scan), EVEN_GREY))
         with np.errstate(invalid="ignore"):
             brightness = np.nan_to_num(scan.intensity) / self.brightest
             return shades(GREYS, np.sqrt(np.clip(brightness, 0, 1)))
@@ -95,7 +95,8 @@ class SensorLook:
     def centimetres(self, seen: RangeImage) -> NDArray[np.uint16]:
         """The range of each pixel, uint16 (H, W), centimetres; 0 where nothing returned."""
         ranges = np.where(seen.valid, seen.nearest, 0) * PER_METRE
-        return np.clip(ranges, 0, np.iinfo(np.uint16).max).round().astype(np.uint16)
+        pixels: NDArray[np.uint16] = np.clip(ranges, 0, 65535).round().astype(np.uint16)
+        return pixels
 
 
 def _readable(frames: Sequence[Frame]) -> list[Scan]:

@@ -10,11 +10,11 @@ from derain.pictures.palette import PROBABILITY, outcomes, shades
 from derain.playback.caption import caption
 from derain.playback.entities import (
     CAPTION,
-    KEPT,
-    NOT_KNOWN,
+    CLASS_KEPT,
+    CLASS_NOT_KNOWN,
+    CLASS_RAIN,
     NOTHING,
     POINTS,
-    RAIN,
     RANGES,
     SCAN,
     SENSOR,
@@ -31,7 +31,7 @@ from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 
 # Points that are less probably rain are not written again as such: they are most of them.
-FAINT = 0.01
+LEAST_PROBABILITY = 0.01
 
 
 class PlaybackWriter:
@@ -102,12 +102,12 @@ class PlaybackWriter:
         for path, rows in ((stand_at.kept, scan.valid & ~rain), (stand_at.removed, rain)):
             self.file.log(path, rerun.Points3D(scan.xyz[rows], class_ids=classed[rows]))
         if not isinstance(method, FilterDerainer):  # which says yes or no
-            rows = judgement.probability >= FAINT
+            rows = judgement.probability >= LEAST_PROBABILITY
             colours = shades(PROBABILITY, judgement.probability[rows])
             self.file.log(stand_at.probability, rerun.Points3D(scan.xyz[rows], colors=colours))
         if self.look.view is not None:
             winner = self.look.view(scan).winner
-            coloured = np.append(np.where(classed == KEPT, NOTHING, classed), NOTHING)
+            coloured = np.append(np.where(classed == CLASS_KEPT, NOTHING, classed), NOTHING)
             image = coloured[winner].reshape(self.look.view.grid.rows, -1)
             self.file.log(stand_at.image, rerun.SegmentationImage(image.astype(np.uint8)))
         self._share(stand_at.share, rain, scan)
@@ -133,7 +133,7 @@ class PlaybackWriter:
                 self.file.log(path, rerun.Clear(recursive=True))
             return
         told = scan.valid & (found.rain | ~found.known)
-        classed = np.where(found.rain[told], RAIN, NOT_KNOWN).astype(np.uint16)
+        classed = np.where(found.rain[told], CLASS_RAIN, CLASS_NOT_KNOWN).astype(np.uint16)
         self.file.log(stand_at.points, rerun.Points3D(scan.xyz[told], class_ids=classed))
         self._share(stand_at.share, found.rain, scan)
         if labels.card.unknown:

@@ -10,7 +10,7 @@ from derain.models.callbacks.step_times import SPEED, STEP
 
 # Charts by question, each with regular expressions of the scalars in it. All lines of a run have
 # one colour, and only their marks tell them apart: what is to be compared stands in one chart.
-LAYOUT = {
+CHARTS = {
     "Is it learning?": {
         "loss in training": ["train/loss$"],
         "loss in validation": ["val/loss$"],
@@ -41,6 +41,6 @@ class Dashboard(lightning.Callback):
                 logger.experiment.add_custom_scalars(
                     {
                         question: {title: ["Multiline", tags] for title, tags in charts.items()}
-                        for question, charts in LAYOUT.items()
+                        for question, charts in CHARTS.items()
                     }
                 )

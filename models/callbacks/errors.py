@@ -8,7 +8,7 @@ from lightning.pytorch.loggers import TensorBoardLogger
 from numpy.typing import NDArray
 
 from derain.evaluation.metrics import RainMetrics
-from derain.evaluation.operating_points import EVEN, OperatingPoints
+from derain.evaluation.operating_points import CURVE_THRESHOLDS, OperatingPoints
 from derain.evaluation.rain_counts import band_names
 from derain.models.base import DerainingModule
 from derain.models.callbacks.drawn_epochs import DrawnEpochs
@@ -78,7 +78,9 @@ class ErrorPanels(lightning.Callback):
             if points.rain:
                 figure = operating_points_figure(points, model.spec.threshold, title)
                 writer.add_figure(f"{part}: threshold", figure, step)
-                writer.add_pr_curve_raw(f"{part}: rain", *_of_curve(points), step, len(EVEN))
+                writer.add_pr_curve_raw(
+                    f"{part}: rain", *_of_curve(points), step, len(CURVE_THRESHOLDS)
+                )
 
 
 def errors_by_name(metrics: RainMetrics) -> dict[str, float]:
@@ -102,7 +104,7 @@ def errors_by_name(metrics: RainMetrics) -> dict[str, float]:
 
 def _of_curve(points: OperatingPoints) -> tuple[NDArray[np.float64] | NDArray[np.int64], ...]:
     """What TensorBoard wants of a curve, at thresholds from 0 to 1 in equal steps."""
-    even = points.among(EVEN)
+    even = points.among(CURVE_THRESHOLDS)
     hits, false = even.true_positive, even.false_positive
     negatives, misses = points.other - false, points.rain - hits
     return hits, false, negatives, misses, even.precision, even.recall

@@ -13,7 +13,7 @@ from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import read_labels, write_labels
-from derain.playback.entities import KEPT, NOT_KNOWN, RAIN
+from derain.playback.entities import CLASS_KEPT, CLASS_NOT_KNOWN, CLASS_RAIN
 
 SCANS = 4
 
@@ -96,7 +96,7 @@ def test_truth_colours_what_methods_do(run_derain, recording: Path, tmp_path: Pa
     told = np.flatnonzero(scan.valid & (labels != 0))
     np.testing.assert_array_equal(found.points("/sensor/scan/truth")[0], scan.xyz[told])
     classed = found.values("/sensor/scan/truth", "Points3D:class_ids")
-    assert classed[0] == np.where(labels[told] == 110, RAIN, NOT_KNOWN).tolist()
+    assert classed[0] == np.where(labels[told] == 110, CLASS_RAIN, CLASS_NOT_KNOWN).tolist()
     assert found.numbers("/share/scan/truth")[0] == pytest.approx(100 * 30 / scan.valid.sum())
     assert found.numbers("/share/scan/truth_not_known")[0] == pytest.approx(100 * 99 / 299)
     # The scan without labels does not show those of the one before.
@@ -104,7 +104,7 @@ def test_truth_colours_what_methods_do(run_derain, recording: Path, tmp_path: Pa
     run_derain("run", "dror", recording, "--out", tmp_path / "dror")
     called = read_labels(tmp_path / "dror/000.label", 300) == 1
     rain = np.where(labels == 9, called, labels == 110)
-    outcome_of = np.select([rain & called, rain, called], [1, 2, 3], default=0) + KEPT
+    outcome_of = np.select([rain & called, rain, called], [1, 2, 3], default=0) + CLASS_KEPT
     kept = found.values("/sensor/methods/dror/kept", "Points3D:class_ids")[0]
     assert kept == outcome_of[scan.valid & ~called].tolist()
     removed = found.values("/sensor/methods/dror/removed", "Points3D:class_ids")[0]
@@ -211,7 +211,7 @@ def test_without_rerun_it_is_said_what_installs_it(
     monkeypatch.setitem(sys.modules, "rerun", None)
     outcome = run_derain("view", recording, "--rerun", tmp_path / "out.rrd")
     assert outcome.code == 2
-    assert "pip install 'derain[view]'." in outcome.err
+    assert "pip install 'derain[view]'" in outcome.err
     assert not (tmp_path / "out.rrd").exists()
 
 

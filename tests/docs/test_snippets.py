@@ -105,7 +105,7 @@ def test_what_is_not_run_has_a_reason_and_options_that_there_are(snippet: Snippe
     pytest.skip(f"not run: {snippet.not_run}")
 
 
-@pytest.mark.parametrize("page", PAGES[1:], ids=name_of)
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_commands_stand_in_fences(page: Path) -> None:
     """Indented, they would be run by nobody."""
     text = re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)

@@ -5,7 +5,7 @@ import pytest
 
 from derain.errors import InputError
 from derain.evaluation.counts import Counts
-from derain.evaluation.operating_points import EVEN, ThresholdCounts
+from derain.evaluation.operating_points import CURVE_THRESHOLDS, ThresholdCounts
 
 
 def drawn(seed: int, points: int = 500) -> tuple[np.ndarray, np.ndarray]:
@@ -13,7 +13,7 @@ def drawn(seed: int, points: int = 500) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     rain = rng.random(points) < 0.2
     probability = np.clip(rng.normal(np.where(rain, 0.9, 0.05), 0.3), 0, 1).astype(np.float32)
-    probability[::10] = rng.choice(EVEN, len(probability[::10]))
+    probability[::10] = rng.choice(CURVE_THRESHOLDS, len(probability[::10]))
     probability[5::50] = 1 - 1e-6
     return probability, rain
 
@@ -66,9 +66,9 @@ def test_a_perfect_and_a_useless_answer() -> None:
 
 def test_some_of_the_thresholds_alone_keep_their_counts() -> None:
     points = counted(drawn(4)).points()
-    even = points.among(EVEN)
-    np.testing.assert_array_equal(even.thresholds, EVEN)
-    for number, threshold in enumerate(EVEN):
+    even = points.among(CURVE_THRESHOLDS)
+    np.testing.assert_array_equal(even.thresholds, CURVE_THRESHOLDS)
+    for number, threshold in enumerate(CURVE_THRESHOLDS):
         assert even.counts(number) == points.counts(points.at(threshold))
 
 

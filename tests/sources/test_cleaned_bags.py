@@ -23,6 +23,7 @@ from benchmarks.recorded_bags import (
     read_bag,
 )
 from derain.bags.cloud_message import CDR, ROS1, CloudMessage
+from derain.export.runtime import Derainer
 from derain.files.labels import read_labels
 
 RUN = ("run", "ror", "--set", "radius=2", "--set", "neighbours=3")
@@ -76,11 +77,11 @@ def test_only_the_clouds_change_and_as_files_do(
         assert (now.head, now.cloud.fields) == (was.head, was.cloud.fields)
 
 
-def test_what_was_removed_and_its_probability_can_be_kept(
+def test_what_was_removed_can_be_kept(
     tmp_path: Path, storage: Storage, run_derain, rain_of_files: list[NDArray[np.bool_]]
 ) -> None:
     bag = small_bag(tmp_path, storage)
-    topic = ("--cleaned-topic", "/points_clean", "--removed-topic", "/rain", "--probability")
+    topic = ("--cleaned-topic", "/points_clean", "--removed-topic", "/rain")
     assert run_derain(*RUN, bag, "--out", tmp_path / "out", *topic).code == 0
     after = read_bag(bag_path(tmp_path / "out", storage))
 
@@ -94,8 +95,20 @@ def test_what_was_removed_and_its_probability_can_be_kept(
             assert time == START + number * PERIOD
             columns = cloud_of(message, storage).cloud.columns()
             np.testing.assert_array_equal(columns["x"], table["x"][rain == bool(value)])
-            assert set(columns["rain_probability"]) == {value}
-            assert columns["rain_probability"].dtype == np.float32
+
+
+def test_points_can_say_how_probably_they_are_rain(
+    tmp_path: Path, storage: Storage, run_derain
+) -> None:
+    bag = small_bag(tmp_path, storage)
+    assert run_derain("run", "default", bag, "--out", tmp_path / "out", "--probability").code == 0
+    clouds = [m for m in read_bag(bag_path(tmp_path / "out", storage)) if m[0] == POINTS]
+    derainer = Derainer()
+    for (_, _, _, message), table in zip(clouds, tables(), strict=True):
+        points = np.stack([table[name] for name in ("x", "y", "z", "intensity")], axis=1)
+        probability, rain = derainer.probability(points), derainer(points)
+        written = cloud_of(message, storage).cloud.columns()["rain_probability"]
+        np.testing.assert_array_equal(written, probability[~rain].astype(np.float32))
 
 
 def test_an_organised_cloud_can_keep_its_shape(

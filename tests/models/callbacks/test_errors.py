@@ -14,9 +14,9 @@ from tensorboard.util import tensor_util
 
 from derain.datamodules.in_memory import InMemory
 from derain.evaluation.hard_cases import scene
-from derain.evaluation.operating_points import EVEN
+from derain.evaluation.operating_points import CURVE_THRESHOLDS
 from derain.models.callbacks import errors
-from derain.models.callbacks.dashboard import LAYOUT, Dashboard
+from derain.models.callbacks.dashboard import CHARTS, Dashboard
 from derain.models.callbacks.errors import ErrorPanels
 from derain.models.outdet import OutDet
 from derain.scan import Scan
@@ -92,7 +92,7 @@ def test_the_curve_goes_through_the_counts_at_the_threshold(train: Callable[...,
     assert points.counts(points.at(model.spec.threshold)) == model.metrics.pooled()
     (event,) = events.Tensors("validation: rain")
     curve = tensor_util.make_ndarray(event.tensor_proto)
-    assert curve.shape == (6, len(EVEN))
+    assert curve.shape == (6, len(CURVE_THRESHOLDS))
     counts = model.metrics.pooled()
     expected = [
         *(counts.true_positive, counts.false_positive),
@@ -143,5 +143,5 @@ def test_the_layout_names_what_is_logged(train: Callable[..., Any]) -> None:
     _, _, events = train(1, Dashboard())
     (layout,) = events.Tensors("custom_scalars__config__")
     content = layout.tensor_proto.string_val[0]
-    for question, charts in LAYOUT.items():
+    for question, charts in CHARTS.items():
         assert all(text.encode() in content for text in (question, *charts))
