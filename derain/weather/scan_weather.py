@@ -29,8 +29,7 @@ class ScanWeather:
 
     Attributes:
         ends: int64 (2, RAY_SECTORS, RANGE_BINS): rays that end at something else, and rays that
-        end at rain;
-            by sector of azimuth and by bin of range (:mod:`derain.weather.rays`).
+            end at rain; by sector of azimuth and by bin of range (:mod:`derain.weather.rays`).
     """
 
     ends: NDArray[np.int64]
