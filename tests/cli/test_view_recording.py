@@ -1,12 +1,12 @@
 """``derain view RECORDING --rerun``: what the viewer is given is what ``derain run`` finds."""
 
-import resource
-import signal
+import os
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+import rerun
 from recording_read_back import ReadBack
 
 from derain.evaluation.hard_cases import scene
@@ -236,17 +236,20 @@ def test_a_file_that_is_there_stays_until_the_new_one_is_whole(
     assert len(ReadBack(out).points("/sensor/methods/default/kept")) == SCANS
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
-def test_a_disk_that_is_full_leaves_nothing(run_derain, recording: Path, tmp_path: Path) -> None:
+def test_a_file_that_is_not_whole_is_refused(
+    run_derain, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a full disk, of which the library that writes says nothing."""
     out = tmp_path / "out.rrd"
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
-    try:
-        outcome = run_derain("view", recording, "--methods", "dror", "--rerun", out)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-        signal.signal(signal.SIGXFSZ, handler)
+    usual = rerun.RecordingStream.disconnect
+
+    def cut_off(stream: rerun.RecordingStream) -> None:
+        usual(stream)
+        for file in tmp_path.glob(".derain-*"):
+            os.truncate(file, 20_000)
+
+    monkeypatch.setattr(rerun.RecordingStream, "disconnect", cut_off)
+    outcome = run_derain("view", recording, "--methods", "dror", "--rerun", out)
     assert outcome.code == 2
     assert f"{out}: cannot be written whole" in outcome.err
     assert [file.name for file in tmp_path.iterdir()] == ["drive"]
