@@ -80,7 +80,7 @@ def build(out: Path) -> list[Path]:
         sdist = built("sdist", copy_of_sources(work / "of_sdist"), first)
         wheel = built("wheel", copy_of_sources(work / "of_wheel"), first)
         with tarfile.open(sdist) as archive:
-            archive.extractall(unpacked, filter="data")
+            archive.extractall(unpacked)
         (sources,) = unpacked.iterdir()
         refuse_difference(content_of(wheel), content_of(built("wheel", sources, second)))
         out.mkdir(parents=True, exist_ok=True)
