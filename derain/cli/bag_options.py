@@ -54,10 +54,11 @@ def cleaned_bags(arguments: argparse.Namespace, source: Source) -> CleanedBags:
         raise InputError("--removed-topic", f"{removed} is --cleaned-topic too", "Name another.")
     options = BagOptions(cleaned, removed, arguments.probability, arguments.keep_shape)
     bags = CleanedBags(arguments.out, source, options)
-    if arguments.removed is not None and (of_bags := [f for f in source if bags.takes(f)]):
+    in_bag = next(filter(bags.takes, source), None)
+    if arguments.removed is not None and in_bag is not None:
         raise InputError(
             "--removed",
-            f"is a folder for files, and {of_bags[0].name} is in a bag",
+            f"is a folder for files, and {in_bag.name} is in a bag",
             "Give --removed-topic NAME.",
         )
     return bags

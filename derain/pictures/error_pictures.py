@@ -10,6 +10,7 @@ from matplotlib.patches import Patch
 
 from derain.evaluation.operating_points import OperatingPoints
 from derain.evaluation.rain_counts import ClassCounts
+from derain.pictures.palette import LOST, MISSED
 
 # Classes that a table has rows for; what is left of the others stands in one row.
 MOST_CLASSES = 14
@@ -18,8 +19,8 @@ MOST_CLASSES = 14
 DARKEST, LIGHTEST = 1.0, 1e-4
 
 # Of the cells: rain that is left, and others that are removed. As in the pictures of scans.
-LEFT = LinearSegmentedColormap.from_list("left", ["#fffdf3", "#ffd23f"])
-LOST_SHADES = LinearSegmentedColormap.from_list("lost", ["#fff8f8", "#ff5d5d"])
+LEFT = LinearSegmentedColormap.from_list("left", ["#fffdf3", MISSED])
+LOST_SHADES = LinearSegmentedColormap.from_list("lost", ["#fff8f8", LOST])
 
 PRECISION, RECALL, IOU = "#d98200", "#1f77b4", "#111827"
 FAINT_TEXT = "#9ca3af"

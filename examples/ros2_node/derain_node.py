@@ -15,7 +15,8 @@ Parameters:
 - ``organised``: keep rows and columns of a cloud, with NaN where rain was (false).
 
 Stamp, frame, order of the points and all of their fields stay as they are. Once a second it says on
-``/diagnostics`` what share of the points was rain, and how long a cloud took.
+``/diagnostics`` what share of the points was rain, how far one sees, and how long a cloud took; its
+level is a warning or an error where visibility is low, by the levels of ``derain.Alarm``.
 """
 
 import array
@@ -33,6 +34,8 @@ from derain.bags.point_cloud import PointCloud, PointField
 from derain.errors import InputError
 from derain.export.runtime import Derainer, Judgement
 from derain.views.oddities import MOST_RAIN
+from derain.weather.alarm import Alarm, Level
+from derain.weather.scan_weather import ScanWeather
 
 DEFAULTS = {
     "input": "points",
@@ -108,15 +111,22 @@ class Tally:
         points: Their points.
         rain: Those of them that were rain.
         seconds: What cleaning them took.
+        weather: What they show of the weather, all together.
+        level: How bad it is, after the last of them.
     """
 
     clouds: int = 0
     points: int = 0
     rain: int = 0
     seconds: float = 0.0
+    weather: ScanWeather = field(default_factory=ScanWeather.none)
+    level: Level = Level.CLEAR
 
-    def add(self, judgement: Judgement, seconds: float) -> None:
-        """Counts a cloud."""
+    def add(self, judgement: Judgement, seconds: float, alarm: Alarm) -> None:
+        """Counts a cloud, and tells the alarm of its weather."""
+        weather = judgement.weather
+        self.weather += weather
+        self.level = alarm.update(weather.visibility)
         self.clouds += 1
         self.points += len(judgement.rain)
         self.rain += int(judgement.rain.sum())
@@ -142,6 +152,7 @@ class Tally:
             "clouds": str(self.clouds),
             "points per cloud": f"{self.points / max(self.clouds, 1):.0f}",
             "share of rain": f"{self.share:.4f}",
+            "visibility": str(self.weather.visibility),
             "milliseconds per cloud": f"{1000 * self.seconds / max(self.clouds, 1):.1f}",
         }
 
@@ -154,11 +165,13 @@ class RainRemover:
         derainer: The model.
         tally: What became of the clouds since the last diagnostic.
         told: What was odd about earlier clouds, which is said once.
+        alarm: What knows how bad the weather was before.
     """
 
     derainer: Derainer
     tally: Tally = field(default_factory=Tally)
     told: set[str] = field(default_factory=set)
+    alarm: Alarm = field(default_factory=Alarm)
 
     def judge(self, message: Any) -> Judgement:
         """Says which points of a PointCloud2 are rain, row after row.
@@ -169,7 +182,7 @@ class RainRemover:
         """
         began = perf_counter()
         judgement = self.derainer.judge(scan_of_cloud(Path("cloud"), cloud_of(message)))
-        self.tally.add(judgement, perf_counter() - began)
+        self.tally.add(judgement, perf_counter() - began, self.alarm)
         return judgement
 
     def news(self, judgement: Judgement) -> list[str]:
@@ -235,10 +248,12 @@ class DerainNode:
         from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
         tally = self.remover.tally_so_far()
+        levels = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
         status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if tally.warning else DiagnosticStatus.OK,
+            level=levels[max(tally.level, Level.WARNING if tally.warning else Level.CLEAR)],
             name=f"{self.node.get_name()}: rain",
-            message=tally.warning or f"{tally.share:.1%} of the points are rain",
+            message=tally.warning
+            or f"{tally.share:.1%} of the points are rain, visibility {tally.weather.visibility}",
             hardware_id=self.remover.derainer.name,
             values=[KeyValue(key=key, value=value) for key, value in tally.values().items()],
         )

@@ -45,6 +45,7 @@ class DiagnosticStatus:
 
     OK = b"\0"
     WARN = b"\1"
+    ERROR = b"\2"
     level: bytes = OK
     name: str = ""
     message: str = ""

@@ -3,6 +3,7 @@
 import array
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -214,11 +215,33 @@ def test_once_a_second_it_says_what_share_was_rain(example: ModuleType) -> None:
     report()
     said, silent = (one.status[0] for one in node.publishers["/diagnostics"][1])
     values = {one.key: one.value for one in said.values}
-    share = Derainer(KEPT, threads=1)(points).mean()
+    judgement = Derainer(KEPT, threads=1).judge(points)
+    share, visibility = judgement.rain.mean(), judgement.weather.visibility
     assert period == 1.0
     assert (values["clouds"], values["points per cloud"]) == ("1", "600")
     assert float(values["share of rain"]) == pytest.approx(share, abs=1e-4)
+    assert values["visibility"] == str(visibility)
     assert (silent.level, silent.message) == (DiagnosticStatus.WARN, "no clouds")
+
+
+@pytest.mark.usefixtures("ros")
+@pytest.mark.parametrize(("drops", "level"), [(0, "OK"), (400, "ERROR")])
+def test_its_level_is_that_of_the_weather(
+    example: ModuleType, monkeypatch: pytest.MonkeyPatch, drops: int, level: str
+) -> None:
+    points = scene(2000)
+    rain = np.arange(2000) < drops
+    points[:drops, :3] *= 3 / np.linalg.norm(points[:drops, :3], axis=1, keepdims=True)
+    usual = Derainer.judge
+    monkeypatch.setattr(
+        example.Derainer, "judge", lambda self, scan: replace(usual(self, scan), rain=rain)
+    )
+    node = Node(model=str(KEPT), threads=1)
+    example.DerainNode(node)
+    node.subscriptions["points"][1](message_of(points))
+    node.timers[0][1]()
+    (said,) = node.publishers["/diagnostics"][1]
+    assert said.status[0].level == getattr(DiagnosticStatus, level)
 
 
 def test_the_messages_made_up_here_have_the_attributes_of_those_of_ros() -> None:
