@@ -13,6 +13,7 @@ from derain.cli.main import TRAINING, main
 # What every training of the test adds to what the page says: none is to take long or to be seen.
 QUIETLY = ("--trainer.accelerator", "cpu", "--trainer.enable_progress_bar", "false")
 WITHOUT_PANELS = ("--panels.scans", "0")
+TIMED_ONCE = ("--scan", "scan.bin", "--repeats", "1")
 
 COMMAND = "import sys; from derain.cli.main import main; sys.exit(main(sys.argv[1:]))"
 
@@ -33,6 +34,8 @@ def run(words: list[str], line: str, folder: Path) -> tuple[int, str]:
     arguments = words[1:]
     if arguments[0] in TRAINING:
         arguments += [*QUIETLY, *WITHOUT_PANELS]
+    elif arguments[0] == "export":
+        arguments += TIMED_ONCE
     if (folder / "pyproject.toml").exists():
         install(folder)
         command = [sys.executable, "-c", COMMAND, *arguments]

@@ -105,6 +105,17 @@ PREPARATIONS = {
 }
 
 
+# An export takes as long as all the rest, and knows the data of a model by its specification alone:
+# each network and each data set once.
+EXPORTED = (
+    "lisnownet_wads.yaml",
+    "outdet_rehearse3d.yaml",
+    "outdet_wads36.yaml",
+    "salsanext_lite_taught.yaml",
+    "salsanext_simulated.yaml",
+)
+
+
 def test_every_packaged_configuration_is_put_to_the_test() -> None:
     with_tests_of_their_own = {"outdet_mixture.yaml", "relative_outdet_worlds.yaml"}
     assert packaged_configs().keys() - with_tests_of_their_own == PREPARATIONS.keys()
@@ -144,13 +155,18 @@ def test_a_packaged_configuration_goes_from_training_to_a_deployed_model(
     # As the deployed model computes, whatever the training did.
     exact = ["--trainer.precision", "32"]
     assert run_derain("predict", *data, *exact, "--ckpt_path", checkpoint).code == 0
+    predicted = {
+        scan: np.fromfile(Path("predictions") / f"{scan.stem}.label", "<u4") for scan in scans
+    }
+    assert {label.max() for label in predicted.values()} <= {0, 1}
+    if config not in EXPORTED:
+        return
     # The whole proof has tests of its own.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     timed_on = ["--scan", scans[0], "--repeats", "1"]
     assert run_derain("export", checkpoint, "--out", "model.onnx", *timed_on).code == 0
     derainer = Derainer("model.onnx")
-    for scan in scans:
-        label = np.fromfile(Path("predictions") / f"{scan.stem}.label", "<u4")
+    for scan, label in predicted.items():
         np.testing.assert_array_equal(label, derainer(read_scan(scan)))
 
 
