@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.recorded_bags import Ros, drive, table_of, write_bag
 from derain.cards.card import load_card
 from derain.cli.main import main
 from derain.evaluation.hard_cases import scene
@@ -20,19 +21,23 @@ DRIVE = "--layout street --speed 6 --sensor spinning_16 --rain 25 --sequences 1 
 
 
 def write_drive(folder: Path) -> None:
-    """Simulates a short drive through a street in the rain."""
+    """Simulates a short drive through a street in the rain, and records it in a bag as well."""
     assert main(["simulate", "--out", str(folder), *DRIVE.split(), "--workers", "1"]) == 0
+    clouds = [np.fromfile(scan, np.float32).reshape(-1, 4) for scan in _scans(folder)]
+    columns = ("x", "y", "z", "intensity")
+    tables = [table_of(dict(zip(columns, cloud.T, strict=True))) for cloud in clouds]
+    write_bag(folder / "bag", "mcap", drive(Ros("mcap"), tables))
 
 
 def prepare(folder: Path, simulated: Path) -> None:
-    """Puts into a folder what pages name: scans, a drive, labels, a model, data sets.
+    """Puts into a folder what pages name: scans, a drive, a bag, labels, a model, data sets.
 
     Args:
         folder: The page's own.
         simulated: What :func:`write_drive` wrote.
     """
     sequence = simulated / "sequences/000"
-    scans = sorted((sequence / "lidar_radar_pcd").glob("*.bin"))
+    scans = _scans(simulated)
     for name in ("drive", "scans", "labelled", "my_data/sequences/00/lidar"):
         (folder / name).mkdir(parents=True)
     (folder / "my_data/sequences/00/classes").mkdir()
@@ -53,9 +58,14 @@ def prepare(folder: Path, simulated: Path) -> None:
     points = np.fromfile(scans[0], np.float32).reshape(-1, 4)
     rings = np.zeros((len(points), 1), np.float32)
     np.hstack([points, rings]).tofile(folder / "rings.bin")
+    shutil.copy(next(simulated.glob("bag/*.mcap")), folder / "drive.mcap")
     shutil.copy(KEPT / "outdet.onnx", folder / "model.onnx")
     shutil.copy(KEPT / "outdet.ckpt", folder / "model.ckpt")
     _put_wads(folder / "WADS")
+
+
+def _scans(simulated: Path) -> list[Path]:
+    return sorted((simulated / "sequences/000/lidar_radar_pcd").glob("*.bin"))
 
 
 def _put(scan: Path, folder: Path, label: "np.ndarray[tuple[int], np.dtype[np.int64]]") -> None:
