@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 # Steele and Vigna 2021, "Computationally easy, spectrally good multipliers".
 MULTIPLIER, NEXT_MULTIPLIER = 2654435769, 0x915F77F5
 
+# A sample has one in so many values, and speaks for all of them if it has so many numbers.
+ONE_IN, FEWEST_SAMPLED = 16, 3000
+
 
 def repetitions(numbers: NDArray[np.uint32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Finds the numbers that repeat another one.
@@ -43,6 +46,25 @@ def repetitions(numbers: NDArray[np.uint32]) -> tuple[NDArray[np.intp], NDArray[
         np.concatenate(parts, dtype=np.intp) for parts in zip(*pairs, strict=True)
     )
     return repeating, repeated
+
+
+def seem_distinct(numbers: NDArray[np.uint32]) -> bool:
+    """Whether a sample shows that next to none of the numbers repeats another.
+
+    The sample is of values, not of places, so that it has all that equal one of it. Of few numbers
+    nothing is said.
+
+    Args:
+        numbers: uint32 (N,).
+
+    Returns:
+        Whether the sample has no repetition, and is so large that, with one chance in twenty of an
+        error, no more than three in FEWEST_SAMPLED of the values are repeated.
+
+    Source: Hanley and Lippman-Hand 1983, the rule of three.
+    """
+    sampled = np.flatnonzero(numbers * np.uint32(MULTIPLIER) < 2**32 // ONE_IN)
+    return len(sampled) >= FEWEST_SAMPLED and not len(repetitions(numbers.take(sampled))[0])
 
 
 def _last_in_slot(

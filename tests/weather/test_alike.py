@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from derain.weather.alike import MULTIPLIER, repetitions
+from derain.weather.alike import FEWEST_SAMPLED, MULTIPLIER, ONE_IN, repetitions, seem_distinct
 
 
 @given(st.lists(st.integers(0, 2**32 - 1) | st.integers(0, 20), max_size=200))
@@ -24,3 +24,13 @@ def test_numbers_of_one_slot_are_told_apart() -> None:
     repeating, repeated = repetitions(numbers)
     assert len(repeating) == 2000
     np.testing.assert_array_equal(np.abs(repeating - repeated), 2000)
+
+
+def test_a_sample_shows_whether_many_numbers_repeat_others() -> None:
+    generator = np.random.default_rng(0)
+    many = np.unique(generator.integers(0, 2**32, 2 * ONE_IN * FEWEST_SAMPLED, np.uint32))
+    generator.shuffle(many)
+    assert seem_distinct(many)
+    again = generator.choice(many, len(many) // 100)
+    assert not seem_distinct(np.concatenate([many, again]))
+    assert not seem_distinct(many[: FEWEST_SAMPLED * ONE_IN // 2])  # too few to say so
