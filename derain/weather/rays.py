@@ -103,7 +103,8 @@ def _sectors_of_cells() -> NDArray[np.int32]:
     y = np.where(ahead, quarters, 2 - quarters)
     x = np.where(ahead, 1, -1) * (1 - np.abs(y))
     width = 2 * np.pi / RAY_SECTORS
-    return np.round(np.arctan2(y, x) / width).astype(np.int32) % RAY_SECTORS * SCORES
+    sector: NDArray[np.int32] = np.round(np.arctan2(y, x) / width).astype(np.int32) % RAY_SECTORS
+    return sector * SCORES
 
 
 SECTOR_OF_CELL = _sectors_of_cells()
