@@ -32,6 +32,7 @@ from derain.simulation.dataset import simulate_track
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.recorded import rain_on_scan
 from derain.simulation.sensor_file import load_sensor
+from derain.system.memory import keep_freed_memory
 from derain.weather.alarm import Alarm, Threshold
 from derain.weather.scan_weather import RANGE_BANDS, ScanWeather
 from derain.weather.visibility import Visibility
@@ -229,6 +230,7 @@ def _drive_tables(drive: list[tuple[str, ScanWeather, ScanWeather]]) -> Iterator
 
 def _speed(data: Path, derainer: Derainer, threads: int) -> str:
     """What the weather costs beside judging a scan, as ratios of medians in one run."""
+    keep_freed_memory()  # as `derain run` does
     rows = [["scan", "weather / DROR", "weather / default"]]
     dror = FilterDerainer(DROR(), threads)
     for name in ("wads/sample.bin", "wads/drive/velodyne/042223.bin", "clean/kitti_hdl64.bin"):
@@ -240,7 +242,7 @@ def _speed(data: Path, derainer: Derainer, threads: int) -> str:
                 "dror": lambda scan=scan: dror(scan),
                 "default": lambda scan=scan: derainer(scan),
             },
-            rounds=7,
+            rounds=15,
         )
         weather, of_dror, of_default = (float(np.median(each)) for each in times.values())
         rows.append([name, f"{weather / of_dror:.3f}", f"{weather / of_default:.3f}"])

@@ -58,14 +58,22 @@ def main() -> None:
         for row, ratio in _rows(load_sensor(name), derainer):
             rows.append([name, *row])
             ratios.append(ratio)
-    off = np.exp(np.abs(np.log(np.array(ratios))).mean(axis=0))
-    text = (
-        f"{plain_table(rows)}\n\ntimes too long or too short on (geometric) average: "
-        + ", ".join(f"{way} {times:.2f}" for way, times in zip(WAYS, off, strict=True))
-    )
+    text = f"{plain_table(rows)}\n\n{_together(np.log(np.array(ratios)))}"
     print(text)
     arguments.out.mkdir(parents=True, exist_ok=True)
     (arguments.out / "weather_truth.txt").write_text(f"{text}\n", "utf-8")
+
+
+def _together(off: NDArray[np.float64]) -> str:
+    """How far each way is from the truth, and from place to place, by the logarithms of ratios."""
+    by_place = off.reshape(len(SENSORS), len(PLACES), len(RATES), len(WAYS))
+    spread = by_place.max(axis=1) - by_place.min(axis=1)
+    means = {
+        "times too long or too short": np.abs(off).mean(axis=0),
+        "largest of the places over the smallest": spread.mean(axis=(0, 1)),
+    }
+    rows = [[title, *(f"{times:.2f}" for times in np.exp(mean))] for title, mean in means.items()]
+    return plain_table([["geometric means", *WAYS], *rows])
 
 
 def _rows(sensor: Sensor, derainer: Derainer) -> Iterator[tuple[list[str], list[float]]]:

@@ -34,11 +34,9 @@ def repetitions(numbers: NDArray[np.uint32]) -> tuple[NDArray[np.intp], NDArray[
     pairs = [(places[:0], places[:0])]
     while len(asked):
         found = _last_in_slot(asked, places, multiplier, table)
-        # take is several times faster than indexing by truth values that follow no pattern.
-        others = np.flatnonzero(found != places)
-        places, found, asked = places.take(others), found.take(others), asked.take(others)
         equal = numbers.take(found) == asked
-        repeats, strangers = np.flatnonzero(equal), np.flatnonzero(~equal)
+        # take is several times faster than indexing by truth values that follow no pattern.
+        repeats, strangers = np.flatnonzero(equal & (found != places)), np.flatnonzero(~equal)
         pairs.append((places.take(repeats), found.take(repeats)))
         places, asked = places.take(strangers), asked.take(strangers)
         multiplier = multiplier * NEXT_MULTIPLIER % 2**32
@@ -63,7 +61,7 @@ def seem_distinct(numbers: NDArray[np.uint32]) -> bool:
 
     Source: Hanley and Lippman-Hand 1983, the rule of three.
     """
-    sampled = np.flatnonzero(numbers * np.uint32(MULTIPLIER) < 2**32 // ONE_IN)
+    sampled = np.flatnonzero(numbers * np.uint32(NEXT_MULTIPLIER) < 2**32 // ONE_IN)
     return len(sampled) >= FEWEST_SAMPLED and not len(repetitions(numbers.take(sampled))[0])
 
 
