@@ -4,12 +4,12 @@ python -m benchmarks.weather --shared ../shared --out weather
 
 The simulated rates are told by the true labels and by the model that comes with derain; real scans
 by the same, and by their labels where they have any. Labels only measure: no threshold is taken
-from them. Writes weather.txt and rose.png to --out.
+from them. Writes weather.txt, weather.png and rose.png to --out.
 """
 
 import argparse
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.turns import milliseconds_in_turns
+from benchmarks.weather_pictures import draw_rose, draw_visibility
 from derain.cards.card import load_card
 from derain.evaluation.text_tables import plain_table
 from derain.export.runtime import Derainer
@@ -31,8 +32,10 @@ from derain.simulation.dataset import simulate_track
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.recorded import rain_on_scan
 from derain.simulation.sensor_file import load_sensor
+from derain.system.memory import keep_freed_memory
 from derain.weather.alarm import Alarm, Threshold
 from derain.weather.scan_weather import RANGE_BANDS, ScanWeather
+from derain.weather.visibility import Visibility
 
 # Rain in mm/h, from none over light and heavy to a cloudburst.
 RATES = (0.0, 2.0, 5.0, 10.0, 25.0, 50.0, 100.0)
@@ -61,6 +64,10 @@ class Told:
         told = None if rain is None else ScanWeather.of(scan, rain)
         return told, self.derainer.weather(scan)
 
+    def by_both_of(self, scan: Scan, rain: NDArray[np.bool_]) -> tuple[ScanWeather, ScanWeather]:
+        """What both say of a scan that has labels."""
+        return ScanWeather.of(scan, rain), self.derainer.weather(scan)
+
 
 def main() -> None:
     """Prints the tables, and draws the picture."""
@@ -79,27 +86,40 @@ def main() -> None:
         return
     arguments.out.mkdir(parents=True, exist_ok=True)
     told = Told(derainer)
-    drive = list(_drive(data, told))
-    text = "\n\n".join([*_rates(data, told), _real(data, told), *_drive_tables(drive)])
+    drive, places = list(_drive(data, told)), dict(_rates(data, told))
+    tables = [_table_of_rates(title, of_place) for title, of_place in places.items()]
+    text = "\n\n".join([*tables, _real(data, told), *_drive_tables(drive)])
     print(text)
     (arguments.out / "weather.txt").write_text(f"{text}\n", "utf-8")
     pooled = ScanWeather.none()
     for _, _, by_model in drive:
         pooled = pooled + by_model
-    _draw_rose(pooled, arguments.out / "rose.png")
+    draw_rose(pooled, arguments.out / "rose.png")
+    draw_visibility(
+        {title.removesuffix(", simulated"): _seen(pairs[1:]) for title, pairs in places.items()},
+        RATES[1:],
+        _seen([pair for _, *pair in drive]),
+        Alarm(**CROSSED, hold=HELD),
+        arguments.out / "weather.png",
+    )
 
 
-def _rates(data: Path, told: Told) -> Iterator[str]:
-    """A table of each place at all rates."""
+def _seen(pairs: Iterable[Iterable[ScanWeather]]) -> list[tuple[Visibility, Visibility]]:
+    """The visibility of each pair of weathers."""
+    return [(one.visibility, other.visibility) for one, other in pairs]
+
+
+def _rates(data: Path, told: Told) -> Iterator[tuple[str, list[tuple[ScanWeather, ScanWeather]]]]:
+    """Each place, with what both say of it at all rates."""
     for layout, sensor in PLACES:
         scans = [_simulated(layout, sensor, rate) for rate in RATES]
-        yield _table_of_rates(f"{layout}, {sensor}, simulated", scans, told)
+        yield f"{layout}, {sensor}, simulated", [told.by_both_of(*pair) for pair in scans]
     clean, sensor = read_scan(data / RAINED_ON[0]), load_sensor(RAINED_ON[1])
-    scans = [
+    rained = [
         rain_on_scan(clean, UniformRain(rate), sensor, np.random.default_rng(0)) for rate in RATES
     ]
-    title = f"simulated rain on {RAINED_ON[0]}, {RAINED_ON[1]}"
-    yield _table_of_rates(title, [(scan, scan.label == TrackClass.RAIN) for scan in scans], told)
+    pairs = [told.by_both_of(scan, scan.label == TrackClass.RAIN) for scan in rained]
+    yield f"{Path(RAINED_ON[0]).name}, {RAINED_ON[1]}, simulated", pairs
 
 
 def _simulated(layout: str, sensor: str, rate: float) -> tuple[Scan, NDArray[np.bool_]]:
@@ -113,11 +133,9 @@ def _simulated(layout: str, sensor: str, rate: float) -> tuple[Scan, NDArray[np.
         return scan, semantic(read_labels(label, len(scan))) == TrackClass.RAIN
 
 
-def _table_of_rates(title: str, scans: Sequence[tuple[Scan, NDArray[np.bool_]]], told: Told) -> str:
+def _table_of_rates(title: str, of_place: Sequence[tuple[ScanWeather, ScanWeather]]) -> str:
     rows, reach = [["mm/h", *TITLES[1:]]], []
-    for rate, (scan, rain) in zip(RATES, tqdm(scans, desc=title, disable=None), strict=True):
-        by_labels, by_model = told.by_both(scan, rain)
-        assert by_labels is not None
+    for rate, (by_labels, by_model) in zip(RATES, of_place, strict=True):
         rows.append(_row(f"{rate:g}", by_labels, by_model))
         reach.append((by_labels.visibility.at_least, by_model.visibility.at_least))
     for place, name in enumerate(("labels", "default")):
@@ -169,9 +187,9 @@ def _share_and_visibility(weather: ScanWeather) -> list[str]:
 def _drive(data: Path, told: Told) -> Iterator[tuple[str, ScanWeather, ScanWeather]]:
     for path in tqdm(sorted((data / "wads/drive/velodyne").glob("*.bin")), disable=None):
         scan = read_scan(path)
-        by_labels, by_model = told.by_both(scan, _labelled(path, scan))
-        assert by_labels is not None
-        yield path.stem, by_labels, by_model
+        rain = _labelled(path, scan)
+        assert rain is not None
+        yield path.stem, *told.by_both_of(scan, rain)
 
 
 def _drive_tables(drive: list[tuple[str, ScanWeather, ScanWeather]]) -> Iterator[str]:
@@ -210,35 +228,9 @@ def _drive_tables(drive: list[tuple[str, ScanWeather, ScanWeather]]) -> Iterator
     yield f"{title}\n{plain_table(by_sector)}"
 
 
-def _draw_rose(weather: ScanWeather, path: Path) -> None:
-    """Draws the shares of rain by sector and range, the sensor in the middle and ahead up."""
-    from matplotlib.figure import Figure
-
-    from derain.pictures.scan_pictures import save
-
-    figure = Figure(figsize=(6.4, 5.2), layout="constrained")
-    axes = figure.add_subplot(projection="polar")
-    axes.set_theta_zero_location("N")
-    # A sector is drawn as thirty slices, which look round; rings of equal width, for most rain is
-    # near by.
-    turn = np.radians(np.arange(361) - 15)
-    shares = np.repeat(100 * weather.shares[:, :-1].T, 30, axis=1)
-    drawn = axes.pcolormesh(
-        turn, np.arange(len(RANGE_BANDS)), shares, cmap="Blues", vmin=0, vmax=100
-    )
-    axes.set_yticks(
-        range(1, len(RANGE_BANDS)), [f"{edge} m" for edge in RANGE_BANDS[1:]], fontsize=8
-    )
-    axes.set_xticks(np.radians([0, 90, 180, 270]), ["ahead", "left", "behind", "right"])
-    axes.set_rlabel_position(-75)  # between two sectors
-    axes.grid(alpha=0.3)
-    axes.set_title(f"Rays that end at snow; 90 % get through {weather.visibility}")
-    figure.colorbar(drawn, ax=axes, label="share of the rays that end there, %", shrink=0.8)
-    save(figure, path)
-
-
 def _speed(data: Path, derainer: Derainer, threads: int) -> str:
     """What the weather costs beside judging a scan, as ratios of medians in one run."""
+    keep_freed_memory()  # as `derain run` does
     rows = [["scan", "weather / DROR", "weather / default"]]
     dror = FilterDerainer(DROR(), threads)
     for name in ("wads/sample.bin", "wads/drive/velodyne/042223.bin", "clean/kitti_hdl64.bin"):
@@ -250,7 +242,7 @@ def _speed(data: Path, derainer: Derainer, threads: int) -> str:
                 "dror": lambda scan=scan: dror(scan),
                 "default": lambda scan=scan: derainer(scan),
             },
-            rounds=7,
+            rounds=15,
         )
         weather, of_dror, of_default = (float(np.median(each)) for each in times.values())
         rows.append([name, f"{weather / of_dror:.3f}", f"{weather / of_default:.3f}"])

@@ -37,6 +37,7 @@ def folder_sink(out: Path, source: Source, removed: Path | None = None) -> Folde
 def tell(facts: "DataclassInstance", as_json: bool) -> None:
     """Prints what was done to a scan, above a progress bar: a line of text, or an object."""
     tqdm.write(json.dumps(asdict(facts)) if as_json else str(facts), sys.stdout)
+    sys.stdout.flush()  # whoever reads them through a pipe is told of each scan at once
 
 
 def say(text: str, stream: TextIO | None = None) -> None:

@@ -53,6 +53,7 @@ level, and with --json or --weather the shares of rain by sector and range.
   derain run drive.mcap --out cleaned --removed-topic /rain
   derain run scans/ --out cleaned --removed removed --probability
   derain run scans/ --out cleaned --weather weather.csv --warning 30 40 --error 15 20 --hold 5
+  derain run scans/ --out cleaned --json --fail-at error
 
 METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
 or a name (below).
@@ -67,6 +68,7 @@ called rain is left alone. It and a scan that cannot be read are reported and pa
 code is then 2.
 Visibility is the range that 90 % of the rays would get through if rain met them everywhere as often
 as in the first 10 m. It compares scans of one sensor, and is not what a weather station measures.
+Where every scan was cleaned and one was at the level of --fail-at or worse, the exit code is 3.
 """
 
 
@@ -177,8 +179,8 @@ def _clean(source: Source, cleaning: "_Cleaning", arguments: argparse.Namespace)
                 cleaning.write(frame, judgement, stopwatch)
     cleaning.notices.tell_how_many_more()
     if len(cleaning.done) > 1:
-        print(_summary(cleaning.done), file=stream)
-    return scans.exit_code("{scans} could not be cleaned")
+        print(_summary(cleaning.done, cleaning.weather), file=stream)
+    return scans.exit_code("{scans} could not be cleaned") or cleaning.weather.exit_code()
 
 
 class _Cleaning:
@@ -242,11 +244,11 @@ class _Cleaning:
         self.sink.write(frame, scan.take(~rain), rain, removed)
 
 
-def _summary(done: Sequence[Cleaned]) -> str:
+def _summary(done: Sequence[Cleaned], weather: WeatherWatch) -> str:
     """What was done to all scans together."""
     valid, removed = sum(item.valid for item in done), sum(item.rain for item in done)
     odd = sum(bool(item.warnings) for item in done)
     return (
         f"{len(done):,} scans: {sum(item.points for item in done):,} points, {removed:,} of rain "
-        f"({removed / max(valid, 1):.1%}); {odd:,} scans with warnings"
+        f"({removed / max(valid, 1):.1%}), {weather}; {odd:,} scans with warnings"
     )

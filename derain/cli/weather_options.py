@@ -2,6 +2,8 @@
 
 import argparse
 import csv
+import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,9 +19,13 @@ from derain.files.atomic import replacing
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.source import Source
-from derain.weather.alarm import ERROR, HOLD, WARNING, Alarm, Threshold
+from derain.weather.alarm import ERROR, HOLD, WARNING, Alarm, Level, Threshold
 from derain.weather.rays import RAY_SECTORS
 from derain.weather.scan_weather import RANGE_BANDS, ScanWeather
+
+# What a run ends with that cleaned every scan, where one was as bad as `--fail-at` says. An error
+# of the run itself ends with 2.
+BAD_WEATHER = 3
 
 # Digits of shares: rays are a hundred thousand at most.
 SHARE_DIGITS = 5
@@ -72,23 +78,25 @@ class ToldWeather:
 
 
 class WeatherWatch:
-    """Says how bad the weather is, scan after scan.
+    """Says how bad the weather is, scan after scan, and at the end of all.
 
     Args:
         arguments: Of the command.
         source: What is read.
 
     Raises:
-        InputError: Levels that cannot be, or a table that would overwrite a scan.
+        InputError: Levels that cannot be, or a table in the place of a scan or of the results.
     """
 
     def __init__(self, arguments: argparse.Namespace, source: Source) -> None:
         self._levels = Threshold(*arguments.warning), Threshold(*arguments.error), arguments.hold
         self._alarm = Alarm(*self._levels)
         self._sequence: str | None = None
+        self._fail_at = None if arguments.fail_at is None else Level[arguments.fail_at.upper()]
+        self._all, self._scans_at = ScanWeather.none(), Counter[Level]()
         self._table = _WeatherTable(arguments.weather)
         if arguments.weather is not None:
-            _refuse_scan(arguments.weather, source)
+            _refuse_taken(arguments.weather, arguments.out, source)
 
     @contextmanager
     def writing(self) -> Iterator[None]:
@@ -105,9 +113,28 @@ class WeatherWatch:
         """
         if frame.sequence != self._sequence:
             self._sequence, self._alarm = frame.sequence, Alarm(*self._levels)
-        told = ToldWeather.of(weather, str(self._alarm.update(weather.visibility)))
+        level = self._alarm.update(weather.visibility)
+        self._all, self._scans_at[level] = self._all + weather, self._scans_at[level] + 1
+        told = ToldWeather.of(weather, str(level))
         self._table.add(frame, told, weather)
         return told
+
+    def __str__(self) -> str:
+        """What all scans together tell, and how many of them were at which level."""
+        levels = ", ".join(f"{self._scans_at[level]:,} {level}" for level in sorted(self._scans_at))
+        return f"visibility {self._all.visibility} ({levels})"
+
+    def exit_code(self) -> int:
+        """BAD_WEATHER, which is told, where it was as bad as is asked for; else 0."""
+        if self._fail_at is None:
+            return 0
+        scans = sum(self._scans_at[level] for level in Level if level >= self._fail_at)
+        if not scans:
+            return 0
+        of_all = f"{scans:,} of {self._scans_at.total():,} scans"
+        worse = " or worse" if self._fail_at < max(Level) else ""
+        print(f"derain: the weather was at {self._fail_at}{worse} in {of_all}", file=sys.stderr)
+        return BAD_WEATHER
 
 
 class _WeatherTable:
@@ -166,11 +193,20 @@ def add_weather(parser: argparse.ArgumentParser) -> None:
         metavar="SCANS",
         help="scans in a row that have to agree before the level changes (default: %(default)s)",
     )
+    group.add_argument(
+        "--fail-at",
+        choices=[str(level) for level in Level if level],
+        metavar="LEVEL",
+        help=f"after all scans, exit with code {BAD_WEATHER} if one was at this level or worse: "
+        "warning or error",
+    )
 
 
-def _refuse_scan(table: Path, source: Source) -> None:
-    """Refuses a table that would take the place of a scan."""
+def _refuse_taken(table: Path, out: Path, source: Source) -> None:
+    """Refuses a table that would take the place of a scan, or of the folder of the results."""
     target = table.resolve()
+    if target == out.resolve():
+        raise InputError(table, "it is the folder of --out", "Give --weather another file.")
     for frame in source:
         if isinstance(frame, FileFrame) and frame.path.resolve() == target:
             raise InputError(table, "it is one of the scans", "Give --weather another file.")

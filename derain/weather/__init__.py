@@ -4,6 +4,7 @@ A ray ends at the first drop that it meets, or else at the last thing that it me
 by where they end and at what are all that is kept of a scan; they add up over scans.
 
 What the figures are not: a LiDAR sees drops only as far as they return enough light, often ten to
-thirty metres, and rays that bring nothing back are in no file. So they compare scans of one sensor
-with one another, and say nothing of what a person or a weather station would see.
+thirty metres, and rays that bring nothing back are not counted, for most of them went to the sky.
+So they compare scans of one sensor with one another, and say nothing of what a person or a weather
+station would see.
 """

@@ -1,14 +1,15 @@
 """Where each ray of a scan ends, and whether at rain.
 
 Returns in one direction are of one ray: the copies of a return that dual-return sensors write, and
-what stands behind a drop. They are told by direction alone, in one sort, for that takes a small
-part of the time of :func:`derain.views.returns.pair_returns`, which says which return is which.
+what stands behind a drop. They are told by direction alone, which takes a small part of the time of
+:func:`derain.views.returns.pair_returns`, which says which return is which.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import Scan
+from derain.weather.alike import repetitions, seem_distinct
 
 # Sectors of azimuth, each of 30 degrees like the hours of a clock: the first has x (ahead) in its
 # middle, the next ones follow towards y (left).
@@ -18,19 +19,21 @@ RAY_SECTORS = 12
 BIN = 0.5
 RANGE_BINS = 161
 
-# Returns are of one ray whose directions lie in one cell of so many cells a degree. Two rays that
-# are neighbours are farther apart: 0.1 degrees and more. Coordinates are rounded to float32, which
-# is far finer, or to millimetres, which near by is coarser: such returns count as rays of their
-# own.
-CELLS_PER_DEGREE = 100
-CELLS_PER_RADIAN = np.float32(CELLS_PER_DEGREE * 180 / np.pi)
-AROUND, UPWARDS = 360 * CELLS_PER_DEGREE, 180 * CELLS_PER_DEGREE
+# Returns are of one ray whose directions lie in one cell, of so many in a quarter of a turn and so
+# many from the horizon upwards: .003 to .006 degrees wide. Two rays that are neighbours are farther
+# apart: 0.1 degrees and more. Coordinates are rounded to float32, which is far finer, or to
+# millimetres, which near by is coarser: such returns count as rays of their own.
+CELLS_IN_QUARTER = 18_000
+CELLS_UPWARDS = 11_460
+CELLS_AROUND = 4 * CELLS_IN_QUARTER
 
-# A ray as one number, from the top: inclination and azimuth of its cell, then what a return of it
-# is and where it lies, so that sorting brings the returns of a ray together, rain first.
-BITS_OF_BIN, BITS_OF_AZIMUTH = 8, 16
-NOT_RAIN = 1 << BITS_OF_BIN
-BITS_OF_RETURN = BITS_OF_BIN + 1
+# Added to what is divided by, so that it is never 0.
+TINY = np.finfo(np.float32).tiny
+
+# A return as one number: its sector, then a score of which the highest of a ray is the return at
+# which that ray ends. The score of what is not rain is its bin; that of rain is above all of these,
+# and the higher the nearer it is.
+SCORES = 512
 
 
 def ray_ends(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -48,53 +51,77 @@ def ray_ends(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
         Numbers of rays, int64 (2, RAY_SECTORS, RANGE_BINS): those that end at something
         else, and those that end at rain.
     """
+    xyz = scan.xyz
     asked = scan.valid if scan.radar is None else scan.valid & ~scan.radar
-    every = bool(asked.all())
-    xyz, reach = (scan.xyz, scan.range) if every else (scan.xyz[asked], scan.range[asked])
-    returns = _numbered(xyz, reach, rain if every else rain[asked])
-    # A stable sort, since it makes use of what is in order already, as the rows of most files are.
-    return _counted(_ends_of(np.sort(returns, kind="stable")))
+    if not asked.all():
+        xyz, rain = xyz[asked], rain[asked]
+    x, y, z = np.ascontiguousarray(xyz.T)
+    reach = np.sqrt(x * x + y * y + z * z)  # which need not be as exact as Scan.range
+    azimuth = _azimuth_cells(x, y)
+    cell = _inclination_cells(z, reach) * np.uint32(CELLS_AROUND) + azimuth
+    ends = _scores(reach, rain)
+    # The returns of a ray share its sector, so that the highest number is that of the best score.
+    ends += SECTOR_OF_CELL.take(azimuth)
+    if seem_distinct(cell):  # as of sensors of one return, which saves a third of the time
+        return _counted(ends)
+    further, ray = repetitions(cell)
+    np.maximum.at(ends, ray, ends.take(further))
+    return _counted(ends) - _counted(ends.take(further))
 
 
-def _numbered(
-    xyz: NDArray[np.float32], reach: NDArray[np.float32], rain: NDArray[np.bool_]
-) -> NDArray[np.int64]:
-    """Each return as one number, int64 (M,)."""
-    x, y, z = np.ascontiguousarray(xyz.T) + np.float32(0)  # -0.0 would be another way than 0.0
-    azimuth = _cells(np.arctan2(y, x)) % AROUND
-    inclination = _cells(np.arctan2(z, np.sqrt(x * x + y * y))) + UPWARDS // 2
-    # Not above the last bin, however far.
-    place = np.minimum(reach / np.float32(BIN), np.float32(RANGE_BINS - 1)).astype(np.int64)
-    direction = inclination << BITS_OF_AZIMUTH | azimuth
-    what = np.where(rain, 0, NOT_RAIN)
-    numbers: NDArray[np.int64] = direction << BITS_OF_RETURN | what | place
-    return numbers
+def _azimuth_cells(x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.uint32]:
+    """Numbers of the cells of azimuth that directions lie in, uint32 (M,).
 
-
-def _cells(angle: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Numbers of the cells that angles lie in, from radians, int64 (M,)."""
-    cells: NDArray[np.int64] = np.floor(angle * CELLS_PER_RADIAN).astype(np.int64)
+    They are alike not in degrees but in y / (|x| + |y|), which takes no trigonometry: it goes
+    around the circle straight from corner to corner of a square in it.
+    """
+    around = np.abs(x)
+    around += np.abs(y)
+    around += TINY  # straight up, any azimuth will do
+    quarters = np.divide(y, around, out=around)  # -1 right, 0 ahead, 1 left
+    np.subtract(2, quarters, out=quarters, where=x < 0)  # 2 behind, up to 3 right again
+    quarters += 1
+    quarters *= CELLS_IN_QUARTER
+    cells = quarters.astype(np.uint32)
+    cells[cells == CELLS_AROUND] = 0
     return cells
 
 
-def _ends_of(returns: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Of the sorted returns, the one of each ray at which it ends, int64 (rays,)."""
-    if not len(returns):
-        return returns
-    direction = returns >> BITS_OF_RETURN
-    changes = np.flatnonzero(direction[1:] != direction[:-1])
-    first = returns[np.concatenate([[0], changes + 1])]
-    last = returns[np.concatenate([changes, [len(returns) - 1]])]
-    ends: NDArray[np.int64] = np.where(first & NOT_RAIN, last, first)
-    return ends
+def _inclination_cells(z: NDArray[np.float32], reach: NDArray[np.float32]) -> NDArray[np.uint32]:
+    """Numbers of the cells of inclination, alike in z / range, uint32 (M,)."""
+    upwards = z / (reach + TINY)
+    np.clip(upwards, -1, 1, out=upwards)  # nearer than 10⁻¹⁹ m the range becomes 0
+    upwards += 1
+    upwards *= CELLS_UPWARDS
+    return upwards.astype(np.uint32)
 
 
-def _counted(ends: NDArray[np.int64]) -> NDArray[np.int64]:
+def _sectors_of_cells() -> NDArray[np.int32]:
+    """SCORES times the sector in which the middle of each cell of azimuth lies, (CELLS_AROUND,)."""
+    quarters = (np.arange(CELLS_AROUND) + 0.5) / CELLS_IN_QUARTER - 1
+    ahead = quarters < 1
+    y = np.where(ahead, quarters, 2 - quarters)
+    x = np.where(ahead, 1, -1) * (1 - np.abs(y))
+    width = 2 * np.pi / RAY_SECTORS
+    sector: NDArray[np.int32] = np.round(np.arctan2(y, x) / width).astype(np.int32) % RAY_SECTORS
+    return sector * SCORES
+
+
+SECTOR_OF_CELL = _sectors_of_cells()
+
+
+def _scores(reach: NDArray[np.float32], rain: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """How far returns go before others of their ray, int32 (M,): rain first, the nearest of it."""
+    place = reach * np.float32(1 / BIN)
+    np.minimum(place, RANGE_BINS - 1, out=place)  # not above the last bin, however far
+    scores = place.astype(np.int32)
+    drops = np.flatnonzero(rain)
+    scores[drops] = SCORES - 1 - scores[drops]
+    return scores
+
+
+def _counted(ends: NDArray[np.int32]) -> NDArray[np.int64]:
     """Numbers of rays by what they end at, sector and bin, int64 (2, RAY_SECTORS, RANGE_BINS)."""
-    azimuth = ends >> BITS_OF_RETURN & ((1 << BITS_OF_AZIMUTH) - 1)
-    wide = AROUND // RAY_SECTORS
-    sector = (azimuth + wide // 2) % AROUND // wide
-    at_rain = (ends & NOT_RAIN) == 0
-    cell = (at_rain * RAY_SECTORS + sector) * RANGE_BINS + (ends & (NOT_RAIN - 1))
-    counts = np.bincount(cell, minlength=2 * RAY_SECTORS * RANGE_BINS)
-    return counts.reshape(2, RAY_SECTORS, RANGE_BINS).astype(np.int64)
+    counts = np.bincount(ends, minlength=RAY_SECTORS * SCORES).reshape(RAY_SECTORS, SCORES)
+    rain = counts[:, ::-1]
+    return np.stack([counts[:, :RANGE_BINS], rain[:, :RANGE_BINS]]).astype(np.int64)

@@ -57,6 +57,21 @@ def test_view_draws_a_cloud_of_a_bag(tmp_path: Path, run_derain) -> None:
     assert (outcome.code, picture.stat().st_size > 10_000) == (0, True)
 
 
+def test_a_bag_tells_the_weather_that_its_scans_tell_as_files(tmp_path: Path, run_derain) -> None:
+    clouds, files = tables(points=2000), tmp_path / "files"
+    files.mkdir()
+    for number, cloud in enumerate(clouds):
+        np.save(files / f"{number}.npy", cloud)
+    told = []
+    for source in (small_bag(tmp_path, "mcap", clouds=clouds), files):
+        options = ("--out", tmp_path / f"of_{source.name}", "--json", "--hold", "2")
+        outcome = run_derain("run", "dror", source, *options)
+        told.append([json.loads(line)["weather"] for line in outcome.out.splitlines()])
+    assert len(told[0]) == len(clouds)
+    assert told[0] == told[1]
+    assert all(one["met_rain"] for one in told[0])
+
+
 def test_a_taught_bag_is_read_again_with_its_labels(tmp_path: Path, run_derain) -> None:
     bag = small_bag(tmp_path, "mcap", clouds=tables(5))
     root = tmp_path / "taught"

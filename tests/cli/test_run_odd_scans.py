@@ -72,7 +72,8 @@ def test_a_method_that_takes_nearly_all_says_so(run_derain, scans: Path, tmp_pat
     ]
     *lines, summary = outcome.out.splitlines()
     assert all("200 points, 200 of rain (100.0%), " in line for line in lines)
-    assert summary == ("5 scans: 1,000 points, 1,000 of rain (100.0%); 5 scans with warnings")
+    assert summary.startswith("5 scans: 1,000 points, 1,000 of rain (100.0%), ")
+    assert summary.endswith("; 5 scans with warnings")
 
 
 def test_a_scan_that_would_lose_too_much_is_left_alone(

@@ -88,6 +88,26 @@ def test_the_line_of_a_scan_says_visibility_and_level(
     assert "(clear)" in lines[0]
 
 
+@pytest.mark.parametrize(
+    ("asked", "code", "told"),
+    [
+        ("warning", 3, "the weather was at warning or worse in 2 of 6 scans"),
+        ("error", 0, ""),
+    ],
+)
+def test_bad_weather_can_be_told_by_the_exit_code_after_all_scans(
+    run_derain, recording: Path, tmp_path: Path, asked: str, code: int, told: str
+) -> None:
+    out = tmp_path / "out"
+    outcome = run_derain("run", "dror", recording, "--out", out, *LEVELS, "--fail-at", asked)
+    assert outcome.code == code
+    assert told in outcome.err
+    assert ("the weather was" in outcome.err) == bool(told)
+    pooled = sum(weather_of(recording, out), ScanWeather.none())
+    last = outcome.out.splitlines()[-1]
+    assert f", visibility {pooled.visibility} (4 clear, 2 warning); " in last
+
+
 def test_a_table_has_a_line_a_scan_and_nothing_where_nothing_is_known(
     run_derain, recording: Path, tmp_path: Path
 ) -> None:
@@ -132,6 +152,9 @@ def test_nothing_is_left_of_the_table_where_the_run_fails(
     assert (outcome.code, outcome.out) == (2, "")
     assert "it is one of the scans. Give --weather another file" in outcome.err
     assert scan.read_bytes() == before
+    outcome = run_derain(*arguments, "--weather", tmp_path / "out")
+    assert outcome.code == 2
+    assert "it is the folder of --out. Give --weather another file" in outcome.err
     outcome = run_derain(*arguments, "--weather", tmp_path)
     assert outcome.code == 2
     assert "is not a file that can be replaced" in outcome.err
@@ -143,8 +166,9 @@ def test_a_scan_that_cannot_be_read_has_no_line(
 ) -> None:
     (recording / "000001.bin").write_bytes(b"12345")
     table = tmp_path / "weather.csv"
-    outcome = run_derain("run", "dror", recording, "--out", tmp_path / "o", "--weather", table)
-    assert outcome.code == 2
+    arguments = ("--out", tmp_path / "o", "--weather", table, *LEVELS, "--fail-at", "warning")
+    outcome = run_derain("run", "dror", recording, *arguments)
+    assert outcome.code == 2  # and not what bad weather alone ends with
     assert len(table.read_text().splitlines()) == 1 + 5
 
 

@@ -51,6 +51,21 @@ def test_the_life_table_is_what_its_definition_says_bin_by_bin(
     np.testing.assert_allclose(transmission(other, rain), expected, rtol=1e-9, atol=1e-12)
 
 
+def test_the_life_table_is_the_estimate_of_kaplan_and_meier_but_for_its_bins() -> None:
+    generator = np.random.default_rng(1)
+    drop, wall = generator.weibull(1.5, 3000) * 12, generator.uniform(1, 18, 3000)
+    end, met = np.minimum(drop, wall), drop < wall
+    place = (end / BIN).astype(int)
+    table = transmission(
+        np.bincount(place[~met], minlength=40), np.bincount(place[met], minlength=40)
+    )
+    # Ray after ray, from the nearest end on: of those that come as far, each drop takes one away.
+    coming = np.arange(3000, 0, -1)
+    share = np.cumprod(1 - met[np.argsort(end)] / coming)
+    ended = np.searchsorted(np.sort(end), BIN * np.arange(1, 33))  # before each bin's end
+    np.testing.assert_allclose(table[1:33], share[ended - 1], atol=0.004)
+
+
 @given(counts, counts, st.integers(0, BINS - 1))
 def test_a_ray_more_that_meets_rain_makes_visibility_no_better(
     other: NDArray[np.int64], rain: NDArray[np.int64], place: int
