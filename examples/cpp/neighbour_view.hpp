@@ -5,12 +5,13 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <string>
-#include <thread>
 #include <tuple>
 #include <vector>
 
+#include "candidates.hpp"
+#include "inputs.hpp"
 #include "kd_tree.hpp"
+#include "parallel.hpp"
 #include "scan.hpp"
 #include "spec.hpp"
 
@@ -22,6 +23,7 @@ struct NeighbourView {
   std::size_t k = 0;
   std::vector<std::int64_t> first;       // (M) row of the scan that each point was taken from
   std::vector<std::int64_t> inverse;     // (N) point of each row of the scan; -1 for invalid rows
+  std::size_t channels = 0;
   std::vector<float> points;             // (M, C)
   std::vector<std::int64_t> neighbours;  // (F, k) points, each one's own first
   std::vector<float> distances;          // (F, k) metres
@@ -30,8 +32,16 @@ struct NeighbourView {
   // How many points the network scores: J, or M.
   std::size_t scored() const { return candidates ? candidates->size() / k : first.size(); }
 
+  std::vector<Input> inputs() {
+    std::vector<Input> result = {matrix("points", Element::real, points, channels),
+                                 matrix("distances", Element::real, distances, k),
+                                 matrix("neighbours", Element::whole, neighbours, k)};
+    if (candidates) result.push_back(matrix("candidates", Element::whole, *candidates, k));
+    return result;
+  }
+
   // One value per row of the scan from one per scored point; 0 for all that were not scored.
-  std::vector<float> to_rows(const std::vector<float>& score) const {
+  std::vector<float> to_rows(const std::vector<float>& score, unsigned) const {
     std::vector<float> of_points(first.size(), 0.0F);
     for (std::size_t number = 0; number < score.size(); ++number) {
       // A candidate's neighbourhood is among the first J, and begins with the candidate itself.
@@ -119,16 +129,12 @@ inline void find_points(const Scan& scan, const std::vector<bool>& valid, Neighb
 
 inline void fill_points(const Scan& scan, const std::vector<bool>& valid, const Spec& spec,
                         NeighbourView& view) {
-  const std::size_t width = spec.channels.size();
+  const std::size_t width = view.channels = spec.channels.size();
   view.points.resize(view.first.size() * width);
-  for (std::size_t channel = 0; channel < width; ++channel) {
-    const auto values = channel_of(scan, valid, spec.channels[channel]);
-    for (std::size_t point = 0; point < view.first.size(); ++point) {
-      const auto row = static_cast<std::size_t>(view.first[point]);
-      const bool lacking = !values || std::isnan((*values)[row]);
-      view.points[point * width + channel] = lacking ? spec.mean[channel] : (*values)[row];
-    }
-  }
+  for_channels(scan, valid, spec, view.first,
+               [&](std::size_t point, std::size_t channel, float value) {
+                 view.points[point * width + channel] = value;
+               });
 }
 
 // Neighbourhoods of some points, behind those that the view has already.
@@ -138,7 +144,7 @@ inline void add_neighbourhoods(const Scan& scan, const KdTree& tree,
   const std::size_t begin = view.neighbours.size();
   view.neighbours.resize(begin + queries.size() * view.k);
   view.distances.resize(begin + queries.size() * view.k);
-  const auto work = [&](std::size_t from, std::size_t to) {
+  in_parts(queries.size(), threads, [&](std::size_t from, std::size_t to) {
     std::vector<Neighbour> found;
     for (std::size_t query = from; query < to; ++query) {
       const auto point = static_cast<std::size_t>(queries[query]);
@@ -152,31 +158,7 @@ inline void add_neighbourhoods(const Scan& scan, const KdTree& tree,
         view.distances[at] = std::sqrt(static_cast<float>(neighbour.squared));
       }
     }
-  };
-  const std::size_t share = queries.size() / threads + 1;
-  std::vector<std::thread> workers;
-  for (std::size_t from = 0; from < queries.size(); from += share) {
-    workers.emplace_back(work, from, std::min(from + share, queries.size()));
-  }
-  for (std::thread& worker : workers) worker.join();
-}
-
-// Which points may be rain: those of which no bounded channel is known to be out of bounds.
-inline std::vector<bool> candidate_points(const Scan& scan, const std::vector<bool>& valid,
-                                          const std::vector<Bound>& bounds,
-                                          const NeighbourView& view) {
-  std::vector<bool> candidate(view.first.size(), true);
-  for (const Bound& bound : bounds) {
-    const auto values = channel_of(scan, valid, bound.channel);
-    if (!values) continue;
-    for (std::size_t point = 0; point < candidate.size(); ++point) {
-      const float value = (*values)[static_cast<std::size_t>(view.first[point])];
-      if ((bound.least && value < *bound.least) || (bound.most && value > *bound.most)) {
-        candidate[point] = false;
-      }
-    }
-  }
-  return candidate;
+  });
 }
 
 inline std::vector<std::int64_t> numbers_where(const std::vector<bool>& wanted) {
@@ -227,7 +209,11 @@ inline NeighbourView neighbour_view(const Scan& scan, const Spec& spec, unsigned
   }
   const KdTree tree(std::move(positions), view.first);
   if (spec.candidates) {
-    const auto candidate = detail::candidate_points(scan, valid, *spec.candidates, view);
+    const std::vector<bool> rows = candidate_rows(scan, valid, spec);
+    std::vector<bool> candidate;
+    for (const std::int64_t first : view.first) {
+      candidate.push_back(rows[static_cast<std::size_t>(first)]);
+    }
     detail::add_around_candidates(scan, tree, candidate, threads, view);
   } else {
     const std::vector<bool> all(view.first.size(), true);
