@@ -51,7 +51,7 @@ class KdTree {
   }
 
  private:
-  static constexpr std::size_t kLeaf = 12;
+  static constexpr std::size_t kLeaf = 16;
 
   struct Box {
     Position least, most;
@@ -113,6 +113,7 @@ class KdTree {
         const Position& other = positions_[at];
         const double squared =
             sum_of_squares(other[0] - place[0], other[1] - place[1], other[2] - place[2]);
+        if (found.size() == k && squared > found.back().squared) continue;
         keep({squared, rank_[at], points_[at]}, k, found);
       }
       return;
@@ -130,15 +131,17 @@ class KdTree {
     if (found.size() < k || to_far <= found.back().squared) search(far, place, k, found);
   }
 
+  // Puts a point among the nearest so far, if it is one of them.
   static void keep(const Neighbour& next, std::size_t k, std::vector<Neighbour>& found) {
-    if (found.size() == k) {
-      if (!next.before(found.back())) return;
-      found.pop_back();
+    if (found.size() < k) {
+      found.push_back(next);
+    } else if (!next.before(found.back())) {
+      return;
     }
-    found.push_back(next);
-    for (std::size_t at = found.size() - 1; at > 0 && found[at].before(found[at - 1]); --at) {
-      std::swap(found[at], found[at - 1]);
-    }
+    // The last one makes room.
+    std::size_t at = found.size() - 1;
+    for (; at > 0 && next.before(found[at - 1]); --at) found[at] = found[at - 1];
+    found[at] = next;
   }
 
   std::vector<Position> positions_;   // in the order of points_, once it is built

@@ -58,58 +58,56 @@ struct NeighbourView {
 
 namespace detail {
 
-// Moves bit i of 16 to bit 3 i.
+// Moves bit i of 16 to bit 3 i: of each group of bits, ever smaller ones, the upper half goes up.
 inline std::uint64_t spread(std::uint64_t value) {
-  std::uint64_t result = 0;
-  for (int bit = 0; bit < 16; ++bit) result |= (value >> bit & 1U) << (3 * bit);
-  return result;
+  value = (value | value << 16) & 0x0000FF0000FF;
+  value = (value | value << 8) & 0x00F00F00F00F;
+  value = (value | value << 4) & 0x0C30C30C30C3;
+  return (value | value << 2) & 0x249249249249;
 }
 
-// Each row's cell along a Morton curve through the cube around the valid rows. The order matters:
-// the model that comes with derain takes every n-th point along it for a fair sample of the scan.
-inline std::vector<std::uint64_t> morton_codes(const Scan& scan,
-                                               const std::vector<std::int64_t>& rows) {
+// A valid row, and its cell along a Morton curve through the cube around all of them.
+struct CodedRow {
+  std::uint64_t code;
+  std::int64_t row;
+};
+
+// The valid rows, ascending.
+inline std::vector<CodedRow> coded_rows(const Scan& scan, const std::vector<bool>& valid) {
+  std::vector<CodedRow> rows;
+  rows.reserve(scan.size());
   Position least{INFINITY, INFINITY, INFINITY};
-  for (const std::int64_t row : rows) {
+  Position most{-INFINITY, -INFINITY, -INFINITY};
+  for (std::size_t number = 0; number < scan.size(); ++number) {
+    if (!valid[number]) continue;
+    rows.push_back({0, static_cast<std::int64_t>(number)});
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double value = scan.row(static_cast<std::size_t>(row))[axis];
+      const double value = scan.row(number)[axis];
       least[axis] = std::min(least[axis], value);
+      most[axis] = std::max(most[axis], value);
     }
   }
   double side = 0;
-  for (const std::int64_t row : rows) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double value = scan.row(static_cast<std::size_t>(row))[axis];
-      side = std::max(side, value - least[axis]);
-    }
-  }
+  for (std::size_t axis = 0; axis < 3; ++axis) side = std::max(side, most[axis] - least[axis]);
   const double scale = side > 0 ? 65535.0 / side : 0.0;
-  std::vector<std::uint64_t> codes(scan.size());
-  for (const std::int64_t row : rows) {
+  for (CodedRow& coded : rows) {
+    const float* row = scan.row(static_cast<std::size_t>(coded.row));
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double value = scan.row(static_cast<std::size_t>(row))[axis];
-      const auto cell = static_cast<std::uint64_t>((value - least[axis]) * scale);
-      codes[static_cast<std::size_t>(row)] |= spread(cell) << axis;
+      coded.code |= spread(static_cast<std::uint64_t>((row[axis] - least[axis]) * scale)) << axis;
     }
   }
-  return codes;
+  return rows;
 }
 
-// The valid rows, those at one position side by side, the lowest first.
-inline std::vector<std::int64_t> along_the_curve(const Scan& scan,
-                                                 const std::vector<bool>& valid) {
-  std::vector<std::int64_t> rows;
-  for (std::size_t row = 0; row < scan.size(); ++row) {
-    if (valid[row]) rows.push_back(static_cast<std::int64_t>(row));
-  }
-  const std::vector<std::uint64_t> codes = morton_codes(scan, rows);
-  std::sort(rows.begin(), rows.end(), [&](std::int64_t one, std::int64_t other) {
-    const auto a = static_cast<std::size_t>(one);
-    const auto b = static_cast<std::size_t>(other);
-    if (codes[a] != codes[b]) return codes[a] < codes[b];
-    const float* p = scan.row(a);
-    const float* q = scan.row(b);
-    return std::tie(p[2], p[1], p[0], one) < std::tie(q[2], q[1], q[0], other);
+// The valid rows, those at one position side by side, the lowest first. The order matters: the
+// model that comes with derain takes every n-th point along it for a fair sample of the scan.
+inline std::vector<CodedRow> along_the_curve(const Scan& scan, const std::vector<bool>& valid) {
+  std::vector<CodedRow> rows = coded_rows(scan, valid);
+  std::sort(rows.begin(), rows.end(), [&](const CodedRow& one, const CodedRow& other) {
+    if (one.code != other.code) return one.code < other.code;
+    const float* p = scan.row(static_cast<std::size_t>(one.row));
+    const float* q = scan.row(static_cast<std::size_t>(other.row));
+    return std::tie(p[2], p[1], p[0], one.row) < std::tie(q[2], q[1], q[0], other.row);
   });
   return rows;
 }
@@ -118,7 +116,7 @@ inline std::vector<std::int64_t> along_the_curve(const Scan& scan,
 inline void find_points(const Scan& scan, const std::vector<bool>& valid, NeighbourView& view) {
   view.inverse.assign(scan.size(), -1);
   const float* before = nullptr;
-  for (const std::int64_t row : along_the_curve(scan, valid)) {
+  for (const auto& [code, row] : along_the_curve(scan, valid)) {
     const float* here = scan.row(static_cast<std::size_t>(row));
     if (before == nullptr || !std::equal(here, here + 3, before)) view.first.push_back(row);
     view.inverse[static_cast<std::size_t>(row)] =
