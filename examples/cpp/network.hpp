@@ -48,18 +48,29 @@ class Network {
       throw InputError(name_, "there is no such file, or it cannot be read", "Check the path.");
     }
     const std::string content{std::istreambuf_iterator<char>(file), {}};
+    try {
+      Ort::Session session = of_bytes(content, threads);
+      refuse_changed(content, metadata_of(session));
+      return session;
+    } catch (const Ort::Exception& error) {
+      throw failure(error.what());
+    }
+  }
+
+  Ort::Session of_bytes(const std::string& content, unsigned threads) {
     Ort::SessionOptions options;
     options.SetIntraOpNumThreads(static_cast<int>(threads));
     options.SetInterOpNumThreads(1);
     // Threads may spin while the network runs; after it, the cores are for the next scan's view.
     options.AddConfigEntry("session.force_spinning_stop", "1");
     try {
-      Ort::Session session(environment_, content.data(), content.size(), options);
-      refuse_changed(content, metadata_of(session));
-      return session;
+      return Ort::Session(environment_, content.data(), content.size(), options);
     } catch (const Ort::Exception& error) {
-      throw failure(error.what());
+      if (error.GetOrtErrorCode() != ORT_NOT_IMPLEMENTED) throw;
     }
+    // Before 1.27, onnxruntime makes of a matrix product in float64 one that it cannot compute.
+    options.AddConfigEntry("optimization.disable_specified_optimizers", "MatmulTransposeFusion");
+    return Ort::Session(environment_, content.data(), content.size(), options);
   }
 
   std::string metadata() { return metadata_of(session_); }

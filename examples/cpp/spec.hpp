@@ -43,11 +43,17 @@ struct Spec {
   std::optional<std::vector<Bound>> candidates;
 };
 
+// A model that is one of derain's, and asks for what this program does not know.
+class Unknown : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 namespace detail {
 
-inline const Json& member(const Json& of, const std::string& key, Json::Kind kind) {
+inline const Json& member(const Json& of, const char* key, Json::Kind kind) {
   const Json& value = of[key];
-  if (!value.is(kind)) throw std::runtime_error("its Spec has no proper '" + key + "'");
+  if (!value.is(kind)) throw std::runtime_error(std::string("its Spec has no proper '") + key + "'");
   return value;
 }
 
@@ -68,7 +74,7 @@ inline WayBack way_back_of(const std::string& name) {
   if (name == "copy") return WayBack::copy;
   if (name == "nearest range") return WayBack::nearest_range;
   if (name == "vote") return WayBack::vote;
-  throw std::runtime_error("its scores come back by '" + name + "', which is not known here");
+  throw Unknown("its way_back is '" + name + "', which this program does not know");
 }
 
 inline RangeSpec range_spec_of(const Json& view) {
@@ -96,7 +102,7 @@ inline void read_view(const Json& view, Spec& spec) {
   } else if (kind == "range") {
     spec.range = range_spec_of(view);
   } else {
-    throw std::runtime_error("its view is '" + kind + "', which is not known here");
+    throw Unknown("its view is '" + kind + "', which this program does not know");
   }
 }
 
@@ -113,7 +119,7 @@ inline Spec spec_of(const Json& content) {
   // A Spec of before there was a number is of the first layout.
   const Json& schema = content["schema"];
   if (schema.is(Json::Kind::number) && schema.number > kSchema) {
-    throw std::runtime_error("its Spec is of a newer layout than this program reads");
+    throw Unknown("its Spec is of a newer layout than this program reads");
   }
   Spec spec;
   spec.network = member(content, "network", Json::Kind::text).text;
@@ -121,7 +127,9 @@ inline Spec spec_of(const Json& content) {
   for (const Json& item : member(content, "channels", Json::Kind::array).items) {
     spec.channels.push_back(item.text);
     // It is made from both returns of a ray, which this program does not pair.
-    if (item.text == "dual_return") throw std::runtime_error("it sees the channel 'dual_return'");
+    if (item.text == "dual_return") {
+      throw Unknown("it sees 'dual_return', which this program cannot make of a scan");
+    }
   }
   for (const Json& item : member(content, "mean", Json::Kind::array).items) {
     spec.mean.push_back(static_cast<float>(item.number));
@@ -154,6 +162,8 @@ inline Spec read_spec(const std::string& model, const std::string& text) {
   const Json document = read_metadata(model, text);
   try {
     return detail::spec_of(detail::member(document, "spec", Json::Kind::object));
+  } catch (const Unknown& error) {
+    throw InputError(model, error.what(), "Run it with derain.");
   } catch (const std::runtime_error& error) {
     throw InputError(model, error.what(), "Give a model written by `derain export`.");
   }
