@@ -11,6 +11,8 @@ import pytest
 
 from derain.views.candidates import Bound, Candidates
 
+from .cpp import Program, build, missing_tools, program
+
 if TYPE_CHECKING:
     from derain.models.outdet import OutDet
 
@@ -19,6 +21,31 @@ if TYPE_CHECKING:
 def candidates() -> Candidates:
     """Bounds that leave out some points of every kind."""
     return Candidates((Bound("range", least=2.0, most=9.0), Bound("intensity", most=99.0)))
+
+
+@pytest.fixture(scope="session")
+def built(made_once: Callable[..., Path]) -> Path:
+    """The folder in which the example in C++ was built."""
+    if missing := missing_tools():
+        pytest.skip(f"no {' and no '.join(missing)} to build the example with")
+    return made_once("examples_cpp", build)
+
+
+@pytest.fixture(scope="session")
+def show_view(built: Path) -> Program:
+    """Its program that needs no onnxruntime."""
+    return program(built / "show_view")
+
+
+@pytest.fixture(scope="session")
+def derain_onnx(built: Path) -> Program:
+    """The one that does."""
+    if not (built / "derain_onnx").exists():
+        pytest.skip(
+            "no headers of onnxruntime: apt install libonnxruntime-dev (Debian 13), or set "
+            "ONNXRUNTIME_ROOT to an unpacked release"
+        )
+    return program(built / "derain_onnx")
 
 
 @pytest.fixture(scope="session")
