@@ -47,6 +47,8 @@ class Network {
     if (!file || !std::filesystem::is_regular_file(path)) {
       throw InputError(name_, "there is no such file, or it cannot be read", "Check the path.");
     }
+    // From 1.29 on, onnxruntime tells its makers of every model that is opened.
+    environment_.DisableTelemetryEvents();
     const std::string content{std::istreambuf_iterator<char>(file), {}};
     try {
       Ort::Session session = of_bytes(content, threads);

@@ -1,5 +1,6 @@
 """Of onnxruntime, what differs between its versions."""
 
+import os
 from typing import Any
 
 import numpy as np
@@ -26,3 +27,7 @@ def test_a_network_that_earlier_versions_fuse_wrongly_is_opened_without_that(
 
     monkeypatch.setattr(onnxruntime, "InferenceSession", earlier)
     np.testing.assert_array_equal(Derainer(threads=1)(scene(300)), rain)
+
+
+def test_it_tells_nobody_of_the_models_that_are_opened() -> None:
+    assert os.environ["ORT_DISABLE_TELEMETRY"] == "1"
