@@ -1,6 +1,5 @@
 """onnxruntime, which comes with derain and runs a model unless another runtime is named."""
 
-import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,10 +12,6 @@ from derain.export.runtimes.session import Session, TensorType
 
 # NumPy's names of what onnxruntime calls the types of a view's inputs and of scores.
 NUMPY_NAMES = {"tensor(float)": "float32", "tensor(int64)": "int64", "tensor(bool)": "bool"}
-
-# From 1.29 on, onnxruntime tells its makers of every model that is opened, unless this is set before
-# it is imported. What runs on a robot tells nobody; whoever wants it to sets the variable to 0.
-os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
 
 # Before 1.27, onnxruntime makes of a matrix product in float64, as the model that comes with derain
 # has one, an operator that it cannot compute.
