@@ -1,10 +1,13 @@
 """Models that examples are tried with."""
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -12,6 +15,7 @@ import pytest
 from derain.views.candidates import Bound, Candidates
 
 from .cpp import Program, build, missing_tools, program
+from .made_up_ros import EXAMPLE, DiagnosticArray, DiagnosticStatus, KeyValue, PointCloud2
 
 if TYPE_CHECKING:
     from derain.models.outdet import OutDet
@@ -60,3 +64,35 @@ def judging_candidates(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("derain.models.outdet.deployed.BLOCKS", 1)  # traced several times as quickly
         return made_once("examples_candidates.onnx", partial(export, model))
+
+
+@pytest.fixture(scope="module")
+def ros2_node() -> Iterator[ModuleType]:
+    """The example's module, imported where there is no rclpy."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(EXAMPLE)
+        patch.setitem(sys.modules, "rclpy", None)  # whoever imports it fails
+        yield import_module("derain_node")
+        del sys.modules["derain_node"]
+
+
+@pytest.fixture
+def ros(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Modules of ROS, as much of them as the example imports."""
+    modules = {
+        "rclpy": {},
+        "rclpy.qos": {
+            "QoSProfile": SimpleNamespace,
+            "ReliabilityPolicy": SimpleNamespace(BEST_EFFORT="best effort", RELIABLE="reliable"),
+        },
+        "sensor_msgs": {},
+        "sensor_msgs.msg": {"PointCloud2": PointCloud2},
+        "diagnostic_msgs": {},
+        "diagnostic_msgs.msg": {
+            one.__name__: one for one in (DiagnosticArray, DiagnosticStatus, KeyValue)
+        },
+    }
+    for name, members in modules.items():
+        module = ModuleType(name)
+        vars(module).update(members)
+        monkeypatch.setitem(sys.modules, name, module)
