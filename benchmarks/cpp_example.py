@@ -4,8 +4,8 @@
     python -m benchmarks.cpp_example build/cpp/derain_onnx ../shared/data/wads/drive/velodyne/*.bin
     python -m benchmarks.cpp_example build/cpp/derain_onnx SCAN.bin... --model a.onnx --model b.onnx
 
-Both clean the same scans in turns, with as many threads. The first scan of each turn is cleaned
-once before, untimed. Prints for each model how many points they judge otherwise, the median of each
+Both clean the same scans in turns, with as many threads; in each turn all of them once before,
+untimed, for the first scans that a process cleans take longer. Prints for each model how many points they judge otherwise, the median of each
 stage, and what C++ takes of the time of derain.
 """
 
@@ -71,21 +71,21 @@ def by_program(model: Path, arguments: argparse.Namespace) -> tuple[list[NDArray
     with tempfile.TemporaryDirectory() as out:
         command = [arguments.program, "--threads", str(arguments.threads), model, out]
         done = subprocess.run(
-            [*command, scans[0], *scans], check=True, capture_output=True, text=True
+            [*command, *scans, *scans], check=True, capture_output=True, text=True
         )
         labels = [np.fromfile(Path(out) / f"{scan.stem}.label", "<u4") == 1 for scan in scans]
     taken = np.array(SAID.findall(done.stdout), np.float64)
-    return labels, taken[1:]
+    return labels, taken[len(scans) :]
 
 
 def by_derain(derainer: Derainer, scans: list[Path]) -> tuple[list[NDArray[np.bool_]], Times]:
     """What derain calls rain, and its times."""
     masks, taken = [], []
-    for scan in (scans[0], *scans):
+    for scan in (*scans, *scans):
         stopwatch = Stopwatch()
         masks.append(derainer(np.fromfile(scan, np.float32).reshape(-1, 4), stopwatch))
         taken.append([stopwatch.milliseconds[stage] for stage in STAGES])
-    return masks[1:], np.array(taken[1:])
+    return masks[len(scans) :], np.array(taken[len(scans) :])
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ PARAMETERS = {
 
 
 def generate_launch_description() -> LaunchDescription:
-    """The node, started again where it ends by an error."""
+    """The node, started again whenever it ends."""
     arguments = [DeclareLaunchArgument("python", default_value="python3")]
     arguments += [
         DeclareLaunchArgument(name, default_value=default)
