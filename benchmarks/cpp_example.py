@@ -5,8 +5,8 @@
     python -m benchmarks.cpp_example build/cpp/derain_onnx SCAN.bin... --model a.onnx --model b.onnx
 
 Both clean the same scans in turns, with as many threads; in each turn all of them once before,
-untimed, for the first scans that a process cleans take longer. Prints for each model how many points they judge otherwise, the median of each
-stage, and what C++ takes of the time of derain.
+untimed, for the first scans that a process cleans take longer. Prints for each model how many
+points they judge otherwise, the median of each stage, and what C++ takes of the time of derain.
 """
 
 import argparse
