@@ -205,7 +205,7 @@ inline NeighbourView neighbour_view(const Scan& scan, const Spec& spec, unsigned
     const float* row = scan.row(static_cast<std::size_t>(first));
     positions.push_back({row[0], row[1], row[2]});
   }
-  const KdTree tree(std::move(positions), view.first);
+  const KdTree tree(std::move(positions), view.first, threads);
   if (spec.candidates) {
     const std::vector<bool> rows = candidate_rows(scan, valid, spec);
     std::vector<bool> candidate;
