@@ -1,8 +1,9 @@
 // Cleans scans with a model that `derain export` wrote:
 //
-//     derain_onnx MODEL.onnx OUT SCAN.bin...
+//     derain_onnx [--threads N] MODEL.onnx OUT SCAN.bin...
 //
-// For each scan, OUT/<stem>.label (uint32 per row, 1 = rain) and OUT/<stem>.bin (the other rows).
+// For each scan, OUT/<stem>.label (uint32 per row, 1 = rain) and OUT/<stem>.bin (the other rows),
+// and a line that says how many points were rain and what the stages took.
 // docs/onnx_contract.md says what happens on the way.
 
 #include <algorithm>
@@ -10,12 +11,13 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <iostream>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "network.hpp"
+#include "derainer.hpp"
 
 namespace {
 
@@ -37,18 +39,18 @@ void write(const fs::path& path, const std::vector<Number>& numbers) {
   fs::rename(unfinished, path);
 }
 
-void clean(derain::Network& network, const fs::path& path, const fs::path& out, unsigned threads) {
+void clean(derain::Derainer& derainer, const fs::path& path, const fs::path& out) {
   const fs::path cleaned_path = out / path.filename().replace_extension(".bin");
   if (fs::exists(cleaned_path) && fs::equivalent(path, cleaned_path)) {
     throw derain::InputError(path.string(), "it would be overwritten", "Give another folder.");
   }
   const derain::Scan scan = derain::read_scan(path);
-  derain::NeighbourView view = derain::neighbour_view(scan, network.spec(), threads);
-  const std::vector<float> probability = view.to_rows(network.probability(view));
+  derain::Times times;
+  const std::vector<float> probability = derainer.probability(scan, times);
   std::vector<std::uint32_t> label(scan.size());
   std::vector<float> cleaned;
   for (std::size_t row = 0; row < scan.size(); ++row) {
-    label[row] = probability[row] > network.spec().threshold ? 1 : 0;
+    label[row] = probability[row] > derainer.spec().threshold ? 1 : 0;
     if (label[row] == 0) {
       cleaned.insert(cleaned.end(), scan.row(row), scan.row(row) + derain::kColumns);
     }
@@ -56,22 +58,44 @@ void clean(derain::Network& network, const fs::path& path, const fs::path& out, 
   write(out / path.filename().replace_extension(".label"), label);
   write(cleaned_path, cleaned);
   std::cout << path.string() << ": " << scan.size() << " points, "
-            << std::count(label.begin(), label.end(), 1U) << " rain\n";
+            << std::count(label.begin(), label.end(), 1U) << " rain, view " << std::fixed
+            << std::setprecision(1) << times.view << " ms, network " << times.network
+            << " ms, back " << times.back << " ms\n";
+}
+
+// How many threads were asked for; every core where nothing or 0 was.
+unsigned threads_in(const std::string& text) {
+  std::size_t end = 0;
+  int asked = -1;
+  try {
+    asked = std::stoi(text, &end);
+  } catch (const std::exception&) {
+  }
+  if (asked < 0 || end != text.size()) {
+    throw derain::InputError("--threads", "'" + text + "' is no number of threads",
+                             "Give 0 for every core.");
+  }
+  return asked > 0 ? static_cast<unsigned>(asked) : std::max(1U, std::thread::hardware_concurrency());
 }
 
 }  // namespace
 
 int main(int count, char** arguments) {
-  if (count < 4) {
-    std::cerr << "usage: derain_onnx MODEL.onnx OUT SCAN.bin...\n";
-    return 2;
-  }
+  std::vector<std::string> words(arguments + 1, arguments + count);
   try {
-    const unsigned threads = std::max(1U, std::thread::hardware_concurrency());
-    derain::Network network(arguments[1], threads);
-    const fs::path out(arguments[2]);
+    std::string threads = "0";
+    if (words.size() >= 2 && words[0] == "--threads") {
+      threads = words[1];
+      words.erase(words.begin(), words.begin() + 2);
+    }
+    if (words.size() < 3) {
+      std::cerr << "usage: derain_onnx [--threads N] MODEL.onnx OUT SCAN.bin...\n";
+      return 2;
+    }
+    derain::Derainer derainer(words[0], threads_in(threads));
+    const fs::path out(words[1]);
     fs::create_directories(out);
-    for (int scan = 3; scan < count; ++scan) clean(network, arguments[scan], out, threads);
+    for (std::size_t scan = 2; scan < words.size(); ++scan) clean(derainer, words[scan], out);
   } catch (const std::exception& error) {
     std::cerr << "derain_onnx: " << error.what() << '\n';
     return 2;

@@ -21,7 +21,7 @@ struct Json {
   std::vector<std::string> keys;
 
   // The member of an object; null where there is none.
-  const Json& operator[](const std::string& key) const {
+  const Json& operator[](const char* key) const {
     static const Json nothing;
     for (std::size_t place = 0; place < keys.size(); ++place) {
       if (keys[place] == key) return items[place];

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <thread>
 #include <vector>
 
 namespace derain {
@@ -30,11 +31,14 @@ struct Neighbour {
 // point as near as the last one kept.
 class KdTree {
  public:
-  // `rank` orders equally near points.
-  KdTree(std::vector<Position> positions, const std::vector<std::int64_t>& rank)
+  // `rank` orders equally near points; `threads` is 1 or more.
+  KdTree(std::vector<Position> positions, const std::vector<std::int64_t>& rank, unsigned threads)
       : positions_(std::move(positions)), points_(positions_.size()) {
     std::iota(points_.begin(), points_.end(), std::int64_t{0});
-    if (!points_.empty()) build(0, points_.size());
+    std::size_t boxes = 1;
+    for (std::size_t most = points_.size(); most > kLeaf; most -= most / 2) boxes = 2 * boxes + 1;
+    boxes_.resize(boxes);
+    build(0, 0, points_.size(), threads);
     std::vector<Position> in_order;
     in_order.reserve(points_.size());
     for (const std::int64_t point : points_) {
@@ -47,23 +51,23 @@ class KdTree {
   // The `k` nearest points in ascending distance, or all where there are fewer.
   void nearest(const Position& place, std::size_t k, std::vector<Neighbour>& found) const {
     found.clear();
-    if (!boxes_.empty()) search(0, place, k, found);
+    search(0, place, k, found);
   }
 
  private:
-  static constexpr std::size_t kLeaf = 12;
+  static constexpr std::size_t kLeaf = 16;
 
+  // The halves of box n are boxes 2 n + 1 and 2 n + 2, unless it is a leaf.
   struct Box {
     Position least, most;
-    std::size_t begin, end;   // its points
-    std::size_t right = 0;    // the box of the upper half; that of the lower is the next one
+    std::size_t begin, end;  // its points
+
+    bool is_leaf() const { return end - begin <= kLeaf; }
   };
 
-  void build(std::size_t begin, std::size_t end) {
-    const std::size_t self = boxes_.size();
-    boxes_.push_back(around(begin, end));
-    if (end - begin <= kLeaf) return;
-    const Box box = boxes_[self];
+  void build(std::size_t number, std::size_t begin, std::size_t end, unsigned threads) {
+    const Box box = boxes_[number] = around(begin, end);
+    if (box.is_leaf()) return;
     std::size_t axis = 0;
     for (std::size_t other = 1; other < 3; ++other) {
       if (box.most[other] - box.least[other] > box.most[axis] - box.least[axis]) axis = other;
@@ -76,9 +80,15 @@ class KdTree {
       return positions_[static_cast<std::size_t>(one)][axis] <
              positions_[static_cast<std::size_t>(other)][axis];
     });
-    build(begin, middle);
-    boxes_[self].right = boxes_.size();
-    build(middle, end);
+    const auto lower = [&] { build(2 * number + 1, begin, middle, threads / 2); };
+    std::thread worker;
+    if (threads > 1) {
+      worker = std::thread(lower);
+    } else {
+      lower();
+    }
+    build(2 * number + 2, middle, end, threads - threads / 2);
+    if (worker.joinable()) worker.join();
   }
 
   Box around(std::size_t begin, std::size_t end) const {
@@ -108,17 +118,18 @@ class KdTree {
   void search(std::size_t number, const Position& place, std::size_t k,
               std::vector<Neighbour>& found) const {
     const Box& box = boxes_[number];
-    if (box.right == 0) {
+    if (box.is_leaf()) {
       for (std::size_t at = box.begin; at < box.end; ++at) {
         const Position& other = positions_[at];
         const double squared =
             sum_of_squares(other[0] - place[0], other[1] - place[1], other[2] - place[2]);
+        if (found.size() == k && squared > found.back().squared) continue;
         keep({squared, rank_[at], points_[at]}, k, found);
       }
       return;
     }
-    std::size_t near = number + 1;
-    std::size_t far = box.right;
+    std::size_t near = 2 * number + 1;
+    std::size_t far = near + 1;
     double to_near = squared_to(boxes_[near], place);
     double to_far = squared_to(boxes_[far], place);
     if (to_far < to_near) {
@@ -130,15 +141,17 @@ class KdTree {
     if (found.size() < k || to_far <= found.back().squared) search(far, place, k, found);
   }
 
+  // Puts a point among the nearest so far, if it is one of them.
   static void keep(const Neighbour& next, std::size_t k, std::vector<Neighbour>& found) {
-    if (found.size() == k) {
-      if (!next.before(found.back())) return;
-      found.pop_back();
+    if (found.size() < k) {
+      found.push_back(next);
+    } else if (!next.before(found.back())) {
+      return;
     }
-    found.push_back(next);
-    for (std::size_t at = found.size() - 1; at > 0 && found[at].before(found[at - 1]); --at) {
-      std::swap(found[at], found[at - 1]);
-    }
+    // The last one makes room.
+    std::size_t at = found.size() - 1;
+    for (; at > 0 && next.before(found[at - 1]); --at) found[at] = found[at - 1];
+    found[at] = next;
   }
 
   std::vector<Position> positions_;   // in the order of points_, once it is built

@@ -5,12 +5,13 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <string>
-#include <thread>
 #include <tuple>
 #include <vector>
 
+#include "candidates.hpp"
+#include "inputs.hpp"
 #include "kd_tree.hpp"
+#include "parallel.hpp"
 #include "scan.hpp"
 #include "spec.hpp"
 
@@ -22,6 +23,7 @@ struct NeighbourView {
   std::size_t k = 0;
   std::vector<std::int64_t> first;       // (M) row of the scan that each point was taken from
   std::vector<std::int64_t> inverse;     // (N) point of each row of the scan; -1 for invalid rows
+  std::size_t channels = 0;
   std::vector<float> points;             // (M, C)
   std::vector<std::int64_t> neighbours;  // (F, k) points, each one's own first
   std::vector<float> distances;          // (F, k) metres
@@ -30,8 +32,16 @@ struct NeighbourView {
   // How many points the network scores: J, or M.
   std::size_t scored() const { return candidates ? candidates->size() / k : first.size(); }
 
+  std::vector<Input> inputs() {
+    std::vector<Input> result = {matrix("points", Element::real, points, channels),
+                                 matrix("distances", Element::real, distances, k),
+                                 matrix("neighbours", Element::whole, neighbours, k)};
+    if (candidates) result.push_back(matrix("candidates", Element::whole, *candidates, k));
+    return result;
+  }
+
   // One value per row of the scan from one per scored point; 0 for all that were not scored.
-  std::vector<float> to_rows(const std::vector<float>& score) const {
+  std::vector<float> to_rows(const std::vector<float>& score, unsigned) const {
     std::vector<float> of_points(first.size(), 0.0F);
     for (std::size_t number = 0; number < score.size(); ++number) {
       // A candidate's neighbourhood is among the first J, and begins with the candidate itself.
@@ -48,58 +58,56 @@ struct NeighbourView {
 
 namespace detail {
 
-// Moves bit i of 16 to bit 3 i.
+// Moves bit i of 16 to bit 3 i: of each group of bits, ever smaller ones, the upper half goes up.
 inline std::uint64_t spread(std::uint64_t value) {
-  std::uint64_t result = 0;
-  for (int bit = 0; bit < 16; ++bit) result |= (value >> bit & 1U) << (3 * bit);
-  return result;
+  value = (value | value << 16) & 0x0000FF0000FF;
+  value = (value | value << 8) & 0x00F00F00F00F;
+  value = (value | value << 4) & 0x0C30C30C30C3;
+  return (value | value << 2) & 0x249249249249;
 }
 
-// Each row's cell along a Morton curve through the cube around the valid rows. The order matters:
-// the model that comes with derain takes every n-th point along it for a fair sample of the scan.
-inline std::vector<std::uint64_t> morton_codes(const Scan& scan,
-                                               const std::vector<std::int64_t>& rows) {
+// A valid row, and its cell along a Morton curve through the cube around all of them.
+struct CodedRow {
+  std::uint64_t code;
+  std::int64_t row;
+};
+
+// The valid rows, ascending.
+inline std::vector<CodedRow> coded_rows(const Scan& scan, const std::vector<bool>& valid) {
+  std::vector<CodedRow> rows;
+  rows.reserve(scan.size());
   Position least{INFINITY, INFINITY, INFINITY};
-  for (const std::int64_t row : rows) {
+  Position most{-INFINITY, -INFINITY, -INFINITY};
+  for (std::size_t number = 0; number < scan.size(); ++number) {
+    if (!valid[number]) continue;
+    rows.push_back({0, static_cast<std::int64_t>(number)});
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double value = scan.row(static_cast<std::size_t>(row))[axis];
+      const double value = scan.row(number)[axis];
       least[axis] = std::min(least[axis], value);
+      most[axis] = std::max(most[axis], value);
     }
   }
   double side = 0;
-  for (const std::int64_t row : rows) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double value = scan.row(static_cast<std::size_t>(row))[axis];
-      side = std::max(side, value - least[axis]);
-    }
-  }
+  for (std::size_t axis = 0; axis < 3; ++axis) side = std::max(side, most[axis] - least[axis]);
   const double scale = side > 0 ? 65535.0 / side : 0.0;
-  std::vector<std::uint64_t> codes(scan.size());
-  for (const std::int64_t row : rows) {
+  for (CodedRow& coded : rows) {
+    const float* row = scan.row(static_cast<std::size_t>(coded.row));
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double value = scan.row(static_cast<std::size_t>(row))[axis];
-      const auto cell = static_cast<std::uint64_t>((value - least[axis]) * scale);
-      codes[static_cast<std::size_t>(row)] |= spread(cell) << axis;
+      coded.code |= spread(static_cast<std::uint64_t>((row[axis] - least[axis]) * scale)) << axis;
     }
   }
-  return codes;
+  return rows;
 }
 
-// The valid rows, those at one position side by side, the lowest first.
-inline std::vector<std::int64_t> along_the_curve(const Scan& scan,
-                                                 const std::vector<bool>& valid) {
-  std::vector<std::int64_t> rows;
-  for (std::size_t row = 0; row < scan.size(); ++row) {
-    if (valid[row]) rows.push_back(static_cast<std::int64_t>(row));
-  }
-  const std::vector<std::uint64_t> codes = morton_codes(scan, rows);
-  std::sort(rows.begin(), rows.end(), [&](std::int64_t one, std::int64_t other) {
-    const auto a = static_cast<std::size_t>(one);
-    const auto b = static_cast<std::size_t>(other);
-    if (codes[a] != codes[b]) return codes[a] < codes[b];
-    const float* p = scan.row(a);
-    const float* q = scan.row(b);
-    return std::tie(p[2], p[1], p[0], one) < std::tie(q[2], q[1], q[0], other);
+// The valid rows, those at one position side by side, the lowest first. The order matters: the
+// model that comes with derain takes every n-th point along it for a fair sample of the scan.
+inline std::vector<CodedRow> along_the_curve(const Scan& scan, const std::vector<bool>& valid) {
+  std::vector<CodedRow> rows = coded_rows(scan, valid);
+  std::sort(rows.begin(), rows.end(), [&](const CodedRow& one, const CodedRow& other) {
+    if (one.code != other.code) return one.code < other.code;
+    const float* p = scan.row(static_cast<std::size_t>(one.row));
+    const float* q = scan.row(static_cast<std::size_t>(other.row));
+    return std::tie(p[2], p[1], p[0], one.row) < std::tie(q[2], q[1], q[0], other.row);
   });
   return rows;
 }
@@ -108,7 +116,7 @@ inline std::vector<std::int64_t> along_the_curve(const Scan& scan,
 inline void find_points(const Scan& scan, const std::vector<bool>& valid, NeighbourView& view) {
   view.inverse.assign(scan.size(), -1);
   const float* before = nullptr;
-  for (const std::int64_t row : along_the_curve(scan, valid)) {
+  for (const auto& [code, row] : along_the_curve(scan, valid)) {
     const float* here = scan.row(static_cast<std::size_t>(row));
     if (before == nullptr || !std::equal(here, here + 3, before)) view.first.push_back(row);
     view.inverse[static_cast<std::size_t>(row)] =
@@ -119,16 +127,12 @@ inline void find_points(const Scan& scan, const std::vector<bool>& valid, Neighb
 
 inline void fill_points(const Scan& scan, const std::vector<bool>& valid, const Spec& spec,
                         NeighbourView& view) {
-  const std::size_t width = spec.channels.size();
+  const std::size_t width = view.channels = spec.channels.size();
   view.points.resize(view.first.size() * width);
-  for (std::size_t channel = 0; channel < width; ++channel) {
-    const auto values = channel_of(scan, valid, spec.channels[channel]);
-    for (std::size_t point = 0; point < view.first.size(); ++point) {
-      const auto row = static_cast<std::size_t>(view.first[point]);
-      const bool lacking = !values || std::isnan((*values)[row]);
-      view.points[point * width + channel] = lacking ? spec.mean[channel] : (*values)[row];
-    }
-  }
+  for_channels(scan, valid, spec, view.first,
+               [&](std::size_t point, std::size_t channel, float value) {
+                 view.points[point * width + channel] = value;
+               });
 }
 
 // Neighbourhoods of some points, behind those that the view has already.
@@ -138,7 +142,7 @@ inline void add_neighbourhoods(const Scan& scan, const KdTree& tree,
   const std::size_t begin = view.neighbours.size();
   view.neighbours.resize(begin + queries.size() * view.k);
   view.distances.resize(begin + queries.size() * view.k);
-  const auto work = [&](std::size_t from, std::size_t to) {
+  in_parts(queries.size(), threads, [&](std::size_t from, std::size_t to) {
     std::vector<Neighbour> found;
     for (std::size_t query = from; query < to; ++query) {
       const auto point = static_cast<std::size_t>(queries[query]);
@@ -152,31 +156,7 @@ inline void add_neighbourhoods(const Scan& scan, const KdTree& tree,
         view.distances[at] = std::sqrt(static_cast<float>(neighbour.squared));
       }
     }
-  };
-  const std::size_t share = queries.size() / threads + 1;
-  std::vector<std::thread> workers;
-  for (std::size_t from = 0; from < queries.size(); from += share) {
-    workers.emplace_back(work, from, std::min(from + share, queries.size()));
-  }
-  for (std::thread& worker : workers) worker.join();
-}
-
-// Which points may be rain: those of which no bounded channel is known to be out of bounds.
-inline std::vector<bool> candidate_points(const Scan& scan, const std::vector<bool>& valid,
-                                          const std::vector<Bound>& bounds,
-                                          const NeighbourView& view) {
-  std::vector<bool> candidate(view.first.size(), true);
-  for (const Bound& bound : bounds) {
-    const auto values = channel_of(scan, valid, bound.channel);
-    if (!values) continue;
-    for (std::size_t point = 0; point < candidate.size(); ++point) {
-      const float value = (*values)[static_cast<std::size_t>(view.first[point])];
-      if ((bound.least && value < *bound.least) || (bound.most && value > *bound.most)) {
-        candidate[point] = false;
-      }
-    }
-  }
-  return candidate;
+  });
 }
 
 inline std::vector<std::int64_t> numbers_where(const std::vector<bool>& wanted) {
@@ -225,9 +205,13 @@ inline NeighbourView neighbour_view(const Scan& scan, const Spec& spec, unsigned
     const float* row = scan.row(static_cast<std::size_t>(first));
     positions.push_back({row[0], row[1], row[2]});
   }
-  const KdTree tree(std::move(positions), view.first);
+  const KdTree tree(std::move(positions), view.first, threads);
   if (spec.candidates) {
-    const auto candidate = detail::candidate_points(scan, valid, *spec.candidates, view);
+    const std::vector<bool> rows = candidate_rows(scan, valid, spec);
+    std::vector<bool> candidate;
+    for (const std::int64_t first : view.first) {
+      candidate.push_back(rows[static_cast<std::size_t>(first)]);
+    }
     detail::add_around_candidates(scan, tree, candidate, threads, view);
   } else {
     const std::vector<bool> all(view.first.size(), true);

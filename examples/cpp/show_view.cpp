@@ -4,7 +4,8 @@
 //     show_view METADATA.json SCAN.bin OUT
 //
 // METADATA.json is the text under the model's metadata key `derain`. OUT/<input> has the numbers of
-// each input, row by row, and OUT/first and OUT/inverse those of the way back.
+// each input, row by row; of the way back, OUT/first and OUT/inverse have those of neighbourhoods,
+// OUT/pixel and OUT/winner those of an image.
 
 #include <exception>
 #include <filesystem>
@@ -15,15 +16,22 @@
 #include <vector>
 
 #include "neighbour_view.hpp"
+#include "range_view.hpp"
 
 namespace {
 
 template <typename Number>
-void write(const std::filesystem::path& path, const std::vector<Number>& numbers) {
+void write(const std::filesystem::path& path, const Number* numbers, std::size_t count) {
   std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(numbers.data()),
-             static_cast<std::streamsize>(numbers.size() * sizeof(Number)));
+  file.write(reinterpret_cast<const char*>(numbers),
+             static_cast<std::streamsize>(count * sizeof(Number)));
   if (!file) throw derain::InputError(path.string(), "it cannot be written", "Check the folder.");
+}
+
+void write_inputs(const std::filesystem::path& out, const std::vector<derain::Input>& inputs) {
+  for (const derain::Input& input : inputs) {
+    write(out / input.type.name, static_cast<const char*>(input.numbers), input.bytes);
+  }
 }
 
 }  // namespace
@@ -38,15 +46,19 @@ int main(int count, char** arguments) {
     const std::string metadata{std::istreambuf_iterator<char>(file), {}};
     const derain::Spec spec = derain::read_spec(arguments[1], metadata);
     const derain::Scan scan = derain::read_scan(arguments[2]);
-    const derain::NeighbourView view = derain::neighbour_view(scan, spec, 2);
     const std::filesystem::path out(arguments[3]);
     std::filesystem::create_directories(out);
-    write(out / "points", view.points);
-    write(out / "neighbours", view.neighbours);
-    write(out / "distances", view.distances);
-    write(out / "first", view.first);
-    write(out / "inverse", view.inverse);
-    if (view.candidates) write(out / "candidates", *view.candidates);
+    if (spec.range) {
+      derain::RangeView view = derain::range_view(scan, spec, 2);
+      write_inputs(out, view.inputs());
+      write(out / "pixel", view.pixel.data(), view.pixel.size());
+      write(out / "winner", view.winner.data(), view.winner.size());
+    } else {
+      derain::NeighbourView view = derain::neighbour_view(scan, spec, 2);
+      write_inputs(out, view.inputs());
+      write(out / "first", view.first.data(), view.first.size());
+      write(out / "inverse", view.inverse.data(), view.inverse.size());
+    }
   } catch (const std::exception& error) {
     std::cerr << "show_view: " << error.what() << '\n';
     return 2;

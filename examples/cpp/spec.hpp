@@ -1,12 +1,15 @@
 // The Spec of a model, as far as this program uses it: docs/onnx_contract.md says the whole.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "errors.hpp"
+#include "grid.hpp"
+#include "inputs.hpp"
 #include "json.hpp"
 
 namespace derain {
@@ -22,20 +25,35 @@ struct Bound {
   std::optional<float> most;
 };
 
+// How points get a score that lost their pixel.
+enum class WayBack { copy, nearest_range, vote };
+
+struct RangeSpec {
+  Grid grid;
+  WayBack way_back = WayBack::copy;
+};
+
 struct Spec {
   std::string network;
-  std::size_t neighbours = 0;         // k, the point itself included
-  std::vector<std::string> channels;  // in the order of the columns of the input `points`
+  std::size_t neighbours = 0;         // k of the neighbour view, the point itself included
+  std::optional<RangeSpec> range;     // the range view, where the network has that one
+  std::vector<std::string> channels;  // what the network sees of a point, in order
   std::vector<float> mean;            // stands in for what a scan lacks, by channel
   float threshold = 0.5F;             // a point is rain where its probability is greater
   std::optional<std::vector<Bound>> candidates;
 };
 
+// A model that is one of derain's, and asks for what this program does not know.
+class Unknown : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 namespace detail {
 
-inline const Json& member(const Json& of, const std::string& key, Json::Kind kind) {
+inline const Json& member(const Json& of, const char* key, Json::Kind kind) {
   const Json& value = of[key];
-  if (!value.is(kind)) throw std::runtime_error("its Spec has no proper '" + key + "'");
+  if (!value.is(kind)) throw std::runtime_error(std::string("its Spec has no proper '") + key + "'");
   return value;
 }
 
@@ -45,15 +63,47 @@ inline std::optional<float> limit(const Json& value) {
 }
 
 inline std::size_t neighbours_of(const Json& view) {
-  const std::string kind = member(view, "kind", Json::Kind::text).text;
-  if (kind != "neighbours") {
-    throw std::runtime_error("its view is '" + kind + "', and this program knows 'neighbours'");
-  }
   const double count = member(view, "neighbours", Json::Kind::number).number;
   if (!(count >= 1 && count <= kMostNeighbours)) {
     throw std::runtime_error("its neighbourhoods are of no possible size");
   }
   return static_cast<std::size_t>(count);
+}
+
+inline WayBack way_back_of(const std::string& name) {
+  if (name == "copy") return WayBack::copy;
+  if (name == "nearest range") return WayBack::nearest_range;
+  if (name == "vote") return WayBack::vote;
+  throw Unknown("its way_back is '" + name + "', which this program does not know");
+}
+
+inline RangeSpec range_spec_of(const Json& view) {
+  RangeSpec range;
+  range.way_back = way_back_of(member(view, "way_back", Json::Kind::text).text);
+  const Json& grid = member(view, "grid", Json::Kind::object);
+  const Json& azimuth = member(grid, "azimuth", Json::Kind::array);
+  const double columns = member(grid, "columns", Json::Kind::number).number;
+  if (columns >= 1 && columns <= double{Grid::kMostPixels} && azimuth.items.size() == 2) {
+    range.grid.columns = static_cast<std::int64_t>(columns);
+    range.grid.right = azimuth.items[0].number;
+    range.grid.left = azimuth.items[1].number;
+  }
+  for (const Json& edge : member(grid, "edges", Json::Kind::array).items) {
+    range.grid.edges.push_back(edge.number);
+  }
+  if (!range.grid.is_possible()) throw std::runtime_error("its grid is none that there can be");
+  return range;
+}
+
+inline void read_view(const Json& view, Spec& spec) {
+  const std::string kind = member(view, "kind", Json::Kind::text).text;
+  if (kind == "neighbours") {
+    spec.neighbours = neighbours_of(view);
+  } else if (kind == "range") {
+    spec.range = range_spec_of(view);
+  } else {
+    throw Unknown("its view is '" + kind + "', which this program does not know");
+  }
 }
 
 inline std::vector<Bound> bounds_of(const Json& candidates) {
@@ -69,15 +119,17 @@ inline Spec spec_of(const Json& content) {
   // A Spec of before there was a number is of the first layout.
   const Json& schema = content["schema"];
   if (schema.is(Json::Kind::number) && schema.number > kSchema) {
-    throw std::runtime_error("its Spec is of a newer layout than this program reads");
+    throw Unknown("its Spec is of a newer layout than this program reads");
   }
   Spec spec;
   spec.network = member(content, "network", Json::Kind::text).text;
-  spec.neighbours = neighbours_of(member(content, "view", Json::Kind::object));
+  read_view(member(content, "view", Json::Kind::object), spec);
   for (const Json& item : member(content, "channels", Json::Kind::array).items) {
     spec.channels.push_back(item.text);
     // It is made from both returns of a ray, which this program does not pair.
-    if (item.text == "dual_return") throw std::runtime_error("it sees the channel 'dual_return'");
+    if (item.text == "dual_return") {
+      throw Unknown("it sees 'dual_return', which this program cannot make of a scan");
+    }
   }
   for (const Json& item : member(content, "mean", Json::Kind::array).items) {
     spec.mean.push_back(static_cast<float>(item.number));
@@ -96,14 +148,42 @@ inline Spec spec_of(const Json& content) {
 
 }  // namespace detail
 
-// The Spec in the text that stands in a model's metadata under the key `derain`.
-inline Spec read_spec(const std::string& model, const std::string& metadata) {
+// All that stands in a model's metadata under the key `derain`.
+inline Json read_metadata(const std::string& model, const std::string& text) {
   try {
-    const Json document = JsonReader(metadata).document();
-    return detail::spec_of(detail::member(document, "spec", Json::Kind::object));
+    return JsonReader(text).document();
   } catch (const std::runtime_error& error) {
     throw InputError(model, error.what(), "Give a model written by `derain export`.");
   }
+}
+
+// The Spec in it.
+inline Spec read_spec(const std::string& model, const std::string& text) {
+  const Json document = read_metadata(model, text);
+  try {
+    return detail::spec_of(detail::member(document, "spec", Json::Kind::object));
+  } catch (const Unknown& error) {
+    throw InputError(model, error.what(), "Run it with derain.");
+  } catch (const std::runtime_error& error) {
+    throw InputError(model, error.what(), "Give a model written by `derain export`.");
+  }
+}
+
+// What a network of a Spec takes.
+inline std::vector<InputType> inputs_of(const Spec& spec) {
+  const auto channels = static_cast<std::int64_t>(spec.channels.size());
+  if (spec.range) {
+    const std::int64_t height = spec.range->grid.rows();
+    const std::int64_t width = spec.range->grid.columns;
+    return {{"image", Element::real, {1, channels, height, width}},
+            {"valid", Element::truth, {1, 1, height, width}}};
+  }
+  const auto k = static_cast<std::int64_t>(spec.neighbours);
+  std::vector<InputType> inputs = {{"points", Element::real, {kVarying, channels}},
+                                   {"distances", Element::real, {kVarying, k}},
+                                   {"neighbours", Element::whole, {kVarying, k}}};
+  if (spec.candidates) inputs.push_back({"candidates", Element::whole, {kVarying, k}});
+  return inputs;
 }
 
 }  // namespace derain

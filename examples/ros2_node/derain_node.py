@@ -4,6 +4,8 @@ It needs ROS 2 with Python 3.11 or later (Jazzy has 3.12), and ``pip install der
 
     python3 derain_node.py --ros-args -p input:=/ouster/points -p output:=/ouster/points/clean
 
+``derain.launch.py`` beside it starts it with parameters; ``docs/robot.md`` says how to install it.
+
 Parameters:
 
 - ``input``, ``output``: topics of ``sensor_msgs/PointCloud2`` (``points``, ``points/clean``).
@@ -83,12 +85,7 @@ def message_of(cloud: PointCloud, like: Any) -> Any:
 
 
 def cleaned(message: Any, rain: NDArray[np.bool_], organised: bool = False) -> Any:
-    """A PointCloud2 without its rain.
-
-    Args:
-        message: The message.
-        rain: True for rain, bool (N,), row after row.
-        organised: Whether rain becomes NaN in its place, instead of being left out.
+    """A PointCloud2 without its rain, bool (N,); organised, with NaN in its place.
 
     Raises:
         ValueError: Coordinates that can hold no NaN.
@@ -159,14 +156,7 @@ class Tally:
 
 @dataclass
 class RainRemover:
-    """Judges clouds, and remembers what it has told of them.
-
-    Attributes:
-        derainer: The model.
-        tally: What became of the clouds since the last diagnostic.
-        told: What was odd about earlier clouds, which is said once.
-        alarm: What knows how bad the weather was before.
-    """
+    """Judges clouds, and remembers what became of them and what it has told of them."""
 
     derainer: Derainer
     tally: Tally = field(default_factory=Tally)
@@ -197,11 +187,29 @@ class RainRemover:
         return tally
 
 
+def refuse(asked: dict[str, Any]) -> None:
+    """Refuses parameters that no node can run with.
+
+    Raises:
+        InputError: A topic that would clean its own clouds, or a queue that holds none.
+    """
+    for name in ("output", "removed"):
+        if asked[name] == asked["input"]:
+            raise InputError(
+                name, f"it is the input, '{asked['input']}'", "Give a topic of its own."
+            )
+    if asked["queue"] < 1:
+        raise InputError("queue", f"{asked['queue']} clouds", "Give 1 or more.")
+
+
 class DerainNode:
     """Subscribes to clouds, publishes them without rain.
 
     Args:
         node: A node of rclpy.
+
+    Raises:
+        InputError: Parameters that no node can run with, or a model that there is not.
     """
 
     def __init__(self, node: Any) -> None:
@@ -213,6 +221,7 @@ class DerainNode:
         asked = {
             name: node.declare_parameter(name, default).value for name, default in DEFAULTS.items()
         }
+        refuse(asked)
         self.organised: bool = asked["organised"]
         self.remover = RainRemover(Derainer(asked["model"] or None, threads=asked["threads"]))
         # A sensor's driver repeats no cloud that was lost, and asking it to would find no driver.
@@ -277,6 +286,10 @@ def main() -> int:
         return 2
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except Exception:
+        # Stopped while a cloud was cleaned, which there is no longer anybody to publish for.
+        if rclpy.ok():
+            raise
     finally:
         node.destroy_node()
         rclpy.try_shutdown()

@@ -13,6 +13,10 @@ from derain.export.runtimes.session import Session, TensorType
 # NumPy's names of what onnxruntime calls the types of a view's inputs and of scores.
 NUMPY_NAMES = {"tensor(float)": "float32", "tensor(int64)": "int64", "tensor(bool)": "bool"}
 
+# Before 1.27, onnxruntime makes of a matrix product in float64, as the model that comes with derain
+# has one, an operator that it cannot compute.
+WRONG_FUSION = "MatmulTransposeFusion"
+
 
 @RUNTIMES.add(DEFAULT_RUNTIME)
 class OnnxRuntimeSession(Session):
@@ -22,6 +26,7 @@ class OnnxRuntimeSession(Session):
 
     def __init__(self, file: ModelFile, threads: int, precision: str) -> None:
         import onnxruntime
+        from onnxruntime.capi.onnxruntime_pybind11_state import NotImplemented as NoKernel
 
         options = onnxruntime.SessionOptions()
         # Always stated: the default counts the host's cores, not those a container may use.
@@ -31,9 +36,10 @@ class OnnxRuntimeSession(Session):
         # Threads may spin while the network runs; after it, the cores are for the next scan's view.
         options.add_session_config_entry("session.force_spinning_stop", "1")
         try:
-            self.session = onnxruntime.InferenceSession(
-                file.content, options, providers=["CPUExecutionProvider"]
-            )
+            try:
+                self.session = _opened(file, options)
+            except NoKernel:
+                self.session = _opened(file, options, disabled_optimizers=[WRONG_FUSION])
         except Exception as error:  # onnxruntime's exceptions share no base of their own
             raise self.cannot_run(file, error) from error
 
@@ -50,6 +56,14 @@ class OnnxRuntimeSession(Session):
     def run(self, inputs: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
         """The network's first output."""
         return self.session.run(None, inputs)[0]  # type: ignore[no-any-return]
+
+
+def _opened(file: ModelFile, options: Any, **more: Any) -> Any:
+    import onnxruntime
+
+    return onnxruntime.InferenceSession(
+        file.content, options, providers=["CPUExecutionProvider"], **more
+    )
 
 
 def _type_of(value: Any) -> TensorType:

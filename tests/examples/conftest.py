@@ -1,15 +1,21 @@
 """Models that examples are tried with."""
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING
 
 import pytest
 
 from derain.views.candidates import Bound, Candidates
+
+from .cpp import Program, build, missing_tools, program
+from .made_up_ros import EXAMPLE, DiagnosticArray, DiagnosticStatus, KeyValue, PointCloud2
 
 if TYPE_CHECKING:
     from derain.models.outdet import OutDet
@@ -19,6 +25,31 @@ if TYPE_CHECKING:
 def candidates() -> Candidates:
     """Bounds that leave out some points of every kind."""
     return Candidates((Bound("range", least=2.0, most=9.0), Bound("intensity", most=99.0)))
+
+
+@pytest.fixture(scope="session")
+def built(made_once: Callable[..., Path]) -> Path:
+    """The folder in which the example in C++ was built."""
+    if missing := missing_tools():
+        pytest.skip(f"no {' and no '.join(missing)} to build the example with")
+    return made_once("examples_cpp", build)
+
+
+@pytest.fixture(scope="session")
+def show_view(built: Path) -> Program:
+    """Its program that needs no onnxruntime."""
+    return program(built / "show_view")
+
+
+@pytest.fixture(scope="session")
+def derain_onnx(built: Path) -> Program:
+    """The one that does."""
+    if not (built / "derain_onnx").exists():
+        pytest.skip(
+            "no headers of onnxruntime: apt install libonnxruntime-dev (Debian 13), or set "
+            "ONNXRUNTIME_ROOT to an unpacked release"
+        )
+    return program(built / "derain_onnx")
 
 
 @pytest.fixture(scope="session")
@@ -33,3 +64,35 @@ def judging_candidates(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("derain.models.outdet.deployed.BLOCKS", 1)  # traced several times as quickly
         return made_once("examples_candidates.onnx", partial(export, model))
+
+
+@pytest.fixture(scope="module")
+def ros2_node() -> Iterator[ModuleType]:
+    """The example's module, imported where there is no rclpy."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(EXAMPLE)
+        patch.setitem(sys.modules, "rclpy", None)  # whoever imports it fails
+        yield import_module("derain_node")
+        del sys.modules["derain_node"]
+
+
+@pytest.fixture
+def ros(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Modules of ROS, as much of them as the example imports."""
+    modules = {
+        "rclpy": {},
+        "rclpy.qos": {
+            "QoSProfile": SimpleNamespace,
+            "ReliabilityPolicy": SimpleNamespace(BEST_EFFORT="best effort", RELIABLE="reliable"),
+        },
+        "sensor_msgs": {},
+        "sensor_msgs.msg": {"PointCloud2": PointCloud2},
+        "diagnostic_msgs": {},
+        "diagnostic_msgs.msg": {
+            one.__name__: one for one in (DiagnosticArray, DiagnosticStatus, KeyValue)
+        },
+    }
+    for name, members in modules.items():
+        module = ModuleType(name)
+        vars(module).update(members)
+        monkeypatch.setitem(sys.modules, name, module)

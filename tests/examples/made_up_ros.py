@@ -2,8 +2,25 @@
 
 import array
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "ros2_node"
+
+# x, y, z, 4 bytes of nothing, intensity, ring, and a byte more.
+POINT = np.dtype(
+    {
+        "names": ["x", "y", "z", "intensity", "ring"],
+        "formats": ["<f4", "<f4", "<f4", "<f4", "<u2"],
+        "offsets": [0, 4, 8, 16, 20],
+        "itemsize": 23,
+    }
+)
+FLOAT32, UINT16 = 7, 4
 
 
 @dataclass
@@ -73,7 +90,7 @@ class Logger(list[str]):
     def error(self, text: str, throttle_duration_sec: float) -> None:
         self.append(text)
 
-    warning = list.append
+    warning = fatal = list.append
 
 
 class Node:
@@ -85,6 +102,7 @@ class Node:
         self.subscriptions: dict[str, tuple[type, Any, Any]] = {}
         self.timers: list[tuple[float, Any]] = []
         self.logger = Logger()
+        self.destroyed = False
 
     def declare_parameter(self, name: str, default: Any) -> SimpleNamespace:
         return SimpleNamespace(value=self.parameters.get(name, default))
@@ -102,9 +120,70 @@ class Node:
     def get_logger(self) -> Logger:
         return self.logger
 
+    def destroy_node(self) -> None:
+        self.destroyed = True
+
     def get_name(self) -> str:
         return "derain"
 
     def get_clock(self) -> SimpleNamespace:
         now = SimpleNamespace(to_msg=lambda: "the time")
         return SimpleNamespace(now=lambda: now)
+
+
+def message_of(points: NDArray[np.float32], height: int = 1, gap: int = 0) -> PointCloud2:
+    """A message of (N, 4) points in rows, each followed by a gap of so many bytes."""
+    table = np.frombuffer(np.random.default_rng(0).bytes(len(points) * 23), POINT).copy()
+    for place, name in enumerate(("x", "y", "z", "intensity")):
+        table[name] = points[:, place]
+    width = len(points) // height
+    rows = np.frombuffer(table.tobytes(), np.uint8).reshape(height, width * 23)
+    rows = np.pad(rows, ((0, 0), (0, gap)), constant_values=7)
+    fields = [Field(name, POINT.fields[name][1], FLOAT32, 1) for name in POINT.names[:4]]
+    return PointCloud2(
+        SimpleNamespace(stamp="now", frame_id="lidar"),
+        height,
+        width,
+        [*fields, Field("ring", 20, UINT16, 1)],
+        point_step=23,
+        row_step=width * 23 + gap,
+        data=array.array("B", rows.tobytes()),
+        is_dense=True,
+    )
+
+
+@dataclass
+class Ros:
+    """What the example asks of rclpy itself, where some messages come in before it ends."""
+
+    node: Node
+    messages: list[PointCloud2]
+    ending: BaseException | None = None
+    running: bool = False
+
+    def init(self) -> None:
+        self.running = True
+
+    def create_node(self, name: str) -> Node:
+        assert self.running
+        assert name == "derain"
+        return self.node
+
+    def spin(self, node: Node) -> None:
+        ((_, call, _),) = node.subscriptions.values()
+        for message in self.messages:
+            call(message)
+        for _, report in node.timers:
+            report()
+        if self.ending is not None:
+            raise self.ending
+
+    def ok(self) -> bool:
+        return self.running
+
+    def try_shutdown(self) -> None:
+        self.running = False
+
+
+class ExternalShutdownError(Exception):
+    """As rclpy raises it where something else than the node ends it."""

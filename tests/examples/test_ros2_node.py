@@ -1,12 +1,9 @@
 """The node of ROS 2, without ROS: its messages are made up here, and so is what it hangs on."""
 
 import array
-import sys
-from collections.abc import Iterator
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -15,52 +12,18 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 
-from .made_up_ros import DiagnosticArray, DiagnosticStatus, Field, KeyValue, Node, PointCloud2
-
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "ros2_node"
-KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
-
-# x, y, z, 4 bytes of nothing, intensity, ring, and a byte more.
-POINT = np.dtype(
-    {
-        "names": ["x", "y", "z", "intensity", "ring"],
-        "formats": ["<f4", "<f4", "<f4", "<f4", "<u2"],
-        "offsets": [0, 4, 8, 16, 20],
-        "itemsize": 23,
-    }
+from .made_up_ros import (
+    POINT,
+    DiagnosticArray,
+    DiagnosticStatus,
+    Field,
+    KeyValue,
+    Node,
+    PointCloud2,
+    message_of,
 )
-FLOAT32, UINT16 = 7, 4
 
-
-@pytest.fixture(scope="module")
-def example() -> Iterator[ModuleType]:
-    """The example's module, imported where there is no rclpy."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(EXAMPLE)
-        patch.setitem(sys.modules, "rclpy", None)  # whoever imports it fails
-        yield import_module("derain_node")
-        del sys.modules["derain_node"]
-
-
-def message_of(points: NDArray[np.float32], height: int = 1, gap: int = 0) -> PointCloud2:
-    """A message of (N, 4) points in rows, each followed by a gap of so many bytes."""
-    table = np.frombuffer(np.random.default_rng(0).bytes(len(points) * 23), POINT).copy()
-    for place, name in enumerate(("x", "y", "z", "intensity")):
-        table[name] = points[:, place]
-    width = len(points) // height
-    rows = np.frombuffer(table.tobytes(), np.uint8).reshape(height, width * 23)
-    rows = np.pad(rows, ((0, 0), (0, gap)), constant_values=7)
-    fields = [Field(name, POINT.fields[name][1], FLOAT32, 1) for name in POINT.names[:4]]
-    return PointCloud2(
-        SimpleNamespace(stamp="now", frame_id="lidar"),
-        height,
-        width,
-        [*fields, Field("ring", 20, UINT16, 1)],
-        point_step=23,
-        row_step=width * 23 + gap,
-        data=array.array("B", rows.tobytes()),
-        is_dense=True,
-    )
+KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
 
 
 def bytes_of_points(message: PointCloud2) -> NDArray[np.void]:
@@ -72,14 +35,14 @@ def bytes_of_points(message: PointCloud2) -> NDArray[np.void]:
 
 @pytest.mark.parametrize(("height", "gap"), [(1, 0), (4, 0), (4, 9)])
 def test_every_byte_of_the_points_that_stay_stays(
-    example: ModuleType, height: int, gap: int
+    ros2_node: ModuleType, height: int, gap: int
 ) -> None:
     message = message_of(scene(200), height, gap)
     rain = np.random.default_rng(1).random(200) < 0.3
     before = bytes_of_points(message)
     for result, expected in (
-        (example.cleaned(message, rain), before[~rain]),
-        (example.removed(message, rain), before[rain]),
+        (ros2_node.cleaned(message, rain), before[~rain]),
+        (ros2_node.removed(message, rain), before[rain]),
     ):
         np.testing.assert_array_equal(bytes_of_points(result), expected)
         assert (result.height, result.width) == (1, len(expected))
@@ -89,11 +52,11 @@ def test_every_byte_of_the_points_that_stay_stays(
             assert getattr(result, name) is getattr(message, name)
 
 
-def test_of_an_organised_cloud_rain_becomes_nan_in_its_place(example: ModuleType) -> None:
+def test_of_an_organised_cloud_rain_becomes_nan_in_its_place(ros2_node: ModuleType) -> None:
     message = message_of(scene(200), height=4, gap=9)
     rain = np.zeros(200, bool)
     rain[[3, 70, 199]] = True
-    result = example.cleaned(message, rain, organised=True)
+    result = ros2_node.cleaned(message, rain, organised=True)
     before, after = (bytes_of_points(one).view(POINT) for one in (message, result))
     assert (result.height, result.width, result.row_step) == (4, 50, 50 * 23 + 9)
     np.testing.assert_array_equal(bytes_of_points(result)[~rain], bytes_of_points(message)[~rain])
@@ -102,75 +65,53 @@ def test_of_an_organised_cloud_rain_becomes_nan_in_its_place(example: ModuleType
     np.testing.assert_array_equal(after["ring"], before["ring"])
 
 
-def test_a_cloud_without_rain_is_the_same_cloud(example: ModuleType) -> None:
+def test_a_cloud_without_rain_is_the_same_cloud(ros2_node: ModuleType) -> None:
     message = message_of(scene(200), height=4)
-    result = example.cleaned(message, np.zeros(200, bool))
+    result = ros2_node.cleaned(message, np.zeros(200, bool))
     assert result == message
     assert result is not message
 
 
 @pytest.mark.parametrize("model", [None, KEPT], ids=["default", "outdet"])
 def test_rain_is_what_the_model_says_of_the_same_points(
-    example: ModuleType, model: Path | None
+    ros2_node: ModuleType, model: Path | None
 ) -> None:
     points = scene(600)
     derainer = Derainer(model, threads=1)
-    judgement = example.RainRemover(derainer).judge(message_of(points, height=2, gap=5))
+    judgement = ros2_node.RainRemover(derainer).judge(message_of(points, height=2, gap=5))
     np.testing.assert_array_equal(judgement.probability, derainer.probability(points))
 
 
-def test_what_is_odd_is_told_once(example: ModuleType) -> None:
+def test_what_is_odd_is_told_once(ros2_node: ModuleType) -> None:
     points = scene(600)
     points[:, 3] = 5  # which no sensor measured
-    remover = example.RainRemover(Derainer(KEPT, threads=1))
+    remover = ros2_node.RainRemover(Derainer(KEPT, threads=1))
     news = [remover.news(remover.judge(message_of(points))) for _ in range(2)]
     assert "stands in" in news[0][0]
     assert news[1] == []
 
 
-@pytest.fixture
-def ros(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Modules of ROS, as much of them as the example imports."""
-    modules = {
-        "rclpy": {},
-        "rclpy.qos": {
-            "QoSProfile": SimpleNamespace,
-            "ReliabilityPolicy": SimpleNamespace(BEST_EFFORT="best effort", RELIABLE="reliable"),
-        },
-        "sensor_msgs": {},
-        "sensor_msgs.msg": {"PointCloud2": PointCloud2},
-        "diagnostic_msgs": {},
-        "diagnostic_msgs.msg": {
-            one.__name__: one for one in (DiagnosticArray, DiagnosticStatus, KeyValue)
-        },
-    }
-    for name, members in modules.items():
-        module = ModuleType(name)
-        vars(module).update(members)
-        monkeypatch.setitem(sys.modules, name, module)
-
-
 @pytest.mark.usefixtures("ros")
-def test_a_cloud_comes_in_and_goes_out_clean(example: ModuleType) -> None:
+def test_a_cloud_comes_in_and_goes_out_clean(ros2_node: ModuleType) -> None:
     points = scene(600)
     message = message_of(points)
     node = Node(input="in", output="out", removed="gone", model=str(KEPT), threads=1)
-    example.DerainNode(node)
+    ros2_node.DerainNode(node)
     kind, call, quality = node.subscriptions["in"]
     assert (kind, quality.depth, quality.reliability) == (PointCloud2, 1, "best effort")
     call(message)
     rain = Derainer(KEPT, threads=1)(points)
     assert 0 < rain.sum() < len(rain)
-    expected = {"out": example.cleaned(message, rain), "gone": example.removed(message, rain)}
+    expected = {"out": ros2_node.cleaned(message, rain), "gone": ros2_node.removed(message, rain)}
     for topic, one in expected.items():
         kind, published, quality = node.publishers[topic]
         assert (kind, published, quality.reliability) == (PointCloud2, [one], "reliable")
 
 
 @pytest.mark.usefixtures("ros")
-def test_by_default_it_runs_the_packaged_model_and_publishes_no_rain(example: ModuleType) -> None:
+def test_by_default_it_runs_the_packaged_model_and_publishes_no_rain(ros2_node: ModuleType) -> None:
     node = Node()
-    made = example.DerainNode(node)
+    made = ros2_node.DerainNode(node)
     assert made.remover.derainer.name == "default"
     assert set(node.publishers) == {"points/clean", "/diagnostics"}
     assert set(node.subscriptions) == {"points"}
@@ -178,10 +119,10 @@ def test_by_default_it_runs_the_packaged_model_and_publishes_no_rain(example: Mo
 
 @pytest.mark.usefixtures("ros")
 def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(
-    example: ModuleType,
+    ros2_node: ModuleType,
 ) -> None:
     node = Node(model=str(KEPT), threads=1)
-    example.DerainNode(node)
+    ros2_node.DerainNode(node)
     _, call, _ = node.subscriptions["points"]
     flat, short = message_of(scene(200)), message_of(scene(200))
     flat.fields = [one for one in flat.fields if one.name != "z"]
@@ -194,9 +135,9 @@ def test_a_cloud_that_cannot_be_read_is_logged_and_the_next_one_is_cleaned(
 
 
 @pytest.mark.usefixtures("ros")
-def test_a_cloud_of_no_points_goes_through(example: ModuleType) -> None:
+def test_a_cloud_of_no_points_goes_through(ros2_node: ModuleType) -> None:
     node = Node(threads=1)
-    example.DerainNode(node)
+    ros2_node.DerainNode(node)
     message = message_of(scene(200))
     message.width = message.row_step = 0
     message.data = array.array("B")
@@ -205,10 +146,10 @@ def test_a_cloud_of_no_points_goes_through(example: ModuleType) -> None:
 
 
 @pytest.mark.usefixtures("ros")
-def test_once_a_second_it_says_what_share_was_rain(example: ModuleType) -> None:
+def test_once_a_second_it_says_what_share_was_rain(ros2_node: ModuleType) -> None:
     points = scene(600)
     node = Node(model=str(KEPT), threads=1)
-    example.DerainNode(node)
+    ros2_node.DerainNode(node)
     ((period, report),) = node.timers
     node.subscriptions["points"][1](message_of(points))
     report()
@@ -227,17 +168,17 @@ def test_once_a_second_it_says_what_share_was_rain(example: ModuleType) -> None:
 @pytest.mark.usefixtures("ros")
 @pytest.mark.parametrize(("drops", "level"), [(0, "OK"), (400, "ERROR")])
 def test_its_level_is_that_of_the_weather(
-    example: ModuleType, monkeypatch: pytest.MonkeyPatch, drops: int, level: str
+    ros2_node: ModuleType, monkeypatch: pytest.MonkeyPatch, drops: int, level: str
 ) -> None:
     points = scene(2000)
     rain = np.arange(2000) < drops
     points[:drops, :3] *= 3 / np.linalg.norm(points[:drops, :3], axis=1, keepdims=True)
     usual = Derainer.judge
     monkeypatch.setattr(
-        example.Derainer, "judge", lambda self, scan: replace(usual(self, scan), rain=rain)
+        ros2_node.Derainer, "judge", lambda self, scan: replace(usual(self, scan), rain=rain)
     )
     node = Node(model=str(KEPT), threads=1)
-    example.DerainNode(node)
+    ros2_node.DerainNode(node)
     node.subscriptions["points"][1](message_of(points))
     node.timers[0][1]()
     (said,) = node.publishers["/diagnostics"][1]

@@ -1,0 +1,92 @@
+"""The example in C++ beside derain: the same masks, and what the stages take.
+
+    cmake -S examples/cpp -B build/cpp && cmake --build build/cpp
+    python -m benchmarks.cpp_example build/cpp/derain_onnx ../shared/data/wads/drive/velodyne/*.bin
+    python -m benchmarks.cpp_example build/cpp/derain_onnx SCAN.bin... --model a.onnx --model b.onnx
+
+Both clean the same scans in turns, with as many threads; in each turn all of them once before,
+untimed, for the first scans that a process cleans take longer. Prints for each model how many
+points they judge otherwise, the median of each stage, and what C++ takes of the time of derain.
+"""
+
+import argparse
+import re
+import subprocess
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.export.runtime import Derainer
+from derain.system.stopwatch import Stopwatch
+
+STAGES = ("view", "network", "back")
+SAID = re.compile("rain, " + ", ".join(rf"{stage} ([\d.]+) ms" for stage in STAGES))
+
+Times = NDArray[np.float64]  # (scans, stages), milliseconds
+
+
+def main() -> None:
+    """Measures, and prints a table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("program", type=Path)
+    parser.add_argument("scans", type=Path, nargs="+", metavar="SCAN.bin")
+    parser.add_argument("--model", type=Path, action="append", help="(default: derain's own)")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--rounds", type=int, default=3)
+    arguments = parser.parse_args()
+    print("| model | who | view | network | back | ms | points | judged otherwise |")
+    print("|---|---|--:|--:|--:|--:|--:|--:|")
+    for model in arguments.model or [None]:
+        compare(model, arguments)
+
+
+def compare(model: Path | None, arguments: argparse.Namespace) -> None:
+    """Prints what became of one model."""
+    derainer = Derainer(model, threads=arguments.threads)
+    times: dict[str, list[Times]] = {"C++": [], "derain": []}
+    points = differ = 0
+    for _ in range(arguments.rounds):
+        labels, taken = by_program(derainer.path, arguments)
+        times["C++"].append(taken)
+        masks, taken = by_derain(derainer, arguments.scans)
+        times["derain"].append(taken)
+        points = sum(map(len, masks))
+        differ += sum(int((a != b).sum()) for a, b in zip(labels, masks, strict=True))
+    totals = {}
+    for who, taken in times.items():
+        stages = np.median(np.concatenate(taken), axis=0)
+        totals[who] = np.median(np.concatenate(taken).sum(axis=1))
+        cells = " | ".join(f"{one:.0f}" for one in (*stages, totals[who]))
+        print(f"| {derainer.name} | {who} | {cells} | {points:,} | {differ:,} |")
+    print(f"C++ takes {totals['C++'] / totals['derain']:.2f} of the time of derain")
+
+
+def by_program(model: Path, arguments: argparse.Namespace) -> tuple[list[NDArray[np.bool_]], Times]:
+    """What the program calls rain, and its times."""
+    scans: list[Path] = arguments.scans
+    with tempfile.TemporaryDirectory() as out:
+        command = [arguments.program, "--threads", str(arguments.threads), model, out]
+        done = subprocess.run(
+            [*command, *scans, *scans], check=True, capture_output=True, text=True
+        )
+        labels = [np.fromfile(Path(out) / f"{scan.stem}.label", "<u4") == 1 for scan in scans]
+    taken = np.array(SAID.findall(done.stdout), np.float64)
+    return labels, taken[len(scans) :]
+
+
+def by_derain(derainer: Derainer, scans: list[Path]) -> tuple[list[NDArray[np.bool_]], Times]:
+    """What derain calls rain, and its times."""
+    masks, taken = [], []
+    for scan in (*scans, *scans):
+        stopwatch = Stopwatch()
+        masks.append(derainer(np.fromfile(scan, np.float32).reshape(-1, 4), stopwatch))
+        taken.append([stopwatch.milliseconds[stage] for stage in STAGES])
+    return masks[len(scans) :], np.array(taken[len(scans) :])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+"""With onnxruntime's headers, the example in C++ judges as derain judges."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from numpy.typing import NDArray
+
+from derain.default import default_model
+from derain.evaluation.hard_cases import scene
+from derain.export.model_file import METADATA_KEY, NO_CHECKSUM, sealed
+from derain.export.runtime import Derainer
+from derain.views.back_projection import BACK_PROJECTIONS
+from derain.views.candidates import Candidates
+
+from .cpp import Program
+from .hard_points import hard_scans
+
+KEPT = Path(__file__).parents[1] / "export" / "kept" / "outdet.onnx"
+SCANS = hard_scans()
+
+
+def judged_alike(
+    derain_onnx: Program, folder: Path, model: Path, scans: Iterable[NDArray[np.float32]]
+) -> None:
+    """Judges scans by the program and by derain, and compares all that they write."""
+    paths = {folder / f"{number}.bin": points for number, points in enumerate(scans)}
+    for path, points in paths.items():
+        points.tofile(path)
+    done = derain_onnx("--threads", "1", model, folder / "out", *paths)
+    assert (done.returncode, done.stderr) == (0, "")
+    derainer = Derainer(model, threads=1)
+    for path, points in paths.items():
+        rain = derainer(points)
+        label = np.fromfile(folder / "out" / f"{path.stem}.label", "<u4")
+        np.testing.assert_array_equal(label, rain)
+        assert (folder / "out" / path.name).read_bytes() == points[~rain].tobytes()
+        assert f"{path}: {len(points)} points, {rain.sum()} rain, view " in done.stdout
+
+
+@pytest.mark.parametrize("model", [default_model(), KEPT], ids=["default", "outdet"])
+def test_it_calls_rain_what_derain_calls_rain(
+    derain_onnx: Program, tmp_path: Path, model: Path
+) -> None:
+    judged_alike(derain_onnx, tmp_path, model, [*SCANS.values(), scene()])
+
+
+def test_it_judges_candidates_as_well(
+    derain_onnx: Program, judging_candidates: Path, tmp_path: Path
+) -> None:
+    points = SCANS["ties, copies, invalid rows"]
+    judged_alike(derain_onnx, tmp_path, judging_candidates, [points])
+    assert 0 < Derainer(judging_candidates, threads=1)(points).mean() < 1
+
+
+@pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
+@pytest.mark.parametrize("azimuth", [(-180.0, 180.0), (-60.0, 75.0)], ids=["circle", "sector"])
+def test_and_images_whichever_way_their_scores_come_back(
+    derain_onnx: Program,
+    image_onnx: Path,
+    candidates: Candidates,
+    tmp_path: Path,
+    way_back: str,
+    azimuth: tuple[float, float],
+) -> None:
+    proto, spec = onnx.load(image_onnx), Derainer(image_onnx).spec
+    view = {**spec.view, "grid": {**spec.view["grid"], "azimuth": azimuth}, "way_back": way_back}
+    for bounds in (None, candidates):
+        changed = replace(spec, view=view, candidates=bounds)
+        metadata = {"spec": changed.as_dict(), "sha256": NO_CHECKSUM}
+        onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps(metadata)})
+        (tmp_path / "model.onnx").write_bytes(sealed(proto.SerializeToString()))
+        scans = [*SCANS.values(), np.concatenate([SCANS["ties, copies, invalid rows"], scene(800)])]
+        judged_alike(derain_onnx, tmp_path, tmp_path / "model.onnx", scans)
+
+
+def test_a_model_that_has_changed_is_refused(derain_onnx: Program, tmp_path: Path) -> None:
+    scene(50).tofile(tmp_path / "scan.bin")
+    model = tmp_path / "model.onnx"
+    model.write_bytes(default_model().read_bytes().replace(b'"numpy"', b'"numpY"'))
+    done = derain_onnx(model, tmp_path / "out", tmp_path / "scan.bin")
+    assert done.returncode == 2
+    assert "it is not as it was exported: its checksum differs" in done.stderr
+    assert not list(tmp_path.glob("out/*"))
+
+
+def test_a_file_that_is_no_model_of_derain_is_refused(derain_onnx: Program, tmp_path: Path) -> None:
+    scene(50).tofile(tmp_path / "scan.bin")
+    (tmp_path / "text.onnx").write_text("no model")
+    spec = Derainer(KEPT).spec.as_dict()
+    other = {**spec, "view": {"kind": "neighbours", "neighbours": 4}}
+    for name, metadata, reason in (
+        ("no_spec.onnx", {"spec": {}}, "its Spec has no proper 'network'"),
+        ("other.onnx", {"spec": other}, "its network takes other inputs than its Spec says"),
+        ("text.onnx", None, ""),
+        ("none.onnx", None, "there is no such file"),
+    ):
+        if metadata is not None:
+            proto = onnx.load(KEPT)
+            onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps(metadata)})
+            onnx.save(proto, tmp_path / name)
+        done = derain_onnx(tmp_path / name, tmp_path / "out", tmp_path / "scan.bin")
+        assert done.returncode == 2
+        assert done.stderr.startswith(f"derain_onnx: {tmp_path / name}: {reason}")
+        assert not list(tmp_path.glob("out/*"))
+
+
+def test_a_scan_is_never_overwritten(derain_onnx: Program, tmp_path: Path) -> None:
+    scene(50).tofile(tmp_path / "scan.bin")
+    done = derain_onnx(default_model(), tmp_path, tmp_path / "scan.bin")
+    assert done.returncode == 2
+    assert "it would be overwritten" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["scan.bin"]
