@@ -102,7 +102,7 @@ class CloudTopic:
         """
         message = self.message(number)
         try:
-            cloud = CloudMessage.parse(message.data, self.bag.encoding)
+            cloud = CloudMessage.parse(message.data, self.topic.encoding)
         except ValueError as error:
             raise damaged_cloud(self.name_of(number), error) from error
         self._tell_of_other_fields(number, cloud.cloud.fields)
@@ -166,7 +166,7 @@ class CloudTopic:
 
     def _taken(self, number: int, message: Message) -> int:
         try:
-            return stamp_of(message.data, self.bag.encoding) or message.time
+            return stamp_of(message.data, self.topic.encoding) or message.time
         except ValueError:  # who reads the cloud is told
             return message.time
 

@@ -184,7 +184,7 @@ def say_there_are(bag: Path, clouds: int) -> None:
 
 
 def test_a_bag_with_fewer_clouds_than_it_says_is_refused(tmp_path: Path) -> None:
-    bag = small_bag(tmp_path, "mcap")
+    bag = small_bag(tmp_path, "sqlite3")
     say_there_are(bag, 5)
     assert "says that it has 5 messages" in refusal(lambda: read_all(bag))
 

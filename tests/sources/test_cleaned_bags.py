@@ -151,7 +151,7 @@ def test_nothing_is_left_of_a_bag_that_breaks_off(
 ) -> None:
     from rosbags import rosbag2
 
-    bag = small_bag(tmp_path, "mcap")
+    bag = small_bag(tmp_path, "sqlite3")
     messages = rosbag2.Reader.messages
 
     def breaking_off(self, *arguments, **options):
