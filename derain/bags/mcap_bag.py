@@ -4,11 +4,12 @@ from collections.abc import Collection, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 from derain.bags.mcap_file import McapFile
 from derain.bags.ros2_metadata import MESSAGE, Ros2Metadata
 from derain.bags.unpacking import unpack
+from derain.errors import InputError, reason_of
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,22 @@ class McapBag:
                     message.published,
                     message.sequence,
                 )
+
+    def attachments_and_metadata(self) -> Iterator[tuple[int, Any]]:
+        """Kind and content of every record that is neither a message nor about messages.
+
+        Raises:
+            InputError: One is damaged.
+        """
+        try:
+            for file in self._files:
+                yield from file.attachments_and_metadata()
+        except Exception as error:
+            raise InputError(
+                self.path,
+                f"its attachments and metadata cannot be read ({reason_of(error)})",
+                "Have it repaired by mcap recover.",
+            ) from error
 
     def __enter__(self) -> Self:
         names = self.metadata.files if self.metadata is not None else ("",)

@@ -90,18 +90,12 @@ class McapWriter:
 
     def close(self) -> None:
         """Ends the bag, which is whole then."""
-        for file in self.bag.files:
-            for kind, record in file.attachments_and_metadata():
-                if kind == ATTACHMENT:
-                    self._writer.add_attachment(
-                        record.create_time,
-                        record.log_time,
-                        record.name,
-                        record.media_type,
-                        record.data,
-                    )
-                elif record.name != ROS2_RECORD:
-                    self._writer.add_metadata(record.name, record.metadata)
+        for kind, record in self.bag.attachments_and_metadata():
+            if kind == ATTACHMENT:
+                times = record.create_time, record.log_time
+                self._writer.add_attachment(*times, record.name, record.media_type, record.data)
+            elif record.name != ROS2_RECORD:
+                self._writer.add_metadata(record.name, record.metadata)
         metadata = self._metadata()
         text = yaml.safe_dump(metadata.content, sort_keys=False)
         self._writer.add_metadata(ROS2_RECORD, {ROS2_NOTE: text})
@@ -127,17 +121,18 @@ class McapWriter:
             for each in old.get("topics_with_message_count", ())
         }
         version = int(old.get("version", 0)) or self._version()
-        count = sum(self._counts.values())
         span = {
             "starting_time": {"nanoseconds_since_epoch": self._first},
             "duration": {"nanoseconds": max(0, self._last - self._first)},
-            "message_count": count,
+            "message_count": sum(self._counts.values()),
         }
         name = os.path.basename(self._file.name) + (".zstd" if self._compression == FILE else "")
         content = {
+            "compression_format": "",
+            "compression_mode": "",
+            "custom_data": None,
+            "ros_distro": "unknown",
             **old,
-            "compression_format": old.get("compression_format", ""),
-            "compression_mode": old.get("compression_mode", ""),
             "version": version,
             "storage_identifier": "mcap",
             **span,
@@ -149,7 +144,7 @@ class McapWriter:
                 for connection, number in self._counts.items()
             ],
             "relative_file_paths": [name],
-            "files": [{"path": name, **span}],
+            "files": [{"path": name, **deepcopy(span)}],
         }
         return Ros2Metadata(content, version, "mcap", (name,), self._compression)
 
@@ -157,12 +152,11 @@ class McapWriter:
         """What the other bag's metadata.yaml says, or its file, where that repeats it."""
         if self.metadata is not None:
             return deepcopy(self.metadata.content)
-        for file in self.bag.files:
-            for kind, record in file.attachments_and_metadata():
-                if kind != ATTACHMENT and record.name == ROS2_RECORD:
-                    content = yaml.safe_load(record.metadata.get(ROS2_NOTE, ""))
-                    if isinstance(content, dict):
-                        return content
+        for kind, record in self.bag.attachments_and_metadata():
+            if kind != ATTACHMENT and record.name == ROS2_RECORD:
+                content = yaml.safe_load(record.metadata.get(ROS2_NOTE, ""))
+                if isinstance(content, dict):
+                    return content
         return {}
 
     def _version(self) -> int:

@@ -1,7 +1,7 @@
 """Bags of ROS 1, made and read by ROS itself: nothing here is derain's, nor of its libraries.
 
     apt-get install python3-rosbag python3-sensor-msgs       # Debian bookworm
-    P="/usr/bin/python3 benchmarks/by_others/ros1.py"
+    P="/usr/bin/python3 benchmarks/by_others/noetic.py"
     $P make bags ../shared/data/wads/drive/velodyne --scans 5
     derain run ../shared/data/wads/drive/velodyne/*00?.bin --out masks
     for kind in none bz2 lz4; do
@@ -63,7 +63,9 @@ def make_bag(path, compression, scans):
     with rosbag.Bag(str(path), "w", compression=compression, chunk_threshold=200_000) as bag:
         for number, scan in enumerate(scans):
             time = START + number * PERIOD
-            bag.write("/driver", String(data=f"cloud {number}"), at(time), connection_header=latched)
+            bag.write(
+                "/driver", String(data=f"cloud {number}"), at(time), connection_header=latched
+            )
             bag.write("/imu/data", Imu(header=header(number, time, "imu")), at(time))
             bag.write(POINTS, cloud(scan, number, time - 1000), at(time))
 
