@@ -8,6 +8,8 @@ for kind in none lz4 zstd unchunked unindexed; do
     derain run bags/$kind.mcap --out cleaned
     $P compare bags/$kind.mcap cleaned/$kind masks
 done
+
+Ends with 1 where anything is not the same.
 """
 
 import argparse
@@ -171,12 +173,13 @@ def clouds(path):
 def described(path):
     """What a file says of its channels."""
     with path.open("rb") as file:
-        found = {
-            (channel.topic, channel.message_encoding, tuple(channel.metadata.items()))
-            + (schema.name, schema.encoding, schema.data)
+        return {
+            (
+                *(channel.topic, channel.message_encoding, tuple(channel.metadata.items())),
+                *(schema.name, schema.encoding, schema.data),
+            )
             for schema, channel, _ in make_reader(file).iter_messages()
         }
-    return found
 
 
 def attached(path):

@@ -5,6 +5,8 @@ $P make bags/humble ../shared/data/wads/drive/velodyne --scans 5
 derain run ../shared/data/wads/drive/velodyne/*00?.bin --out masks
 derain run bags/humble --out cleaned
 $P compare bags/humble cleaned/humble masks
+
+Ends with 1 where anything is not the same.
 """
 
 import argparse
@@ -190,10 +192,10 @@ def clouds(found):
 def metadata_is_right(folder, found):
     """Whether the metadata.yaml has all that ROS 2 asks for, and says what the database has."""
     told, times = metadata(folder), [time for _, time, _ in found]
-    assert KEYS <= told.keys(), KEYS - told.keys()
+    assert told.keys() >= KEYS, KEYS - told.keys()
     counts = {}
     for topic in told["topics_with_message_count"]:
-        assert TOPIC_KEYS <= topic["topic_metadata"].keys()
+        assert topic["topic_metadata"].keys() >= TOPIC_KEYS
         counts[topic["topic_metadata"]["name"]] = topic["message_count"]
     return (
         told["storage_identifier"] == "sqlite3"

@@ -51,7 +51,7 @@ def main() -> int:
 
 
 def make_bag(path, compression, scans):
-    """A bag with many small chunks, a latched text, and stamps other than the times of recording."""
+    """A bag of small chunks, with a latched text, and stamps other than times of recording."""
     latched = {
         "topic": "/driver",
         "type": String._type,
@@ -85,7 +85,7 @@ def cloud(scan, number, time):
     points = np.fromfile(scan, "<f4").reshape(-1, 4)
     layout = [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")]
     table = np.zeros(len(points), [*layout, ("ring", "<u2"), ("time", "<f4")])
-    for column, (name, _) in zip(points.T, layout):
+    for column, (name, _) in zip(points.T, layout, strict=False):
         table[name] = column
     table["ring"] = np.arange(len(points)) % 64
     fields = [
