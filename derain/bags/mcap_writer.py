@@ -4,7 +4,7 @@ import os
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 
@@ -17,8 +17,11 @@ from derain.bags.ros2_metadata import (
     NONE,
     OLDER_VERSION,
     Ros2Metadata,
+    small_yaml,
 )
 from derain.system.extras import MCAP, ZSTANDARD
+
+T = TypeVar("T")
 
 # The record in which ROS 2 repeats the metadata.yaml, and the one note in it.
 ROS2_RECORD, ROS2_NOTE = "rosbag2", "serialized_metadata"
@@ -154,9 +157,7 @@ class McapWriter:
             return deepcopy(self.metadata.content)
         for kind, record in self.bag.attachments_and_metadata():
             if kind != ATTACHMENT and record.name == ROS2_RECORD:
-                content = yaml.safe_load(record.metadata.get(ROS2_NOTE, ""))
-                if isinstance(content, dict):
-                    return content
+                return _said(record.metadata.get(ROS2_NOTE, ""), dict) or {}
         return {}
 
     def _version(self) -> int:
@@ -173,7 +174,7 @@ def _topic_metadata(
     notes = dict(connection.notes)
     profiles: Any = notes.get(QOS, "")
     if version >= NEWEST_VERSION:
-        profiles = yaml.safe_load(profiles) or []
+        profiles = _said(profiles, list) or []
     made = {
         "name": connection.topic,
         "type": connection.msgtype,
@@ -182,6 +183,15 @@ def _topic_metadata(
         "type_description_hash": notes.get(TYPE_HASH, ""),
     }
     return made | known.get(connection.topic, {})
+
+
+def _said(note: str, kind: type[T]) -> T | None:
+    """What a note in YAML says; None where it says nothing that can be used."""
+    try:
+        value = small_yaml(note)
+    except ValueError:
+        return None
+    return value if isinstance(value, kind) else None
 
 
 def _pack(file: Path) -> None:

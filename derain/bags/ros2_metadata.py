@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from derain.bags.names import BAG_METADATA, METADATA_WORD
+from derain.files.documents import LARGEST_DOCUMENT, Entry
 
 # The newest version that is known. It spells quality of service in words, which readers older
 # than it do not know; the one before it has it in numbers, as text.
@@ -18,6 +19,23 @@ STORAGES = ("sqlite3", "mcap")
 
 # How bags are compressed: not, message by message, each chunk, or file by file.
 NONE, MESSAGE, FILE = "", "message", "file"
+
+
+def small_yaml(text: str) -> Any:
+    """What a text within a bag says.
+
+    Args:
+        text: The text.
+
+    Raises:
+        ValueError: No YAML, or more of it than a bag needs.
+    """
+    if len(text) > LARGEST_DOCUMENT:
+        raise ValueError(f"a note of {len(text):,} characters")
+    try:
+        return yaml.safe_load(text)
+    except (yaml.YAMLError, RecursionError) as error:
+        raise ValueError(f"a note that is no YAML ({error})") from error
 
 
 @dataclass(frozen=True)
@@ -43,11 +61,11 @@ class Ros2Metadata:
         """Reads that of a bag.
 
         Raises:
+            InputError: It cannot be read, or is no small YAML.
             ValueError: It says what no bag of ROS 2 does, or names what is not there.
-            OSError: It cannot be read.
         """
+        document = Entry.of_yaml(folder / BAG_METADATA).value
         try:
-            document = yaml.safe_load((folder / BAG_METADATA).read_text("utf-8"))
             content = document[METADATA_WORD.decode()]
             version, storage = int(content["version"]), str(content["storage_identifier"])
             files = tuple(PurePath(name).name for name in content["relative_file_paths"])
@@ -55,7 +73,7 @@ class Ros2Metadata:
             packing = str(content.get("compression_format") or "")
             for topic in content["topics_with_message_count"]:
                 int(topic["message_count"]), topic["topic_metadata"]["name"]
-        except (yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
+        except (LookupError, TypeError, AttributeError) as error:
             raise ValueError(f"its {BAG_METADATA} is damaged: {error!r}") from error
         if version > NEWEST_VERSION:
             raise ValueError(f"version {version} of {BAG_METADATA} is not known")
