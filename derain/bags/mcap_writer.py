@@ -47,7 +47,7 @@ class McapWriter:
         self.metadata = metadata
         self.path = path
         self._library = library = MCAP.load(path, "writer")
-        path.mkdir()
+        path.mkdir(parents=True)
         self._file = (path / f"{path.name}.mcap").open("xb")
         chunks = [chunk for file in bag.files for chunk in file.chunks]
         packing = {chunk.compression for chunk in chunks}

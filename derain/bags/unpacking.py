@@ -59,8 +59,9 @@ def _lz4(data: bytes) -> bytes:
 
 
 def _zstd(data: bytes) -> bytes:
-    with ZSTANDARD.load("bags").ZstdDecompressor().stream_reader(data) as reader:
-        unpacked: bytes = reader.read(MOST_UNPACKED + 1)
+    library = ZSTANDARD.load("bags")
+    check_size(library.frame_content_size(data))  # -1 where it does not say
+    unpacked: bytes = library.decompress(data, MOST_UNPACKED)
     return unpacked
 
 
