@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from derain.bags.names import is_bag
 from derain.cli.arguments import add_threads, count
 from derain.cli.bag_options import add_topic
 from derain.cli.filter_help import list_methods
@@ -24,7 +25,7 @@ sensor sees it; or writes a whole recording, to be looked at scan after scan in 
   derain view recording/ --methods default dsor --rerun out.rrd    then: rerun out.rrd
   derain view recording/ --card wads --every 10 --rerun out.rrd
   derain view recording/ --methods persistence --poses odometry --frames 0:50 --rerun out.rrd
-  derain view drive.mcap/velodyne_points/000012 --out figure.png
+  derain view drive.mcap/velodyne_points/000012 --out figure.png     of a bag, its first cloud
 
 A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), default or a filter
 (below); of one scan also all or none, of a recording also what sees several scans. --card says what
@@ -87,9 +88,10 @@ def main(arguments: argparse.Namespace) -> int:
         return view_recording(arguments)
     from derain.cli.view_scan import view_scan
 
-    if len(arguments.scans) > 1 or arguments.scans[0].is_dir():
+    path = arguments.scans[0]
+    if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):
         raise InputError(
-            arguments.scans[0],
+            path,
             "is more than one scan, which no picture shows",
             "Name one, or give --rerun out.rrd to look at all of them.",
         )
