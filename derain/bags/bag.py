@@ -180,12 +180,15 @@ class Bag:
             yield
         except (InputError, BrokenPipeError):
             raise
-        except Exception as error:  # the library checks little of what it reads
+        except Exception as error:  # the libraries check little of what they read
+            reason = reason_of(error).rstrip(".")
             raise InputError(
                 self.path,
-                f"cannot be read as a bag ({reason_of(error)})",
-                "It is damaged, cut off, encrypted or of another kind. What was cut off may be "
-                "saved by " + self._rescuer,
+                f"cannot be read as a bag ({reason})",
+                "Have it made readable by rosbag decrypt."
+                if "encrypt" in reason
+                else "It is damaged, cut off, encrypted or of another kind. What was cut off may "
+                f"be saved by {self._rescuer}",
             ) from error
 
     def messages(self, topic: Topic | None = None, start: int | None = None) -> Iterator[Message]:
@@ -239,9 +242,9 @@ class Bag:
     def _rescuer(self) -> str:
         if self.is_ros1:
             return "rosbag reindex."
-        if os.path.isdir(self.path):
-            return "ros2 bag reindex."
-        return "mcap recover." if self.path.suffix.lower() == ".mcap" else "sqlite3's .recover."
+        names = os.listdir(self.path) if os.path.isdir(self.path) else [self.path.name]
+        is_mcap = any(name.lower().endswith(".mcap") for name in names)
+        return "mcap recover." if is_mcap else "sqlite3's .recover."
 
     def _named(self, name: str, clouds: list[Topic]) -> Topic:
         same = [topic for topic in self.topics if topic.name.strip("/") == name.strip("/")]
