@@ -266,7 +266,7 @@ def _hostile_metadata() -> list[Callable[[], bytes]]:
         lambda: with_(b"drive.mcap", b"/dev/zero"),
         lambda: with_(b"version: 8", b"version: 99999999999999999999"),
         lambda: b"rosbag2_bagfile_information: &a [*a, *a]",
-        lambda: b"rosbag2_bagfile_information: " + b"[" * 10_000,
+        lambda: b"rosbag2_bagfile_information: " + b"[" * 500_000,
         lambda: b"rosbag2_bagfile_information: 1\n" + b"a: 1\n" * 3_000_000,
     ]
 

@@ -76,7 +76,8 @@ class McapMessage(NamedTuple):
         """Reads the body of its record."""
         if len(body) < MESSAGE_HEAD.size:
             raise ValueError("a message is cut off")
-        return cls(*MESSAGE_HEAD.unpack_from(body), bytes(body[MESSAGE_HEAD.size :]))
+        channel, sequence, time, published = MESSAGE_HEAD.unpack_from(body)
+        return cls(channel, sequence, time, published, bytes(body[MESSAGE_HEAD.size :]))
 
 
 class McapRecords:

@@ -157,7 +157,9 @@ class McapWriter:
             return deepcopy(self.metadata.content)
         for kind, record in self.bag.attachments_and_metadata():
             if kind != ATTACHMENT and record.name == ROS2_RECORD:
-                return _said(record.metadata.get(ROS2_NOTE, ""), dict) or {}
+                content: dict[str, Any] | None
+                content = _said(str(record.metadata.get(ROS2_NOTE, "")), dict)
+                return content or {}
         return {}
 
     def _version(self) -> int:

@@ -9,7 +9,8 @@ from typing import Any
 import yaml
 
 from derain.bags.names import BAG_METADATA, METADATA_WORD
-from derain.files.documents import LARGEST_DOCUMENT, Entry
+from derain.errors import reason_of
+from derain.files.documents import LARGEST_DOCUMENT, parsed_yaml
 
 # The newest version that is known. It spells quality of service in words, which readers older
 # than it do not know; the one before it has it in numbers, as text.
@@ -30,12 +31,10 @@ def small_yaml(text: str) -> Any:
     Raises:
         ValueError: No YAML, or more of it than a bag needs.
     """
-    if len(text) > LARGEST_DOCUMENT:
-        raise ValueError(f"a note of {len(text):,} characters")
     try:
-        return yaml.safe_load(text)
-    except (yaml.YAMLError, RecursionError) as error:
-        raise ValueError(f"a note that is no YAML ({error})") from error
+        return parsed_yaml(text, aliases=True)
+    except Exception as error:  # PyYAML has many
+        raise ValueError(f"no YAML that can be used ({reason_of(error)})") from error
 
 
 @dataclass(frozen=True)
@@ -61,10 +60,12 @@ class Ros2Metadata:
         """Reads that of a bag.
 
         Raises:
-            InputError: It cannot be read, or is no small YAML.
-            ValueError: It says what no bag of ROS 2 does, or names what is not there.
+            ValueError: It is no small YAML, says what no bag of ROS 2 does, or names what is not
+                there.
+            OSError: It cannot be read.
         """
-        document = Entry.of_yaml(folder / BAG_METADATA).value
+        with (folder / BAG_METADATA).open("rb") as file:
+            document = small_yaml(file.read(LARGEST_DOCUMENT + 1).decode("utf-8"))
         try:
             content = document[METADATA_WORD.decode()]
             version, storage = int(content["version"]), str(content["storage_identifier"])
