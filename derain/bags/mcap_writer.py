@@ -119,7 +119,7 @@ class McapWriter:
     def _metadata(self) -> Ros2Metadata:
         """That of the new bag: what the other's says, with what has changed."""
         old = self._old_metadata()
-        topics = {
+        topics: dict[str, dict[str, Any]] = {
             each["topic_metadata"]["name"]: each["topic_metadata"]
             for each in old.get("topics_with_message_count", ())
         }
@@ -170,14 +170,14 @@ class McapWriter:
 
 
 def _topic_metadata(
-    connection: McapConnection, version: int, known: dict[str, Any]
+    connection: McapConnection, version: int, known: dict[str, dict[str, Any]]
 ) -> dict[str, Any]:
     """What a metadata.yaml says of a topic."""
     notes = dict(connection.notes)
     profiles: Any = notes.get(QOS, "")
     if version >= NEWEST_VERSION:
         profiles = _said(profiles, list) or []
-    made = {
+    made: dict[str, Any] = {
         "name": connection.topic,
         "type": connection.msgtype,
         "serialization_format": connection.encoding,
