@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from derain.bags.ros2_metadata import Ros2Metadata
+from derain.files.temporary import temporary_folder
 from derain.system.extras import ZSTANDARD
 
 # What is written at once, and what is left on the disk for others, bytes.
@@ -25,12 +26,13 @@ def unpacked_files(folder: Path, metadata: Ros2Metadata) -> Iterator[Path]:
         ValueError: A damaged file, or one that unpacks to more than there is room for.
         OSError: It cannot be read, or the other not written.
     """
-    with tempfile.TemporaryDirectory(prefix="derain-") as name:
+    with temporary_folder(Path(tempfile.gettempdir())) as lent:
+        lent.chmod(0o700)  # others may look into the folder that it is in
         plain = metadata.unpacked()
         for packed, file in zip(metadata.files, plain.files, strict=True):
-            _unpack(folder / packed, Path(name, file))
-        plain.write(Path(name))
-        yield Path(name)
+            _unpack(folder / packed, lent / file)
+        plain.write(lent)
+        yield lent
 
 
 def _unpack(source: Path, target: Path) -> None:
