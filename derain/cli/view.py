@@ -25,12 +25,13 @@ sensor sees it; or writes a whole recording, to be looked at scan after scan in 
   derain view recording/ --methods default dsor --rerun out.rrd    then: rerun out.rrd
   derain view recording/ --card wads --every 10 --rerun out.rrd
   derain view recording/ --methods persistence --poses odometry --frames 0:50 --rerun out.rrd
-  derain view drive.mcap/velodyne_points/000012 --out figure.png     of a bag, its first cloud
+  derain view drive.mcap/velodyne_points/000012 --out figure.png
 
 A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), default or a filter
 (below); of one scan also all or none, of a recording also what sees several scans. --card says what
 the labels mean; without it there is no truth, and in a picture points whose label says that they
 are unknown are left out.
+Of a bag the first cloud is drawn, unless the path names another.
 --rerun needs derain[view]. It writes the scans, and for each method what it keeps, what it removes
 and how probable it finds rain; range images, and the share removed over time. It says before how
 large that becomes. Where poses lie beside the scans, or --poses tells them, the scans lie in the
