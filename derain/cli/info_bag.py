@@ -44,7 +44,7 @@ def facts_of_bag(path: Path) -> dict[str, Any]:
 def _of_topic(topic: Topic) -> str:
     decoder = decoder_of(topic.type)
     told = "" if decoder is None else f"; no point clouds before {decoder} makes them"
-    return f"{topic.type}, {topic.messages:,} messages{told}"
+    return f"{topic.type or 'no type'}, {topic.messages:,} messages{told}"
 
 
 def _of_clouds(clouds: CloudTopic) -> dict[str, Any]:
