@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from benchmarks.recorded_bags import Ros, Storage, drive, table_of, write_bag
 from derain.cards.card import load_card
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
@@ -46,6 +47,14 @@ class SmallInputs:
     def scans(self) -> Path:
         """Folder of two labelled scans."""
         return self.data() / "sequences/00/velodyne"
+
+    def bag(self, storage: Storage) -> Path:
+        """A bag of twenty clouds."""
+        path = self.folder / ("drive.bag" if storage == "ros1" else f"drive_{storage}")
+        columns = ("x", "y", "z", "intensity")
+        points = (scene(POINTS, seed=number).T for number in range(20))
+        tables = [table_of(dict(zip(columns, each, strict=True))) for each in points]
+        return write_bag(path, storage, drive(Ros(storage), tables))
 
     def radar(self) -> Path:
         """Folder of two radar frames, at the times of the scans."""
@@ -96,6 +105,9 @@ def _fit(inputs: SmallInputs, *options: str) -> list[str | Path]:
 # Arguments of each command; it writes into the folder "out" of the folder where it is started.
 COMMANDS: dict[str, Callable[[SmallInputs], list[str | Path]]] = {
     "run": lambda i: ["run", "dror", i.scans(), "--out", "out"],
+    "run, ROS 1": lambda i: ["run", "dror", i.bag("ros1"), "--out", "out"],
+    "run, SQLite": lambda i: ["run", "dror", i.bag("sqlite3"), "--out", "out"],
+    "run, MCAP": lambda i: ["run", "dror", i.bag("mcap"), "--out", "out"],
     "teach": lambda i: ["teach", "dror", i.scans(), "--out", "out", "--card", "wads"],
     "bench": lambda i: [
         *("bench", "--data", i.scans(), "--card", "wads", "--methods", "dror", "dsor", "all"),

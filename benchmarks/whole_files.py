@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 from PIL import Image
 
+from derain.bags.bag import Bag
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.models.checkpoint import load_model
@@ -43,16 +44,23 @@ def _picture(file: Path) -> None:
         image.load()
 
 
+def _bag(file: Path) -> None:
+    assert sum(1 for _ in Bag(file).messages()), "no messages"
+
+
 def _database(file: Path) -> None:
     with sqlite3.connect(file) as database:
         assert database.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
 
 
 _READERS: dict[str, Callable[[Path], object]] = {
+    ".bag": _bag,
     ".ckpt": load_model,
     ".csv": _lines,
     ".db": _database,
+    ".db3": _bag,
     ".json": lambda file: json.loads(file.read_text("utf-8")),
+    ".mcap": _bag,
     ".md": _lines,
     ".npz": read_scan,
     ".onnx": Derainer,

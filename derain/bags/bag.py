@@ -1,7 +1,7 @@
 """A bag: which topics it has, and its messages one after the other.
 
-The library that reads bags has one exception for each thing that it checks, and whatever Python
-raises for what it does not. Here each is one InputError.
+The libraries that read bags have one exception for each thing that they check, and whatever Python
+raises for what they do not. Here each is one InputError.
 """
 
 import os
@@ -13,10 +13,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from derain.bags.cloud_message import CDR, ROS1
+from derain.bags.mcap_bag import McapBag
 from derain.bags.names import ROS1_SUFFIX
+from derain.bags.ros2_metadata import FILE, MESSAGE, Ros2Metadata
+from derain.bags.rosbags_reader import rosbags_reader
+from derain.bags.unpacked_files import unpacked_files
+from derain.bags.unpacking import unpack
 from derain.bags.vendors import decoder_of
 from derain.errors import InputError, reason_of
-from derain.system.extras import ROSBAGS
 
 # ROS 1 calls it sensor_msgs/PointCloud2; the library gives both the longer name.
 POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
@@ -30,11 +34,13 @@ class Topic:
         name: Its name.
         type: Type of its messages.
         messages: How many there are, as the bag's index has it.
+        encoding: How they are written: ``ros1`` or ``cdr``.
     """
 
     name: str
     type: str
     messages: int
+    encoding: str
 
     def has(self, connection: Any) -> bool:
         """Whether a connection of the library is one of its; one may have several publishers."""
@@ -51,11 +57,15 @@ class Message(NamedTuple):
         connection: What the library knows of its topic.
         time: When it was recorded, nanoseconds.
         data: Its bytes.
+        published: When it was published, nanoseconds; 0 but in MCAP.
+        sequence: Its number, as the publisher counts; 0 but in MCAP.
     """
 
     connection: Any
     time: int
     data: bytes
+    published: int = 0
+    sequence: int = 0
 
 
 class Bag:
@@ -73,10 +83,28 @@ class Bag:
         """Whether ROS 1 recorded it."""
         return self.path.suffix.lower() == ROS1_SUFFIX and not os.path.isdir(self.path)
 
+    @cached_property
+    def metadata(self) -> Ros2Metadata | None:
+        """What the metadata.yaml of a folder says; None of a file.
+
+        Raises:
+            InputError: It is damaged, or of a kind that is not known.
+        """
+        with self.reading():
+            return Ros2Metadata.read(self.path) if os.path.isdir(self.path) else None
+
     @property
-    def encoding(self) -> str:
-        """How its messages are written: ``ros1`` or ``cdr``."""
-        return ROS1 if self.is_ros1 else CDR
+    def storage(self) -> str:
+        """How it is stored: ``ros1``, ``mcap`` or ``sqlite3``.
+
+        Raises:
+            InputError: As for :attr:`metadata`.
+        """
+        if self.metadata is not None:
+            return self.metadata.storage
+        if self.is_ros1:
+            return "ros1"
+        return "mcap" if self.path.suffix.lower() == ".mcap" else "sqlite3"
 
     @cached_property
     def topics(self) -> tuple[Topic, ...]:
@@ -85,12 +113,14 @@ class Bag:
         Raises:
             InputError: A bag that cannot be read.
         """
-        counts: dict[tuple[str, str], int] = {}
+        found: dict[tuple[str, str], Topic] = {}
         with self.opened() as reader:
             for connection in reader.connections:
                 name = (str(connection.topic), str(connection.msgtype))
-                counts[name] = counts.get(name, 0) + max(connection.msgcount, 0)
-        return tuple(Topic(*name, count) for name, count in sorted(counts.items()))
+                before = found[name].messages if name in found else 0
+                messages = before + max(connection.msgcount, 0)
+                found[name] = Topic(*name, messages, self._encoding_of(connection))
+        return tuple(topic for _, topic in sorted(found.items()))
 
     def cloud_topic(self, name: str = "") -> Topic:
         """The topic of point clouds that is meant.
@@ -121,15 +151,23 @@ class Bag:
 
     @contextmanager
     def opened(self) -> Iterator[Any]:
-        """Lends the library's reader of the bag, open.
+        """Lends a reader of the bag, open: the library's, or one of MCAP.
 
         Raises:
-            InputError: The library is not installed, or a bag that it cannot read; also what is
+            InputError: A library is not installed, or a bag that cannot be read; also what is
                 found out while it is read in the block.
         """
-        library = ROSBAGS.load(self.path, "rosbag1" if self.is_ros1 else "rosbag2")
-        with self.reading(), library.Reader(self.path) as reader:
-            yield reader
+        with self.reading():
+            metadata = self.metadata
+            if metadata is None or metadata.compression != FILE:
+                with self._reader(self.path, metadata) as reader:
+                    yield reader
+            else:
+                with (
+                    unpacked_files(self.path, metadata) as folder,
+                    self._reader(folder, metadata.unpacked()) as reader,
+                ):
+                    yield reader
 
     @contextmanager
     def reading(self) -> Iterator[None]:
@@ -142,12 +180,15 @@ class Bag:
             yield
         except (InputError, BrokenPipeError):
             raise
-        except Exception as error:  # the library checks little of what it reads
+        except Exception as error:  # the libraries check little of what they read
+            reason = reason_of(error).rstrip(".")
             raise InputError(
                 self.path,
-                f"cannot be read as a bag ({reason_of(error)})",
-                "It is damaged, cut off, encrypted or of another kind. What was cut off may be "
-                "saved by " + self._rescuer,
+                f"cannot be read as a bag ({reason})",
+                "Have it made readable by rosbag decrypt."
+                if "encrypt" in reason
+                else "It is damaged, cut off, encrypted or of another kind. What was cut off may "
+                f"be saved by {self._rescuer}",
             ) from error
 
     def messages(self, topic: Topic | None = None, start: int | None = None) -> Iterator[Message]:
@@ -178,16 +219,32 @@ class Bag:
             chosen = [c for c in reader.connections if topic is None or topic.has(c)]
             if not chosen:
                 return
-            for connection, time, data in reader.messages(chosen, start=start):
-                yield Message(connection, time, bytes(data))
+            packed = self.storage == "sqlite3" and self._packs_messages
+            for connection, time, data, *more in reader.messages(chosen, start=start):
+                data = unpack(data, "zstd") if packed else bytes(data)
+                yield Message(connection, time, data, *more)
+
+    def _reader(self, path: Path, metadata: Ros2Metadata | None) -> Any:
+        if self.storage == "mcap":
+            return McapBag(path, metadata)
+        return rosbags_reader(path, self.is_ros1)
+
+    @property
+    def _packs_messages(self) -> bool:
+        return self.metadata is not None and self.metadata.compression == MESSAGE
+
+    def _encoding_of(self, connection: Any) -> str:
+        if self.storage == "mcap":
+            return str(connection.encoding)
+        return ROS1 if self.is_ros1 else CDR
 
     @property
     def _rescuer(self) -> str:
         if self.is_ros1:
             return "rosbag reindex."
-        if os.path.isdir(self.path):
-            return "ros2 bag reindex."
-        return "mcap recover." if self.path.suffix.lower() == ".mcap" else "sqlite3's .recover."
+        names = os.listdir(self.path) if os.path.isdir(self.path) else [self.path.name]
+        is_mcap = any(name.lower().endswith(".mcap") for name in names)
+        return "mcap recover." if is_mcap else "sqlite3's .recover."
 
     def _named(self, name: str, clouds: list[Topic]) -> Topic:
         same = [topic for topic in self.topics if topic.name.strip("/") == name.strip("/")]

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Self
 
 from derain.bags.bag import Bag, Message, Topic
-from derain.bags.bag_writer import BagWriter
+from derain.bags.bag_writer import writer_like
 from derain.errors import InputError, reason_of
 
 
@@ -31,7 +31,7 @@ class BagCopy:
         self._stack = ExitStack()
         reader = self._stack.enter_context(bag.opened())
         with self._writing():
-            self._writer = BagWriter(bag, reader, folder)
+            self._writer = writer_like(bag, reader, folder)
         self._messages = bag.messages_of(reader)
         self._clouds = 0
         for connection in reader.connections:  # as many, and in the same order
@@ -80,7 +80,7 @@ class BagCopy:
         """
         with self._writing():
             connection = self._writer.connection(message.connection, topic)
-            self._writer.write(connection, message.time, message.data if data is None else data)
+            self._writer.write(connection, message, message.data if data is None else data)
 
     def finish(self) -> Path:
         """Copies the rest.

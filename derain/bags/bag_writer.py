@@ -1,35 +1,46 @@
 """Writes a bag that is like another: its storage, its compression, and its topics as they were."""
 
-import os
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from derain.bags.bag import Bag
-from derain.bags.names import BAG_METADATA, stem
-from derain.files.reading import reading
-from derain.system.extras import ROSBAGS
+from derain.bags.bag import Bag, Message
+from derain.bags.mcap_writer import McapWriter
+from derain.bags.names import stem
+from derain.bags.ros2_metadata import NEWEST_VERSION, OLDER_VERSION
+from derain.bags.rosbags_reader import compressions_of
+from derain.system.extras import LZ4, ROSBAGS
 
-# Versions of metadata.yaml that the library writes. The newer one spells quality of service in
-# words, which readers older than it do not know.
-NEWER_VERSION, OLDER_VERSION = 9, 8
+
+def writer_like(bag: Bag, reader: Any, folder: Path) -> "BagWriter | McapWriter":
+    """What writes a bag like another.
+
+    Args:
+        bag: The other bag.
+        reader: The reader of it, open.
+        folder: Where the bag is written, named as the other: a file of ROS 1, a folder of ROS 2.
+    """
+    path = folder / written_name(bag)
+    if bag.storage == "mcap":
+        return McapWriter(reader, bag.metadata, path)
+    return BagWriter(bag, reader, path)
 
 
 class BagWriter:
     """Writes messages to a bag like another.
 
-    Connections keep definition, hash, quality of service, caller and latching. Two publishers that
-    differ in nothing that a bag tells become one.
+    Of ROS 1 and SQLite. Connections keep definition, hash, quality of service, caller and latching.
+    Two publishers that differ in nothing that a bag tells become one.
 
     Args:
         bag: The other bag.
         reader: The library's reader of it, open.
-        folder: Where the bag is written, named as the other: a file of ROS 1, a folder of ROS 2.
+        path: Where the bag is written: a file of ROS 1, a folder of ROS 2.
     """
 
-    def __init__(self, bag: Bag, reader: Any, folder: Path) -> None:
-        self.path = folder / written_name(bag)
+    def __init__(self, bag: Bag, reader: Any, path: Path) -> None:
+        self.path = path
         self._is_ros1 = bag.is_ros1
         self._writer = _ros1(reader, self.path) if bag.is_ros1 else _ros2(bag, reader, self.path)
         self._writer.open()
@@ -50,15 +61,15 @@ class BagWriter:
             self._connections[new] = declare(like, new.topic)
         return self._connections[new]
 
-    def write(self, connection: Any, time: int, data: bytes) -> None:
+    def write(self, connection: Any, like: Message, data: bytes) -> None:
         """Writes a message.
 
         Args:
             connection: What :meth:`connection` gave.
-            time: When it was recorded, nanoseconds.
+            like: A message of the other bag, in whose place in time it is.
             data: Its bytes.
         """
-        self._writer.write(connection, time, data)
+        self._writer.write(connection, like.time, data)
 
     def close(self) -> None:
         """Ends the bag, which is whole then."""
@@ -87,13 +98,12 @@ class BagWriter:
         writer = self._writer
         new = like._replace(id=len(writer.connections) + 1, topic=topic, msgcount=0, owner=writer)
         metadata = ROSBAGS.load(self.path, "rosbag2.metadata")
-        newer = writer.version >= NEWER_VERSION
+        newer = writer.version >= NEWEST_VERSION
         profiles = (metadata.dump_qos_v9 if newer else metadata.dump_qos_v8)(
             new.ext.offered_qos_profiles
         )
         text = profiles if isinstance(profiles, str) else yaml.safe_dump(profiles).strip()
-        is_mcap = writer.storage_plugin.name == "MCAP"  # whose channels cannot be without
-        if new.msgtype not in writer.added_types and (new.msgdef.data or is_mcap):
+        if new.msgtype not in writer.added_types and new.msgdef.data:
             writer.storage.add_msgtype(new)
             writer.added_types.add(new.msgtype)
         writer.storage.add_connection(new, text)
@@ -110,62 +120,39 @@ def written_name(bag: Bag) -> str:
 def _ros1(reader: Any, path: Path) -> Any:
     """A writer of ROS 1 that compresses as the other bag does."""
     library = ROSBAGS.load(path, "rosbag1")
-    by_name = ROSBAGS.load(path, "rosbag1.reader").decompressors
-    names = {function: name for name, function in by_name.items()}
-    used = {names.get(chunk.decompressor, "none") for chunk in reader.chunks.values()}
+    used = compressions_of(reader)
     writer = library.Writer(path)
     for format_ in library.Writer.CompressionFormat:
         if format_.name.lower() in used:
             writer.set_compression(format_)
+    if writer.compression_format == "lz4":
+        writer.compressor = _lz4_of_ros1
     return writer
+
+
+def _lz4_of_ros1(data: bytes) -> bytes:
+    """Compresses a chunk such that ROS 1 can read it.
+
+    Source: roslz4, which refuses linked blocks, wants a checksum, and knows no size of the content.
+    """
+    packed: bytes = LZ4.load("bags", "frame").compress(
+        data, block_linked=False, content_checksum=True, store_size=False
+    )
+    return packed
 
 
 def _ros2(bag: Bag, reader: Any, path: Path) -> Any:
-    """A writer of ROS 2 with the storage, compression and notes of the other bag."""
+    """A writer of ROS 2 with the compression and notes of the other bag."""
     library = ROSBAGS.load(path, "rosbag2")
-    newer = _version(bag) >= NEWER_VERSION
-    mcap = storage_of(bag, reader) == "mcap"
+    newer = bag.metadata is not None and bag.metadata.version >= NEWEST_VERSION
     writer = library.Writer(
         path,
-        version=NEWER_VERSION if newer else OLDER_VERSION,
-        storage_plugin=library.StoragePlugin.MCAP if mcap else library.StoragePlugin.SQLITE3,
+        version=NEWEST_VERSION if newer else OLDER_VERSION,
+        storage_plugin=library.StoragePlugin.SQLITE3,
     )
-    mode = (reader.compression_mode or "").upper()
-    if not mode and any(chunk.compression for file in _files(reader) for chunk in _chunks(file)):
-        mode = "STORAGE"
-    if mode:
-        writer.set_compression(library.CompressionMode[mode], library.CompressionFormat.ZSTD)
+    if bag.metadata is not None and bag.metadata.compression:
+        mode = library.CompressionMode[bag.metadata.compression.upper()]
+        writer.set_compression(mode, library.CompressionFormat.ZSTD)
     for key, value in (reader.storage.metadata.custom or {}).items():
         writer.set_custom_data(str(key), str(value))
     return writer
-
-
-def storage_of(bag: Bag, reader: Any) -> str:
-    """How a bag is stored: ``ros1``, ``mcap`` or ``sqlite3``.
-
-    Args:
-        bag: The bag.
-        reader: The library's reader of it, open.
-    """
-    if bag.is_ros1:
-        return "ros1"
-    return "mcap" if any(hasattr(file, "chunks") for file in _files(reader)) else "sqlite3"
-
-
-def _files(reader: Any) -> list[Any]:
-    """The readers of a bag's files: a folder may have several."""
-    return list(getattr(reader.storage, "storages", None) or [reader.storage])
-
-
-def _chunks(file: Any) -> list[Any]:
-    return getattr(file, "chunks", [])
-
-
-def _version(bag: Bag) -> int:
-    """Version of a folder's metadata.yaml; 0 of a file without one."""
-    path = bag.path / BAG_METADATA
-    if not os.path.isfile(path):
-        return 0
-    with reading(path, yaml.YAMLError, UnicodeDecodeError):
-        content = yaml.safe_load(path.read_text("utf-8"))
-    return int(content["rosbag2_bagfile_information"]["version"])

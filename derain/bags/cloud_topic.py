@@ -60,6 +60,8 @@ class CloudTopic:
     _last: tuple[int, Message] | None
     _stamps: Stamps | None
     _layouts: set[tuple[PointField, ...]]
+    _first_of_stamp: dict[int, int]
+    _told_of_stamps: bool
 
     def __init__(self, bag: Bag, topic: Topic) -> None:
         self.bag = bag
@@ -102,10 +104,11 @@ class CloudTopic:
         """
         message = self.message(number)
         try:
-            cloud = CloudMessage.parse(message.data, self.bag.encoding)
+            cloud = CloudMessage.parse(message.data, self.topic.encoding)
         except ValueError as error:
             raise damaged_cloud(self.name_of(number), error) from error
         self._tell_of_other_fields(number, cloud.cloud.fields)
+        self._tell_of_one_stamp(number, cloud.stamp)
         return cloud
 
     def seconds(self, number: int) -> float:
@@ -140,6 +143,8 @@ class CloudTopic:
         self._last = None
         self._stamps = None
         self._layouts = set()
+        self._first_of_stamp = {}
+        self._told_of_stamps = False
 
     def _read(self, number: int) -> Message:
         if self._next is None or not 0 <= number - self._next <= NEAR:
@@ -166,7 +171,7 @@ class CloudTopic:
 
     def _taken(self, number: int, message: Message) -> int:
         try:
-            return stamp_of(message.data, self.bag.encoding) or message.time
+            return stamp_of(message.data, self.topic.encoding) or message.time
         except ValueError:  # who reads the cloud is told
             return message.time
 
@@ -190,6 +195,16 @@ class CloudTopic:
                 f"it is read by its own ({names})"
             )
         self._layouts.add(fields)
+
+    def _tell_of_one_stamp(self, number: int, stamp: int) -> None:
+        """Warns of two clouds of one time, and of no more of them."""
+        first = self._first_of_stamp.setdefault(stamp, number)
+        if stamp and first != number and not self._told_of_stamps:
+            self._told_of_stamps = True
+            warn(
+                f"{self.name_of(number)}: has the stamp of {self.name_of(first)}; both are read, "
+                "and others like them are not told"
+            )
 
 
 def damaged_cloud(name: str, error: ValueError) -> InputError:

@@ -19,6 +19,9 @@ SUFFIXES = (ROS1_SUFFIX, ".mcap", ".db3")
 # Files of ROS 2 that are compressed as a whole are read by way of their folder.
 COMPRESSED_SUFFIXES = (".mcap.zstd", ".db3.zstd")
 
+# What ROS 1 calls a bag until its recording is ended.
+UNFINISHED_SUFFIX = ".bag.active"
+
 # The file that makes a folder a bag of ROS 2, and the word in it that says so.
 BAG_METADATA, METADATA_WORD = "metadata.yaml", b"rosbag2_bagfile_information"
 
@@ -47,9 +50,16 @@ def is_bag(path: Path) -> bool:
     """Whether something is a bag: a file by its suffix, a folder by what it holds.
 
     Raises:
-        InputError: A file of ROS 2 that is compressed as a whole, which its folder tells.
+        InputError: A file of ROS 2 that is compressed as a whole, which its folder tells; or a bag
+            of ROS 1 whose recording was not ended.
     """
     if os.path.isfile(path):
+        if path.name.lower().endswith(UNFINISHED_SUFFIX):
+            raise InputError(
+                path,
+                "is a bag whose recording goes on, or was cut off",
+                "End the recording; or name a copy .bag, and have it mended by rosbag reindex.",
+            )
         if path.name.lower().endswith(COMPRESSED_SUFFIXES):
             raise InputError(
                 path, "is compressed, as its bag's metadata.yaml tells", "Name the bag's folder."

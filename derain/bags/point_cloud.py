@@ -90,10 +90,11 @@ class PointCloud:
                 raise ValueError(
                     f"field '{field.name}' ends at byte {end:,} of points of {self.point_step:,}"
                 )
-        if not len(self):
+        points = self.height * self.width  # more than a length may be, before the checks
+        if not points:
             return
         if self.point_step == 0:
-            raise ValueError(f"{len(self):,} points of no bytes")
+            raise ValueError(f"{points:,} points of no bytes")
         if self.height > 1 and self.row_step < self.width * self.point_step:
             raise ValueError(
                 f"rows of {self.row_step:,} bytes hold no {self.width:,} points of "

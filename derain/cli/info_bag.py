@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from derain.bags.bag import POINT_CLOUD, Bag, Topic
-from derain.bags.bag_writer import storage_of
 from derain.bags.cloud_topic import CloudTopic
 from derain.bags.point_cloud import DATATYPES, PointField
 from derain.bags.vendors import decoder_of
@@ -23,7 +22,7 @@ def facts_of_bag(path: Path) -> dict[str, Any]:
     """
     bag = Bag(path)
     with bag.opened() as reader:
-        storage, messages = storage_of(bag, reader), reader.message_count
+        storage, messages = bag.storage, reader.message_count
         start, seconds = reader.start_time, 1e-9 * reader.duration
     return {
         "bag": storage,
@@ -45,7 +44,7 @@ def facts_of_bag(path: Path) -> dict[str, Any]:
 def _of_topic(topic: Topic) -> str:
     decoder = decoder_of(topic.type)
     told = "" if decoder is None else f"; no point clouds before {decoder} makes them"
-    return f"{topic.type}, {topic.messages:,} messages{told}"
+    return f"{topic.type or 'no type'}, {topic.messages:,} messages{told}"
 
 
 def _of_clouds(clouds: CloudTopic) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from derain.evaluation.counts import SCORES
 from derain.evaluation.rain_counts import RainCounts
 from derain.evaluation.text_tables import markdown_table
 from derain.scan import Scan
+from derain.sources.bag_frame import BagFrame
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
@@ -56,7 +57,10 @@ def _measured(
         assert isinstance(frame, FileFrame)  # what is taught lies in files
         scan = reader.read(frame)
         answer, called_rain = answer_of(scan, taught), student(scan)
-        labelled = replace(frame, label_path=label_of(frame.path, layouts)).read_label(len(scan))
+        own = (
+            frame.label_beside_bag if isinstance(frame, BagFrame) else label_of(frame.path, layouts)
+        )
+        labelled = replace(frame, label_path=own).read_label(len(scan))
         rows = first_rows(scan) if card.deduplicate else np.flatnonzero(scan.valid)
         sure = rows[answer[rows] != NOT_KNOWN]
         truth = scan.with_label(labelled)

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from derain.bags.names import is_bag
 from derain.cli.arguments import add_threads, count
 from derain.cli.bag_options import add_topic
 from derain.cli.filter_help import list_methods
@@ -30,6 +31,7 @@ A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), defaul
 (below); of one scan also all or none, of a recording also what sees several scans. --card says what
 the labels mean; without it there is no truth, and in a picture points whose label says that they
 are unknown are left out.
+Of a bag the first cloud is drawn, unless the path names another.
 --rerun needs derain[view]. It writes the scans, and for each method what it keeps, what it removes
 and how probable it finds rain; range images, and the share removed over time. It says before how
 large that becomes. Where poses lie beside the scans, or --poses tells them, the scans lie in the
@@ -87,9 +89,10 @@ def main(arguments: argparse.Namespace) -> int:
         return view_recording(arguments)
     from derain.cli.view_scan import view_scan
 
-    if len(arguments.scans) > 1 or arguments.scans[0].is_dir():
+    path = arguments.scans[0]
+    if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):
         raise InputError(
-            arguments.scans[0],
+            path,
             "is more than one scan, which no picture shows",
             "Name one, or give --rerun out.rrd to look at all of them.",
         )

@@ -1,6 +1,7 @@
 """Draws one scan as several methods clean it."""
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cards.card import DataCard, load_card
@@ -8,6 +9,7 @@ from derain.cards.known import layouts_for
 from derain.cli.bag_options import in_topic
 from derain.cli.outputs import say
 from derain.errors import InputError
+from derain.sources.bag_frame import NUMBER, BagFrame
 from derain.sources.folders import frame_of
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
 from derain.system.notices import Notices
@@ -47,7 +49,7 @@ def view_scan(arguments: argparse.Namespace) -> None:
     predicted = {
         method.title: _rain(scan, method, arguments.threads, notices) for method in methods
     }
-    title, rain = f"{path.name}: {len(scan):,} points", None
+    title, rain = f"{_shown(frame, path)}: {len(scan):,} points", None
     if truth is not None:
         rain, known = truth
         scan, rain = scan.take(known), rain[known]
@@ -62,6 +64,15 @@ def view_scan(arguments: argparse.Namespace) -> None:
         from derain.pictures.comparison_window import show_comparison
 
         show_comparison(scan, predicted, rain)
+
+
+def _shown(frame: "Frame", path: Path) -> str:
+    """What the title calls a scan; of a bag, the cloud is said that is drawn."""
+    if not isinstance(frame, BagFrame):
+        return path.name
+    if NUMBER.fullmatch(path.name) is None:
+        say(f"{frame.name} is drawn, the first of {len(frame.clouds):,} clouds")
+    return str(frame.path.relative_to(frame.clouds.bag.path.parent))
 
 
 def _rain(

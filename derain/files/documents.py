@@ -80,9 +80,7 @@ class Entry:
                 or is not YAML.
         """
         with reading(path, *_YAML_DAMAGE):
-            text = _text(path, largest)
-            _refuse_what_unfolds(text, largest // BYTES_PER_VALUE)
-            return cls(path, "", yaml.load(text, _LOADER))
+            return cls(path, "", parsed_yaml(_text(path, largest), largest))
 
     @classmethod
     def of_json_file(cls, path: Path, largest: int = LARGEST_DOCUMENT) -> "Entry":
@@ -277,13 +275,32 @@ def _refuse_depth(value: Any, depth: int = 0) -> None:
             _refuse_depth(part, depth + 1)
 
 
-def _refuse_what_unfolds(text: str, most: int) -> None:
+def parsed_yaml(text: str, largest: int = LARGEST_DOCUMENT, aliases: bool = False) -> Any:
+    """What a text in YAML says.
+
+    Args:
+        text: The text.
+        largest: Characters that it may have.
+        aliases: Whether it may use aliases, as programs write them; whoever goes through all of it
+            may then find far more than was written.
+
+    Raises:
+        Exception: Whatever PyYAML raises; ValueError for one that is too large or nested too
+            deeply, or uses aliases.
+    """
+    if len(text) > largest:
+        raise ValueError(f"more than {largest:,} characters")
+    _refuse_what_unfolds(text, largest // BYTES_PER_VALUE, aliases)
+    return yaml.load(text, _LOADER)
+
+
+def _refuse_what_unfolds(text: str, most: int, aliases: bool) -> None:
     """Refuses a text whose values would take far more memory than it, before any are made."""
     depth = 0
     for number, event in enumerate(yaml.parse(text, _LOADER)):
         if number > most:
             raise ValueError(f"more than {most:,} values")
-        if isinstance(event, yaml.AliasEvent):
+        if isinstance(event, yaml.AliasEvent) and not aliases:
             raise ValueError(f"the alias *{short(str(event.anchor))}: write out what it stands for")
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)

@@ -1,7 +1,7 @@
 """Point clouds in bags as frames."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -38,6 +38,12 @@ class BagFrame(FileFrame):
     def suffix(self) -> str:
         """Nothing: there is no file that what is made of it could be like."""
         return ""
+
+    @property
+    def label_beside_bag(self) -> Path:
+        """Where labels of its own lie: ``drive.labels/000012.label`` beside the bag."""
+        bag = self.clouds.bag.path
+        return bag.with_name(stem(bag) + LABELS_SUFFIX) / f"{self.number:06d}{LABEL}"
 
     @property
     def time(self) -> float:
@@ -113,15 +119,14 @@ def bag_frame(clouds: CloudTopic, number: int, key: str) -> BagFrame:
         number: Which of them, from 0.
         key: What is made of it is named by this.
     """
-    bag = clouds.bag.path
-    return BagFrame(
+    frame = BagFrame(
         key=key,
-        sequence=stem(bag),
+        sequence=stem(clouds.bag.path),
         number=number,
-        label_path=bag.with_name(stem(bag) + LABELS_SUFFIX) / f"{number:06d}{LABEL}",
         path=Path(clouds.name_of(number)),
         clouds=clouds,
     )
+    return replace(frame, label_path=frame.label_beside_bag)
 
 
 def clouds_at(path: Path) -> CloudTopic:

@@ -104,7 +104,7 @@ class CleanedBags:
         options = self.options
         columns = {RAIN_PROBABILITY: judgement.probability} if options.probability else {}
         try:
-            message = CloudMessage.parse(recorded.data, frame.clouds.bag.encoding)
+            message = CloudMessage.parse(recorded.data, frame.clouds.topic.encoding)
             new = cleaned(message, judgement.rain, columns, options.keep_shape)
         except ValueError as error:
             copy.write(recorded)

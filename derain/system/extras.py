@@ -78,11 +78,27 @@ FLATBUFFERS = Extra("feather", "flatbuffers")
 LASPY = Extra("las", "laspy")
 OPENVINO = Extra("openvino", "openvino")
 ROSBAGS = Extra("ros", "rosbags")
+MCAP = Extra("ros", "mcap")
+APSW = Extra("ros", "apsw")
+LZ4 = Extra("ros", "lz4")
+ZSTANDARD = Extra("ros", "zstandard")
 RERUN = Extra("view", "rerun")
 
 EXTRAS = (
     *(TORCH, LIGHTNING, TORCHMETRICS, JSONARGPARSE, TENSORBOARD, MATPLOTLIB),
-    *(ONNX, ONNXSCRIPT, OPTUNA, OPEN3D, PYARROW, FLATBUFFERS, LASPY, OPENVINO, ROSBAGS, RERUN),
+    *(
+        ONNX,
+        ONNXSCRIPT,
+        OPTUNA,
+        OPEN3D,
+        PYARROW,
+        FLATBUFFERS,
+        LASPY,
+        OPENVINO,
+        ROSBAGS,
+        MCAP,
+        RERUN,
+    ),
 )
 
 # What is needed to read a checkpoint, to make an ONNX file of it, and to train it.

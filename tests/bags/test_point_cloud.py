@@ -122,6 +122,7 @@ X = (PointField("x", 0, 7, 1),)
         ((2, 3, X, False, 4, 11, bytes(24), True), "rows of 11 bytes"),
         ((1, 3, (), False, 0, 0, b"", True), "points of no bytes"),
         ((2**31, 2**31, X, False, 4, 2**32 - 1, b"", True), "rows of"),
+        ((2**32 - 1, 2**32 - 1, X, False, 4, 16, b"", True), "rows of"),
     ],
 )
 def test_contradictions_are_refused(arguments: tuple[Any, ...], reason: str) -> None:

@@ -52,9 +52,14 @@ def test_a_topic_without_a_bag_is_refused(tmp_path: Path, run_derain) -> None:
 
 
 def test_view_draws_a_cloud_of_a_bag(tmp_path: Path, run_derain) -> None:
-    bag, picture = small_bag(tmp_path, "ros1"), tmp_path / "figure.png"
-    outcome = run_derain("view", bag / "000001", "--methods", "ror", "--out", picture)
-    assert (outcome.code, picture.stat().st_size > 10_000) == (0, True)
+    """One that is named, or the first, also of a folder."""
+    bag, picture = small_bag(tmp_path, "mcap"), tmp_path / "figure.png"
+    for path, drawn in ((bag / "000001", ""), (bag, "000000")):
+        outcome = run_derain("view", path, "--methods", "ror", "--out", picture)
+        assert (outcome.code, picture.stat().st_size > 10_000) == (0, True)
+        said = f"{path}/velodyne_points/{drawn} is drawn, the first of 3 clouds"
+        assert (said in outcome.out) == bool(drawn)
+        picture.unlink()
 
 
 def test_a_bag_tells_the_weather_that_its_scans_tell_as_files(tmp_path: Path, run_derain) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_bags import small_bag
 
 from derain.cards.card import load_card
 from derain.cli.learning_record import record_of
@@ -53,6 +54,15 @@ def test_teacher_and_student_are_measured_by_the_labels(data: Taught, tmp_path: 
     assert "100.00%" in rows["falling-snow (rain)"]
     solid = load_card("wads").classes[0]
     assert f"{10 / 270:.2%}" in rows[solid]
+
+
+def test_labels_beside_a_bag_measure_too(tmp_path: Path) -> None:
+    bag = small_bag(tmp_path, "mcap")
+    write_labels(tmp_path / "drive.labels/000002.label", np.where(DROPS, 110, 0))
+    teach(FilterDerainer(DROR()), named_frames([bag]), tmp_path / "taught")
+    data = Taught(str(tmp_path / "taught"))
+    text = record_of(data.frames("validation"), data.card, "wads", student)
+    assert "0.750 | 1.000 | 0.857 | 0.750" in text
 
 
 @pytest.mark.parametrize("card", ["wads", "no_such_card"])

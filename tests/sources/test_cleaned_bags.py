@@ -151,7 +151,7 @@ def test_nothing_is_left_of_a_bag_that_breaks_off(
 ) -> None:
     from rosbags import rosbag2
 
-    bag = small_bag(tmp_path, "mcap")
+    bag = small_bag(tmp_path, "sqlite3")
     messages = rosbag2.Reader.messages
 
     def breaking_off(self, *arguments, **options):
@@ -229,7 +229,10 @@ def test_compressed_bags_are_read_and_stay_compressed(
     made = bag_path(tmp_path / "out", storage)
     assert [m[:3] for m in read_bag(made)] == [m[:3] for m in read_bag(bag)]
     if storage == "ros1":
-        assert f"compression={mode}".encode() in made.read_bytes()
+        content = made.read_bytes()
+        assert f"compression={mode}".encode() in content
+        # What ROS 1 asks of LZ4: blocks on their own, no size, a checksum. The flags follow a mark.
+        assert mode != "lz4" or content.split(b"\x04\x22\x4d\x18")[1][0] & 0b101100 == 0b100100
     else:
         assert storage_file(made).suffixes == storage_file(bag).suffixes
         key = "rosbag2_bagfile_information"

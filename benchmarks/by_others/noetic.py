@@ -1,0 +1,171 @@
+"""Bags of ROS 1, made and read by ROS itself: nothing here is derain's, nor of its libraries.
+
+    apt-get install python3-rosbag python3-sensor-msgs       # Debian bookworm
+    P="/usr/bin/python3 benchmarks/by_others/noetic.py"
+    $P make bags ../shared/data/wads/drive/velodyne --scans 5
+    derain run ../shared/data/wads/drive/velodyne/*00?.bin --out masks
+    for kind in none bz2 lz4; do
+        derain run bags/$kind.bag --out cleaned
+        $P compare bags/$kind.bag cleaned/$kind.bag masks
+    done
+
+Needs ROS's own interpreter, and NumPy.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import genpy
+import numpy as np
+import rosbag
+from sensor_msgs import point_cloud2
+from sensor_msgs.msg import Imu, PointCloud2, PointField
+from std_msgs.msg import Header, String
+
+POINTS = "/velodyne_points"
+PERIOD = 100_000_000
+START = 1_700_000_000_123_456_789
+
+
+def main() -> int:
+    """Makes bags, or compares two."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    make = commands.add_parser("make", help="bags of scans, one of each compression")
+    make.add_argument("out", type=Path)
+    make.add_argument("scans", type=Path, help="folder of .bin")
+    make.add_argument("--scans", type=int, default=5, dest="number")
+    compare = commands.add_parser("compare", help="a bag, and what derain made of it")
+    compare.add_argument("before", type=Path)
+    compare.add_argument("after", type=Path)
+    compare.add_argument("masks", type=Path, help="folder of .label, in the order of the clouds")
+    arguments = parser.parse_args()
+    if arguments.command == "make":
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        for compression in ("none", "bz2", "lz4"):
+            scans = sorted(arguments.scans.glob("*.bin"))[: arguments.number]
+            make_bag(arguments.out / f"{compression}.bag", compression, scans)
+        return 0
+    return compare_bags(arguments.before, arguments.after, arguments.masks)
+
+
+def make_bag(path, compression, scans):
+    """A bag of small chunks, with a latched text, and stamps other than times of recording."""
+    latched = {
+        "topic": "/driver",
+        "type": String._type,
+        "md5sum": String._md5sum,
+        "message_definition": String._full_text,
+        "callerid": "/driver_node",
+        "latching": "1",
+    }
+    with rosbag.Bag(str(path), "w", compression=compression, chunk_threshold=200_000) as bag:
+        for number, scan in enumerate(scans):
+            time = START + number * PERIOD
+            bag.write(
+                "/driver", String(data=f"cloud {number}"), at(time), connection_header=latched
+            )
+            bag.write("/imu/data", Imu(header=header(number, time, "imu")), at(time))
+            bag.write(POINTS, cloud(scan, number, time - 1000), at(time))
+
+
+def at(nanoseconds):
+    """A time of ROS."""
+    return genpy.Time(nanoseconds // 10**9, nanoseconds % 10**9)
+
+
+def header(number, time, frame):
+    """What a message of a sensor begins with."""
+    return Header(seq=number, stamp=at(time), frame_id=frame)
+
+
+def cloud(scan, number, time):
+    """A cloud as Velodyne's driver lays it out: 22 bytes a point, ring and time after intensity."""
+    points = np.fromfile(scan, "<f4").reshape(-1, 4)
+    layout = [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")]
+    table = np.zeros(len(points), [*layout, ("ring", "<u2"), ("time", "<f4")])
+    for column, (name, _) in zip(points.T, layout, strict=False):
+        table[name] = column
+    table["ring"] = np.arange(len(points)) % 64
+    fields = [
+        PointField(name, table.dtype.fields[name][1], 4 if name == "ring" else 7, 1)
+        for name in table.dtype.names
+    ]
+    size = table.dtype.itemsize
+    return PointCloud2(
+        header=header(number, time, "velodyne"),
+        height=1,
+        width=len(table),
+        fields=fields,
+        is_bigendian=False,
+        point_step=size,
+        row_step=size * len(table),
+        data=table.tobytes(),
+        is_dense=True,
+    )
+
+
+def compare_bags(before, after, masks):
+    """Compares message by message, and says what it found."""
+    old, new = messages(before), messages(after)
+    left = clouds(after)
+    rain = [np.fromfile(mask, "<u4") == 1 for mask in sorted(masks.glob("*.label"))]
+    kept = [points[~drops] for points, drops in zip(clouds(before), rain, strict=True)]
+    others = [(a, b) for a, b in zip(old, new, strict=False) if a[0] != POINTS]
+    findings = {
+        f"{len(old)} messages": len(old) == len(new),
+        "order, topics and stamps": [m[:2] for m in old] == [m[:2] for m in new],
+        "connection headers": connections(before) == connections(after),
+        "types, counts and compression": summary(before) == summary(after),
+        f"{len(others)} messages of other topics, byte for byte": all(a == b for a, b in others),
+        "headers of clouds": headers(before) == headers(after),
+        f"{sum(map(len, left)):,} points left of {sum(map(len, rain)):,}": len(left) == len(kept)
+        and all(map(np.array_equal, left, kept)),
+    }
+    for title, found in findings.items():
+        print(f"{before.stem:5} {'same' if found else 'DIFFERENT':10} {title}")
+    return 0 if all(findings.values()) else 1
+
+
+def messages(path):
+    """Topic, time, type, hash and bytes of all messages, in ROS's order."""
+    with rosbag.Bag(str(path)) as bag:
+        return [
+            (topic, time.to_nsec(), raw[0], raw[2], bytes(raw[1]))
+            for topic, raw, time in bag.read_messages(raw=True)
+        ]
+
+
+def clouds(path):
+    """All columns of all clouds, as ROS reads their points."""
+    with rosbag.Bag(str(path)) as bag:
+        return [
+            np.array(list(point_cloud2.read_points(message)))
+            for _, message, _ in bag.read_messages([POINTS])
+        ]
+
+
+def headers(path):
+    """Headers of all clouds."""
+    with rosbag.Bag(str(path)) as bag:
+        return [message.header for _, message, _ in bag.read_messages([POINTS])]
+
+
+def connections(path):
+    """What publishers say of themselves: definition, caller, latching."""
+    with rosbag.Bag(str(path)) as bag:
+        return sorted(sorted(each.header.items()) for each in bag._connections.values())
+
+
+def summary(path):
+    """What `rosbag info` says of topics and compression."""
+    with rosbag.Bag(str(path)) as bag:
+        types, topics = bag.get_type_and_topic_info()
+        counted = {name: (topic.msg_type, topic.message_count) for name, topic in topics.items()}
+        kind = bag.get_compression_info().compression
+        return types, counted, kind, bag.get_start_time(), bag.get_end_time()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,205 @@
+"""Writes a bag in MCAP that is like another, with all that the other has besides messages."""
+
+import os
+from copy import deepcopy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+
+from derain.bags.mcap_bag import McapBag, McapConnection
+from derain.bags.mcap_records import ATTACHMENT
+from derain.bags.ros2_metadata import (
+    FILE,
+    MESSAGE,
+    NEWEST_VERSION,
+    NONE,
+    OLDER_VERSION,
+    Ros2Metadata,
+    small_yaml,
+)
+from derain.system.extras import MCAP, ZSTANDARD
+
+T = TypeVar("T")
+
+# The record in which ROS 2 repeats the metadata.yaml, and the one note in it.
+ROS2_RECORD, ROS2_NOTE = "rosbag2", "serialized_metadata"
+
+# What ROS 2 notes of a channel.
+QOS, TYPE_HASH = "offered_qos_profiles", "topic_type_hash"
+
+
+class McapWriter:
+    """Writes messages to a folder of ROS 2 with one file of MCAP.
+
+    Channels keep their schemas and notes, and messages their numbers and times; attachments and
+    metadata follow when the bag is ended.
+
+    Args:
+        bag: The other bag, open.
+        metadata: What its metadata.yaml says, if it has one.
+        path: The folder, which is made.
+    """
+
+    def __init__(self, bag: McapBag, metadata: Ros2Metadata | None, path: Path) -> None:
+        self.bag = bag
+        self.metadata = metadata
+        self.path = path
+        self._library = library = MCAP.load(path, "writer")
+        path.mkdir(parents=True)
+        self._file = (path / f"{path.name}.mcap").open("xb")
+        chunks = [chunk for file in bag.files for chunk in file.chunks]
+        packing = {chunk.compression for chunk in chunks}
+        self._writer: Any = library.Writer(
+            self._file,
+            compression=next(
+                (kind for kind in library.CompressionType if kind.name.lower() in packing),
+                library.CompressionType.NONE,
+            ),
+            use_chunking=bool(chunks) or not bag.message_count,
+        )
+        profiles = [file.records.profile for file in bag.files]
+        self._writer.start(profiles[0] if profiles else "ros2")
+        self._schemas: dict[object, int] = {}
+        self._channels: dict[McapConnection, int] = {}
+        self._counts: dict[McapConnection, int] = {}
+        self._first, self._last = 2**63 - 1, 0
+
+    def connection(self, like: McapConnection, topic: str | None = None) -> McapConnection:
+        """What messages are written to; see :meth:`BagWriter.connection`."""
+        new = replace(like, topic=topic or like.topic, msgcount=0)
+        if new not in self._channels:
+            number = 0
+            if new.schema is not None:
+                if new.schema not in self._schemas:
+                    self._schemas[new.schema] = self._writer.register_schema(*new.schema)
+                number = self._schemas[new.schema]
+            self._channels[new] = self._writer.register_channel(
+                new.topic, new.encoding, number, dict(new.notes)
+            )
+            self._counts[new] = 0
+        return new
+
+    def write(self, connection: McapConnection, like: Any, data: bytes) -> None:
+        """Writes a message; see :meth:`BagWriter.write`."""
+        if self._compression == MESSAGE:
+            data = ZSTANDARD.load(self.path).compress(data)
+        self._writer.add_message(
+            self._channels[connection], like.time, data, like.published, like.sequence
+        )
+        self._counts[connection] += 1
+        self._first, self._last = min(self._first, like.time), max(self._last, like.time)
+
+    def close(self) -> None:
+        """Ends the bag, which is whole then."""
+        for kind, record in self.bag.attachments_and_metadata():
+            if kind == ATTACHMENT:
+                times = record.create_time, record.log_time
+                self._writer.add_attachment(*times, record.name, record.media_type, record.data)
+            elif record.name != ROS2_RECORD:
+                self._writer.add_metadata(record.name, record.metadata)
+        metadata = self._metadata()
+        text = yaml.safe_dump(metadata.content, sort_keys=False)
+        self._writer.add_metadata(ROS2_RECORD, {ROS2_NOTE: text})
+        self._writer.finish()
+        self._file.close()
+        if self._compression == FILE:
+            _pack(Path(self._file.name))
+        metadata.write(self.path)
+
+    def abort(self) -> None:
+        """Lets go of the bag, which is not whole."""
+        self._file.close()
+
+    @property
+    def _compression(self) -> str:
+        return NONE if self.metadata is None else self.metadata.compression
+
+    def _metadata(self) -> Ros2Metadata:
+        """That of the new bag: what the other's says, with what has changed."""
+        old = self._old_metadata()
+        topics: dict[str, dict[str, Any]] = {
+            each["topic_metadata"]["name"]: each["topic_metadata"]
+            for each in old.get("topics_with_message_count", ())
+        }
+        version = int(old.get("version", 0)) or self._version()
+        span = {
+            "starting_time": {"nanoseconds_since_epoch": self._first},
+            "duration": {"nanoseconds": max(0, self._last - self._first)},
+            "message_count": sum(self._counts.values()),
+        }
+        name = os.path.basename(self._file.name) + (".zstd" if self._compression == FILE else "")
+        content = {
+            "compression_format": "",
+            "compression_mode": "",
+            "custom_data": None,
+            "ros_distro": "unknown",
+            **old,
+            "version": version,
+            "storage_identifier": "mcap",
+            **span,
+            "topics_with_message_count": [
+                {
+                    "topic_metadata": _topic_metadata(connection, version, topics),
+                    "message_count": number,
+                }
+                for connection, number in self._counts.items()
+            ],
+            "relative_file_paths": [name],
+            "files": [{"path": name, **deepcopy(span)}],
+        }
+        return Ros2Metadata(content, version, "mcap", (name,), self._compression)
+
+    def _old_metadata(self) -> dict[str, Any]:
+        """What the other bag's metadata.yaml says, or its file, where that repeats it."""
+        if self.metadata is not None:
+            return deepcopy(self.metadata.content)
+        for kind, record in self.bag.attachments_and_metadata():
+            if kind != ATTACHMENT and record.name == ROS2_RECORD:
+                content: dict[str, Any] | None
+                content = _said(str(record.metadata.get(ROS2_NOTE, "")), dict)
+                return content or {}
+        return {}
+
+    def _version(self) -> int:
+        """The version that has quality of service as the channels have it."""
+        texts = (dict(each.notes).get(QOS, "") for each in self._channels)
+        newest = any("keep_last" in text or "keep_all" in text for text in texts)
+        return NEWEST_VERSION if newest else OLDER_VERSION
+
+
+def _topic_metadata(
+    connection: McapConnection, version: int, known: dict[str, dict[str, Any]]
+) -> dict[str, Any]:
+    """What a metadata.yaml says of a topic."""
+    notes = dict(connection.notes)
+    profiles: Any = notes.get(QOS, "")
+    if version >= NEWEST_VERSION:
+        profiles = _said(profiles, list) or []
+    made: dict[str, Any] = {
+        "name": connection.topic,
+        "type": connection.msgtype,
+        "serialization_format": connection.encoding,
+        "offered_qos_profiles": profiles,
+        "type_description_hash": notes.get(TYPE_HASH, ""),
+    }
+    return made | known.get(connection.topic, {})
+
+
+def _said(note: str, kind: type[T]) -> T | None:
+    """What a note in YAML says; None where it says nothing that can be used."""
+    try:
+        value = small_yaml(note)
+    except ValueError:
+        return None
+    return value if isinstance(value, kind) else None
+
+
+def _pack(file: Path) -> None:
+    """Puts a compressed file in the place of a file."""
+    compressor = ZSTANDARD.load(file).ZstdCompressor()
+    packed = file.with_name(f"{file.name}.zstd")
+    with file.open("rb") as source, packed.open("xb") as target:
+        compressor.copy_stream(source, target)
+    file.unlink()

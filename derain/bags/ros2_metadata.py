@@ -1,0 +1,103 @@
+"""The metadata.yaml of a bag of ROS 2: which files it has, and how they are compressed."""
+
+import os
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import Any
+
+import yaml
+
+from derain.bags.names import BAG_METADATA, METADATA_WORD
+from derain.errors import reason_of
+from derain.files.documents import LARGEST_DOCUMENT, parsed_yaml
+
+# The newest version that is known. It spells quality of service in words, which readers older
+# than it do not know; the one before it has it in numbers, as text.
+NEWEST_VERSION, OLDER_VERSION = 9, 8
+
+STORAGES = ("sqlite3", "mcap")
+
+# How bags are compressed: not, message by message, each chunk, or file by file.
+NONE, MESSAGE, FILE = "", "message", "file"
+
+
+def small_yaml(text: str) -> Any:
+    """What a text within a bag says.
+
+    Args:
+        text: The text.
+
+    Raises:
+        ValueError: No YAML, or more of it than a bag needs.
+    """
+    try:
+        return parsed_yaml(text, aliases=True)
+    except Exception as error:  # PyYAML has many
+        raise ValueError(f"no YAML that can be used ({reason_of(error)})") from error
+
+
+@dataclass(frozen=True)
+class Ros2Metadata:
+    """What a metadata.yaml says.
+
+    Attributes:
+        content: All of it, below its one key.
+        version: Version of its format.
+        storage: ``sqlite3`` or ``mcap``.
+        files: Names of its files, in the order of time.
+        compression: ``""``, ``message`` or ``file``; the compression is zstd.
+    """
+
+    content: dict[str, Any]
+    version: int
+    storage: str
+    files: tuple[str, ...]
+    compression: str
+
+    @classmethod
+    def read(cls, folder: Path) -> "Ros2Metadata":
+        """Reads that of a bag.
+
+        Raises:
+            ValueError: It is no small YAML, says what no bag of ROS 2 does, or names what is not
+                there.
+            OSError: It cannot be read.
+        """
+        with (folder / BAG_METADATA).open("rb") as file:
+            document = small_yaml(file.read(LARGEST_DOCUMENT + 1).decode("utf-8"))
+        try:
+            content = document[METADATA_WORD.decode()]
+            version, storage = int(content["version"]), str(content["storage_identifier"])
+            files = tuple(PurePath(name).name for name in content["relative_file_paths"])
+            mode = str(content.get("compression_mode") or "").lower().replace("none", NONE)
+            packing = str(content.get("compression_format") or "")
+            for topic in content["topics_with_message_count"]:
+                int(topic["message_count"]), topic["topic_metadata"]["name"]
+        except (LookupError, TypeError, AttributeError) as error:
+            raise ValueError(f"its {BAG_METADATA} is damaged: {error!r}") from error
+        if version > NEWEST_VERSION:
+            raise ValueError(f"version {version} of {BAG_METADATA} is not known")
+        if storage not in STORAGES:
+            raise ValueError(f"the storage '{storage}' is not known")
+        if mode not in (NONE, MESSAGE, FILE) or (mode and packing != "zstd"):
+            raise ValueError(f"the compression '{packing}' by {mode} is not known")
+        missing = [name for name in files if not os.path.isfile(folder / name)]
+        if missing or not files:
+            raise ValueError(f"its file {', '.join(missing) or 'of messages'} is missing")
+        return cls(content, version, storage, files, mode)
+
+    def unpacked(self) -> "Ros2Metadata":
+        """That of the same bag, whose files are compressed as a whole no more."""
+        files = [PurePath(name).stem for name in self.files]
+        content = deepcopy(self.content) | {
+            "relative_file_paths": files,
+            "compression_mode": NONE,
+            "compression_format": "",
+        }
+        return Ros2Metadata(content, self.version, self.storage, tuple(files), NONE)
+
+    def write(self, folder: Path) -> None:
+        """Writes it to a folder."""
+        text = yaml.safe_dump({METADATA_WORD.decode(): self.content}, sort_keys=False)
+        (folder / BAG_METADATA).write_text(text, "utf-8")

@@ -1,0 +1,133 @@
+"""What only MCAP has: times of publication, numbers, attachments, metadata, and no index."""
+
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pytest
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.writer import CompressionType, IndexType, Writer
+from small_bags import small_bag, tables
+
+from benchmarks.recorded_bags import CLOUD_TYPE, IMU, POINTS, START, STORAGES, Ros, drive
+from derain.bags import mcap_file
+from derain.bags.bag import Bag
+from derain.bags.bag_copy import BagCopy
+from derain.errors import InputError
+from derain.sources.folders import named_frames
+
+KINDS: dict[str, dict[str, Any]] = {
+    "zstd": {},
+    "lz4": {"compression": CompressionType.LZ4},
+    "not chunked": {"use_chunking": False},
+    "not indexed": {"index_types": IndexType.NONE, "use_statistics": False},
+    "no summary": {
+        "index_types": IndexType.NONE,
+        "use_statistics": False,
+        "repeat_channels": False,
+        "repeat_schemas": False,
+        "use_summary_offsets": False,
+    },
+}
+NOTES = {"offered_qos_profiles": "", "topic_type_hash": "RIHS01_5"}
+
+
+def record(path: Path, ros: Ros, backwards: bool = False, **options: Any) -> Path:
+    """A file by the library of MCAP's makers."""
+    profile, encoding = ("ros1", "ros1") if ros.is_ros1 else ("ros2", "cdr")
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=5000, **options)
+        writer.start(profile)
+        writer.add_metadata("trip", {"driver": "nobody"})
+        channels: dict[str, int] = {}
+        messages = drive(ros, tables(3))
+        for number, each in enumerate(reversed(messages) if backwards else messages):
+            if each.topic not in channels:
+                type_ = each.type.replace("/msg", "") if ros.is_ros1 else each.type
+                schema = writer.register_schema(type_, f"{profile}msg", b"a definition")
+                channels[each.topic] = writer.register_channel(each.topic, encoding, schema, NOTES)
+            message = ros.to_bytes(each.message, each.type)
+            place = channels[each.topic]
+            writer.add_message(place, each.time, message, each.time - 700, 100 + number)
+        writer.add_attachment(START + 1, START, "note.txt", "text/plain", b"a note" * 1000)
+        writer.finish()
+    return path
+
+
+def all_of(file: BinaryIO) -> list[tuple[Any, ...]]:
+    """Everything that a file has but its clouds' bytes, by the makers' reader."""
+    found: list[tuple[Any, ...]] = []
+    for schema, channel, each in make_reader(file, validate_crcs=True).iter_messages():
+        data = b"" if channel.topic == POINTS else each.data
+        assert schema is not None
+        found.append((each.log_time, each.publish_time, each.sequence, data, channel.topic))
+        found.append((channel.message_encoding, channel.metadata, schema.name, schema.data))
+    for each in (NonSeekingReader.iter_attachments, NonSeekingReader.iter_metadata):
+        file.seek(0)
+        found += [(a,) for a in each(NonSeekingReader(file)) if getattr(a, "name", "") != "rosbag2"]
+    return found
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_cleaned_file_keeps_all_but_the_rain(tmp_path: Path, kind: str, run_derain) -> None:
+    bag = record(tmp_path / "drive.mcap", Ros("mcap"), **KINDS[kind])
+    outcome = run_derain("run", "ror", bag, "--out", tmp_path / "out")
+    assert (outcome.code, outcome.said) == (0, [])
+    with bag.open("rb") as old, (tmp_path / "out/drive/drive.mcap").open("rb") as new:
+        assert all_of(new) == all_of(old)
+    assert len(named_frames([tmp_path / "out/drive"])) == 3
+
+
+def test_messages_of_a_file_in_any_order_come_in_that_of_time(tmp_path: Path) -> None:
+    ros = Ros("mcap")
+    forward = Bag(record(tmp_path / "a.mcap", ros))
+    for name, options in (("b", {}), ("c", {"use_chunking": False})):
+        bag = Bag(record(tmp_path / f"{name}.mcap", ros, backwards=True, **options))
+        times = [message.time for message in bag.messages()]
+        assert times == sorted(times) == [message.time for message in forward.messages()]
+        late = [message.time for message in bag.messages(bag.cloud_topic(), start=times[5])]
+        assert late == [
+            m.time for m in forward.messages(forward.cloud_topic()) if m.time >= times[5]
+        ]
+
+
+def test_ros_1_in_mcap_is_read_and_written(tmp_path: Path, run_derain) -> None:
+    bag = record(tmp_path / "drive.mcap", Ros("ros1"))
+    assert run_derain("run", "ror", bag, "--out", tmp_path / "out").code == 0
+    for frame, table in zip(named_frames([bag]), tables(3), strict=True):
+        np.testing.assert_array_equal(frame.read().xyz[:, 0], table["x"])
+    with (tmp_path / "out/drive/drive.mcap").open("rb") as new:
+        assert make_reader(new).get_header().profile == "ros1"
+
+
+def test_chunks_of_one_time_that_are_too_many_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bag = record(tmp_path / "drive.mcap", Ros("mcap"))
+    monkeypatch.setattr(mcap_file, "MOST_HELD", 1000)
+    with pytest.raises(InputError, match="in chunks of one time"):
+        list(Bag(bag).messages())
+
+
+def test_a_damaged_attachment_is_told(tmp_path: Path) -> None:
+    bag = record(tmp_path / "drive.mcap", Ros("mcap"))
+    content = bag.read_bytes()
+    bag.write_bytes(content.replace(b"a notea note", b"a notea n0te", 1))
+    copied = Bag(bag)
+    with (
+        pytest.raises(InputError, match="checksum of an attachment"),
+        BagCopy(copied, copied.cloud_topic(), tmp_path / "out") as copy,
+    ):
+        copy.finish()
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_a_copy_says_what_the_bag_says(tmp_path: Path, storage: Any) -> None:
+    bag = Bag(small_bag(tmp_path, storage))
+    (tmp_path / "out").mkdir()
+    with BagCopy(bag, bag.cloud_topic(), tmp_path / "out") as copy:
+        made = Bag(copy.finish())
+    assert made.topics == bag.topics
+    assert {topic.name for topic in made.topics} >= {POINTS, IMU}
+    assert made.cloud_topic().type == CLOUD_TYPE
+    assert [m[1:] for m in made.messages()] == [m[1:] for m in bag.messages()]
