@@ -10,7 +10,10 @@ from derain.sources.frame import Frame
 # What the colours of the palette are called.
 NAMES = {SOLID: "grey", RAIN: "blue", MISSED: "yellow", LOST: "red"}
 
-_COLOURS = "\n".join(f"- {NAMES[colour]}: {outcome}" for outcome, colour in OUTCOMES.items())
+# What the colours mean where nobody knows what is rain.
+WITHOUT_LABELS = {"kept": SOLID, "removed": RAIN}
+
+PROBABILITY = "Probability of rain: dark, blue, white, ever higher"
 
 
 def caption(frame: Frame, scan: Scan, labels: str | None, held_out: bool) -> str:
@@ -22,9 +25,11 @@ def caption(frame: Frame, scan: Scan, labels: str | None, held_out: bool) -> str
         labels: What labels are called by which rain is known; None where there are none.
         held_out: Whether nothing was learnt from it, where something was.
     """
-    by = f"Rain is what the {labels} calls so" if labels else "Whatever a method removes is rain"
     which = f"**{_plain(frame.key)}**, {len(scan):,} points" + ", held out" * held_out
-    return f"{which}\n\n{_COLOURS}\n\n{by}. Probability: the brighter, the more.\n"
+    by = f"Rain is what the {labels} calls so." if labels else "No labels: nobody knows better."
+    coloured = OUTCOMES if labels else WITHOUT_LABELS
+    meanings = "\n".join(f"- {NAMES[colour]}: {meaning}" for meaning, colour in coloured.items())
+    return f"{which}\n\n{meanings}\n\n{by} {PROBABILITY}.\n"
 
 
 def file_name(frame: Frame) -> str:

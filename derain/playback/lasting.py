@@ -40,8 +40,9 @@ def write_what_lasts(
     for place, title in enumerate(methods):
         of_method = OfMethod(title)
         _sized(file, SMALL, [of_method.kept])
-        _sized(file, LARGE, [of_method.removed, of_method.probability])
-        _line(file, of_method.share, title, LINES[place % len(LINES)])
+        _sized(file, LARGE, [of_method.removed, of_method.missed, of_method.probability])
+        for line in (of_method.share, of_method.iou):
+            _line(file, line, title, LINES[place % len(LINES)])
 
 
 def _sized(file: RecordingFile, size: float, paths: Sequence[str]) -> None:

@@ -111,6 +111,15 @@ def test_truth_colours_what_methods_do(run_derain, recording: Path, tmp_path: Pa
     assert kept == outcome_of[scan.valid & ~called].tolist()
     removed = found.values("/sensor/methods/dror/removed", "Points3D:class_ids")[0]
     assert removed == outcome_of[called].tolist()
+    # The rain that is left is drawn once more, and measured with what is lost; not the unknown.
+    known = scan.valid & (labels != 9)
+    missed, hits, wrong = (known & part for part in (rain & ~called, rain & called, rain ^ called))
+    np.testing.assert_array_equal(found.points("/sensor/methods/dror/missed")[0], scan.xyz[missed])
+    iou = found.numbers("/iou/methods/dror")
+    assert iou[0] == pytest.approx(hits.sum() / (hits.sum() + wrong.sum()))
+    assert list(iou) == [0, 1]  # the scan without labels has none
+    captions = [text[0] for text in found.values("/caption", "TextDocument:text").values()]
+    assert ["red: solid, lost" in text for text in captions] == [True, True, False]
 
 
 def test_without_labels_there_is_no_truth(run_derain, recording: Path, tmp_path: Path) -> None:
