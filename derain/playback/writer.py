@@ -61,7 +61,7 @@ class PlaybackWriter:
         scan = frame.read()
         labelled = None if self.labels is None else self.labels.of(frame, scan)
         self._at(frame)
-        by = None if self.labels is None or labelled is None else self.labels.name
+        by = None if labelled is None else self.labels
         text = caption(frame, scan, by, frame.key in self.selection.held_out)
         self.file.log(CAPTION, rerun.TextDocument(text, media_type="text/markdown"))
         if frame.key in self.selection.poses:
