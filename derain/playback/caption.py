@@ -37,7 +37,7 @@ def _by(labels: Labels) -> str:
     known = f"Rain is what the {labels.name} calls so"
     if not labels.card.unknown:
         return f"{known}."
-    return f"{known}; beside the methods, yellow is what it does not know."
+    return f"{known}; in its own view, yellow is what it does not know."
 
 
 def file_name(frame: Frame) -> str:

@@ -46,8 +46,10 @@ def write_what_lasts(
 
 
 def _sized(file: RecordingFile, size: float, paths: Sequence[str]) -> None:
+    # Where points are few, the viewer would write over them what they are classed as.
+    look = rerun.Points3D.from_fields(radii=size, show_labels=False)
     for path in paths:
-        file.log(path, rerun.Points3D.from_fields(radii=size), static=True)
+        file.log(path, look, static=True)
 
 
 def _line(file: RecordingFile, path: str, name: str, colour: str) -> None:
