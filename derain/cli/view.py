@@ -30,9 +30,10 @@ A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), defaul
 (below); of one scan also all or none, of a recording also what sees several scans. --card says what
 the labels mean; without it there is no truth, and in a picture points whose label says that they
 are unknown are left out.
---rerun needs derain[view]. It writes the scans, and for each method what it keeps, what it removes
-and how probable it finds rain; range images, and the share removed over time. It says before how
-large that becomes. Where poses lie beside the scans, or --poses tells them, the scans lie in the
+It needs derain[view], and --window derain[scene], too.
+--rerun writes the scans, and for each method what it keeps, what it removes and how probable it
+finds rain; range images; the share removed over time, and with --card the IoU of each scan. It says
+before how large that becomes. Where poses lie beside the scans, or --poses tells them, the scans lie in the
 world. Scans that cannot be read or judged are reported and shown empty; the exit code is then 2.
 """
 
