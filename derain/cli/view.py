@@ -33,8 +33,9 @@ are unknown are left out.
 It needs derain[view], and --window derain[scene], too.
 --rerun writes the scans, and for each method what it keeps, what it removes and how probable it
 finds rain; range images; the share removed over time, and with --card the IoU of each scan. It says
-before how large that becomes. Where poses lie beside the scans, or --poses tells them, the scans lie in the
-world. Scans that cannot be read or judged are reported and shown empty; the exit code is then 2.
+before how large that becomes. Where poses lie beside the scans, or --poses tells them, the scans
+lie in the world. Scans that cannot be read or judged are reported and shown empty; the exit code is
+then 2.
 """
 
 

@@ -25,10 +25,6 @@ from derain.sources.method import Method
 # From where a scan is looked at, and where to, metres: from behind and above.
 STANDPOINT, LOOKED_AT = (-22.0, 0.0, 16.0), (6.0, 0.0, 0.0)
 
-# Where the points of a scan lie under probabilities, they all are as dark as what is improbable:
-# bright ones would look like probable ones.
-DARK = {POINTS: rerun.Points3D.from_fields(colors=rgb(PROBABILITY[0]))}
-
 
 def layout(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -> Blueprint:
     """The layout.
@@ -68,7 +64,7 @@ def _clouds(methods: Mapping[str, Method], labels: Labels | None, placed: bool) 
         _cloud(f"{title}: kept", [m.kept, m.missed], placed) for title, m in stand_at.items()
     ]
     probability = [
-        _cloud(f"{title}: probability", [POINTS, m.probability], placed, DARK)
+        _cloud(f"{title}: probability", [POINTS, m.probability], placed, dark=True)
         for title, m in stand_at.items()
         if methods[title].gives_probabilities
     ]
@@ -84,17 +80,16 @@ def _clouds(methods: Mapping[str, Method], labels: Labels | None, placed: bool) 
 
 
 def _cloud(
-    name: str,
-    paths: Sequence[str],
-    placed: bool,
-    overrides: Mapping[str, rerun.Points3D] | None = None,
+    name: str, paths: Sequence[str], placed: bool, *, dark: bool = False
 ) -> views.Spatial3DView:
+    # Bright points of the scan would look like probable rain: there all are as what is improbable.
+    shade = rerun.Points3D.from_fields(colors=rgb(PROBABILITY[0]))
     return views.Spatial3DView(
         origin="/",
         contents=[f"+ {path}" for path in (*paths, TRAJECTORY)],
         name=name,
         background=rgb(BACKGROUND),
-        overrides=overrides,
+        overrides={POINTS: shade} if dark else None,
         eye_controls=views.EyeControls3D(
             kind=views.Eye3DKind.Orbital,
             position=STANDPOINT,
