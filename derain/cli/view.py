@@ -32,10 +32,12 @@ A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), defaul
 the labels mean; without it there is no truth, and in a picture points whose label says that they
 are unknown are left out.
 Of a bag the first cloud is drawn, unless the path names another.
---rerun needs derain[view]. It writes the scans, and for each method what it keeps, what it removes
-and how probable it finds rain; range images, and the share removed over time. It says before how
-large that becomes. Where poses lie beside the scans, or --poses tells them, the scans lie in the
-world. Scans that cannot be read or judged are reported and shown empty; the exit code is then 2.
+It needs derain[view], and --window derain[scene], too.
+--rerun writes the scans, and for each method what it keeps, what it removes and how probable it
+finds rain; range images; the share removed over time, and with --card the IoU of each scan. It says
+before how large that becomes. Where poses lie beside the scans, or --poses tells them, the scans
+lie in the world. Scans that cannot be read or judged are reported and shown empty; the exit code is
+then 2.
 """
 
 

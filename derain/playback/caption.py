@@ -4,27 +4,40 @@ from pathlib import Path
 
 from derain.errors import printable
 from derain.pictures.palette import LOST, MISSED, OUTCOMES, RAIN, SOLID
+from derain.playback.labels import Labels
 from derain.scan import Scan
 from derain.sources.frame import Frame
 
 # What the colours of the palette are called.
 NAMES = {SOLID: "grey", RAIN: "blue", MISSED: "yellow", LOST: "red"}
 
-_COLOURS = "\n".join(f"- {NAMES[colour]}: {outcome}" for outcome, colour in OUTCOMES.items())
+# What the colours mean where nobody knows what is rain.
+WITHOUT_LABELS = {"kept": SOLID, "removed": RAIN}
+
+PROBABILITY = "Probability of rain: dark, blue, white, ever higher"
 
 
-def caption(frame: Frame, scan: Scan, labels: str | None, held_out: bool) -> str:
+def caption(frame: Frame, scan: Scan, labels: Labels | None, held_out: bool) -> str:
     """The text of one scan, in Markdown.
 
     Args:
         frame: The frame.
         scan: Its scan.
-        labels: What labels are called by which rain is known; None where there are none.
+        labels: Labels by which its rain is known; None where it has none.
         held_out: Whether nothing was learnt from it, where something was.
     """
-    by = f"Rain is what the {labels} calls so" if labels else "Whatever a method removes is rain"
     which = f"**{_plain(frame.key)}**, {len(scan):,} points" + ", held out" * held_out
-    return f"{which}\n\n{_COLOURS}\n\n{by}. Probability: the brighter, the more.\n"
+    by = _by(labels) if labels else "No labels: nobody knows better."
+    coloured = OUTCOMES if labels else WITHOUT_LABELS
+    meanings = "\n".join(f"- {NAMES[colour]}: {meaning}" for meaning, colour in coloured.items())
+    return f"{which}\n\n{meanings}\n\n{by} {PROBABILITY}.\n"
+
+
+def _by(labels: Labels) -> str:
+    known = f"Rain is what the {labels.name} calls so"
+    if not labels.card.unknown:
+        return f"{known}."
+    return f"{known}; in its own view, yellow is what it does not know."
 
 
 def file_name(frame: Frame) -> str:

@@ -2,11 +2,12 @@
 
 - ``sensor``: the pose, where poses are known. Below it, in the sensor's frame:
   ``sensor/scan/points`` (shades of intensity), ``sensor/scan/truth`` (what labels call rain, and of
-  what they do not know), and for each method ``sensor/methods/<title>/kept``, ``.../removed`` and
-  ``.../probability``.
+  what they do not know), and for each method ``sensor/methods/<title>/kept``, ``.../removed``,
+  ``.../missed`` (what labels call rain among what is kept, once more) and ``.../probability``.
 - ``trajectory``: the way of the sensor.
 - ``range_image/scan`` (range), and over it ``range_image/methods/<title>`` (what was found).
 - ``share/scan/truth`` and ``share/methods/<title>``: per cent of the points that can be judged.
+- ``iou/methods/<title>``: IoU with what labels call rain, of the points of which they know.
 - ``caption``: the scan's name, and what the colours mean.
 """
 
@@ -26,6 +27,7 @@ TRAJECTORY = "/trajectory"
 RANGE_IMAGE = "/range_image"
 RANGES = "/range_image/scan"
 SHARE = "/share"
+IOU = "/iou"
 CAPTION = "/caption"
 
 # Timelines: the place of a scan in its recording, and seconds since the first one that is shown.
@@ -34,6 +36,7 @@ FRAME, TIME = "frame", "time"
 # Classes of points. The first shows nothing, in images of classes; those of OUTCOMES follow.
 NOTHING = 0
 CLASS_KEPT = 1
+CLASS_MISSED = 1 + list(OUTCOMES).index("rain, left")
 CLASS_RAIN = len(OUTCOMES) + 1
 CLASS_NOT_KNOWN = len(OUTCOMES) + 2
 
@@ -64,6 +67,11 @@ class OfMethod:
         return f"{self.all}/removed"
 
     @property
+    def missed(self) -> str:
+        """The points that it leaves, and that labels call rain."""
+        return f"{self.all}/missed"
+
+    @property
     def probability(self) -> str:
         """The points that may be rain, by the probability that it gives them."""
         return f"{self.all}/probability"
@@ -77,6 +85,11 @@ class OfMethod:
     def share(self) -> str:
         """Share of the points that it removes, per cent."""
         return rerun.new_entity_path(["share", "methods", self.title])
+
+    @property
+    def iou(self) -> str:
+        """IoU with what labels call rain, of each scan."""
+        return rerun.new_entity_path(["iou", "methods", self.title])
 
 
 @dataclass(frozen=True)

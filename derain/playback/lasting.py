@@ -40,13 +40,16 @@ def write_what_lasts(
     for place, title in enumerate(methods):
         of_method = OfMethod(title)
         _sized(file, SMALL, [of_method.kept])
-        _sized(file, LARGE, [of_method.removed, of_method.probability])
-        _line(file, of_method.share, title, LINES[place % len(LINES)])
+        _sized(file, LARGE, [of_method.removed, of_method.missed, of_method.probability])
+        for line in (of_method.share, of_method.iou):
+            _line(file, line, title, LINES[place % len(LINES)])
 
 
 def _sized(file: RecordingFile, size: float, paths: Sequence[str]) -> None:
+    # Where points are few, the viewer would write over them what they are classed as.
+    look = rerun.Points3D.from_fields(radii=size, show_labels=False)
     for path in paths:
-        file.log(path, rerun.Points3D.from_fields(radii=size), static=True)
+        file.log(path, look, static=True)
 
 
 def _line(file: RecordingFile, path: str, name: str, colour: str) -> None:

@@ -51,7 +51,7 @@ def write_playback(
             where the guard lets that through.
     """
     refuse_too_large(path, look.expected_bytes(len(selection.frames), len(methods)))
-    opened_with = layout(list(methods), labels, placed=bool(selection.poses))
+    opened_with = layout(methods, labels, placed=bool(selection.poses))
     with recording_file(path, file_name(selection.frames[0]), opened_with) as file:
         write_what_lasts(file, selection, labels, methods)
         writer = PlaybackWriter(file, selection, look, labels)

@@ -12,6 +12,7 @@ from rerun.chunk import RrdReader
 from derain.errors import InputError, reason_of
 from derain.files.atomic import replacing
 from derain.playback.entities import FRAME, TIME
+from derain.playback.piped_file import PipedFile, PlainFile, piped_file
 
 
 class RecordingFile:
@@ -20,11 +21,15 @@ class RecordingFile:
     Args:
         path: The file that the user named, for messages.
         stream: What Rerun logs to.
+        written: What Rerun's library writes to.
     """
 
-    def __init__(self, path: Path, stream: rerun.RecordingStream) -> None:
+    def __init__(
+        self, path: Path, stream: rerun.RecordingStream, written: PipedFile | PlainFile
+    ) -> None:
         self.path = path
         self.stream = stream
+        self.written = written
 
     def at(self, number: int, seconds: float | None) -> None:
         """Says of which scan all that is logged from here on is.
@@ -59,6 +64,16 @@ class RecordingFile:
             self.stream.flush()
         except RuntimeError as error:
             raise _not_written(self.path, error) from error
+        self.refuse_not_written()
+
+    def refuse_not_written(self) -> None:
+        """Says so where something could not be written.
+
+        Raises:
+            InputError: Something could not.
+        """
+        if self.written.error is not None:
+            raise _not_written(self.path, self.written.error)
 
 
 @contextmanager
@@ -74,22 +89,24 @@ def recording_file(path: Path, name: str, blueprint: Blueprint) -> Iterator[Reco
         InputError: It cannot be written.
     """
     with replacing(path) as temporary:
-        stream = rerun.RecordingStream("derain")
-        stream.set_log_time_enabled(False)  # when it was written tells nothing of the scans
-        stream.set_log_tick_enabled(False)
-        stream.save(temporary, default_blueprint=blueprint)
-        file = RecordingFile(path, stream)
-        try:
-            stream.send_recording_name(name)
-            yield file
-            file.flush()
-        finally:
-            stream.disconnect()  # ends its thread, and writes the index
+        with piped_file(temporary) as written:
+            stream = rerun.RecordingStream("derain")
+            stream.set_log_time_enabled(False)  # when it was written tells nothing of the scans
+            stream.set_log_tick_enabled(False)
+            stream.save(written.path, default_blueprint=blueprint)
+            file = RecordingFile(path, stream, written)
+            try:
+                stream.send_recording_name(name)
+                yield file
+                file.flush()
+            finally:
+                stream.disconnect()  # ends its thread, and writes the index
+        file.refuse_not_written()
         _refuse_incomplete(path, temporary)
 
 
 def _refuse_incomplete(path: Path, temporary: Path) -> None:
-    """Refuses a file without the index that is written last: nothing else tells of a full disk."""
+    """Refuses a file without the index that is written last."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -99,8 +116,9 @@ def _refuse_incomplete(path: Path, temporary: Path) -> None:
 
 
 def _not_written(path: Path, error: Exception) -> InputError:
+    reason = getattr(error, "strerror", None) or reason_of(error)
     return InputError(
         path,
-        f"cannot be written whole ({reason_of(error)})",
+        f"cannot be written whole ({reason})",
         "Choose a folder that has room, or show fewer scans: --every 10.",
     )

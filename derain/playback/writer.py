@@ -4,13 +4,13 @@ import numpy as np
 import rerun
 from numpy.typing import NDArray
 
-from derain.evaluation.counts import ratio
-from derain.filters import FilterDerainer
+from derain.evaluation.counts import Counts, ratio
 from derain.pictures.palette import PROBABILITY, outcomes, shades
 from derain.playback.caption import caption
 from derain.playback.entities import (
     CAPTION,
     CLASS_KEPT,
+    CLASS_MISSED,
     CLASS_NOT_KNOWN,
     CLASS_RAIN,
     NOTHING,
@@ -61,7 +61,7 @@ class PlaybackWriter:
         scan = frame.read()
         labelled = None if self.labels is None else self.labels.of(frame, scan)
         self._at(frame)
-        by = None if self.labels is None or labelled is None else self.labels.name
+        by = None if labelled is None else self.labels
         text = caption(frame, scan, by, frame.key in self.selection.held_out)
         self.file.log(CAPTION, rerun.TextDocument(text, media_type="text/markdown"))
         if frame.key in self.selection.poses:
@@ -97,11 +97,14 @@ class PlaybackWriter:
         frame, scan, rain = judgement.frame, judgement.scan, judgement.rain
         assert frame is not None  # a frame was pushed, not points
         stand_at = OfMethod(title)
-        classed = class_of(outcomes(rain, self._truth(frame, scan, rain)))
+        labelled = None if self.labels is None else self.labels.of(frame, scan)
+        classed = class_of(outcomes(rain, _truth(labelled, rain)))
         self._at(frame)
         for path, rows in ((stand_at.kept, scan.valid & ~rain), (stand_at.removed, rain)):
             self.file.log(path, rerun.Points3D(scan.xyz[rows], class_ids=classed[rows]))
-        if not isinstance(method, FilterDerainer):  # which says yes or no
+        if self.labels is not None:
+            self._write_errors(stand_at, judgement, labelled)
+        if method.gives_probabilities:
             rows = judgement.probability >= LEAST_PROBABILITY
             colours = shades(PROBABILITY, judgement.probability[rows])
             self.file.log(stand_at.probability, rerun.Points3D(scan.xyz[rows], colors=colours))
@@ -123,7 +126,7 @@ class PlaybackWriter:
         """Writes that a method says nothing of a scan."""
         self._at(frame)
         stand_at = OfMethod(title)
-        for path in (stand_at.all, stand_at.image, stand_at.share):
+        for path in (stand_at.all, stand_at.image, stand_at.share, stand_at.iou):
             self.file.log(path, rerun.Clear(recursive=True))
 
     def _write_labels(self, labels: Labels, scan: Scan, found: LabelledRain | None) -> None:
@@ -139,10 +142,20 @@ class PlaybackWriter:
         if labels.card.unknown:
             self._share(stand_at.share_not_known, ~found.known, scan)
 
-    def _truth(self, frame: Frame, scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """What is rain, bool (N,); of what nobody knows, all that was called so counts."""
-        found = None if self.labels is None else self.labels.of(frame, scan)
-        return rain if found is None else np.where(found.known, found.rain, rain)
+    def _write_errors(
+        self, stand_at: OfMethod, judgement: Judgement, found: LabelledRain | None
+    ) -> None:
+        """Writes the rain that a method leaves, to be drawn large, and its IoU."""
+        if found is None:
+            for path in (stand_at.missed, stand_at.iou):
+                self.file.log(path, rerun.Clear(recursive=False))
+            return
+        scan, rain = judgement.scan, judgement.rain
+        judged = scan.valid & found.known
+        missed = scan.xyz[judged & found.rain & ~rain]
+        self.file.log(stand_at.missed, rerun.Points3D(missed, class_ids=CLASS_MISSED))
+        counts = Counts.of(rain[judged], found.rain[judged])
+        self.file.log(stand_at.iou, rerun.Scalars(counts.iou))
 
     def _share(self, path: str, part: NDArray[np.bool_], scan: Scan) -> None:
         """Writes which share some points are of those that can be judged, per cent."""
@@ -153,3 +166,8 @@ class PlaybackWriter:
     def _at(self, frame: Frame) -> None:
         selection = self.selection
         self.file.at(selection.number_of[frame.key], selection.seconds.get(frame.key))
+
+
+def _truth(labelled: LabelledRain | None, rain: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What is rain, bool (N,); of what nobody knows, all that was called so counts."""
+    return rain if labelled is None else np.where(labelled.known, labelled.rain, rain)

@@ -27,12 +27,14 @@ class Extra:
     """A library of one of derain's extras, as in ``pip install 'derain[las]'``.
 
     Attributes:
-        name: Name of the extra.
+        name: Name of the extra, the smallest one that brings the library.
         library: Name of the module that it installs.
+        also: Names of larger extras that bring it, too.
     """
 
     name: str
     library: str
+    also: tuple[str, ...] = ()
 
     @property
     def installed(self) -> bool:
@@ -68,7 +70,7 @@ LIGHTNING = Extra("train", "lightning")
 TORCHMETRICS = Extra("train", "torchmetrics")
 JSONARGPARSE = Extra("train", "jsonargparse")
 TENSORBOARD = Extra("train", "tensorboard")
-MATPLOTLIB = Extra("train", "matplotlib")
+MATPLOTLIB = Extra("view", "matplotlib", also=("train",))
 ONNX = Extra("train", "onnx")
 ONNXSCRIPT = Extra("train", "onnxscript")
 OPTUNA = Extra("train", "optuna")
@@ -133,7 +135,7 @@ def _missing(subject: str | Path, extras: Sequence[Extra]) -> MissingExtraError:
     libraries = " and ".join(
         filter(None, (", ".join(extra.library for extra in extras[:-1]), extras[-1].library))
     )
-    names = ",".join(dict.fromkeys(extra.name for extra in extras))
+    names = ",".join(_fewest_names(extras))
     is_or_are = "is" if len(extras) == 1 else "are"
     error = MissingExtraError(
         subject,
@@ -142,3 +144,10 @@ def _missing(subject: str | Path, extras: Sequence[Extra]) -> MissingExtraError:
     )
     error.name = extras[0].library
     return error
+
+
+def _fewest_names(extras: Sequence[Extra]) -> list[str]:
+    """The extras that bring all of the libraries, without one whose library another brings."""
+    names = {extra.name for extra in extras}
+    chosen = dict.fromkeys(extra.name for extra in extras if names.isdisjoint(extra.also))
+    return list(chosen)

@@ -9,11 +9,13 @@ import tomllib
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.plugins import event_priority
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 TREE = REPOSITORY / "build" / "docs"
 
 
+@event_priority(100)  # before mkdocstrings looks which of its folders there are
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Makes the links anew; mkdocs.yml says where mkdocstrings finds them."""
     shutil.rmtree(TREE, ignore_errors=True)

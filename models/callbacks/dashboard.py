@@ -14,6 +14,7 @@ CHARTS = {
     "Is it learning?": {
         "loss in training": ["train/loss$"],
         "loss in validation": ["val/loss$"],
+        "parts of the loss in training": ["train/(?!loss$)"],
         "validation: IoU": ["val/iou$"],
         "validation: precision": ["val/precision$"],
         "validation: recall": ["val/recall$"],

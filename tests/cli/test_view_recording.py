@@ -1,6 +1,7 @@
 """``derain view RECORDING --rerun``: what the viewer is given is what ``derain run`` finds."""
 
 import os
+import resource
 import sys
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import read_labels, write_labels
+from derain.playback import piped_file
 from derain.playback.entities import CLASS_KEPT, CLASS_NOT_KNOWN, CLASS_RAIN
 
 SCANS = 4
@@ -109,6 +111,15 @@ def test_truth_colours_what_methods_do(run_derain, recording: Path, tmp_path: Pa
     assert kept == outcome_of[scan.valid & ~called].tolist()
     removed = found.values("/sensor/methods/dror/removed", "Points3D:class_ids")[0]
     assert removed == outcome_of[called].tolist()
+    # The rain that is left is drawn once more, and measured with what is lost; not the unknown.
+    known = scan.valid & (labels != 9)
+    missed, hits, wrong = (known & part for part in (rain & ~called, rain & called, rain ^ called))
+    np.testing.assert_array_equal(found.points("/sensor/methods/dror/missed")[0], scan.xyz[missed])
+    iou = found.numbers("/iou/methods/dror")
+    assert iou[0] == pytest.approx(hits.sum() / (hits.sum() + wrong.sum()))
+    assert list(iou) == [0, 1]  # the scan without labels has none
+    captions = [text[0] for text in found.values("/caption", "TextDocument:text").values()]
+    assert ["red: solid, lost" in text for text in captions] == [True, True, False]
 
 
 def test_without_labels_there_is_no_truth(run_derain, recording: Path, tmp_path: Path) -> None:
@@ -236,10 +247,27 @@ def test_a_file_that_is_there_stays_until_the_new_one_is_whole(
     assert len(ReadBack(out).points("/sensor/methods/default/kept")) == SCANS
 
 
+def test_a_full_disk_ends_the_work_with_a_message_and_leaves_nothing(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    """Rerun's library by itself waits for ever where its file may not grow."""
+    out = tmp_path / "out.rrd"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        outcome = run_derain("view", recording, "--methods", "dror", "--rerun", out)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert outcome.code == 2
+    assert f"{out}: cannot be written whole (File too large)" in outcome.err
+    assert [file.name for file in tmp_path.iterdir()] == ["drive"]
+
+
 def test_a_file_that_is_not_whole_is_refused(
     run_derain, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As on a full disk, of which the library that writes says nothing."""
+    """Where there are no pipes by name, the library itself writes, and tells of nothing."""
+    monkeypatch.setattr(piped_file, "OPEN_FILES", tmp_path / "none")
     out = tmp_path / "out.rrd"
     usual = rerun.RecordingStream.disconnect
 

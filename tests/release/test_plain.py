@@ -135,7 +135,7 @@ def test_methods_are_compared_and_the_picture_is_said_to_be_missing(plain: Any, 
     written = {file.name for file in (scan.parent / "bench").iterdir()}
     assert written == {"bench.md", "bench.csv", "bench.json"}
     assert "speed_error.png: needs matplotlib, which is not installed" in err
-    assert "pip install 'derain[train]'" in err
+    assert "pip install 'derain[view]'" in err
 
 
 def test_a_command_whose_extra_is_missing_says_so_in_one_line_before_any_work(
@@ -150,18 +150,18 @@ def test_a_command_whose_extra_is_missing_says_so_in_one_line_before_any_work(
         ("export", checkpoint, "--out", "model.onnx"): ("torch", "train"),
         ("import-weights", "outdet", given, "--stats", "wads", "--out", "out"): ("torch", "train"),
         ("info", checkpoint): ("torch", "train"),
-        ("info", str(scan.parent), "--picture", "out.png"): ("matplotlib", "train"),
-        ("view", given, "--out", "out.png"): ("matplotlib", "train"),
-        ("view", given, "--window"): ("open3d", "train,scene"),
+        ("info", str(scan.parent), "--picture", "out.png"): ("matplotlib", "view"),
+        ("view", given, "--out", "out.png"): ("matplotlib", "view"),
+        ("view", given, "--window"): ("open3d", "view,scene"),
         ("tune", "dror", *labelled, "--out", "out.yaml"): ("optuna", "train"),
         ("learn", given, "--out", "out.onnx"): ("lightning", "train"),
         ("fit", "--config", "outdet_wads.yaml"): ("jsonargparse", "train"),
         ("test", "--config", "outdet_wads.yaml"): ("torch", "train"),
         ("simulate", "--out", "out"): ("open3d", "scene"),
         ("simulate", "--on", given, "--rain", "9", "--out", "out", "--picture"): (
-            *("matplotlib", "train"),
+            *("matplotlib", "view"),
         ),
-        ("annotate", given, "--scene", "scene.yaml", "--out", "out"): ("open3d", "scene,train"),
+        ("annotate", given, "--scene", "scene.yaml", "--out", "out"): ("open3d", "scene,view"),
         ("demo", "--out", "out"): ("optuna", "train,scene"),
         ("run", given, "--out", "out", "--runtime", "openvino"): ("openvino", "openvino"),
         ("info", str(arrow)): ("pyarrow", "feather"),
@@ -191,7 +191,7 @@ def test_an_import_that_no_command_saw_coming_is_told_too(plain: Any) -> None:
     )
     line, exit_code = plain(code).splitlines()
     assert line == (
-        "derain: info: needs matplotlib, which is not installed. pip install 'derain[train]'"
+        "derain: info: needs matplotlib, which is not installed. pip install 'derain[view]'"
     )
     assert exit_code == "2"
 

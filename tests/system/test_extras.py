@@ -36,9 +36,10 @@ def nothing_installed(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("extra", EXTRAS, ids=lambda extra: extra.library)
 def test_a_library_is_in_the_extra_that_is_said_to_bring_it(extra: Extra) -> None:
     providers = importlib.metadata.packages_distributions().get(extra.library, [extra.library])
-    asked_for = PROJECT["optional-dependencies"][extra.name]
-    names = {re.split(r"[^\w.-]", requirement)[0].lower() for requirement in asked_for}
-    assert names & {provider.lower() for provider in providers}
+    for name in (extra.name, *extra.also):
+        asked_for = PROJECT["optional-dependencies"][name]
+        names = {re.split(r"[^\w.-]", requirement)[0].lower() for requirement in asked_for}
+        assert names & {provider.lower() for provider in providers}
 
 
 def test_plain_derain_brings_no_library_of_an_extra() -> None:
@@ -69,6 +70,20 @@ def test_several_are_named_at_once_and_each_once() -> None:
         "demo: needs torch, onnx and open3d, which are not installed. "
         "pip install 'derain[train,scene]'"
     )
+
+
+@pytest.mark.usefixtures("nothing_installed")
+@pytest.mark.parametrize(
+    ("libraries", "extras"),
+    [
+        ([MATPLOTLIB], "view"),
+        ([OPEN3D, MATPLOTLIB], "scene,view"),
+        ([MATPLOTLIB, TORCH], "train"),
+    ],
+)
+def test_the_smallest_extra_that_does_is_named(libraries: list[Extra], extras: str) -> None:
+    with pytest.raises(MissingExtraError, match=re.escape(f"'derain[{extras}]'")):
+        require("view", *libraries)
 
 
 def test_what_is_installed_is_not_refused_and_not_imported() -> None:
