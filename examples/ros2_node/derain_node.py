@@ -1,6 +1,6 @@
 """A node of ROS 2 that takes the rain out of a topic of point clouds.
 
-It needs ROS 2 with Python 3.11 or later (Jazzy has 3.12), and ``pip install derain``::
+It needs ROS 2 with Python 3.11 or later (Jazzy has 3.12), and derain, installed without extras::
 
     python3 derain_node.py --ros-args -p input:=/ouster/points -p output:=/ouster/points/clean
 
