@@ -2,6 +2,7 @@
 
 import shutil
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,10 @@ from derain.cards.card import load_card
 from derain.cli.main import main
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import read_labels, semantic, write_labels
+
+if TYPE_CHECKING:
+    from derain.models.outdet import OutDet
+    from derain.models.salsanext import SalsaNextModule
 
 KEPT = Path(__file__).resolve().parents[1] / "export" / "kept"
 
@@ -62,6 +67,21 @@ def prepare(folder: Path, simulated: Path) -> None:
     shutil.copy(KEPT / "outdet.onnx", folder / "model.onnx")
     shutil.copy(KEPT / "outdet.ckpt", folder / "model.ckpt")
     _put_wads(folder / "WADS")
+
+
+def put_networks(folder: Path, outdet: "OutDet", salsanext: "SalsaNextModule") -> None:
+    """Puts weights into a folder as the authors of 3D-OutDet publish theirs, and a SalsaNext."""
+    import torch
+
+    from derain.models.checkpoint import save_model
+    from derain.models.outdet import PUBLISHED_KEYS
+
+    tensors = outdet.network.state_dict()
+    published = {name: tensors[ours] for ours, name in PUBLISHED_KEYS.items()}
+    for name in ("saved_models/bin_desnow_wads/outdet.pt", "rehearse3d_outdet.pt"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        torch.save(published, folder / name)
+    save_model(salsanext, folder / "salsanext.ckpt")
 
 
 def _scans(simulated: Path) -> list[Path]:

@@ -18,10 +18,12 @@ from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.bench import bench
 from derain.export.bench.cost import timed_here
+from derain.models.outdet import OutDet
+from derain.models.salsanext import SalsaNextModule
 from derain.scan import Scan
 
 from .pages import PAGES, REPOSITORY, Snippet, snippets
-from .prepared import prepare, write_drive
+from .prepared import prepare, put_networks, write_drive
 from .running import run
 
 SHELL = ("bash", "console")
@@ -43,10 +45,15 @@ def name_of(page: Path) -> str:
 
 @pytest.fixture
 def page_folder(
-    tmp_path: Path, made_once: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    made_once: Callable[..., Path],
+    random_outdet: OutDet,
+    random_salsanext: SalsaNextModule,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[Path]:
     """The folder that a page is run in, in a process which proves and times little."""
     prepare(tmp_path, made_once("documented_drive", write_drive))
+    put_networks(tmp_path, random_outdet, random_salsanext)
     monkeypatch.chdir(tmp_path)
     # How far a step is has a test of its own, and so have the whole proof and the timing.
     monkeypatch.setattr(narration, "PERIODS", {True: 3600, False: 3600})
