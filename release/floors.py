@@ -27,12 +27,13 @@ def floors(extras: Iterable[str] = ()) -> list[str]:
         KeyError: No such extra.
     """
     project = tomllib.loads(PYPROJECT.read_text("utf-8"))["project"]
-    return [
+    lines = (
         f"{requirement.name}=={bound.version}"
         for requirement in _requirements(project, extras)
         for bound in requirement.specifier
         if bound.operator == ">=" and (requirement.marker is None or requirement.marker.evaluate())
-    ]
+    )
+    return list(dict.fromkeys(lines))  # two extras may bring the same
 
 
 def _requirements(project: dict[str, object], extras: Iterable[str]) -> Iterator[Requirement]:

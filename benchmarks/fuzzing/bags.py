@@ -36,7 +36,7 @@ from derain.evaluation.hard_cases import scene
 from derain.sources.bag_frame import clouds_at
 from derain.sources.folders import named_frames
 
-MEGABYTE = bytes(10**6)
+MILLION_ZEROS = bytes(10**6)
 MAGIC = b"\x89MCAP0\r\n"
 
 # What a file of a storage is called.
@@ -315,7 +315,7 @@ def _of_chunks(chunks: Sequence[bytes]) -> bytes:
 
 
 def _megabytes() -> Iterator[bytes]:
-    return (MEGABYTE for _ in range(BOMB))
+    return (MILLION_ZEROS for _ in range(BOMB))
 
 
 @cache

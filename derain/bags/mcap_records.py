@@ -23,7 +23,7 @@ HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = range(1, 7)
 CHUNK_INDEX, ATTACHMENT, STATISTICS, METADATA = 8, 9, 11, 12
 
 # What the library calls those that it is asked for.
-NAMES = {
+RECORD_NAMES = {
     HEADER: "Header",
     SCHEMA: "Schema",
     CHANNEL: "Channel",
@@ -166,7 +166,7 @@ class McapRecords:
             body = view[offset + HEAD.size :][:size]
             if kind == MESSAGE:
                 yield kind, McapMessage.parse(body)
-            elif kind in NAMES:
+            elif kind in RECORD_NAMES:
                 yield kind, self._parsed(kind, bytes(body))
 
     def _read_frame(self) -> None:
@@ -204,7 +204,7 @@ class McapRecords:
         return self._file.read(size)
 
     def _parsed(self, kind: int, body: bytes) -> Any:
-        return getattr(self._library, NAMES[kind]).read(self._stream(BytesIO(body)))
+        return getattr(self._library, RECORD_NAMES[kind]).read(self._stream(BytesIO(body)))
 
 
 def _places(file: BinaryIO, begin: int, end: int) -> Iterator[Place]:

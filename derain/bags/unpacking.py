@@ -13,8 +13,6 @@ from derain.system.extras import LZ4, ZSTANDARD
 # The most that a chunk or a message may take, bytes: a cloud of eight million points of 32 bytes.
 MOST_UNPACKED = 2**28
 
-MEGABYTE = 10**6
-
 
 def unpack(data: bytes, compression: str) -> bytes:
     """Unpacks a chunk or a message.
@@ -43,7 +41,7 @@ def check_size(size: int) -> None:
         ValueError: More than MOST_UNPACKED.
     """
     if size > MOST_UNPACKED:
-        raise ValueError(f"a chunk or message of more than {MOST_UNPACKED // MEGABYTE} MB")
+        raise ValueError(f"a chunk or message of more than {MOST_UNPACKED // 10**6} MB")
 
 
 def _plain(data: bytes) -> bytes:

@@ -9,12 +9,12 @@ from derain.scan import Scan
 from derain.sources.frame import Frame
 
 # What the colours of the palette are called.
-NAMES = {SOLID: "grey", RAIN: "blue", MISSED: "yellow", LOST: "red"}
+COLOUR_NAMES = {SOLID: "grey", RAIN: "blue", MISSED: "yellow", LOST: "red"}
 
 # What the colours mean where nobody knows what is rain.
 WITHOUT_LABELS = {"kept": SOLID, "removed": RAIN}
 
-PROBABILITY = "Probability of rain: dark, blue, white, ever higher"
+PROBABILITY_TEXT = "Probability of rain: dark, blue, white, ever higher"
 
 
 def caption(frame: Frame, scan: Scan, labels: Labels | None, held_out: bool) -> str:
@@ -29,8 +29,10 @@ def caption(frame: Frame, scan: Scan, labels: Labels | None, held_out: bool) -> 
     which = f"**{_plain(frame.key)}**, {len(scan):,} points" + ", held out" * held_out
     by = _by(labels) if labels else "No labels: nobody knows better."
     coloured = OUTCOMES if labels else WITHOUT_LABELS
-    meanings = "\n".join(f"- {NAMES[colour]}: {meaning}" for meaning, colour in coloured.items())
-    return f"{which}\n\n{meanings}\n\n{by} {PROBABILITY}.\n"
+    meanings = "\n".join(
+        f"- {COLOUR_NAMES[colour]}: {meaning}" for meaning, colour in coloured.items()
+    )
+    return f"{which}\n\n{meanings}\n\n{by} {PROBABILITY_TEXT}.\n"
 
 
 def _by(labels: Labels) -> str:

@@ -10,7 +10,7 @@ from threading import Thread
 OPEN_FILES = Path("/dev/fd")
 
 # Bytes that are taken from the pipe at a time.
-BLOCK = 1 << 20
+PIPE_BLOCK = 1 << 20
 
 
 class PipedFile:
@@ -48,7 +48,7 @@ class PipedFile:
                 pass
 
     def _blocks(self) -> Iterator[bytes]:
-        while block := os.read(self._outlet, BLOCK):
+        while block := os.read(self._outlet, PIPE_BLOCK):
             yield block
 
 

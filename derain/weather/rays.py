@@ -33,7 +33,7 @@ TINY = np.finfo(np.float32).tiny
 # A return as one number: its sector, then a score of which the highest of a ray is the return at
 # which that ray ends. The score of what is not rain is its bin; that of rain is above all of these,
 # and the higher the nearer it is.
-SCORES = 512
+SCORES_IN_SECTOR = 512
 
 
 def ray_ends(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -97,14 +97,14 @@ def _inclination_cells(z: NDArray[np.float32], reach: NDArray[np.float32]) -> ND
 
 
 def _sectors_of_cells() -> NDArray[np.int32]:
-    """SCORES times the sector in which the middle of each cell of azimuth lies, (CELLS_AROUND,)."""
+    """The sector in which the middle of each cell of azimuth lies, times SCORES_IN_SECTOR."""
     quarters = (np.arange(CELLS_AROUND) + 0.5) / CELLS_IN_QUARTER - 1
     ahead = quarters < 1
     y = np.where(ahead, quarters, 2 - quarters)
     x = np.where(ahead, 1, -1) * (1 - np.abs(y))
     width = 2 * np.pi / RAY_SECTORS
     sector: NDArray[np.int32] = np.round(np.arctan2(y, x) / width).astype(np.int32) % RAY_SECTORS
-    return sector * SCORES
+    return sector * SCORES_IN_SECTOR
 
 
 SECTOR_OF_CELL = _sectors_of_cells()
@@ -116,12 +116,14 @@ def _scores(reach: NDArray[np.float32], rain: NDArray[np.bool_]) -> NDArray[np.i
     np.minimum(place, RANGE_BINS - 1, out=place)  # not above the last bin, however far
     scores = place.astype(np.int32)
     drops = np.flatnonzero(rain)
-    scores[drops] = SCORES - 1 - scores[drops]
+    scores[drops] = SCORES_IN_SECTOR - 1 - scores[drops]
     return scores
 
 
 def _counted(ends: NDArray[np.int32]) -> NDArray[np.int64]:
     """Numbers of rays by what they end at, sector and bin, int64 (2, RAY_SECTORS, RANGE_BINS)."""
-    counts = np.bincount(ends, minlength=RAY_SECTORS * SCORES).reshape(RAY_SECTORS, SCORES)
+    counts = np.bincount(ends, minlength=RAY_SECTORS * SCORES_IN_SECTOR).reshape(
+        RAY_SECTORS, SCORES_IN_SECTOR
+    )
     rain = counts[:, ::-1]
     return np.stack([counts[:, :RANGE_BINS], rain[:, :RANGE_BINS]]).astype(np.int64)
