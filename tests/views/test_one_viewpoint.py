@@ -1,6 +1,7 @@
 """Scans that are not what one sensor sees in metres are told of, and no others."""
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +62,7 @@ def kinds(points: Points) -> list[str]:
 
 @pytest.fixture(scope="module")
 def spinning() -> Points:
-    return street(rays(64, 1024))
+    return street_from(0.0)
 
 
 def moved(points: Points, x: float, y: float = 0.0, z: float = 0.0) -> Points:
@@ -69,10 +70,16 @@ def moved(points: Points, x: float, y: float = 0.0, z: float = 0.0) -> Points:
     return points + np.array([x, y, z])
 
 
+@cache
+def street_from(x: float) -> Points:
+    """What the sensor sees from a place of its drive."""
+    return street(rays(64, 1024), x)
+
+
 def drive(scans: int, step: float) -> Points:
     """Scans of a sensor that drives along the street, merged in the frame of the last."""
     places = step * np.arange(scans)
-    seen = [moved(street(rays(64, 1024), place), place - places[-1]) for place in places]
+    seen = [moved(street_from(place), place - places[-1]) for place in places]
     return np.concatenate(seen)
 
 

@@ -1,4 +1,4 @@
-"""Every packaged configuration trains, tests, predicts and exports, on a small made-up data set."""
+"""Every packaged configuration trains and is tested on small made-up data; some become models."""
 
 import json
 from collections.abc import Callable
@@ -105,9 +105,9 @@ PREPARATIONS = {
 }
 
 
-# An export takes as long as all the rest, and knows the data of a model by its specification alone:
-# each network and each data set once.
-EXPORTED = (
+# Prediction, export and pictures take as long as all the rest, and know the data of a model by its
+# specification alone: each network and each data set once.
+DEPLOYED = (
     "lisnownet_wads.yaml",
     "outdet_rehearse3d.yaml",
     "outdet_wads36.yaml",
@@ -123,7 +123,7 @@ def test_every_packaged_configuration_is_put_to_the_test() -> None:
 
 @pytest.mark.usefixtures("one_block", "two_sizes")
 @pytest.mark.parametrize(("config", "prepare"), PREPARATIONS.items(), ids=PREPARATIONS.keys())
-def test_a_packaged_configuration_goes_from_training_to_a_deployed_model(
+def test_a_packaged_configuration_is_trained_and_measured_and_some_are_deployed(
     run_derain,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -137,7 +137,8 @@ def test_a_packaged_configuration_goes_from_training_to_a_deployed_model(
     data = ["--config", config, "--data.root", "data", *options, *QUICK]
     run = Path("runs") / config.removesuffix(".yaml")
 
-    assert run_derain("fit", *data, "--trainer.max_epochs", "1", "--panels.scans", "1").code == 0
+    panels = ["--panels.scans", str(int(config in DEPLOYED))]
+    assert run_derain("fit", *data, "--trainer.max_epochs", "1", *panels).code == 0
     checkpoint = run / "version_0/checkpoints/last.ckpt"
     assert {path.name for path in checkpoint.parent.iterdir()} == {"best.ckpt", "last.ckpt"}
     assert list((run / "version_0").glob("events.out.tfevents.*"))
@@ -152,21 +153,18 @@ def test_a_packaged_configuration_goes_from_training_to_a_deployed_model(
     assert report["scans"] == len(scans) > 0
     assert all(0 <= score <= 1 for score in report["scores"].values())
 
+    if config not in DEPLOYED:
+        return
     # As the deployed model computes, whatever the training did.
     exact = ["--trainer.precision", "32"]
     assert run_derain("predict", *data, *exact, "--ckpt_path", checkpoint).code == 0
-    predicted = {
-        scan: np.fromfile(Path("predictions") / f"{scan.stem}.label", "<u4") for scan in scans
-    }
-    assert {label.max() for label in predicted.values()} <= {0, 1}
-    if config not in EXPORTED:
-        return
     # The whole proof has tests of its own.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     timed_on = ["--scan", scans[0], "--repeats", "1"]
     assert run_derain("export", checkpoint, "--out", "model.onnx", *timed_on).code == 0
     derainer = Derainer("model.onnx")
-    for scan, label in predicted.items():
+    for scan in scans:
+        label = np.fromfile(Path("predictions") / f"{scan.stem}.label", "<u4")
         np.testing.assert_array_equal(label, derainer(read_scan(scan)))
 
 
