@@ -7,6 +7,8 @@ import pytest
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
+from derain.export import onnx_file
+from derain.scan import Scan
 from derain.system.open3d_import import import_open3d
 
 WORLD = """
@@ -32,11 +34,15 @@ def test_worlds_are_made_trained_on_and_exported(
         *("--data.root", "worlds", "--data.workers", 1, "--data.loading.workers", 0),
         *("--data.campaign.train", 2, "--data.campaign.validation", 1),
         *("--data.campaign.world", "small.yaml", "--trainer.enable_progress_bar", "false"),
+        *("--panels.scans", 0, "--errors.pictures", 0),
     )
     assert outcome.code == 0, outcome.err
     (checkpoint,) = Path("runs").rglob("last.ckpt")
-    assert run_derain("export", checkpoint, "--out", "model.onnx").code == 0
     scene(500).tofile("scan.bin")
+    # The whole proof has tests of its own.
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
+    timed_on = ["--scan", "scan.bin", "--repeats", "1"]
+    assert run_derain("export", checkpoint, "--out", "model.onnx", *timed_on).code == 0
     outcome = run_derain("run", "model.onnx", "scan.bin", "--out", "out")
     assert outcome.code == 0, outcome.err
     assert len(np.fromfile("out/scan.label", np.uint32)) == 500
