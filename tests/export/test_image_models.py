@@ -45,6 +45,19 @@ def logits_of(model: DerainingModule, scan: Scan) -> NDArray[np.float32]:
         return model(**{name: torch.from_numpy(a) for name, a in view.inputs().items()}).numpy()
 
 
+def test_the_graph_holds_what_its_opset_knows_and_runs_fast(
+    image_onnx: Path, image_model: DerainingModule
+) -> None:
+    proto = onnx.load(image_onnx)
+    onnx.checker.check_model(proto, full_check=True)
+    operators = {node.op_type for node in proto.graph.node}
+    assert not operators & {"NonZero", "ScatterND", "ScatterElements"}
+    # SalsaNext's follow an activation, so that they do not fold into the convolutions.
+    assert ("BatchNormalization" in operators) == (image_model.NAME == "salsanext")
+    attributes = [a for node in proto.graph.node if node.op_type == "Pad" for a in node.attribute]
+    assert {a.s for a in attributes} <= {b"constant"}  # the checker lets opset 19's "wrap" pass
+
+
 def test_the_size_of_the_image_is_that_of_the_grid(
     image_onnx: Path, image_model: DerainingModule
 ) -> None:

@@ -5,8 +5,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import onnx
-import onnxruntime
 import pytest
 import torch
 from torch import Tensor, nn
@@ -214,41 +212,3 @@ def test_a_few_steps_lower_the_loss() -> None:
         optimizer.step()
         losses.append(loss.item())
     assert losses[-1] < 0.8 * losses[0]
-
-
-@pytest.fixture(scope="module")
-def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The small network as ONNX, for images that do not fit its halvings."""
-    path = tmp_path_factory.mktemp("onnx") / "lisnownet.onnx"
-    torch.onnx.export(
-        small(),
-        ODD["ordinary"],
-        path,
-        input_names=["image", "valid"],
-        opset_version=18,
-        dynamo=True,
-        external_data=False,
-        verbose=False,
-    )
-    return path
-
-
-@pytest.mark.filterwarnings("ignore")  # the exporter's own parts warn of each other
-@torch.no_grad()
-def test_the_exported_network_gives_the_same_images(exported: Path) -> None:
-    network = small()
-    session = onnxruntime.InferenceSession(exported, providers=["CPUExecutionProvider"])
-    for case, (image, valid) in ODD.items():
-        (denoised,) = session.run(None, {"image": image.numpy(), "valid": valid.numpy()})
-        expected = network(image, valid)
-        np.testing.assert_allclose(denoised, expected, rtol=0, atol=1e-4, err_msg=case)
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_the_exported_network_holds_what_opset_18_knows_and_runs_fast(exported: Path) -> None:
-    proto = onnx.load(exported)
-    onnx.checker.check_model(proto, full_check=True)
-    operators = {node.op_type for node in proto.graph.node}
-    assert not operators & {"BatchNormalization", "NonZero", "ScatterND", "ScatterElements"}
-    attributes = [a for node in proto.graph.node if node.op_type == "Pad" for a in node.attribute]
-    assert {a.s for a in attributes} <= {b"constant"}  # the checker lets opset 19's "wrap" pass

@@ -190,12 +190,9 @@ def test_a_training_step_in_bfloat16_is_finite() -> None:
     assert all(parameter.grad.isfinite().all() for parameter in network.parameters())
 
 
-@pytest.mark.parametrize(("height", "width"), [(16, 32), (20, 37)])
 @pytest.mark.filterwarnings("ignore")  # the exporter's own parts warn of each other
-def test_the_exported_network_gives_the_same_logits(
-    height: int, width: int, tmp_path: Path
-) -> None:
-    network, seen, path = small(), image(height, width), tmp_path / "salsanext.onnx"
+def test_the_exported_network_spends_nothing_on_sizes_that_fit(tmp_path: Path) -> None:
+    network, seen, path = small(), image(16, 32), tmp_path / "salsanext.onnx"
     torch.onnx.export(
         network,
         (seen,),
@@ -211,5 +208,4 @@ def test_the_exported_network_gives_the_same_logits(
     np.testing.assert_allclose(logits, network(seen).detach(), rtol=0, atol=1e-4)
     operators = Counter(node.op_type for node in onnx.load(path).graph.node)
     assert operators["Conv"] == 51
-    if (height, width) == (16, 32):  # nothing is spent on sizes that fit
-        assert not operators.keys() & {"Pad", "Slice"}
+    assert not operators.keys() & {"Pad", "Slice"}
