@@ -48,25 +48,10 @@ RAINED_ON = ("clean/kitti_hdl64.bin", "spinning_64_far")
 CROSSED = {"warning": Threshold(12.4, 14.0), "error": Threshold(11.3, 12.0)}
 HELD = 2
 
+# Weather of a scan by its labels, and by the model.
+ByBoth = tuple[ScanWeather, ScanWeather]
+
 TITLES = ["scan", "rays", "labels", "visibility", "default", "visibility", "ahead", "behind"]
-
-
-class Told:
-    """Weather of scans by their labels and by the model."""
-
-    def __init__(self, derainer: Derainer) -> None:
-        self.derainer = derainer
-
-    def by_both(
-        self, scan: Scan, rain: NDArray[np.bool_] | None
-    ) -> tuple[ScanWeather | None, ScanWeather]:
-        """What both say of a scan; None of labels that there are none of."""
-        told = None if rain is None else ScanWeather.of(scan, rain)
-        return told, self.derainer.weather(scan)
-
-    def by_both_of(self, scan: Scan, rain: NDArray[np.bool_]) -> tuple[ScanWeather, ScanWeather]:
-        """What both say of a scan that has labels."""
-        return ScanWeather.of(scan, rain), self.derainer.weather(scan)
 
 
 def main() -> None:
@@ -85,10 +70,9 @@ def main() -> None:
         print(_speed(data, derainer, arguments.threads))
         return
     arguments.out.mkdir(parents=True, exist_ok=True)
-    told = Told(derainer)
-    drive, places = list(_drive(data, told)), dict(_rates(data, told))
+    drive, places = list(_drive(data, derainer)), dict(_rates(data, derainer))
     tables = [_table_of_rates(title, of_place) for title, of_place in places.items()]
-    text = "\n\n".join([*tables, _real(data, told), *_drive_tables(drive)])
+    text = "\n\n".join([*tables, _real(data, derainer), *_drive_tables(drive)])
     print(text)
     (arguments.out / "weather.txt").write_text(f"{text}\n", "utf-8")
     pooled = ScanWeather.none()
@@ -104,21 +88,28 @@ def main() -> None:
     )
 
 
+def _by_both(derainer: Derainer, scan: Scan, rain: NDArray[np.bool_]) -> ByBoth:
+    """Weather of a scan by its labels and by the model."""
+    return ScanWeather.of(scan, rain), derainer.weather(scan)
+
+
 def _seen(pairs: Iterable[Iterable[ScanWeather]]) -> list[tuple[Visibility, Visibility]]:
     """The visibility of each pair of weathers."""
     return [(one.visibility, other.visibility) for one, other in pairs]
 
 
-def _rates(data: Path, told: Told) -> Iterator[tuple[str, list[tuple[ScanWeather, ScanWeather]]]]:
+def _rates(
+    data: Path, derainer: Derainer
+) -> Iterator[tuple[str, list[tuple[ScanWeather, ScanWeather]]]]:
     """Each place, with what both say of it at all rates."""
     for layout, sensor in PLACES:
         scans = [_simulated(layout, sensor, rate) for rate in RATES]
-        yield f"{layout}, {sensor}, simulated", [told.by_both_of(*pair) for pair in scans]
+        yield f"{layout}, {sensor}, simulated", [_by_both(derainer, *pair) for pair in scans]
     clean, sensor = read_scan(data / RAINED_ON[0]), load_sensor(RAINED_ON[1])
     rained = [
         rain_on_scan(clean, UniformRain(rate), sensor, np.random.default_rng(0)) for rate in RATES
     ]
-    pairs = [told.by_both_of(scan, scan.label == TrackClass.RAIN) for scan in rained]
+    pairs = [_by_both(derainer, scan, scan.label == TrackClass.RAIN) for scan in rained]
     yield f"{Path(RAINED_ON[0]).name}, {RAINED_ON[1]}, simulated", pairs
 
 
@@ -133,7 +124,7 @@ def _simulated(layout: str, sensor: str, rate: float) -> tuple[Scan, NDArray[np.
         return scan, semantic(read_labels(label, len(scan))) == TrackClass.RAIN
 
 
-def _table_of_rates(title: str, of_place: Sequence[tuple[ScanWeather, ScanWeather]]) -> str:
+def _table_of_rates(title: str, of_place: Sequence[ByBoth]) -> str:
     rows, reach = [["mm/h", *TITLES[1:]]], []
     for rate, (by_labels, by_model) in zip(RATES, of_place, strict=True):
         rows.append(_row(f"{rate:g}", by_labels, by_model))
@@ -144,7 +135,7 @@ def _table_of_rates(title: str, of_place: Sequence[tuple[ScanWeather, ScanWeathe
     return f"{title}\n{plain_table(rows)}"
 
 
-def _real(data: Path, told: Told) -> str:
+def _real(data: Path, derainer: Derainer) -> str:
     """A table of the real scans but for the drive."""
     files = [
         data / "wads/sample.bin",
@@ -154,8 +145,9 @@ def _real(data: Path, told: Told) -> str:
     rows = [TITLES]
     for path in tqdm(files, desc="real scans", disable=None):
         scan = read_scan(path)
-        by_labels, by_model = told.by_both(scan, _labelled(path, scan))
-        rows.append(_row(f"{path.parent.name}/{path.name}", by_labels, by_model))
+        rain = _labelled(path, scan)
+        by_labels = None if rain is None else ScanWeather.of(scan, rain)
+        rows.append(_row(f"{path.parent.name}/{path.name}", by_labels, derainer.weather(scan)))
     title = "real scans (snow in the first, simulated snow in 00000*, none in the others)"
     return f"{title}\n{plain_table(rows)}"
 
@@ -184,12 +176,12 @@ def _share_and_visibility(weather: ScanWeather) -> list[str]:
     return [f"{weather.met_rain / max(weather.rays, 1):.2%}", str(weather.visibility)]
 
 
-def _drive(data: Path, told: Told) -> Iterator[tuple[str, ScanWeather, ScanWeather]]:
+def _drive(data: Path, derainer: Derainer) -> Iterator[tuple[str, ScanWeather, ScanWeather]]:
     for path in tqdm(sorted((data / "wads/drive/velodyne").glob("*.bin")), disable=None):
         scan = read_scan(path)
         rain = _labelled(path, scan)
         assert rain is not None
-        yield path.stem, *told.by_both_of(scan, rain)
+        yield path.stem, *_by_both(derainer, scan, rain)
 
 
 def _drive_tables(drive: list[tuple[str, ScanWeather, ScanWeather]]) -> Iterator[str]:

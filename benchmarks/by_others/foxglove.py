@@ -12,13 +12,12 @@ done
 Ends with 1 where anything is not the same.
 """
 
-import argparse
 import io
 import sys
-from pathlib import Path
 from zlib import crc32
 
 import numpy as np
+from asked import asked
 from mcap.reader import NonSeekingReader, SeekingReader, make_reader
 from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as McapWriter
@@ -66,17 +65,7 @@ KINDS = {
 
 def main() -> int:
     """Makes bags, or compares two."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    commands = parser.add_subparsers(dest="command", required=True)
-    make = commands.add_parser("make", help="files of scans, of every kind")
-    make.add_argument("out", type=Path)
-    make.add_argument("scans", type=Path, help="folder of .bin")
-    make.add_argument("--scans", type=int, default=5, dest="number")
-    compare = commands.add_parser("compare", help="a file, and the bag that derain made of it")
-    compare.add_argument("before", type=Path)
-    compare.add_argument("after", type=Path)
-    compare.add_argument("masks", type=Path, help="folder of .label, in the order of the clouds")
-    arguments = parser.parse_args()
+    arguments = asked(__doc__)
     if arguments.command == "compare":
         made = arguments.after / f"{arguments.after.name}.mcap"
         return compare_files(arguments.before, made, arguments.masks)

@@ -9,13 +9,12 @@ $P compare bags/humble cleaned/humble masks
 Ends with 1 where anything is not the same.
 """
 
-import argparse
 import sqlite3
 import sys
-from pathlib import Path
 
 import numpy as np
 import yaml
+from asked import asked
 from foxglove import CLOUD, PERIOD, POINTS, START, cloud_of
 from mcap_ros2._dynamic import generate_dynamic, serialize_dynamic
 
@@ -60,17 +59,7 @@ TOPIC_KEYS = {"name", "type", "serialization_format", "offered_qos_profiles"}
 
 def main() -> int:
     """Makes a bag, or compares two."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    commands = parser.add_subparsers(dest="command", required=True)
-    make = commands.add_parser("make", help="a bag of scans")
-    make.add_argument("out", type=Path)
-    make.add_argument("scans", type=Path, help="folder of .bin")
-    make.add_argument("--scans", type=int, default=5, dest="number")
-    compare = commands.add_parser("compare", help="a bag, and what derain made of it")
-    compare.add_argument("before", type=Path)
-    compare.add_argument("after", type=Path)
-    compare.add_argument("masks", type=Path, help="folder of .label, in the order of the clouds")
-    arguments = parser.parse_args()
+    arguments = asked(__doc__)
     if arguments.command == "compare":
         return compare_bags(arguments.before, arguments.after, arguments.masks)
     scans = sorted(arguments.scans.glob("*.bin"))[: arguments.number]

@@ -12,13 +12,12 @@
 Needs ROS's own interpreter, and NumPy.
 """
 
-import argparse
 import sys
-from pathlib import Path
 
 import genpy
 import numpy as np
 import rosbag
+from asked import asked
 from sensor_msgs import point_cloud2
 from sensor_msgs.msg import Imu, PointCloud2, PointField
 from std_msgs.msg import Header, String
@@ -30,17 +29,7 @@ START = 1_700_000_000_123_456_789
 
 def main() -> int:
     """Makes bags, or compares two."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    commands = parser.add_subparsers(dest="command", required=True)
-    make = commands.add_parser("make", help="bags of scans, one of each compression")
-    make.add_argument("out", type=Path)
-    make.add_argument("scans", type=Path, help="folder of .bin")
-    make.add_argument("--scans", type=int, default=5, dest="number")
-    compare = commands.add_parser("compare", help="a bag, and what derain made of it")
-    compare.add_argument("before", type=Path)
-    compare.add_argument("after", type=Path)
-    compare.add_argument("masks", type=Path, help="folder of .label, in the order of the clouds")
-    arguments = parser.parse_args()
+    arguments = asked(__doc__)
     if arguments.command == "make":
         arguments.out.mkdir(parents=True, exist_ok=True)
         for compression in ("none", "bz2", "lz4"):
