@@ -31,7 +31,7 @@ from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import left_out, much_removed
+from derain.views.oddities import HEAVIEST_RAIN, MOST_RAIN, left_out, much_removed
 
 SUMMARY = "clean scans on a CPU, without torch"
 
@@ -63,9 +63,9 @@ method is not sure of a point, its best guess decides. Of a data set, results ar
 paths in it.
 Of a bag (.bag of ROS 1; .mcap, .db3 or the folder of ROS 2), a bag of its name is written, in which
 the clouds of one topic have no rain and everything else is as it was, byte for byte.
-What is odd about a scan is warned of, each fault once. One of which more than --most-removed is
-called rain is left alone. It and a scan that cannot be read are reported and passed over; the exit
-code is then 2.
+What is odd about a scan is warned of, each fault once. A scan is left whole where more than
+--most-removed of its valid points are called rain: no file is written for it, and in a bag its
+cloud stays as it is. It and a scan that cannot be read are reported; the exit code is then 2.
 Visibility is the range that 90 % of the rays would get through if rain met them everywhere as often
 as in the first 10 m. It compares scans of one sensor, and is not what a weather station measures.
 Where every scan was cleaned and one was at the level of --fail-at or worse, the exit code is 3.
@@ -103,8 +103,8 @@ class Cleaned:
         name, total = printable(self.scan), sum(self.milliseconds.values())
         unsure = "" if self.not_known is None else f", {self.share_not_known:.1%} not known"
         return (
-            f"{name}: {self.points:,} points, {self.rain:,} of rain "
-            f"({self.share_removed:.1%}){unsure}, {self.weather}, {total:.0f} ms"
+            f"{name}: {_counts(self.points, self.valid, self.rain)}{unsure}, {self.weather}, "
+            f"{total:.0f} ms"
         )
 
     @property
@@ -125,9 +125,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--most-removed",
         type=share,
-        default=1.0,
+        default=MOST_RAIN,
         metavar="SHARE",
-        help="leave a scan alone of which a greater share is called rain, e.g. 0.5 (default: 1)",
+        help="leave a scan whole if a greater share of its valid points is called rain (default: "
+        "%(default)g; 1 cleans every scan)",
     )
     parser.add_argument(
         "--removed", type=Path, metavar="DIR", help="write what is taken away of the scans too"
@@ -206,18 +207,19 @@ class _Cleaning:
         """Writes a scan without what is rain of it; where that is not known, the guess decides."""
         scan, rain = judgement.scan, judgement.rain
         valid, removed = int(scan.valid.sum()), int(rain.sum())
-        share_removed = removed / max(valid, 1)
-        odd = [
-            *self.method.oddities(judgement),
-            *much_removed(share_removed),
-            *left_out(scan),
-        ]
+        share_removed = judgement.share_of_rain
+        odd = [*self.method.oddities(judgement), *left_out(scan)]
+        left_whole = share_removed > self.arguments.most_removed
+        if not left_whole:
+            odd += much_removed(share_removed)
         self.notices.tell(frame.name, odd)
-        if share_removed > self.arguments.most_removed:
+        if left_whole:
             raise InputError(
                 frame.name,
-                f"{share_removed:.1%} of its points are called rain, and nothing was written",
-                "See whether the method suits it, or raise --most-removed.",
+                f"left whole, for {share_removed:.1%} of its valid points are called rain, and in "
+                f"the heaviest rain {HEAVIEST_RAIN:.0%} are",
+                "See whether the method suits sensor and unit of intensity, or raise "
+                "--most-removed.",
             )
         with stopwatch.stage("weather"):
             seen = judgement.weather
@@ -246,9 +248,18 @@ class _Cleaning:
 
 def _summary(done: Sequence[Cleaned], weather: WeatherWatch) -> str:
     """What was done to all scans together."""
+    points = sum(item.points for item in done)
     valid, removed = sum(item.valid for item in done), sum(item.rain for item in done)
     odd = sum(bool(item.warnings) for item in done)
     return (
-        f"{len(done):,} scans: {sum(item.points for item in done):,} points, {removed:,} of rain "
-        f"({removed / max(valid, 1):.1%}), {weather}; {odd:,} scans with warnings"
+        f"{len(done):,} scans: {_counts(points, valid, removed)}, {weather}; "
+        f"{odd:,} scans with warnings"
+    )
+
+
+def _counts(points: int, valid: int, rain: int) -> str:
+    """How many points there are, how many can be judged, and how many of these are rain."""
+    return (
+        f"{points:,} points, {valid:,} valid, {rain:,} of rain ({rain / max(valid, 1):.1%} of the "
+        "valid)"
     )
