@@ -64,9 +64,7 @@ RunDerain = Callable[..., Outcome]
 
 
 @pytest.fixture
-def run_derain(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> RunDerain:
+def run_derain(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> RunDerain:
     """Runs a command of derain in this process.
 
     `derain run` leaves no scan whole: of made-up scans, which are sparse, filters and random
