@@ -4,13 +4,20 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from derain.cli.arguments import add_threads, share
 from derain.cli.bag_options import add_cleaned_bags, add_topic, cleaned_bags, in_topic
 from derain.cli.method_options import add_parameters, method_of
 from derain.cli.method_or_scans import RULE, add_method_and_scans, method_and_scans
-from derain.cli.outputs import folder_sink, say, tell
+from derain.cli.outputs import (
+    folder_sink,
+    noting_what_is_written,
+    refuse_taken,
+    say,
+    tell,
+)
 from derain.cli.pose_options import add_poses, placed
 from derain.cli.probability_column import refuse_improbable, with_probability
 from derain.cli.runtime_options import add_runtime
@@ -157,6 +164,9 @@ def main(arguments: argparse.Namespace) -> int:
     sink = folder_sink(arguments.out, source, arguments.removed)
     weather = WeatherWatch(arguments, source)
     with cleaned_bags(arguments, source) as bags:
+        if arguments.weather is not None:
+            written = (path for frame in source for path in sink.files_of(frame))
+            refuse_taken("--weather", arguments.weather, [*written, *bags.targets()])
         return _clean(source, _Cleaning(method, sink, bags, weather, arguments), arguments)
 
 
@@ -174,13 +184,14 @@ def _clean(source: Source, cleaning: "_Cleaning", arguments: argparse.Namespace)
         warn(sentence)
     in_unit = source.map(lambda frame: frame.with_intensity_times(arguments.intensity_scale))
     scans = ScanByScan(in_unit)
-    with cleaning.weather.writing():
+    so_far = partial(cleaning.so_far, source)
+    with cleaning.weather.writing(), noting_what_is_written(so_far):
         for frame, judgement, stopwatch in judgements(method, scans, scans.passing_over):
             with scans.passing_over(frame):
                 cleaning.write(frame, judgement, stopwatch)
-    cleaning.notices.tell_how_many_more()
-    if len(cleaning.done) > 1:
-        print(_summary(cleaning.done, cleaning.weather), file=stream)
+        cleaning.notices.tell_how_many_more()
+        if len(cleaning.done) > 1:
+            print(_summary(cleaning.done, cleaning.weather), file=stream, flush=True)
     return scans.exit_code("{scans} could not be cleaned") or cleaning.weather.exit_code()
 
 
@@ -202,6 +213,21 @@ class _Cleaning:
         self.arguments = arguments
         self.notices = Notices()
         self.done: list[Cleaned] = []
+        self._files = 0
+
+    def so_far(self, source: Source) -> str:
+        """How many of the scans in files, and of the bags, are written."""
+        scans = sum(not self.bags.takes(frame) for frame in source)
+        parts = (
+            (self._files, scans, "scans"),
+            (len(self.bags.written), len(self.bags.targets()), "bags"),
+        )
+        return (
+            " and ".join(
+                f"{written:,} of {there:,} {what}" for written, there, what in parts if there
+            )
+            + " are written, each of them whole"
+        )
 
     def write(self, frame: Frame, judgement: Judgement, stopwatch: Stopwatch) -> None:
         """Writes a scan without what is rain of it; where that is not known, the guess decides."""
@@ -244,6 +270,7 @@ class _Cleaning:
         scan = with_probability(frame, judgement) if self.arguments.probability else judgement.scan
         removed = None if self.arguments.removed is None else scan.take(rain)
         self.sink.write(frame, scan.take(~rain), rain, removed)
+        self._files += 1
 
 
 def _summary(done: Sequence[Cleaned], weather: WeatherWatch) -> str:
