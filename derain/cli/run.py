@@ -38,7 +38,7 @@ from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import HEAVIEST_RAIN, MOST_RAIN, left_out, much_removed
+from derain.views.oddities import HEAVIEST_RAIN, MOST_RAIN, left_out, much_removed, no_points
 
 SUMMARY = "clean scans on a CPU, without torch"
 
@@ -234,7 +234,7 @@ class _Cleaning:
         scan, rain = judgement.scan, judgement.rain
         valid, removed = int(scan.valid.sum()), int(rain.sum())
         share_removed = judgement.share_of_rain
-        odd = [*self.method.oddities(judgement), *left_out(scan)]
+        odd = [*self.method.oddities(judgement), *left_out(scan), *no_points(scan)]
         left_whole = share_removed > self.arguments.most_removed
         if not left_whole:
             odd += much_removed(share_removed)

@@ -156,6 +156,12 @@ def much_removed(share: float) -> Iterator[Oddity]:
         )
 
 
+def no_points(scan: Scan) -> Iterator[Oddity]:
+    """Whether a scan holds no points: by its format that may be, but it was hardly meant."""
+    if not len(scan):
+        yield Oddity("no points", "it holds no points: the file may be a copy that failed")
+
+
 def left_out(scan: Scan) -> Iterator[Oddity]:
     """Whether a scan's file holds what is not written with the cleaned scan."""
     if isinstance(scan.header, PartialHeader) and scan.header.left_out:

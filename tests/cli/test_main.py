@@ -45,6 +45,23 @@ def test_a_command_that_cannot_be_understood_exits_with_2(run_derain, arguments)
     assert "Traceback" not in outcome.err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "suffix"),
+    [
+        (["export", "model.ckpt"], ".onnx"),
+        (["learn", "recording"], ".onnx"),
+        (["import-weights", "outdet", "model.pt", "--stats", "wads"], ".ckpt"),
+        (["tune", "dsor", "--data", "scans"], ".yaml"),
+    ],
+)
+def test_a_model_is_written_only_under_a_suffix_that_it_is_known_by(
+    run_derain, tmp_path: Path, arguments: list[str], suffix: str
+) -> None:
+    outcome = run_derain(*arguments, "--out", tmp_path / "model.txt")
+    assert outcome.code == 2
+    assert f"--out: {tmp_path / 'model.txt'} does not end in {suffix}" in outcome.err
+
+
 def test_an_interruption_is_no_traceback(run_derain, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(arguments: object) -> int:
         raise KeyboardInterrupt

@@ -146,6 +146,17 @@ def test_parts_of_a_file_that_are_not_written_are_named(run_derain, tmp_path: Pa
     assert outcome.said == [f"derain: warning: {scan}: the cleaned file is without its edge"]
 
 
+@pytest.mark.parametrize("command", ["run dror", "info"])
+def test_a_file_without_points_is_warned_of(run_derain, tmp_path: Path, command: str) -> None:
+    scan = tmp_path / "empty.bin"
+    scan.touch()
+    out = ("--out", tmp_path / "out") if command != "info" else ()
+    outcome = run_derain(*command.split(), scan, *out)
+    assert outcome.code == 0
+    (warning,) = outcome.err.splitlines()
+    assert warning.startswith(f"derain: warning: {scan}: it holds no points")
+
+
 def test_a_scan_for_which_the_memory_is_too_small_does_not_end_the_run(
     run_derain, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
