@@ -122,7 +122,7 @@ def _replace_closed_streams() -> None:
     """Lets a command print to nowhere where it was started with closed streams, as by ``>&-``."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, kept
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
 
 
 def _cut_off(error: BrokenPipeError) -> int:
@@ -130,12 +130,11 @@ def _cut_off(error: BrokenPipeError) -> int:
     with suppress(BrokenPipeError):  # the same reader may have read the errors
         for note in getattr(error, "__notes__", ()):
             print(f"derain: {note}", file=sys.stderr, flush=True)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (sys.stdout, sys.stderr):  # Python flushes the rest of them at its end
-        with suppress(BrokenPipeError):
+    for stream in (sys.stdout, sys.stderr):
+        try:
             stream.flush()
-            continue
-        os.dup2(nowhere, stream.fileno())
+        except BrokenPipeError:  # Python flushes the rest once more at its end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     return BROKEN_PIPE
 
 

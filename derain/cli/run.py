@@ -242,8 +242,8 @@ class _Cleaning:
         if left_whole:
             raise InputError(
                 frame.name,
-                f"left whole, for {share_removed:.1%} of its valid points are called rain, and in "
-                f"the heaviest rain {HEAVIEST_RAIN:.0%} are",
+                f"left whole, for {share_removed:.1%} of its valid points are called rain, where "
+                f"the heaviest rain has {HEAVIEST_RAIN:.0%}",
                 "See whether the method suits sensor and unit of intensity, or raise "
                 "--most-removed.",
             )

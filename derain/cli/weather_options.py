@@ -18,7 +18,7 @@ from derain.cli.arguments import count
 from derain.cli.outputs import refuse_unwritable
 from derain.errors import InputError
 from derain.files.atomic import replacing
-from derain.files.reading import reading
+from derain.files.reading import is_file, reading
 from derain.sources.frame import Frame
 from derain.sources.source import Source
 from derain.weather.alarm import ERROR, HOLD, WARNING, Alarm, Level, Threshold
@@ -209,7 +209,7 @@ def add_weather(parser: argparse.ArgumentParser) -> None:
 
 def _refuse_other_file(path: Path) -> None:
     """Refuses to write the table in place of a file that is not one."""
-    if not path.is_file():
+    if not is_file(path):
         return
     with reading(path), path.open("rb") as file:
         start = file.read(len(TABLE_HEAD))
