@@ -41,7 +41,7 @@ TITLES = [
 ]
 
 # How the table begins.
-TABLE_HEAD = f"{TITLES[0]},{TITLES[1]},".encode()
+TABLE_HEAD = b"scan,time_s,"
 
 
 @dataclass(frozen=True)
