@@ -21,6 +21,9 @@ POINTS, RAIN = 600, 110
 SCENE = "road: [[2, -10], [60, -10], [60, 10], [2, 10]]\n"
 PLACE = "{x: 0.5, y: 0, z: -0.7, roll: 0, pitch: 0, yaw: 90}\n"
 
+# A filter calls much of a made-up scan rain.
+ALL = ("--most-removed", "1")
+
 SPLIT = '{train: ["00"], validation: ["01"], test: ["02"]}'
 
 
@@ -104,10 +107,10 @@ def _fit(inputs: SmallInputs, *options: str) -> list[str | Path]:
 
 # Arguments of each command; it writes into the folder "out" of the folder where it is started.
 COMMANDS: dict[str, Callable[[SmallInputs], list[str | Path]]] = {
-    "run": lambda i: ["run", "dror", i.scans(), "--out", "out"],
-    "run, ROS 1": lambda i: ["run", "dror", i.bag("ros1"), "--out", "out"],
-    "run, SQLite": lambda i: ["run", "dror", i.bag("sqlite3"), "--out", "out"],
-    "run, MCAP": lambda i: ["run", "dror", i.bag("mcap"), "--out", "out"],
+    "run": lambda i: ["run", "dror", i.scans(), "--out", "out", *ALL],
+    "run, ROS 1": lambda i: ["run", "dror", i.bag("ros1"), "--out", "out", *ALL],
+    "run, SQLite": lambda i: ["run", "dror", i.bag("sqlite3"), "--out", "out", *ALL],
+    "run, MCAP": lambda i: ["run", "dror", i.bag("mcap"), "--out", "out", *ALL],
     "teach": lambda i: ["teach", "dror", i.scans(), "--out", "out", "--card", "wads"],
     "bench": lambda i: [
         *("bench", "--data", i.scans(), "--card", "wads", "--methods", "dror", "dsor", "all"),

@@ -64,8 +64,13 @@ RunDerain = Callable[..., Outcome]
 
 
 @pytest.fixture
-def run_derain(capsys: pytest.CaptureFixture[str]) -> RunDerain:
-    """Runs a command of derain in this process."""
+def run_derain(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> RunDerain:
+    """Runs a command of derain in this process.
+
+    `derain run` leaves no scan whole: of made-up scans, which are sparse, filters and random
+    networks call most rain.
+    """
+    monkeypatch.setattr("derain.cli.run.MOST_RAIN", 1.0)
 
     def run(*arguments: str | Path) -> Outcome:
         capsys.readouterr()

@@ -3,6 +3,8 @@
 import argparse
 import math
 import shlex
+from collections.abc import Callable
+from pathlib import Path
 
 from derain.errors import printable
 
@@ -39,6 +41,21 @@ def share(text: str) -> float:
     if not 0 <= value <= 1:
         raise argparse.ArgumentTypeError(f"{text} is not a number from 0 to 1")
     return value
+
+
+def file_named(*suffixes: str) -> Callable[[str], Path]:
+    """A file to write, with a suffix by which other commands know its kind.
+
+    Args:
+        suffixes: Those that it may have.
+    """
+
+    def path(text: str) -> Path:
+        if Path(text).suffix not in suffixes:
+            raise argparse.ArgumentTypeError(f"{text} does not end in {' or '.join(suffixes)}")
+        return Path(text)
+
+    return path
 
 
 def command_line(arguments: argparse.Namespace, positional: str | None = None) -> str:

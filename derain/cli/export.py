@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from derain.cli.arguments import count, share, threads
+from derain.cli.arguments import count, file_named, share, threads
 from derain.cli.outputs import say
 from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_options import add_columns, add_intensity_scale
@@ -46,7 +46,9 @@ The file is the same for every runtime: another that is named has to pass the pr
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument("checkpoint", type=Path, help="checkpoint of derain")
-    parser.add_argument("--out", type=Path, required=True, help="the ONNX file to write")
+    parser.add_argument(
+        "--out", type=file_named(".onnx"), required=True, help="the ONNX file to write"
+    )
     parser.add_argument(
         "--int8", action="store_true", help="compute in eight bits (networks with convolutions)"
     )

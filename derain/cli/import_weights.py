@@ -4,6 +4,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
+from derain.cli.arguments import file_named
 from derain.cli.outputs import say
 from derain.errors import InputError
 from derain.system.extras import OF_CHECKPOINTS, require
@@ -41,7 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--grid", help="of a range image, where they see one: semantickitti, rehearse3d or wads"
     )
-    parser.add_argument("--out", type=Path, required=True, help="the checkpoint to write")
+    parser.add_argument(
+        "--out", type=file_named(".ckpt"), required=True, help="the checkpoint to write"
+    )
 
 
 def main(arguments: argparse.Namespace) -> int:

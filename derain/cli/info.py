@@ -28,10 +28,12 @@ from derain.files.reading import reading
 from derain.scan import Scan
 from derain.sources.folders import frame_of, named_frames
 from derain.system.extras import MATPLOTLIB, OF_CHECKPOINTS, require
+from derain.system.notices import warn
 from derain.views.candidates import candidates_at
 from derain.views.directions import directions
 from derain.views.grid_fit import fit_grid
 from derain.views.morton import distinct_rows
+from derain.views.oddities import no_points
 
 SUMMARY = "say what is in a scan, a label file, a model or a data set"
 
@@ -175,6 +177,8 @@ def _facts(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
             card = None if arguments.card is None else load_card(arguments.card)
             frame = frame_of(path, arguments.columns, layouts_for(card))
             scan = frame.read()
+            for oddity in no_points(scan):
+                warn(f"{path}: {oddity.detail}")
             return {**_of_scan(scan), "returns": facts_of_returns(scan, frame, card)}
 
 

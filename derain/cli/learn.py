@@ -4,7 +4,7 @@ import argparse
 import shutil
 from pathlib import Path
 
-from derain.cli.arguments import count
+from derain.cli.arguments import count, file_named
 from derain.cli.bag_options import add_topic, in_topic
 from derain.cli.learning_student import STUDENTS, network_options, with_network, without_intensity
 from derain.cli.lesson import PERSISTENCE, Lesson
@@ -62,7 +62,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="folders of consecutive scans, or bags, in order",
     )
-    parser.add_argument("--out", type=Path, required=True, help="the ONNX file to write")
+    parser.add_argument(
+        "--out", type=file_named(".onnx"), required=True, help="the ONNX file to write"
+    )
     parser.add_argument("--model", choices=STUDENTS, help="(default: outdet, or that of --start)")
     parser.add_argument("--start", metavar="MODEL", help=START_HELP)
     parser.add_argument(

@@ -5,6 +5,7 @@ import io
 import os
 import signal
 import sys
+from contextlib import suppress
 from types import ModuleType
 
 from derain import __version__
@@ -59,6 +60,9 @@ COMMANDS: dict[str, ModuleType] = {
     "demo": demo,
 }
 
+# Exit code where whoever read the output has closed it, as of programs that SIGPIPE ends.
+BROKEN_PIPE = 128 + 13
+
 # Lightning's own, which parses its arguments itself.
 TRAINING = {
     "fit": "train a derainer",
@@ -75,10 +79,11 @@ def main(arguments: list[str] | None = None) -> int:
         arguments: Command line without the program's name; by default that of the process.
 
     Returns:
-        Exit code: 0, or 2 where the user's input cannot be used, or 128 and the number of the
-        signal that ended it.
+        Exit code: 0, or 2 where the user's input cannot be used, or BROKEN_PIPE, or 128 and the
+        number of the signal that ended it.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
+    _replace_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names may hold what is no text
@@ -93,10 +98,8 @@ def main(arguments: list[str] | None = None) -> int:
         if (missing := missing_extra(arguments[0], error)) is None:
             raise
         return _refused(missing)
-    except BrokenPipeError:
-        # Whoever read our output has had enough; Python must not try to flush the rest.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except BrokenPipeError as error:
+        return _cut_off(error)
     except KeyboardInterrupt as interruption:
         return _interrupted(interruption)
     except SystemExit as leaving:
@@ -113,6 +116,26 @@ def main(arguments: list[str] | None = None) -> int:
         )
     except MemoryError:
         return _refused(InputError("memory", "it is full", "Give it less at once."))
+
+
+def _replace_closed_streams() -> None:
+    """Lets a command print to nowhere where it was started with closed streams, as by ``>&-``."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+
+
+def _cut_off(error: BrokenPipeError) -> int:
+    """Prints what the command had written when the reader of its output closed the pipe."""
+    with suppress(BrokenPipeError):  # the same reader may have read the errors
+        for note in getattr(error, "__notes__", ()):
+            print(f"derain: {note}", file=sys.stderr, flush=True)
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except BrokenPipeError:  # Python flushes the rest once more at its end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    return BROKEN_PIPE
 
 
 def _interrupted(interruption: KeyboardInterrupt) -> int:

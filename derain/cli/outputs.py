@@ -1,15 +1,17 @@
 """What commands print, and where they may write what they make of scans."""
 
 import json
+import os
 import sys
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from tqdm import tqdm
 
-from derain.errors import printable
+from derain.errors import InputError, printable
 from derain.files.atomic import replacing
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
@@ -48,6 +50,43 @@ def say(text: str, stream: TextIO | None = None) -> None:
         stream: Where to; None is the standard output.
     """
     tqdm.write("\n".join(map(printable, text.split("\n"))), stream or sys.stdout)
+
+
+@contextmanager
+def noting_what_is_written(so_far: Callable[[], str]) -> Iterator[None]:
+    """Adds to the error of a closed pipe, as by ``| head``, what the command has written by then.
+
+    Args:
+        so_far: What is written, for instance "2 of 41 scans are written".
+    """
+    try:
+        yield
+    except BrokenPipeError as error:
+        error.add_note(f"the output was closed before the end: {so_far()}")
+        raise
+
+
+def refuse_taken(option: str, path: Path, written: Iterable[Path]) -> None:
+    """Refuses a file that would be in the way of what else a command writes.
+
+    Args:
+        option: The option that names it.
+        path: The file.
+        written: What else is written.
+
+    Raises:
+        InputError: It is one of these, or a folder of one, or lies in one.
+    """
+    place = os.path.realpath(path)
+    for other in written:
+        result = os.path.realpath(other)
+        if place == result or result.startswith(f"{place}{os.sep}"):
+            reason = f"{other} is written there"
+        elif place.startswith(f"{result}{os.sep}"):
+            reason = f"{other} is written in place of what is there"
+        else:
+            continue
+        raise InputError(path, reason, f"Give {option} another file.")
 
 
 def refuse_unwritable(path: Path) -> None:

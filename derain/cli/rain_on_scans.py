@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.cli.outputs import folder_sink, tell
+from derain.cli.outputs import folder_sink, noting_what_is_written, tell
 from derain.cli.scan_by_scan import ScanByScan
 from derain.errors import InputError, printable
 from derain.scan import Scan
@@ -64,13 +64,15 @@ def rain_on_scans(arguments: argparse.Namespace) -> int:
     rain, sensor = UniformRain(arguments.rain[0]), load_sensor(arguments.sensor or "spinning_64")
     source = named_frames(arguments.on, arguments.columns)
     sink = folder_sink(arguments.out, source)
-    scans = ScanByScan(source)
-    for number, frame in enumerate(scans):
-        seed = np.random.SeedSequence(arguments.seed, spawn_key=(number,))
-        with scans.passing_over(frame):
-            generator = np.random.default_rng(seed)
-            rained = _rain_on(frame, rain, sensor, generator, sink, arguments.picture)
-            tell(rained, arguments.json)
+    scans, written = ScanByScan(source), 0
+    with noting_what_is_written(lambda: f"{written:,} of {len(source):,} scans are written"):
+        for number, frame in enumerate(scans):
+            seed = np.random.SeedSequence(arguments.seed, spawn_key=(number,))
+            with scans.passing_over(frame):
+                generator = np.random.default_rng(seed)
+                rained = _rain_on(frame, rain, sensor, generator, sink, arguments.picture)
+                written += 1
+                tell(rained, arguments.json)
     return scans.exit_code("it could not rain on {scans}")
 
 

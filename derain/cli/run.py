@@ -4,13 +4,20 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from derain.cli.arguments import add_threads, share
 from derain.cli.bag_options import add_cleaned_bags, add_topic, cleaned_bags, in_topic
 from derain.cli.method_options import add_parameters, method_of
 from derain.cli.method_or_scans import RULE, add_method_and_scans, method_and_scans
-from derain.cli.outputs import folder_sink, say, tell
+from derain.cli.outputs import (
+    folder_sink,
+    noting_what_is_written,
+    refuse_taken,
+    say,
+    tell,
+)
 from derain.cli.pose_options import add_poses, placed
 from derain.cli.probability_column import refuse_improbable, with_probability
 from derain.cli.runtime_options import add_runtime
@@ -31,7 +38,7 @@ from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import left_out, much_removed
+from derain.views.oddities import HEAVIEST_RAIN, MOST_RAIN, left_out, much_removed, no_points
 
 SUMMARY = "clean scans on a CPU, without torch"
 
@@ -63,9 +70,9 @@ method is not sure of a point, its best guess decides. Of a data set, results ar
 paths in it.
 Of a bag (.bag of ROS 1; .mcap, .db3 or the folder of ROS 2), a bag of its name is written, in which
 the clouds of one topic have no rain and everything else is as it was, byte for byte.
-What is odd about a scan is warned of, each fault once. One of which more than --most-removed is
-called rain is left alone. It and a scan that cannot be read are reported and passed over; the exit
-code is then 2.
+What is odd about a scan is warned of, each fault once. A scan is left whole where more than
+--most-removed of its valid points are called rain: no file is written for it, and in a bag its
+cloud stays as it is. It and a scan that cannot be read are reported; the exit code is then 2.
 Visibility is the range that 90 % of the rays would get through if rain met them everywhere as often
 as in the first 10 m. It compares scans of one sensor, and is not what a weather station measures.
 Where every scan was cleaned and one was at the level of --fail-at or worse, the exit code is 3.
@@ -103,8 +110,8 @@ class Cleaned:
         name, total = printable(self.scan), sum(self.milliseconds.values())
         unsure = "" if self.not_known is None else f", {self.share_not_known:.1%} not known"
         return (
-            f"{name}: {self.points:,} points, {self.rain:,} of rain "
-            f"({self.share_removed:.1%}){unsure}, {self.weather}, {total:.0f} ms"
+            f"{name}: {_counts(self.points, self.valid, self.rain)}{unsure}, {self.weather}, "
+            f"{total:.0f} ms"
         )
 
     @property
@@ -125,9 +132,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--most-removed",
         type=share,
-        default=1.0,
+        default=MOST_RAIN,
         metavar="SHARE",
-        help="leave a scan alone of which a greater share is called rain, e.g. 0.5 (default: 1)",
+        help="leave a scan whole if a greater share of its valid points is called rain (default: "
+        "%(default)g; 1 cleans every scan)",
     )
     parser.add_argument(
         "--removed", type=Path, metavar="DIR", help="write what is taken away of the scans too"
@@ -156,6 +164,9 @@ def main(arguments: argparse.Namespace) -> int:
     sink = folder_sink(arguments.out, source, arguments.removed)
     weather = WeatherWatch(arguments, source)
     with cleaned_bags(arguments, source) as bags:
+        if arguments.weather is not None:
+            written = (path for frame in source for path in sink.files_of(frame))
+            refuse_taken("--weather", arguments.weather, [*written, *bags.targets()])
         return _clean(source, _Cleaning(method, sink, bags, weather, arguments), arguments)
 
 
@@ -173,13 +184,14 @@ def _clean(source: Source, cleaning: "_Cleaning", arguments: argparse.Namespace)
         warn(sentence)
     in_unit = source.map(lambda frame: frame.with_intensity_times(arguments.intensity_scale))
     scans = ScanByScan(in_unit)
-    with cleaning.weather.writing():
+    so_far = partial(cleaning.so_far, source)
+    with cleaning.weather.writing(), noting_what_is_written(so_far):
         for frame, judgement, stopwatch in judgements(method, scans, scans.passing_over):
             with scans.passing_over(frame):
                 cleaning.write(frame, judgement, stopwatch)
-    cleaning.notices.tell_how_many_more()
-    if len(cleaning.done) > 1:
-        print(_summary(cleaning.done, cleaning.weather), file=stream)
+        cleaning.notices.tell_how_many_more()
+        if len(cleaning.done) > 1:
+            print(_summary(cleaning.done, cleaning.weather), file=stream, flush=True)
     return scans.exit_code("{scans} could not be cleaned") or cleaning.weather.exit_code()
 
 
@@ -201,23 +213,39 @@ class _Cleaning:
         self.arguments = arguments
         self.notices = Notices()
         self.done: list[Cleaned] = []
+        self._files = 0
+
+    def so_far(self, source: Source) -> str:
+        """How many of the scans in files, and of the bags, are written."""
+        scans = sum(not self.bags.takes(frame) for frame in source)
+        parts = (
+            (self._files, scans, "scans"),
+            (len(self.bags.written), len(self.bags.targets()), "bags"),
+        )
+        return (
+            " and ".join(
+                f"{written:,} of {there:,} {what}" for written, there, what in parts if there
+            )
+            + " are written, each of them whole"
+        )
 
     def write(self, frame: Frame, judgement: Judgement, stopwatch: Stopwatch) -> None:
         """Writes a scan without what is rain of it; where that is not known, the guess decides."""
         scan, rain = judgement.scan, judgement.rain
         valid, removed = int(scan.valid.sum()), int(rain.sum())
-        share_removed = removed / max(valid, 1)
-        odd = [
-            *self.method.oddities(judgement),
-            *much_removed(share_removed),
-            *left_out(scan),
-        ]
+        share_removed = judgement.share_of_rain
+        odd = [*self.method.oddities(judgement), *left_out(scan), *no_points(scan)]
+        left_whole = share_removed > self.arguments.most_removed
+        if not left_whole:
+            odd += much_removed(share_removed)
         self.notices.tell(frame.name, odd)
-        if share_removed > self.arguments.most_removed:
+        if left_whole:
             raise InputError(
                 frame.name,
-                f"{share_removed:.1%} of its points are called rain, and nothing was written",
-                "See whether the method suits it, or raise --most-removed.",
+                f"left whole, for {share_removed:.1%} of its valid points are called rain, where "
+                f"the heaviest rain has {HEAVIEST_RAIN:.0%}",
+                "See whether the method suits sensor and unit of intensity, or raise "
+                "--most-removed.",
             )
         with stopwatch.stage("weather"):
             seen = judgement.weather
@@ -242,13 +270,23 @@ class _Cleaning:
         scan = with_probability(frame, judgement) if self.arguments.probability else judgement.scan
         removed = None if self.arguments.removed is None else scan.take(rain)
         self.sink.write(frame, scan.take(~rain), rain, removed)
+        self._files += 1
 
 
 def _summary(done: Sequence[Cleaned], weather: WeatherWatch) -> str:
     """What was done to all scans together."""
+    points = sum(item.points for item in done)
     valid, removed = sum(item.valid for item in done), sum(item.rain for item in done)
     odd = sum(bool(item.warnings) for item in done)
     return (
-        f"{len(done):,} scans: {sum(item.points for item in done):,} points, {removed:,} of rain "
-        f"({removed / max(valid, 1):.1%}), {weather}; {odd:,} scans with warnings"
+        f"{len(done):,} scans: {_counts(points, valid, removed)}, {weather}; "
+        f"{odd:,} scans with warnings"
+    )
+
+
+def _counts(points: int, valid: int, rain: int) -> str:
+    """How many points there are, how many can be judged, and how many of these are rain."""
+    return (
+        f"{points:,} points, {valid:,} valid, {rain:,} of rain ({rain / max(valid, 1):.1%} of the "
+        "valid)"
     )

@@ -21,6 +21,7 @@ from derain.sources.folders import named_frames
 from derain.sources.recordings import irregularities
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
+from derain.views.oddities import much_removed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -75,7 +76,7 @@ class TaughtFacts:
 
     def __str__(self) -> str:
         return (
-            f"{printable(self.scan)}: {self.points:,} points, {self.rain:.1%} rain, "
+            f"{printable(self.scan)}: {self.points:,} valid points, {self.rain:.1%} rain, "
             f"{self.not_rain:.1%} not rain, {self.not_known:.1%} not known, "
             f"{sum(self.milliseconds.values()):.0f} ms"
         )
@@ -154,7 +155,8 @@ class _Telling:
         """Tells of one scan, as it is judged."""
         frame, judgement, stopwatch = answer
         self.judged += 1
-        self.notices.tell(frame.name, self.method.oddities(judgement))
+        odd = [*self.method.oddities(judgement), *much_removed(judgement.share_of_rain)]
+        self.notices.tell(frame.name, odd)
         not_rain, rain, unknown = self.shares.add(judgement.scan, labels).tolist()
         points = int(judgement.scan.valid.sum())
         times = dict(stopwatch.milliseconds)

@@ -14,12 +14,13 @@ import yaml
 from tqdm import tqdm
 
 from derain import __version__
-from derain.cli.arguments import add_threads, command_line, count, share
+from derain.cli.arguments import add_threads, command_line, count, file_named, share
 from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
 from derain.cli.outputs import refuse_unwritable, say
 from derain.default import DEFAULT
 from derain.errors import InputError
+from derain.export.methods import PARAMETER_SUFFIXES
 from derain.files.atomic import replacing
 from derain.filters import FILTERS, filter_from
 from derain.filters.parameters import CANDIDATES
@@ -61,7 +62,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("method", metavar="METHOD", help="ONNX file, default or a filter (below)")
     list_filters(parser)
     add_data_arguments(parser, part="validation")
-    parser.add_argument("--out", type=Path, required=True, help="YAML file to write")
+    parser.add_argument(
+        "--out", type=file_named(*PARAMETER_SUFFIXES), required=True, help="YAML file to write"
+    )
     parser.add_argument(
         "--scans", type=count, default=100, help="scans, drawn at random (default: %(default)s)"
     )

@@ -2,9 +2,10 @@
 
 import argparse
 import csv
+import io
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.cli.arguments import count
+from derain.cli.outputs import refuse_unwritable
 from derain.errors import InputError
 from derain.files.atomic import replacing
-from derain.sources.file_frame import FileFrame
+from derain.files.reading import is_file, reading
 from derain.sources.frame import Frame
 from derain.sources.source import Source
 from derain.weather.alarm import ERROR, HOLD, WARNING, Alarm, Level, Threshold
@@ -37,6 +39,9 @@ TITLES = [
     *SECTOR_TITLES,
     *BAND_TITLES,
 ]
+
+# How the table begins.
+TABLE_HEAD = b"scan,time_s,"
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ class WeatherWatch:
         source: What is read.
 
     Raises:
-        InputError: Levels that cannot be, or a table in the place of a scan or of the results.
+        InputError: Levels that cannot be, or a table in the place of some other file.
     """
 
     def __init__(self, arguments: argparse.Namespace, source: Source) -> None:
@@ -95,12 +100,10 @@ class WeatherWatch:
         self._fail_at = None if arguments.fail_at is None else Level[arguments.fail_at.upper()]
         self._all, self._scans_at = ScanWeather.none(), Counter[Level]()
         self._table = _WeatherTable(arguments.weather)
-        if arguments.weather is not None:
-            _refuse_taken(arguments.weather, arguments.out, source)
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Writes the table, if one is asked for; it is there when the block ends well."""
+        """Writes the table, if one is asked for, when the block ends: of the scans so far."""
         with self._table.open():
             yield
 
@@ -146,24 +149,26 @@ class _WeatherTable:
 
     def __init__(self, path: Path | None) -> None:
         self.path = path
-        self._add: Callable[[list[object]], object] | None = None
+        self._text = io.StringIO()
+        self._add = csv.writer(self._text, lineterminator="\n").writerow
+        if path is not None:
+            _refuse_other_file(path)
 
     @contextmanager
     def open(self) -> Iterator[None]:
         if self.path is None:
             yield
             return
-        with (
-            replacing(self.path) as temporary,
-            temporary.open("w", encoding="utf-8", newline="") as file,
-        ):
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(TITLES)
-            self._add = writer.writerow
+        refuse_unwritable(self.path)
+        self._add(TITLES)
+        try:
             yield
+        finally:  # what was cleaned before an error or the end of a pipe has its lines
+            with replacing(self.path) as temporary:
+                temporary.write_text(self._text.getvalue(), "utf-8", newline="")
 
     def add(self, frame: Frame, told: ToldWeather, weather: ScanWeather) -> None:
-        if self._add is None:
+        if self.path is None:
             return
         of_all = (told.rays, told.met_rain, told.visibility_m, told.visibility_over_m, told.level)
         shares = _known(weather.shares_by_sector) + _known(weather.shares_by_range)
@@ -202,14 +207,16 @@ def add_weather(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _refuse_taken(table: Path, out: Path, source: Source) -> None:
-    """Refuses a table that would take the place of a scan, or of the folder of the results."""
-    target = table.resolve()
-    if target == out.resolve():
-        raise InputError(table, "it is the folder of --out", "Give --weather another file.")
-    for frame in source:
-        if isinstance(frame, FileFrame) and frame.path.resolve() == target:
-            raise InputError(table, "it is one of the scans", "Give --weather another file.")
+def _refuse_other_file(path: Path) -> None:
+    """Refuses to write the table in place of a file that is not one."""
+    if not is_file(path):
+        return
+    with reading(path), path.open("rb") as file:
+        start = file.read(len(TABLE_HEAD))
+    if start not in (TABLE_HEAD, b""):
+        raise InputError(
+            path, "is there already, and no table of the weather", "Give --weather another file."
+        )
 
 
 def _known(shares: NDArray[np.float64]) -> list[float | None]:

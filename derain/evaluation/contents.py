@@ -13,11 +13,11 @@ import numpy as np
 
 from derain.cards.layout import Layout, folder_above
 from derain.errors import InputError
-from derain.files import DEFAULT_COLUMNS, find_scans
+from derain.files import DEFAULT_COLUMNS
 from derain.files.labels import label_beside
 from derain.files.reading import reading
 from derain.simulation.manifest import RAIN_RATE, manifest_of
-from derain.sources.folders import frames_of, scan_folders
+from derain.sources.folders import frames_of, listed_scans, scan_folders
 from derain.sources.frame import Frame
 from derain.sources.source import Source
 
@@ -103,7 +103,7 @@ def find_sequences(
         InputError: A folder that holds nothing of this kind, or a damaged weather record.
     """
     if layout is None:
-        frames = frames_of(find_scans([root]), label_beside, columns)
+        frames = frames_of(listed_scans([root]), label_beside, columns)
         return [SequenceOfFrames(root.absolute().name, frames, None)]
     folders = scan_folders(root, layout)
     if not folders:
@@ -116,7 +116,7 @@ def find_sequences(
     sequences = []
     for folder in folders:
         name = folder.absolute().parent.name
-        frames = frames_of(find_scans([folder]), layout.label_of, columns)
+        frames = frames_of(listed_scans([folder]), layout.label_of, columns)
         rate = rates[name] if name in rates else _recorded_rate(folder_above(folder) / "weather")
         sequences.append(SequenceOfFrames(name, frames, rate))
     return sequences

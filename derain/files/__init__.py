@@ -20,8 +20,8 @@ from derain.scan import Scan
 __all__ = ["DEFAULT_COLUMNS", "count_points", "find_scans", "read_scan", "write_scan"]
 
 # Files that lie in folders of scans and are no scans, though their suffix is one of a format: when
-# the scans were taken, and KITTI's poses, times and calibration.
-RECORDS = (METADATA, "calib.txt", "poses.txt", "times.txt", "timestamps.txt")
+# the scans were taken, KITTI's poses, times and calibration, and what a person is to read.
+RECORDS = (METADATA, "calib.txt", "poses.txt", "times.txt", "timestamps.txt", "README.txt")
 
 
 def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Scan:

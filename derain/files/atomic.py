@@ -1,6 +1,7 @@
 """Writing a file whole or not at all."""
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +16,11 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Until then `path` stays as it was; after an error the temporary file is gone. It is hidden, has
     the same suffix where that may be one of a format, and lies in the same folder, which is created
-    if missing. What a killed process leaves there goes when the next one writes to the folder.
+    if missing. What a killed process leaves there goes when the next one writes to the folder. A
+    file that is replaced passes on its permissions, and a symbolic link leads to the new file.
+
+    Nothing is synchronised to the disk: a process that is killed leaves no half-written file, but a
+    machine that loses its power may.
 
     Args:
         path: The file to write.
@@ -30,10 +35,15 @@ def replacing(path: Path) -> Iterator[Path]:
     try:
         if path.exists() and not path.is_file():
             raise InputError(path, "is not a file that can be replaced", "Name a file to write.")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with temporary_beside(path) as temporary:
+        target = Path(os.path.realpath(path))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with temporary_beside(target) as temporary:
             yield temporary
-            os.replace(temporary, path)
+            if target.exists():
+                shutil.copymode(target, temporary)
+            os.replace(temporary, target)
+    except BrokenPipeError:  # the pipe is one that the block prints to, never the file
+        raise
     except OSError as error:
         raise InputError(
             path,

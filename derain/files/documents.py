@@ -36,11 +36,28 @@ _YAML_DAMAGE = (
 )
 
 # The parser in C where PyYAML was built with it: ten times faster on a large document.
-_LOADER: Any = type("_Loader", (getattr(yaml, "CSafeLoader", yaml.SafeLoader),), {})
+_SAFE_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _Loader(_SAFE_LOADER):  # type: ignore[misc]
+    """Refuses a mapping that has a key twice, of which YAML's own takes the last."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
+        keys = set()
+        for key_node, _ in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                continue
+            key = self.construct_object(key_node)
+            if key in keys:
+                line = key_node.start_mark.line + 1
+                raise ValueError(f"line {line:,}: the key {shown(key)} is there twice")
+            keys.add(key)
+        return super().construct_mapping(node, deep)
+
 
 # A number with an exponent, such as 4e-6, which PyYAML takes for a text.
 # Source: YAML 1.2.2, section 10.3.2, core schema.
-_LOADER.add_implicit_resolver(
+_Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+$"),
     list("-+.0123456789"),
@@ -291,13 +308,13 @@ def parsed_yaml(text: str, largest: int = LARGEST_DOCUMENT, aliases: bool = Fals
     if len(text) > largest:
         raise ValueError(f"more than {largest:,} characters")
     _refuse_what_unfolds(text, largest // BYTES_PER_VALUE, aliases)
-    return yaml.load(text, _LOADER)
+    return yaml.load(text, _Loader)
 
 
 def _refuse_what_unfolds(text: str, most: int, aliases: bool) -> None:
     """Refuses a text whose values would take far more memory than it, before any are made."""
     depth = 0
-    for number, event in enumerate(yaml.parse(text, _LOADER)):
+    for number, event in enumerate(yaml.parse(text, _Loader)):
         if number > most:
             raise ValueError(f"more than {most:,} values")
         if isinstance(event, yaml.AliasEvent) and not aliases:

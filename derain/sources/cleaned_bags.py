@@ -72,6 +72,10 @@ class CleanedBags:
         """Whether a frame is of a bag that is written anew."""
         return isinstance(frame, BagFrame) and frame.clouds in self._whole
 
+    def targets(self) -> list[Path]:
+        """Where bags are written."""
+        return [self.out / written_name(clouds.bag) for clouds in self._whole]
+
     def write(self, judgement: Judgement) -> None:
         """Takes what a method says of a cloud; clouds come in the order of their bag.
 

@@ -8,10 +8,11 @@ from glob import escape, glob
 from itertools import groupby
 from pathlib import Path
 
-from derain.bags.names import split
+from derain.bags.names import SUFFIXES as BAG_SUFFIXES
+from derain.bags.names import is_bag, split
 from derain.cards.known import known_layouts, label_of
 from derain.cards.layout import Layout, sequence_of
-from derain.files import DEFAULT_COLUMNS, find_scans
+from derain.files import DEFAULT_COLUMNS, RECORDS, find_scans
 from derain.files.format import FORMATS
 from derain.files.names import scan_stem, scan_suffix
 from derain.files.reading import reading
@@ -20,6 +21,7 @@ from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.records import Records
 from derain.sources.source import Frames
+from derain.system.notices import warn_once
 
 # Scans may be written as text, but beside folders of scans a text is a note or a record.
 TEXTS = (".csv", ".txt")
@@ -68,7 +70,7 @@ def named_frames(
     for path in paths:
         folders = _scan_folders_in(path, layouts)
         of_data_set = of_data_set or len(folders) > 1
-        scans += find_scans(folders or [path])
+        scans += listed_scans(folders or [path])
     where = partial(label_of, layouts=layouts) if labelled else _nowhere
     by_path = of_data_set or (recordings and len({scan.parent for scan in scans}) > 1)
     return frames_of(scans, where, columns, relative_keys(scans) if by_path else None)
@@ -147,8 +149,22 @@ def sequence_frames(
     Raises:
         InputError: A sequence without scans.
     """
-    scans = find_scans(folder / layout.scans for folder in folders)
+    scans = listed_scans(folder / layout.scans for folder in folders)
     return frames_of(scans, layout.label_of, columns, relative_keys(scans))
+
+
+def listed_scans(paths: Iterable[Path]) -> list[Path]:
+    """The scans that files and folders stand for; arguments and errors as for `find_scans`.
+
+    A warning counts what else in a folder may be a scan or a bag, for instance texts beside scans
+    of other formats.
+    """
+    scans: list[Path] = []
+    for path in paths:
+        found = find_scans([path])
+        scans += found
+        _warn_of_others(path, found)
+    return scans
 
 
 def relative_keys(scans: Sequence[Path]) -> list[str]:
@@ -238,11 +254,36 @@ def _with_bags(
     frames: list[Frame] = []
     for of_bags, group in groupby(paths, lambda path: bool(in_bags[path])):
         if of_bags:
-            for path in (each for named in group for each in in_bags[named]):
-                frames += bag_frames(path, labelled, by_name=several)
+            for named in group:
+                _warn_of_others(named, in_bags[named])
+                for path in in_bags[named]:
+                    frames += bag_frames(path, labelled, by_name=several)
         else:
             frames += named_frames(group, columns, labelled, layouts, recordings)
     return Frames(frames)
+
+
+def _warn_of_others(path: Path, taken: Sequence[Path]) -> None:
+    """Warns of what may be scans or bags in a folder, but for those that are taken."""
+    if taken == [path]:  # no folder of several
+        return
+    names = {each.name for each in taken}
+    with reading(path), os.scandir(path) as entries:
+        others = Counter(_kind(entry) for entry in entries if entry.name not in names)
+    del others[""]
+    if others:
+        counts = ", ".join(f"{number:,} {kind}" for kind, number in sorted(others.items()))
+        warn_once(f"{path}: {counts} passed over; name them to have them read")
+
+
+def _kind(entry: os.DirEntry[str]) -> str:
+    """The suffix of what may be a scan or a bag by its name; empty for anything else."""
+    if entry.name.startswith(".") or entry.name in RECORDS:
+        return ""
+    if entry.is_dir():
+        return "folder of a bag" if is_bag(Path(entry.path)) else ""
+    suffix = scan_suffix(Path(entry.name))
+    return suffix if suffix in FORMATS or suffix in BAG_SUFFIXES else ""
 
 
 def _nowhere(scan: Path) -> Path | None:

@@ -89,6 +89,11 @@ class FolderSink(Sink):
         """Where anything else that is made of a scan is written, such as its labels."""
         return self.folder / f"{frame.key}{suffix}"
 
+    def files_of(self, frame: Frame) -> list[Path]:
+        """All files that may be written of a frame."""
+        paths = (self.scan_path(frame), self.path(frame, LABEL), self.removed_path(frame))
+        return [path for path in paths if path is not None]
+
     def refuse_clashes(self, source: Iterable[Frame]) -> None:
         """Refuses to overwrite a scan or labels of the source, or one result by another."""
         if self.removed is not None and _is_same(self.removed, self.folder):

@@ -3,6 +3,7 @@
 import sys
 from collections import Counter
 from collections.abc import Iterable
+from functools import cache
 from typing import Protocol
 
 from tqdm import tqdm
@@ -62,3 +63,9 @@ def warn(text: str) -> None:
     """
     # Not print: a progress bar may stand in the line.
     tqdm.write(f"derain: warning: {printable(text)}", sys.stderr)
+
+
+@cache
+def warn_once(text: str) -> None:
+    """Warns as :func:`warn` does, of each text once in the life of this process."""
+    warn(text)

@@ -23,9 +23,10 @@ FULL_SCALE_PERCENTILE = 99
 MOST_OUTSIDE = 0.02
 
 # Share of rain in the heaviest that is known: 12 % of the points of WADS are snow, and 17 % rain in
-# the heavy rain of REHEARSE-3D. A method that takes twice as much has mistaken sensor or unit.
+# the heavy rain of REHEARSE-3D. A method that takes more than twice as much has mistaken the sensor
+# or the unit of its intensity.
 HEAVIEST_RAIN = 0.17
-MOST_RAIN = 2 * HEAVIEST_RAIN
+MOST_RAIN = 0.35
 
 
 @dataclass(frozen=True)
@@ -153,6 +154,12 @@ def much_removed(share: float) -> Iterator[Oddity]:
             f"{share:.0%} of the points are called rain, where the heaviest rain has "
             f"{HEAVIEST_RAIN:.0%}: the method may not suit the sensor",
         )
+
+
+def no_points(scan: Scan) -> Iterator[Oddity]:
+    """Whether a scan holds no points: by its format that may be, but it was hardly meant."""
+    if not len(scan):
+        yield Oddity("no points", "it holds no points: the file may be a copy that failed")
 
 
 def left_out(scan: Scan) -> Iterator[Oddity]:

@@ -16,9 +16,11 @@ Parameters:
   are cleaned, older ones are let go of: the next to be cleaned is the newest that there is.
 - ``organised``: keep rows and columns of a cloud, with NaN where rain was (false).
 
-Stamp, frame, order of the points and all of their fields stay as they are. Once a second it says on
-``/diagnostics`` what share of the points was rain, how far one sees, and how long a cloud took; its
-level is a warning or an error where visibility is low, by the levels of ``derain.Alarm``.
+Stamp, frame, order of the points and all of their fields stay as they are. A cloud is published
+whole where more than 35 % of its valid points are called rain: no rain is that heavy, and a robot
+must not lose what it could run into. Once a second ``/diagnostics`` has what share of the valid
+points was called rain, how far one sees, and how long a cloud took; its level is a warning or an
+error where visibility is low, by the levels of ``derain.Alarm``.
 """
 
 import array
@@ -99,6 +101,11 @@ def removed(message: Any, rain: NDArray[np.bool_]) -> Any:
     return message_of(cloud_of(message).take(rain), message)
 
 
+def rain_to_remove(judgement: Judgement) -> NDArray[np.bool_]:
+    """The rain of a cloud, bool (N,): none where more is called rain than any rain has."""
+    return judgement.rain & (judgement.share_of_rain <= MOST_RAIN)
+
+
 @dataclass
 class Tally:
     """What became of the clouds since the last diagnostic.
@@ -106,7 +113,8 @@ class Tally:
     Attributes:
         clouds: How many were cleaned.
         points: Their points.
-        rain: Those of them that were rain.
+        valid: Those of them that can be judged.
+        rain: Those of these that were called rain.
         seconds: What cleaning them took.
         weather: What they show of the weather, all together.
         level: How bad it is, after the last of them.
@@ -114,6 +122,7 @@ class Tally:
 
     clouds: int = 0
     points: int = 0
+    valid: int = 0
     rain: int = 0
     seconds: float = 0.0
     weather: ScanWeather = field(default_factory=ScanWeather.none)
@@ -126,13 +135,14 @@ class Tally:
         self.level = alarm.update(weather.visibility)
         self.clouds += 1
         self.points += len(judgement.rain)
+        self.valid += int(judgement.scan.valid.sum())
         self.rain += int(judgement.rain.sum())
         self.seconds += seconds
 
     @property
     def share(self) -> float:
-        """Share of the points that was rain; 0 of no points."""
-        return self.rain / max(self.points, 1)
+        """Share of the valid points that was called rain; 0 of no points."""
+        return self.rain / max(self.valid, 1)
 
     @property
     def warning(self) -> str:
@@ -242,13 +252,14 @@ class DerainNode:
         """Cleans one cloud. What is wrong with it is logged, and the next one is waited for."""
         try:
             judgement = self.remover.judge(message)
-            without_rain = cleaned(message, judgement.rain, self.organised)
+            rain = rain_to_remove(judgement)
+            without_rain = cleaned(message, rain, self.organised)
         except (InputError, ValueError) as error:
             self.node.get_logger().error(f"a cloud is left out: {error}", throttle_duration_sec=5.0)
             return
         self.clean.publish(without_rain)
         if self.removed is not None:
-            self.removed.publish(removed(message, judgement.rain))
+            self.removed.publish(removed(message, rain))
         for text in self.remover.news(judgement):
             self.node.get_logger().warning(text)
 
@@ -262,7 +273,8 @@ class DerainNode:
             level=levels[max(tally.level, Level.WARNING if tally.warning else Level.CLEAR)],
             name=f"{self.node.get_name()}: rain",
             message=tally.warning
-            or f"{tally.share:.1%} of the points are rain, visibility {tally.weather.visibility}",
+            or f"{tally.share:.1%} of the valid points are rain, "
+            f"visibility {tally.weather.visibility}",
             hardware_id=self.remover.derainer.name,
             values=[KeyValue(key=key, value=value) for key, value in tally.values().items()],
         )

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import derain
-from derain.cli.main import COMMANDS, TRAINING
+from derain.cli.main import BROKEN_PIPE, COMMANDS, TRAINING
 from derain.evaluation.hard_cases import scene
 
 MAIN = "import sys; from derain.cli.main import main; sys.exit(main())"
@@ -45,6 +45,23 @@ def test_a_command_that_cannot_be_understood_exits_with_2(run_derain, arguments)
     assert "Traceback" not in outcome.err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "suffix"),
+    [
+        (["export", "model.ckpt"], ".onnx"),
+        (["learn", "recording"], ".onnx"),
+        (["import-weights", "outdet", "model.pt", "--stats", "wads"], ".ckpt"),
+        (["tune", "dsor", "--data", "scans"], ".yaml"),
+    ],
+)
+def test_a_model_is_written_only_under_a_suffix_that_it_is_known_by(
+    run_derain, tmp_path: Path, arguments: list[str], suffix: str
+) -> None:
+    outcome = run_derain(*arguments, "--out", tmp_path / "model.txt")
+    assert outcome.code == 2
+    assert f"--out: {tmp_path / 'model.txt'} does not end in {suffix}" in outcome.err
+
+
 def test_an_interruption_is_no_traceback(run_derain, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(arguments: object) -> int:
         raise KeyboardInterrupt
@@ -65,4 +82,14 @@ def test_a_reader_that_has_had_enough_ends_the_command_quietly(tmp_path: Path) -
     ) as process:
         process.stdout.close()  # before the command prints anything
         assert process.stderr.read() == b""
-        assert process.wait() == 0
+        assert process.wait() == BROKEN_PIPE
+
+
+def test_a_closed_output_is_no_error(tmp_path: Path) -> None:
+    scene(100).tofile(tmp_path / "scan.bin")
+    command = [sys.executable, "-c", MAIN, "run", "ssr", "scan.bin", "--out", "out"]
+    closed = subprocess.run(
+        ["sh", "-c", '"$@" >&-', "sh", *command], cwd=tmp_path, stderr=subprocess.PIPE, check=False
+    )
+    assert b"Traceback" not in closed.stderr
+    assert (closed.returncode, (tmp_path / "out/scan.label").is_file()) == (0, True)

@@ -44,7 +44,8 @@ def test_a_scan_gets_its_labels_and_loses_its_rain(
     assert 0 < rain.sum() < 300
     np.testing.assert_array_equal(labels(out / "000003.label"), rain)
     assert (out / "000003.bin").read_bytes() == scene(300, seed=3)[~rain].tobytes()
-    assert outcome.out.startswith(f"{scan}: 300 points, {rain.sum()} of rain ({rain.mean():.1%}), ")
+    counts = f"300 points, 300 valid, {rain.sum()} of rain ({rain.mean():.1%} of the valid), "
+    assert outcome.out.startswith(f"{scan}: {counts}")
 
 
 def test_a_folder_and_a_file_are_cleaned_together(
@@ -77,7 +78,7 @@ def test_json_is_one_object_a_scan_and_nothing_else(
     assert [item["valid"] for item in objects] == [100, 200, 300, 73]
     rain, odd = sum(item["rain"] for item in objects), sum(bool(i["warnings"]) for i in objects)
     assert summary.startswith(
-        f"4 scans: 680 points, {rain} of rain ({rain / 673:.1%}), visibility "
+        f"4 scans: 680 points, 673 valid, {rain} of rain ({rain / 673:.1%} of the valid), "
     )
     assert summary.endswith(f"; {odd} scans with warnings")
     for item in objects:

@@ -14,6 +14,7 @@ from derain.files import write_scan
 from derain.filters import FilterDerainer
 from derain.scan import Scan
 from derain.sources.judgement import Judgement
+from derain.views.oddities import MOST_RAIN
 from derain.views.spherical_grid import SphericalGrid
 
 
@@ -68,29 +69,32 @@ def test_a_method_that_takes_nearly_all_says_so(run_derain, scans: Path, tmp_pat
     assert outcome.err.splitlines() == [
         f"derain: warning: {scans / 'a.bin'}: 100% of the points are called rain, where the "
         "heaviest rain has 17%: the method may not suit the sensor",
-        "derain: warning: 4 more scans: more than 34% called rain",
+        "derain: warning: 4 more scans: more than 35% called rain",
     ]
     *lines, summary = outcome.out.splitlines()
-    assert all("200 points, 200 of rain (100.0%), " in line for line in lines)
-    assert summary.startswith("5 scans: 1,000 points, 1,000 of rain (100.0%), ")
+    assert all("200 points, 200 valid, 200 of rain (100.0% of the valid), " in x for x in lines)
+    assert summary.startswith("5 scans: 1,000 points, 1,000 valid, 1,000 of rain (100.0% of ")
     assert summary.endswith("; 5 scans with warnings")
 
 
-def test_a_scan_that_would_lose_too_much_is_left_alone(
-    run_derain, tmp_path: Path, scans: Path
+@pytest.mark.parametrize("options", [[], ["--most-removed", "0.99"]])
+def test_a_scan_that_would_lose_too_much_is_left_whole(
+    run_derain,
+    tmp_path: Path,
+    scans: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    options: list[str],
 ) -> None:
+    monkeypatch.setattr("derain.cli.run.MOST_RAIN", MOST_RAIN)
     spread = scene(200) * np.array([1e3, 1e3, 1e3, 1], np.float32)
     spread.tofile(scans / "c.bin")
     (scans / "c.pcd").unlink()
     out = tmp_path / "out"
-    options = ["--set", "radius=20", "--most-removed", "0.5", "--out", out]
-    outcome = run_derain("run", "ror", scans, *options)
+    outcome = run_derain("run", "ror", scans, "--set", "radius=20", "--out", out, *options)
     assert outcome.code == 2
-    assert outcome.err.splitlines()[2:] == [
-        f"derain: {scans / 'c.bin'}: 100.0% of its points are called rain, and nothing was "
-        "written. See whether the method suits it, or raise --most-removed.",
-        "derain: 1 of 5 scans could not be cleaned",
-    ]
+    refused, summary = outcome.err.splitlines()[-2:]
+    assert refused.startswith(f"derain: {scans / 'c.bin'}: left whole, for 100.0% of its valid")
+    assert summary == "derain: 1 of 5 scans could not be cleaned"
     assert sorted(path.stem for path in out.glob("*.label")) == ["a", "b", "d", "e"]
     assert not list(out.glob("c.*"))
 
@@ -140,6 +144,17 @@ def test_parts_of_a_file_that_are_not_written_are_named(run_derain, tmp_path: Pa
     outcome = run_derain("run", "ror", scan, "--out", tmp_path / "out")
     assert outcome.code == 0
     assert outcome.said == [f"derain: warning: {scan}: the cleaned file is without its edge"]
+
+
+@pytest.mark.parametrize("command", ["run dror", "info"])
+def test_a_file_without_points_is_warned_of(run_derain, tmp_path: Path, command: str) -> None:
+    scan = tmp_path / "empty.bin"
+    scan.touch()
+    out = ("--out", tmp_path / "out") if command != "info" else ()
+    outcome = run_derain(*command.split(), scan, *out)
+    assert outcome.code == 0
+    (warning,) = outcome.err.splitlines()
+    assert warning.startswith(f"derain: warning: {scan}: it holds no points")
 
 
 def test_a_scan_for_which_the_memory_is_too_small_does_not_end_the_run(

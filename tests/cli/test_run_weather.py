@@ -2,6 +2,8 @@
 
 import csv
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from derain.cli.main import BROKEN_PIPE
 from derain.files import read_scan
 from derain.weather.alarm import Alarm, Threshold
 from derain.weather.scan_weather import ScanWeather
+
+MAIN = "import sys; from derain.cli.main import main; sys.exit(main())"
 
 
 def wall(drops: int) -> NDArray[np.float32]:
@@ -150,15 +155,58 @@ def test_nothing_is_left_of_the_table_where_the_run_fails(
     arguments = ("run", "dror", recording, "--out", tmp_path / "out")
     outcome = run_derain(*arguments, "--weather", scan)
     assert (outcome.code, outcome.out) == (2, "")
-    assert "it is one of the scans. Give --weather another file" in outcome.err
+    assert f"{scan}: is there already, and no table of the weather" in outcome.err
     assert scan.read_bytes() == before
     outcome = run_derain(*arguments, "--weather", tmp_path / "out")
     assert outcome.code == 2
-    assert "it is the folder of --out. Give --weather another file" in outcome.err
-    outcome = run_derain(*arguments, "--weather", tmp_path)
-    assert outcome.code == 2
-    assert "is not a file that can be replaced" in outcome.err
+    assert f"{tmp_path / 'out'}: {tmp_path / 'out/000000.bin'} is written there" in outcome.err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "table", ["000002.bin", "000002.label", "../removed/000002.bin", ".", ".."]
+)
+def test_a_table_never_takes_the_place_of_a_result(
+    run_derain, recording: Path, tmp_path: Path, table: str
+) -> None:
+    out = tmp_path / "out"
+    (tmp_path / "link").symlink_to(out, target_is_directory=True)
+    options = ("--removed", tmp_path / "removed", "--weather", tmp_path / "link" / table)
+    outcome = run_derain("run", "dror", recording, "--out", out, *options)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "Give --weather another file" in outcome.err
+    assert not out.exists()
+
+
+def test_the_table_of_an_earlier_run_is_replaced(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    table = tmp_path / "out/weather.csv"
+    (tmp_path / "out").mkdir()
+    table.touch()
+    for scans in (recording, recording / "000000.bin"):
+        outcome = run_derain("run", "dror", scans, "--out", tmp_path / "out", "--weather", table)
+        assert outcome.code == 0, outcome.err
+    assert len(table.read_text().splitlines()) == 1 + 1
+
+
+def test_a_reader_that_has_had_enough_leaves_whole_results_and_their_table(
+    recording: Path, tmp_path: Path
+) -> None:
+    options = ("--out", tmp_path / "out", "--weather", tmp_path / "weather.csv")
+    with subprocess.Popen(
+        [sys.executable, "-c", MAIN, "run", "dror", recording, *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        process.stdout.close()  # before the command prints anything
+        line = process.stderr.read().splitlines()[-1]
+        assert process.wait() == BROKEN_PIPE
+    assert "1 of 6 scans are written" in line
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"000000.bin", "000000.label"}
+    (_, row) = (tmp_path / "weather.csv").read_text().splitlines()
+    assert row.startswith(f"{recording / '000000.bin'},")
 
 
 def test_a_scan_that_cannot_be_read_has_no_line(

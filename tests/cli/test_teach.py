@@ -141,7 +141,7 @@ def test_the_cleaned_recording_has_its_best_guesses(
     rain = points[:, 3] < 20
     np.testing.assert_array_equal(read_labels(tmp_path / "out/000001.label", POINTS), rain)
     far = (np.linalg.norm(points[:, :3], axis=1) >= 30).mean()
-    assert f"({rain.mean():.1%}), {far:.1%} not known, " in outcome.out.splitlines()[1]
+    assert f"({rain.mean():.1%} of the valid), {far:.1%} not known, " in outcome.out.splitlines()[1]
     outcome = run_derain("run", "between", drive, "--out", tmp_path / "out", "--json")
     facts = json.loads(outcome.out.splitlines()[0])
     assert (facts["rain"], facts["not_known"]) == (int((scene(POINTS)[:, 3] < 20).sum()), POINTS)

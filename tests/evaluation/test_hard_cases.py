@@ -32,9 +32,14 @@ def cleaned(onnx_model: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for case in CASES:
         name, scan = case.values
         write_scan(folder / "scans" / name, scan)
-    arguments = ["run", onnx_model, folder / "scans", "--out", folder / "cleaned", "--threads", "2"]
-    assert main([str(argument) for argument in arguments]) == 0
+    clean(onnx_model, folder / "scans", folder / "cleaned")
     return folder / "cleaned"
+
+
+def clean(model: Path, scans: Path, out: Path) -> None:
+    """Runs a random network, which calls most of some scans rain."""
+    options = ("--out", out, "--most-removed", "1", "--threads", "2")
+    assert main([str(argument) for argument in ("run", model, scans, *options)]) == 0
 
 
 def check(cleaned: Path, name: str, scan: Scan, onnx_model: Path) -> None:
@@ -62,7 +67,7 @@ def test_a_scan_of_400_000_points_is_cleaned_like_any_other(
     scan = Scan.of(scene(400_000))
     write_scan(tmp_path / "large.bin", scan)
     out = tmp_path / "out"
-    assert main(["run", str(onnx_model), str(tmp_path / "large.bin"), "--out", str(out)]) == 0
+    clean(onnx_model, tmp_path / "large.bin", out)
     check(out, "large.bin", scan, onnx_model)
 
 

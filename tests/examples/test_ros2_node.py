@@ -92,7 +92,10 @@ def test_what_is_odd_is_told_once(ros2_node: ModuleType) -> None:
 
 
 @pytest.mark.usefixtures("ros")
-def test_a_cloud_comes_in_and_goes_out_clean(ros2_node: ModuleType) -> None:
+def test_a_cloud_comes_in_and_goes_out_clean(
+    ros2_node: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ros2_node, "MOST_RAIN", 1.0)  # of so few points much is called rain
     points = scene(600)
     message = message_of(points)
     node = Node(input="in", output="out", removed="gone", model=str(KEPT), threads=1)
@@ -106,6 +109,23 @@ def test_a_cloud_comes_in_and_goes_out_clean(ros2_node: ModuleType) -> None:
     for topic, one in expected.items():
         kind, published, quality = node.publishers[topic]
         assert (kind, published, quality.reliability) == (PointCloud2, [one], "reliable")
+
+
+@pytest.mark.usefixtures("ros")
+@pytest.mark.parametrize(("share", "stay"), [(0.35, 130), (0.36, 200)])
+def test_a_cloud_that_would_lose_too_much_goes_out_whole(
+    ros2_node: ModuleType, monkeypatch: pytest.MonkeyPatch, share: float, stay: int
+) -> None:
+    rain = np.arange(200) < 200 * share
+    usual = Derainer.judge
+    monkeypatch.setattr(
+        ros2_node.Derainer, "judge", lambda self, scan: replace(usual(self, scan), rain=rain)
+    )
+    node = Node(model=str(KEPT), threads=1, removed="gone")
+    ros2_node.DerainNode(node)
+    node.subscriptions["points"][1](message_of(scene(200)))
+    published = [node.publishers[topic][1][0].width for topic in ("points/clean", "gone")]
+    assert published == [stay, 200 - stay]
 
 
 @pytest.mark.usefixtures("ros")

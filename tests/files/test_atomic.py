@@ -59,6 +59,36 @@ def test_the_new_file_has_the_permissions_of_any_new_file(tmp_path: Path) -> Non
     assert (tmp_path / "scan").stat().st_mode == plain.stat().st_mode
 
 
+@pytest.mark.parametrize("mode", [0o600, 0o664, 0o755])
+def test_a_file_that_is_replaced_passes_on_its_permissions(tmp_path: Path, mode: int) -> None:
+    path = tmp_path / "scan"
+    path.touch()
+    path.chmod(mode)
+    with replacing(path) as temporary:
+        temporary.write_bytes(b"new")
+    assert (path.read_bytes(), path.stat().st_mode & 0o777) == (b"new", mode)
+
+
+@pytest.mark.parametrize("dangling", [False, True])
+def test_a_link_leads_to_the_new_file(tmp_path: Path, dangling: bool) -> None:
+    target, link = tmp_path / "elsewhere/scan.bin", tmp_path / "scan.bin"
+    target.parent.mkdir()
+    if not dangling:
+        target.write_bytes(b"old")
+    link.symlink_to("elsewhere/scan.bin")
+    with replacing(link) as temporary:
+        temporary.write_bytes(b"new")
+    assert os.readlink(link) == "elsewhere/scan.bin"
+    assert target.read_bytes() == b"new"
+    assert list(target.parent.iterdir()) == [target]
+
+
+def test_a_broken_pipe_is_no_fault_of_the_file(tmp_path: Path) -> None:
+    with pytest.raises(BrokenPipeError):
+        write_half(tmp_path / "scan.bin", BrokenPipeError())
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_folder_is_not_replaced(tmp_path: Path) -> None:
     for folder in (tmp_path, Path(), Path("/")):
         with pytest.raises(InputError, match=r"is not a file that can be replaced\. Name a file"):

@@ -38,6 +38,24 @@ def test_bad_yaml_is_one_short_line(name: str, tmp_path: Path) -> None:
     assert str(caught.value).isprintable()
 
 
+@pytest.mark.parametrize(
+    ("text", "line", "key"),
+    [
+        ("a: 1\nb: 2\na: 3\n", 3, "a"),
+        ("b:\n  - c: 1\n    'a': 1\n    a: 1\n", 4, "a"),
+        ("5: x\n0x5: y\n", 2, "5"),
+        ("{a: 1, b: {a: 1, a: 1}}", 1, "a"),
+    ],
+)
+def test_a_key_that_is_there_twice_is_named_with_its_line(
+    tmp_path: Path, text: str, line: int, key: str
+) -> None:
+    path = tmp_path / "document.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=rf"line {line}: the key '?{key}'? is there twice"):
+        Entry.of_yaml(path)
+
+
 def test_a_document_that_is_too_large_is_not_read(tmp_path: Path) -> None:
     path = tmp_path / "document.yaml"
     path.write_text("a: 1\n" + "#" * LARGEST_DOCUMENT)

@@ -20,6 +20,9 @@ from derain.filters import FilterDerainer, filter_from
 
 MODULE = Path(__file__).with_name("points_format.py")
 
+# A filter calls much of a made-up scan rain.
+RUN = ("run", "dror", "--most-removed", "1")
+
 # What stands in the file of a wheel that names its entry points.
 ENTRY_POINTS = "[derain.formats]\npoints = points_format\n"
 
@@ -91,7 +94,7 @@ def test_a_decorated_format_is_read_written_found_and_cleaned(
     assert find_scans([file.parent]) == [file]
     with pytest.raises(InputError, match=r"holds x, y, z and intensity alone"):
         write_scan(file, Scan(scan.xyz))
-    assert main(["run", "dror", str(file.parent), "--out", str(tmp_path / "out")]) == 0
+    assert main([*RUN, str(file.parent), "--out", str(tmp_path / "out")]) == 0
     assert_cleaned(file, tmp_path / "out")
     assert "without its remarks" in capsys.readouterr().err
     with pytest.raises(InputError, match=r"Known are .*\.ply, \.pts, \.txt"):
@@ -101,7 +104,7 @@ def test_a_decorated_format_is_read_written_found_and_cleaned(
 def test_an_installed_format_is_known_to_the_commands(
     file: Path, installed: Path, tmp_path: Path
 ) -> None:
-    run = derain("run", "dror", file.parent, "--out", tmp_path / "out", path=installed)
+    run = derain(*RUN, file.parent, "--out", tmp_path / "out", path=installed)
     assert run.returncode == 0, run.stderr
     assert_cleaned(file, tmp_path / "out")
     assert "without its remarks" in run.stderr
@@ -113,7 +116,7 @@ def test_a_format_that_cannot_be_imported_is_named(
     file: Path, installed: Path, tmp_path: Path
 ) -> None:
     (installed / "points_format.py").write_text("import a_module_that_is_not_there\n")
-    run = derain("run", "dror", file.parent, "--out", tmp_path / "out", path=installed)
+    run = derain(*RUN, file.parent, "--out", tmp_path / "out", path=installed)
     assert run.returncode == 2
     assert "derain.formats: points: points_format cannot be imported" in run.stderr
     assert "holds no scans" in run.stderr

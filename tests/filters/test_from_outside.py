@@ -153,7 +153,7 @@ def test_a_package_that_is_broken_keeps_no_filter_of_derain_from_use(
     own, foreign, help_ = run(
         installed,
         COMMANDS,
-        ["run", "dror", scans, "--out", tmp_path / "out"],
+        ["run", "dror", scans, "--out", tmp_path / "out", "--most-removed", "1"],
         ["run", "haze", scans, "--out", tmp_path / "no"],
         ["run", "--help"],
     )

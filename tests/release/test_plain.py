@@ -109,7 +109,7 @@ def test_every_command_has_its_help(plain: Any) -> None:
 def test_scans_are_cleaned_looked_at_and_labelled(plain: Any, scan: Path) -> None:
     tried = [
         ["run", str(scan), "--out", "cleaned"],
-        ["run", "dror", str(scan), "--out", "by_dror"],
+        ["run", "dror", str(scan), "--out", "by_dror", "--most-removed", "1"],
         ["info", "default", str(scan), str(scan.with_suffix(".label")), str(default_model())],
         ["info", str(scan.parent)],
         ["info", "--grid", str(scan)],
@@ -148,7 +148,10 @@ def test_a_command_whose_extra_is_missing_says_so_in_one_line_before_any_work(
     labelled = ["--data", given, "--card", "wads"]
     tried = {
         ("export", checkpoint, "--out", "model.onnx"): ("torch", "train"),
-        ("import-weights", "outdet", given, "--stats", "wads", "--out", "out"): ("torch", "train"),
+        ("import-weights", "outdet", given, "--stats", "wads", "--out", "o.ckpt"): (
+            "torch",
+            "train",
+        ),
         ("info", checkpoint): ("torch", "train"),
         ("info", str(scan.parent), "--picture", "out.png"): ("matplotlib", "view"),
         ("view", given, "--out", "out.png"): ("matplotlib", "view"),

@@ -185,3 +185,12 @@ def test_no_such_cloud(tmp_path: Path, storage: Storage) -> None:
     bag = small_bag(tmp_path, storage)
     with pytest.raises(InputError, match="/velodyne_points has 3"):
         named_frames([bag / "000003"])
+
+
+def test_what_is_passed_over_beside_bags_is_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small_bag(tmp_path, "mcap")
+    (tmp_path / "scan.csv").touch()
+    named_frames([tmp_path])
+    assert f"{tmp_path}: 1 .csv passed over" in capsys.readouterr().err

@@ -25,6 +25,7 @@ from benchmarks.recorded_bags import (
 from derain.bags.cloud_message import CDR, ROS1, CloudMessage
 from derain.export.runtime import Derainer
 from derain.files.labels import read_labels
+from derain.sources.folders import named_frames
 
 RUN = ("run", "ror", "--set", "radius=2", "--set", "neighbours=3")
 
@@ -50,6 +51,19 @@ def rain_of_files(tmp_path: Path, run_derain) -> list[NDArray[np.bool_]]:
     return [
         read_labels(tmp_path / "masks" / f"{n}.label", len(t)) == 1 for n, t in enumerate(tables())
     ]
+
+
+def test_a_cloud_that_would_lose_too_much_stays_whole(
+    tmp_path: Path, storage: Storage, run_derain
+) -> None:
+    clouds = tables()
+    clouds[1]["x"] *= 1000  # no point has a neighbour
+    bag = small_bag(tmp_path, storage, clouds=clouds)
+    outcome = run_derain(*RUN, bag, "--out", tmp_path / "out", "--most-removed", "0.99")
+    assert outcome.code == 2
+    assert f"{bag}/velodyne_points/000001: left whole" in outcome.err
+    made = named_frames([bag_path(tmp_path / "out", storage)])
+    assert [len(frame.read()) == len(clouds[1]) for frame in made] == [False, True, False]
 
 
 def test_only_the_clouds_change_and_as_files_do(

@@ -90,6 +90,29 @@ def test_texts_are_scans_where_there_is_nothing_else(tmp_path: Path) -> None:
     assert [frame.name for frame in named_frames([tmp_path])] == [str(tmp_path / "scan.csv")]
 
 
+@pytest.mark.parametrize("folder", ["", "sequences/00/velodyne", "sequences/01/velodyne"])
+def test_what_is_passed_over_in_a_folder_is_counted_once(
+    tmp_path: Path, folder: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = tmp_path / folder
+    touch(*(place / name for name in ("0.bin", "1.csv", "2.csv.gz", "3.txt", "4.mcap", "5.BAG")))
+    # Labels, records of the scans, and what no format reads.
+    touch(*(place / name for name in ("0.label", "poses.txt", "times.txt", "6.png", ".7.csv")))
+    for _ in range(2):
+        (frame,) = named_frames([tmp_path])
+    assert Path(frame.name) == place / "0.bin"
+    (warning,) = capsys.readouterr().err.splitlines()
+    assert f"{place}: 1 .bag, 2 .csv, 1 .mcap, 1 .txt passed over" in warning
+
+
+def test_nothing_is_said_of_a_folder_whose_scans_are_all_taken(
+    tmp_path: Path, wads: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    touch(tmp_path / "texts/0.csv", tmp_path / "texts/times.txt", tmp_path / "texts/0.txt.label")
+    named_frames([wads, tmp_path / "texts", tmp_path / "texts/0.csv"])
+    assert capsys.readouterr().err == ""
+
+
 @pytest.mark.parametrize("layout", [Layout(), REHEARSE3D, DRIVES])
 def test_labels_lie_where_the_layout_says(tmp_path: Path, layout: Layout) -> None:
     sequence = tmp_path / layout.sequences / "7"
