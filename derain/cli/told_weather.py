@@ -53,7 +53,8 @@ class ToldWeather:
         near, far = self.visibility_from_m or 0.0, self.visibility_to_m or math.inf
         level = self.level or "level open"
         alarm = "" if self.alarm in (None, self.level) else f", alarm {self.alarm}"
-        return f"visibility {Visibility(self.visibility_m, near, far)} ({level}{alarm})"
+        reach = "" if self.reach_99_m is None else f", reach {self.reach_99_m:.0f} m"
+        return f"visibility {Visibility(self.visibility_m, near, far)}{reach} ({level}{alarm})"
 
     @classmethod
     def of(

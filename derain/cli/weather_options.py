@@ -118,7 +118,8 @@ class WeatherWatch:
             for level in (*Level, None)
             if self._scans_at[level]
         )
-        return f"{told} ({levels})"
+        by = "rain alone" if self._dry is None else "rain and range"
+        return f"{told} ({levels}, by {by})"
 
     def exit_code(self) -> int:
         """BAD_WEATHER, which is printed, where it was as bad as is asked for; else 0."""

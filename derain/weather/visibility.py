@@ -50,6 +50,11 @@ class Visibility:
         """Whether the scan has enough rays for an interval."""
         return self.at_least > 0 or self.at_most < math.inf
 
+    @property
+    def shown(self) -> float:
+        """The estimate, or else the near end, metres."""
+        return self.at_least if self.metres is None else self.metres
+
     def or_worse(self, other: "Visibility") -> "Visibility":
         """The shorter of two ranges, end by end; where one is not known, only its far end is."""
         metres = [each.metres for each in (self, other) if each.metres is not None]
@@ -63,7 +68,7 @@ class Visibility:
         if not self.known:
             return "not known"
         if self.metres is None:
-            return f"over {_text(self.at_least)} m"
+            return f"over {_text(self.shown)} m"
         if self.at_most <= WIDE * self.at_least:
             return f"{_text(self.metres)} m"
         end = f"to {_text(self.at_most)} m" if self.at_most < math.inf else "m or more"

@@ -94,7 +94,7 @@ def test_the_line_of_a_scan_has_visibility_level_and_alarm(
     lines = outcome.out.splitlines()[:6]
     told = [f"visibility {w.visibility}" for w in weather_of(recording, tmp_path / "out")]
     for line, visibility in zip(lines, told, strict=True):
-        assert f", {visibility} (" in line
+        assert f", {visibility}, reach 15 m (" in line
     assert "(clear)" in lines[0]
     assert "(warning, alarm clear)" in lines[2]
     assert "(warning)" in lines[3]
@@ -139,7 +139,10 @@ def test_bad_weather_can_be_told_by_the_exit_code_after_all_scans(
     assert ("the weather was" in outcome.err) == bool(told)
     pooled = sum(weather_of(recording, out), ScanWeather.none())
     last = outcome.out.splitlines()[-1]
-    assert f", visibility {pooled.visibility}, reach 15 m (4 clear, 2 warning); " in last
+    assert (
+        f", visibility {pooled.visibility}, reach 15 m (4 clear, 2 warning, by rain alone); "
+        in last
+    )
 
 
 def test_a_table_has_a_line_a_scan_and_nothing_where_nothing_is_known(
@@ -267,6 +270,8 @@ def test_range_that_is_lost_beside_a_dry_reference_is_a_level(
             assert item["reach_95_m"] < item["reach_99_m"] < 21
     assert all(0.2 < item["reach_of_dry"] < 0.3 for item in objects(seeing.out))
     assert "(dry 7" in seeing.err
+    assert "(6 clear, by rain alone)" in blind.err
+    assert "(6 warning, by rain and range)" in seeing.err
 
 
 def test_a_reference_that_can_show_no_level_is_refused(
