@@ -84,11 +84,11 @@ class ToldWeather:
 FIGURES = [field.name for field in fields(ToldWeather) if field.name != "shares"]
 SECTOR_TITLES = [f"share_at_{360 // RAY_SECTORS * sector}_deg" for sector in range(RAY_SECTORS)]
 BAND_TITLES = [f"share_from_{band}_m" for band in RANGE_BANDS]
-COLUMNS = [*FIGURES, *SECTOR_TITLES, *BAND_TITLES]
+WEATHER_COLUMNS = [*FIGURES, *SECTOR_TITLES, *BAND_TITLES]
 
 
 def row_of(told: ToldWeather, weather: ScanWeather) -> list[object]:
-    """The row of a table, in the order of COLUMNS."""
+    """The row of a table, in the order of WEATHER_COLUMNS."""
     figures = [getattr(told, name) for name in FIGURES]
     return [*figures, *_known(weather.shares_by_sector), *_known(weather.shares_by_range)]
 

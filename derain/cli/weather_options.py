@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from derain.cli.arguments import count
-from derain.cli.told_weather import COLUMNS, ToldWeather, row_of
+from derain.cli.told_weather import WEATHER_COLUMNS, ToldWeather, row_of
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.sources.file_frame import FileFrame
@@ -30,7 +30,7 @@ from derain.weather.visibility import Visibility
 BAD_WEATHER = 3
 
 # Without an option that asks for the weather, it is computed for so many scans of a run.
-SAMPLED = 5
+SAMPLED_SCANS = 5
 
 # So many scans of a dry reference are read, evenly spread over it.
 DRY_SCANS = 100
@@ -58,7 +58,7 @@ class WeatherWatch:
         self._new_alarm = partial(Alarm, *levels, arguments.hold, self._dry)
         self._alarm, self._recording = self._new_alarm(), -1
         self._recordings = _numbers_of_recordings(source) if self._asked else {}
-        sample = [] if self._asked else _evenly_spread(len(source), SAMPLED)
+        sample = [] if self._asked else _evenly_spread(len(source), SAMPLED_SCANS)
         self._sample = {source[place].key for place in sample} if len(source) > 1 else set()
         self._fail_at = None if arguments.fail_at is None else Level[arguments.fail_at.upper()]
         self._all, self._scans_at = ScanWeather.none(), Counter[Level | None]()
@@ -164,7 +164,7 @@ class _WeatherTable:
             temporary.open("w", encoding="utf-8", newline="") as file,
         ):
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(["scan", "time_s", *COLUMNS])
+            writer.writerow(["scan", "time_s", *WEATHER_COLUMNS])
             self._add = writer.writerow
             yield
 

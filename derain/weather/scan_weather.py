@@ -33,7 +33,7 @@ class ScanWeather:
         >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)  # x, y, z, intensity
         >>> weather = ScanWeather.of(points, derain.FilterDerainer(derain.DROR())(points))
         >>> weather.rays, weather.met_rain, str(weather.visibility)
-        (820, 20, '42.7 m')
+        (820, 20, '42.9 m [29.5 to 64.7 m]')
 
     Attributes:
         ends: int64 (2, RAY_SECTORS, RANGE_BINS): rays that end at something else, and rays that
