@@ -56,7 +56,12 @@ def draw_rose(weather: ScanWeather, path: Path) -> None:
 
 
 def draw_visibility(
-    places: Mapping[str, ByBoth], rates: Sequence[float], drive: ByBoth, alarm: Alarm, path: Path
+    places: Mapping[str, ByBoth],
+    rates: Sequence[float],
+    drive: ByBoth,
+    alarm: Alarm,
+    bounds: str,
+    path: Path,
 ) -> None:
     """Draws visibility by the rate of rain, and over a drive with the level of an alarm.
 
@@ -65,6 +70,7 @@ def draw_visibility(
         rates: Rates of rain, mm/h, rising.
         drive: What is told of the scans of a drive, in order.
         alarm: What the model's visibility on the drive is given to.
+        bounds: Its thresholds, as the title has them.
         path: Picture to write.
     """
     figure = Figure(figsize=(10, 3.8), layout="constrained")
@@ -83,7 +89,7 @@ def draw_visibility(
         colour = LEVELS[alarm.update(by_model)]
         over_drive.axvspan(scan - 0.5, scan + 0.5, color=colour, linewidth=0)
     _draw_both(over_drive, scans, drive, LINES[4], "snow")
-    over_drive.set(title="a drive in snow, and an alarm with gap and hold", xlabel="scan")
+    over_drive.set(title=f"a drive in snow, alarm: {bounds} m", xlabel="scan")
     over_drive.set_xlim(0.5, len(drive) + 0.5)
     over_drive.set_xticks(scans[::2] + 1)
     for axes in (by_rate, over_drive):
@@ -97,6 +103,6 @@ def draw_visibility(
 
 
 def _draw_both(axes: Axes, places: Sequence[float], told: ByBoth, colour: str, label: str) -> None:
-    labels, model = np.array([[one.at_least, other.at_least] for one, other in told]).T
+    labels, model = np.array([[one.shown, other.shown] for one, other in told]).T
     axes.plot(places, labels, color=colour, linestyle=":")
     axes.plot(places, model, color=colour, marker=".", label=label)

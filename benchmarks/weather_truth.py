@@ -124,7 +124,7 @@ def _told(scan: Scan, rain: NDArray[np.bool_], beams: int) -> tuple[float, float
     other, met = weather.ends.sum(axis=1)
     all_rays = other.copy()
     all_rays[-1] += beams - weather.rays  # they are known to have met nothing on all of their way
-    return weather.visibility.at_least, visibility_of(all_rays, met).at_least
+    return weather.visibility.shown, visibility_of(all_rays, met).shown
 
 
 if __name__ == "__main__":

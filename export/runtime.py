@@ -140,7 +140,7 @@ class Derainer(Method):
             >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)
             >>> weather = Derainer().weather(points)
             >>> weather.rays, str(weather.visibility)
-            (820, '42.7 m')
+            (820, '42.9 m [29.5 to 64.7 m]')
 
         Args:
             points: As for calling the model.

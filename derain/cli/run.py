@@ -23,7 +23,8 @@ from derain.cli.probability_column import refuse_improbable, with_probability
 from derain.cli.runtime_options import add_runtime
 from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns, add_intensity_scale
-from derain.cli.weather_options import ToldWeather, WeatherWatch, add_weather
+from derain.cli.told_weather import ToldWeather
+from derain.cli.weather_options import WeatherWatch, add_weather
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError, printable
 from derain.sources.cleaned_bags import RAIN_PROBABILITY, CleanedBags
@@ -44,8 +45,8 @@ SUMMARY = "clean scans on a CPU, without torch"
 
 DESCRIPTION = f"""\
 Cleans scans: writes <stem>.label (1 = rain, one per row of the input) and the scan without its
-rain, in the input's format with every field kept. Says how bad the weather is: visibility, its
-level, and with --json or --weather the shares of rain by sector and range.
+rain, in the input's format with every field kept. With --weather, --fail-at, --dry or --json it
+measures how bad the weather is in every scan; else in five scans, for the last line alone.
 
   derain run scans/ --out cleaned
   derain run model.onnx scan.bin --out cleaned
@@ -75,6 +76,7 @@ What is odd about a scan is warned of, each fault once. A scan is left whole whe
 cloud stays as it is. It and a scan that cannot be read are reported; the exit code is then 2.
 Visibility is the range that 90 % of the rays would get through if rain met them everywhere as often
 as in the first 10 m. It compares scans of one sensor, and is not what a weather station measures.
+Fog that returns nothing shows only beside dry scans of the sensor, with --dry.
 Where every scan was cleaned and one was at the level of --fail-at or worse, the exit code is 3.
 """
 
@@ -93,7 +95,7 @@ class Cleaned:
             of that.
         milliseconds: By stage.
         warnings: What is odd about it.
-        weather: How bad the weather is that it shows.
+        weather: How bad the weather is that it shows; None where no option asks for it.
     """
 
     scan: str
@@ -104,13 +106,14 @@ class Cleaned:
     not_known: int | None
     milliseconds: dict[str, float]
     warnings: list[str]
-    weather: ToldWeather
+    weather: ToldWeather | None
 
     def __str__(self) -> str:
         name, total = printable(self.scan), sum(self.milliseconds.values())
         unsure = "" if self.not_known is None else f", {self.share_not_known:.1%} not known"
+        weather = "" if self.weather is None else f", {self.weather}"
         return (
-            f"{name}: {_counts(self.points, self.valid, self.rain)}{unsure}, {self.weather}, "
+            f"{name}: {_counts(self.points, self.valid, self.rain)}{unsure}{weather}, "
             f"{total:.0f} ms"
         )
 
@@ -248,13 +251,13 @@ class _Cleaning:
                 "--most-removed.",
             )
         with stopwatch.stage("weather"):
-            seen = judgement.weather
+            seen = judgement.weather if self.weather.wants(frame) else None
         with stopwatch.stage("write"):
             if self.bags.takes(frame):
                 self.bags.write(judgement)
             else:
                 self._write_scans(frame, judgement)
-        weather = self.weather.look(frame, seen)
+        weather = None if seen is None else self.weather.look(frame, seen)
         told = [oddity.detail for oddity in odd]
         times = dict(stopwatch.milliseconds)
         unsure = None if judgement.known is None else int((scan.valid & ~judgement.answered).sum())

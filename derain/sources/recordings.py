@@ -1,6 +1,6 @@
 """Frames by the recordings that they are of, and whether these are fit to be seen several at once.
 
-Most methods see one scan at a time and ask for none of this.
+Most methods see one scan at a time and ask for none of this; the alarm of the weather does.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -16,6 +16,10 @@ from derain.views.window import Window
 # scan says little of the place of another's points.
 LONGEST_STEP = 1.0
 
+# The same where the numbers of files stand for times, as a multiple of their smallest step: a
+# second at ten scans a second.
+LONGEST_NUMBER_STEP = 10
+
 
 def recordings_of(frames: Iterable[Frame]) -> list[list[Frame]]:
     """Frames in groups, in each of which every frame follows the one before it."""
@@ -25,6 +29,23 @@ def recordings_of(frames: Iterable[Frame]) -> list[list[Frame]]:
             recordings.append([])
         recordings[-1].append(frame)
     return recordings
+
+
+def unbroken_recordings(frames: Iterable[Frame]) -> list[list[Frame]]:
+    """Scans in groups, in each of which every scan was taken soon after the one before it.
+
+    Times decide, or else the names of files, where all of a folder are numbers: these rise, and no
+    step is more than ten times the smallest one. Scans with neither are in no group, nor is one
+    alone.
+
+    Args:
+        frames: Frames in time order, one recording after the other.
+
+    Returns:
+        The groups, of two scans or more each.
+    """
+    groups = [group for recording in recordings_of(frames) for group in _unbroken(recording)]
+    return [group for group in groups if len(group) > 1]
 
 
 def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
@@ -50,6 +71,25 @@ def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
         yield from _of_steps(recording)
 
 
+def _unbroken(recording: Sequence[Frame]) -> list[list[Frame]]:
+    """A recording in the parts that breaks in time divide it into."""
+    try:
+        times = [frame.time for frame in recording]
+    except InputError:
+        times = [None] * len(recording)
+    steps = [step for step in _steps(recording, times) if step is not None]
+    if len(steps) + 1 < len(recording):
+        return []
+    smallest = min((step for step in steps if step > 0), default=0.0)
+    longest = LONGEST_NUMBER_STEP * smallest if times[0] is None else LONGEST_STEP
+    parts = [[recording[0]]]
+    for frame, step in zip(recording[1:], steps, strict=True):
+        if not 0 < step <= longest:
+            parts.append([])
+        parts[-1].append(frame)
+    return parts
+
+
 def _of_steps(recording: Sequence[Frame]) -> Iterator[str]:
     """What of the steps from scan to scan does not suit: the first of each kind."""
     try:
@@ -57,10 +97,7 @@ def _of_steps(recording: Sequence[Frame]) -> Iterator[str]:
     except InputError as error:  # the method may well do without
         yield f"{recording[0].name}: when it was taken is not known: {error}"
         return
-    steps = [
-        (after, _step(before, after, *seconds))
-        for (before, after), seconds in zip(pairwise(recording), pairwise(times), strict=True)
-    ]
+    steps = list(zip(recording[1:], _steps(recording, times), strict=True))
     backwards = [frame for frame, step in steps if step is not None and step <= 0]
     if backwards:
         yield (
@@ -73,6 +110,14 @@ def _of_steps(recording: Sequence[Frame]) -> Iterator[str]:
             f"{apart[0].name}: more than {LONGEST_STEP:g} s after the scan before it "
             f"({_scans(len(apart))} in all): they say little of one another"
         )
+
+
+def _steps(recording: Sequence[Frame], times: Sequence[float | None]) -> list[float | None]:
+    """How far each frame but the first is from the one before it, as :func:`_step` gives it."""
+    return [
+        _step(before, after, *seconds)
+        for (before, after), seconds in zip(pairwise(recording), pairwise(times), strict=True)
+    ]
 
 
 def _step(before: Frame, after: Frame, first: float | None, second: float | None) -> float | None:

@@ -1,4 +1,4 @@
-"""Levels of visibility, and an alarm that does not change its mind at every scan."""
+"""Levels of visibility, and an alarm that does not change at every scan."""
 
 import math
 from dataclasses import dataclass, replace
@@ -6,7 +6,7 @@ from enum import IntEnum
 from typing import Any, Self
 
 from derain.errors import InputError
-from derain.weather.visibility import Visibility
+from derain.weather.visibility import NOT_KNOWN, Visibility
 
 
 class Level(IntEnum):
@@ -26,7 +26,7 @@ class Threshold:
 
     Example:
         >>> alarm = Alarm(warning=Threshold(below=50, above=60), error=Threshold(10, 12), hold=3)
-        >>> str(alarm.update(Visibility(45.0, 45.0, 10.0, 0.98)))  # the first scan decides alone
+        >>> str(alarm.update(Visibility(45.0, 44.0, 46.0)))  # the first scan decides alone
         'warning'
 
     Attributes:
@@ -83,11 +83,10 @@ class Latch:
     def after(self, visibility: Visibility) -> Self:
         """The state after a scan.
 
-        A scan that leaves open on which side its visibility lies is passed over, as is one of which
-        nothing is known: what changes the level is counted on with the scan after it.
+        A scan whose interval lies on both sides of the threshold changes nothing, and neither does
+        one of which nothing is known: the count goes on with the scan after it.
         """
-        least = visibility.at_least
-        most = math.inf if visibility.metres is None else visibility.metres
+        least, most = visibility.at_least, visibility.at_most
         if self.on:
             for_change, for_stay = least >= self.threshold.above, most < self.threshold.above
         else:
@@ -102,15 +101,18 @@ class Latch:
 
 
 class Alarm:
-    """Takes the visibility of scan after scan, and says at which level it is.
+    """The level of scan after scan, by the visibility and the reach of each.
 
     A level is entered after several scans in a row below its lower threshold, and left after as
     many at its upper one or above; in between it stays as it is. The first scan of which anything
     is known decides alone, for there is nothing to stay at.
 
+    The reach counts where a dry reference of the sensor is given, and for the levels whose upper
+    threshold the sensor reaches when dry: there the shorter of visibility and reach decides.
+
     Example:
         >>> alarm = Alarm(hold=2)
-        >>> far, near = (Visibility(metres, metres, 10.0, 0.9) for metres in (100.0, 12.0))
+        >>> far, near = (Visibility(metres, metres, metres) for metres in (100.0, 12.0))
         >>> [str(alarm.update(each)) for each in (far, near, near, far, near, far, far)]
         ['clear', 'clear', 'error', 'error', 'error', 'error', 'clear']
 
@@ -118,6 +120,8 @@ class Alarm:
         warning: Where the warning begins and ends.
         error: Where the error does.
         hold: How many scans in a row have to agree before the level changes; 1 changes at once.
+        dry: The reach of the same sensor in dry scans of the same kind of place
+            (:func:`~derain.weather.scan_weather.dry_reach`); None leaves reach out.
 
     Raises:
         InputError: An error that does not begin and end below the warning, or no whole number of
@@ -125,7 +129,11 @@ class Alarm:
     """
 
     def __init__(
-        self, warning: Threshold = WARNING, error: Threshold = ERROR, hold: int = HOLD
+        self,
+        warning: Threshold = WARNING,
+        error: Threshold = ERROR,
+        hold: int = HOLD,
+        dry: Visibility | None = None,
     ) -> None:
         given: Any = hold  # whatever a user gave
         if not (isinstance(given, int) and not isinstance(given, bool) and given >= 1):
@@ -137,19 +145,50 @@ class Alarm:
                 f"warning (below {warning.below:g}, {warning.above:g} m)",
                 "Give it smaller numbers.",
             )
+        self._dry = dry
         self._latches = (Latch.first(warning, hold), Latch.first(error, hold))
 
     @property
     def level(self) -> Level:
         """The level after the scans so far; clear before the first."""
-        return Level(sum(latch.on for latch in self._latches))
+        on = (
+            level
+            for level, latch in zip((Level.WARNING, Level.ERROR), self._latches, strict=True)
+            if latch.on
+        )
+        return max(on, default=Level.CLEAR)
 
-    def update(self, visibility: Visibility) -> Level:
-        """Takes the visibility of the next scan.
+    def update(self, visibility: Visibility, reach: Visibility = NOT_KNOWN) -> Level:
+        """Takes the visibility and the reach of the next scan.
 
         Returns:
             The level after it.
         """
-        warning, error = self._latches
-        self._latches = (warning.after(visibility), error.after(visibility))
+        warning, error = (
+            latch.after(self._deciding(latch.threshold, visibility, reach))
+            for latch in self._latches
+        )
+        self._latches = (warning, error)
         return self.level
+
+    def level_of(self, visibility: Visibility, reach: Visibility = NOT_KNOWN) -> Level | None:
+        """The level of one scan by itself, whatever came before it.
+
+        Returns:
+            The worst level that its whole interval lies below; None where there is none and the
+            interval does not show clear sight either.
+        """
+        clear, level = True, Level.CLEAR
+        for each, latch in zip((Level.WARNING, Level.ERROR), self._latches, strict=True):
+            seen = self._deciding(latch.threshold, visibility, reach)
+            clear = clear and seen.at_least >= latch.threshold.below
+            level = each if seen.at_most < latch.threshold.below else level
+        return level if level or clear else None
+
+    def _deciding(
+        self, threshold: Threshold, visibility: Visibility, reach: Visibility
+    ) -> Visibility:
+        """The range that decides at a threshold."""
+        if self._dry is None or self._dry.at_least < threshold.above:
+            return visibility
+        return visibility.or_worse(reach)

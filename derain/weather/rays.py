@@ -15,9 +15,10 @@ from derain.weather.alike import repetitions, seem_distinct
 # middle, the next ones follow towards y (left).
 RAY_SECTORS = 12
 
-# Bins of range: so many metres each, and one more for whatever is beyond them, 80 m and more.
+# Bins of range: so many metres each, and one more for whatever is beyond them, 300 m and more,
+# which few sensors reach.
 BIN = 0.5
-RANGE_BINS = 161
+RANGE_BINS = 601
 
 # Returns are of one ray whose directions lie in one cell, of so many in a quarter of a turn and so
 # many from the horizon upwards: .003 to .006 degrees wide. Two rays that are neighbours are farther
@@ -33,7 +34,7 @@ TINY = np.finfo(np.float32).tiny
 # A return as one number: its sector, then a score of which the highest of a ray is the return at
 # which that ray ends. The score of what is not rain is its bin; that of rain is above all of these,
 # and the higher the nearer it is.
-SCORES_IN_SECTOR = 512
+SCORES_IN_SECTOR = 2048
 
 
 def ray_ends(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -1,5 +1,6 @@
 """The weather that a scan shows: where its rays meet rain."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
@@ -10,11 +11,18 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.scan import Scan
 from derain.weather.rays import BIN, RANGE_BINS, RAY_SECTORS, ray_ends
-from derain.weather.visibility import Visibility, visibility_of
+from derain.weather.visibility import NOT_KNOWN, Visibility, reach_of, visibility_of
 
 # Where the bands of range begin, metres: each is twice as deep as the one before, for the farther,
 # the less rain is seen. The last one has no end.
 RANGE_BANDS = (0, 5, 10, 20, 40, 80)
+
+# Reach is the range within which this share of the rays end. The farthest hundredth is bounded by
+# the sensor and the air more than by the walls around it.
+SHARE_REACHED = 0.99
+
+# Dry scans reach as far as all but this share of them do.
+SHARE_OF_DRY_BELOW = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +33,7 @@ class ScanWeather:
         >>> points = np.fromfile("scan.bin", np.float32).reshape(-1, 4)  # x, y, z, intensity
         >>> weather = ScanWeather.of(points, derain.FilterDerainer(derain.DROR())(points))
         >>> weather.rays, weather.met_rain, str(weather.visibility)
-        (820, 20, '42.7 m')
+        (820, 20, '42.9 m [29.5 to 64.7 m]')
 
     Attributes:
         ends: int64 (2, RAY_SECTORS, RANGE_BINS): rays that end at something else, and rays that
@@ -110,6 +118,19 @@ class ScanWeather:
         """The range that 90 % of the rays get through without meeting rain."""
         return visibility_of(*self.ends.sum(axis=1))
 
+    @cached_property
+    def reach(self) -> Visibility:
+        """The range within which 99 % of the rays end, whatever they end at."""
+        return self.range_of(SHARE_REACHED)
+
+    def range_of(self, share: float) -> Visibility:
+        """The range within which a share of the rays end, whatever they end at.
+
+        Args:
+            share: Of the rays, such as 0.95.
+        """
+        return reach_of(self.ends.sum(axis=(0, 1)), share)
+
     def visibility_in(self, *sectors: int) -> Visibility:
         """That of some sectors alone, such as of what is ahead.
 
@@ -125,6 +146,19 @@ class ScanWeather:
                 "sectors", f"{odd or 'none'}", f"Give numbers from 0 to {RAY_SECTORS - 1}."
             )
         return visibility_of(*self.ends[:, list(sectors)].sum(axis=1))
+
+
+def dry_reach(dry: Iterable[ScanWeather]) -> Visibility:
+    """The reach that nineteen of twenty dry scans of a sensor have at least.
+
+    It is that of one of them: of the scans sorted by their reach, the one after a twentieth of
+    them. Not known where none of them has 100 rays.
+
+    Args:
+        dry: What each dry scan shows.
+    """
+    known = sorted((one.reach for one in dry if one.reach.known), key=lambda reach: reach.at_least)
+    return known[int(SHARE_OF_DRY_BELOW * len(known))] if known else NOT_KNOWN
 
 
 def _shares(ends: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""How far the rays of a scan get through rain."""
+"""How far a sensor sees, by the rain that its rays meet and by the range that they reach."""
 
 import math
 from dataclasses import dataclass
@@ -11,17 +11,20 @@ from derain.weather.rays import BIN
 # Visibility is the range that this share of the rays gets through.
 SHARE_THROUGH = 0.9
 
-# How far rays are followed, metres. A sensor sees drops only where they return enough light: the
+# Rain is counted up to here, metres. A sensor sees drops only where they return enough light: the
 # largest ones, by the packaged sensors of `derain simulate`, as far as 5 to 31 m. Farther on rain
 # goes on to stop rays, but nothing comes back of it.
 LOOK = 10.0
 
-# Rays are followed no farther than so many of them go.
+# Fewer rays are no scan.
 FEWEST_RAYS = 100
 
-# Where no more is seen than by chance might be missed of so many drops, with one chance in twenty:
-# e⁻³ is .05. Source: Hanley and Lippman-Hand 1983, the rule of three.
-MISSED_BY_CHANCE = 3.0
+# Ends of an interval: the truth lies beyond each with a chance of one in twenty, by this quantile
+# of the normal distribution.
+ONE_IN_TWENTY = 1.645
+
+# An interval is printed where its far end is more than so many times its near one.
+WIDE = 1.5
 
 # What is farther is as good as clear air, metres: of a hundred thousand rays, a hundred meet rain.
 CLEAR_AIR = 1000.0
@@ -29,92 +32,134 @@ CLEAR_AIR = 1000.0
 
 @dataclass(frozen=True)
 class Visibility:
-    """The range that 90 % of the rays would get through if it rained alike everywhere.
-
-    That is, if rays met rain everywhere as often as they do in the first 10 m, of which the scan
-    shows it: a sensor sees little rain farther off, though it goes on to stop rays.
+    """A range that the rays of a scan show, with its interval of 90 % confidence.
 
     Attributes:
-        metres: The range; None where it is farther than a scan can tell, and where nothing is
-            known.
-        at_least: What it is at least, metres: itself; or how far a scan of so many rays can tell,
-            1,000 m at most; 0 where nothing is known.
-        looked: How far the rays were followed, metres: 10, or less where fewer than 100 rays go as
-            far; 0 where nothing is known.
-        through: Share of the rays that get as far as that without meeting rain.
+        metres: The estimate; None where the range is farther than the scan can show, and where
+            nothing is known.
+        at_least: Near end of the interval, metres; 0 where nothing is known.
+        at_most: Far end, metres; infinite where the scan does not bound it.
     """
 
     metres: float | None
     at_least: float
-    looked: float
-    through: float
+    at_most: float
 
     @property
     def known(self) -> bool:
-        """Whether the scan has enough rays to say anything."""
-        return self.looked > 0
+        """Whether the scan has enough rays for an interval."""
+        return self.at_least > 0 or self.at_most < math.inf
+
+    @property
+    def shown(self) -> float:
+        """The estimate, or else the near end, metres."""
+        return self.at_least if self.metres is None else self.metres
+
+    def or_worse(self, other: "Visibility") -> "Visibility":
+        """The shorter of two ranges, end by end; where one is not known, only its far end is."""
+        metres = [each.metres for each in (self, other) if each.metres is not None]
+        return Visibility(
+            min(metres, default=None),
+            min(self.at_least, other.at_least),
+            min(self.at_most, other.at_most),
+        )
 
     def __str__(self) -> str:
         if not self.known:
             return "not known"
-        metres = f"{self.at_least:,.{1 if self.at_least < 100 else 0}f} m"
-        return f"over {metres}" if self.metres is None else metres
+        if self.metres is None:
+            return f"over {_text(self.shown)} m"
+        if self.at_most <= WIDE * self.at_least:
+            return f"{_text(self.metres)} m"
+        end = f"to {_text(self.at_most)} m" if self.at_most < math.inf else "m or more"
+        return f"{_text(self.metres)} m [{_text(self.at_least)} {end}]"
 
 
-def transmission(other: NDArray[np.int64], rain: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Share of the rays that would get so far without meeting rain, if nothing else ended them.
+NOT_KNOWN = Visibility(None, 0.0, math.inf)
 
-    A ray that ends at something else says nothing of what is behind it: it is censored there. So
-    this is the life table of survival analysis, of which rain is the death: in each bin the share
-    of the rays that meet rain, of those that come there, where one that ends in the bin otherwise
-    counts half.
+
+def visibility_of(other: NDArray[np.int64], rain: NDArray[np.int64]) -> Visibility:
+    """The range that 90 % of the rays would get through if it rained alike everywhere.
+
+    The rate at which rays meet rain is their number over the metres that all rays go, in the first
+    10 m. A ray that ends at something else counts as far as it goes. Drops at ranges that few rays
+    reach are thus few drops beside many metres, and a scan of few metres has a wide interval.
 
     Args:
         other: Numbers of rays that end at something else, by bin of range, int64 (B,).
         rain: Numbers of rays that end at rain, by bin of range, int64 (B,).
 
     Returns:
-        At the beginning of each bin, and at the end of the last one, float64 (B + 1,); 1 at the
-        sensor, falling.
+        The range; not known for fewer than 100 rays.
 
-    Source: Cutler and Ederer 1958, "Maximum utilization of the life table method in analyzing
-        survival"; with bins of no width it is the estimate of Kaplan and Meier 1958.
+    Sources: the law of Bouguer, Lambert and Beer, by which the share of rays that get through
+        falls exponentially; the rate of an exponential law from censored lives is deaths over time
+        at risk (Cox and Oakes 1984, "Analysis of Survival Data", 3.2).
     """
-    exposed = _coming(other + rain) - other / 2
-    met = np.divide(rain, exposed, out=np.zeros(len(rain)), where=rain > 0)
-    return np.concatenate([[1.0], np.cumprod(1 - met)])
+    ending = other + rain
+    if ending.sum() < FEWEST_RAYS:
+        return NOT_KNOWN
+    bins = int(LOOK / BIN)
+    coming = ending[::-1].cumsum()[::-1]
+    metres_gone = BIN * float((coming - ending / 2)[:bins].sum())
+    drops = int(rain[:bins].sum())
+    least, most = poisson_interval(drops)
+    near, metres, far = (
+        -math.log(SHARE_THROUGH) * metres_gone / count if count else math.inf
+        for count in (most, drops, least)
+    )
+    return Visibility(metres if metres <= CLEAR_AIR else None, min(near, CLEAR_AIR), far)
 
 
-def visibility_of(other: NDArray[np.int64], rain: NDArray[np.int64]) -> Visibility:
-    """The visibility that numbers of rays tell.
+def reach_of(ending: NDArray[np.int64], share: float) -> Visibility:
+    """The range within which a share of the rays end.
 
     Args:
-        other: Numbers of rays that end at something else, by bin of range, int64 (B,).
-        rain: Numbers of rays that end at rain, by bin of range, int64 (B,).
+        ending: Numbers of rays that end in each bin of range, int64 (B,); the last bin has no end.
+        share: Of the rays, such as 0.99.
+
+    Returns:
+        The range; not known for fewer than 100 rays, and at least 300 m beyond the bins.
+
+    Source: Conover 1999, "Practical Nonparametric Statistics", 3.2: the interval of a quantile lies
+        between the quantiles at its share plus and minus the spread of that share.
     """
-    coming = _coming(other + rain)
-    followed = min(int((coming >= FEWEST_RAYS).sum()), int(LOOK / BIN))
-    looked = followed * BIN
-    if followed == 0:
-        return Visibility(None, 0.0, 0.0, 1.0)
-    through = float(transmission(other, rain)[followed])
-    metres = _range_at(looked, through)
-    can_tell = min(CLEAR_AIR, _range_at(looked, 1 - MISSED_BY_CHANCE / int(coming[0])))
-    if metres > can_tell:
-        return Visibility(None, can_tell, looked, through)
-    return Visibility(metres, metres, looked, through)
+    rays = int(ending.sum())
+    if rays < FEWEST_RAYS:
+        return NOT_KNOWN
+    spread = ONE_IN_TWENTY * math.sqrt(share * (1 - share) / rays)
+    near, metres, far = (_within(ending, each) for each in (share - spread, share, share + spread))
+    return Visibility(metres if metres < math.inf else None, min(near, _last(ending)), far)
 
 
-def _range_at(looked: float, through: float) -> float:
-    """The visibility, metres, where a share of the rays gets through the metres looked at.
+def poisson_interval(count: int) -> tuple[float, float]:
+    """The means between which that of a Poisson count lies, with a chance of 90 %.
 
-    Source: the law of Bouguer, Lambert and Beer, by which the share falls exponentially.
+    Source: the approximation of Byar, in Breslow and Day 1987, "Statistical Methods in Cancer
+        Research" 2, 2.3.
     """
-    if through <= 0:
-        return 0.0
-    return looked * math.log(SHARE_THROUGH) / math.log(through) if through < 1 else math.inf
+
+    def end(number: int, quantile: float) -> float:
+        return number * max(1 - 1 / (9 * number) + quantile / (3 * math.sqrt(number)), 0.0) ** 3
+
+    return end(count, -ONE_IN_TWENTY) if count else 0.0, end(count + 1, ONE_IN_TWENTY)
 
 
-def _coming(ending: NDArray[np.int64]) -> NDArray[np.int64]:
-    """How many rays come to each bin, int64 (B,), from how many end in each."""
-    return ending[::-1].cumsum()[::-1]
+def _within(ending: NDArray[np.int64], share: float) -> float:
+    """Metres within which a share of the rays end; infinite beyond the bins and for all rays."""
+    ended = ending.cumsum()
+    wanted = share * int(ended[-1])
+    if share >= 1 or wanted > ended[-2]:
+        return math.inf
+    place = int(np.searchsorted(ended, wanted))
+    before = int(ended[place] - ending[place])
+    return BIN * (place + (wanted - before) / int(ending[place]))
+
+
+def _last(ending: NDArray[np.int64]) -> float:
+    """Where the last bin begins, metres."""
+    return BIN * (len(ending) - 1)
+
+
+def _text(metres: float) -> str:
+    return f"{metres:,.{1 if metres < 100 else 0}f}"

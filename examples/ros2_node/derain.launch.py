@@ -22,6 +22,7 @@ PARAMETERS = {
     "output": (str, "/ouster/points/clean"),
     "removed": (str, ""),
     "model": (str, ""),
+    "dry": (str, ""),
     "threads": (int, "0"),
     "organised": (bool, "false"),
 }

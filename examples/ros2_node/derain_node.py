@@ -11,6 +11,8 @@ Parameters:
 - ``input``, ``output``: topics of ``sensor_msgs/PointCloud2`` (``points``, ``points/clean``).
 - ``removed``: topic for the points that were taken out; empty, as it is by default, for none.
 - ``model``: an ONNX file of ``derain export``; empty for the model that comes with derain.
+- ``dry``: a dry scan of the same sensor in the same kind of place, as a file; with it the level
+  shows fog that returns nothing too. Empty, as it is by default, for none.
 - ``threads``: threads for each cloud; 0 takes every core.
 - ``queue``: how many clouds may wait while one is cleaned (1). Where clouds come faster than they
   are cleaned, older ones are let go of: the next to be cleaned is the newest that there is.
@@ -37,15 +39,18 @@ from derain.bags.cloud_scan import scan_of_cloud
 from derain.bags.point_cloud import PointCloud, PointField
 from derain.errors import InputError
 from derain.export.runtime import Derainer, Judgement
+from derain.files import read_scan
 from derain.views.oddities import MOST_RAIN
 from derain.weather.alarm import Alarm, Level
 from derain.weather.scan_weather import ScanWeather
+from derain.weather.visibility import Visibility
 
 DEFAULTS = {
     "input": "points",
     "output": "points/clean",
     "removed": "",
     "model": "",
+    "dry": "",
     "threads": 0,
     "queue": 1,
     "organised": False,
@@ -132,7 +137,7 @@ class Tally:
         """Counts a cloud, and tells the alarm of its weather."""
         weather = judgement.weather
         self.weather += weather
-        self.level = alarm.update(weather.visibility)
+        self.level = alarm.update(weather.visibility, weather.reach)
         self.clouds += 1
         self.points += len(judgement.rain)
         self.valid += int(judgement.scan.valid.sum())
@@ -160,6 +165,7 @@ class Tally:
             "points per cloud": f"{self.points / max(self.clouds, 1):.0f}",
             "share of rain": f"{self.share:.4f}",
             "visibility": str(self.weather.visibility),
+            "reach": str(self.weather.reach),
             "milliseconds per cloud": f"{1000 * self.seconds / max(self.clouds, 1):.1f}",
         }
 
@@ -212,6 +218,16 @@ def refuse(asked: dict[str, Any]) -> None:
         raise InputError("queue", f"{asked['queue']} clouds", "Give 1 or more.")
 
 
+def reach_of(dry: str) -> Visibility:
+    """The reach of a dry scan, a file.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    scan = read_scan(Path(dry))
+    return ScanWeather.of(scan, np.zeros(len(scan), bool)).reach
+
+
 class DerainNode:
     """Subscribes to clouds, publishes them without rain.
 
@@ -219,7 +235,7 @@ class DerainNode:
         node: A node of rclpy.
 
     Raises:
-        InputError: Parameters that no node can run with, or a model that there is not.
+        InputError: Parameters that no node can run with, or a model or dry scan that is not there.
     """
 
     def __init__(self, node: Any) -> None:
@@ -233,7 +249,10 @@ class DerainNode:
         }
         refuse(asked)
         self.organised: bool = asked["organised"]
-        self.remover = RainRemover(Derainer(asked["model"] or None, threads=asked["threads"]))
+        self.remover = RainRemover(
+            Derainer(asked["model"] or None, threads=asked["threads"]),
+            alarm=Alarm(dry=reach_of(asked["dry"]) if asked["dry"] else None),
+        )
         # A sensor's driver repeats no cloud that was lost, and asking it to would find no driver.
         newest = QoSProfile(depth=asked["queue"], reliability=ReliabilityPolicy.BEST_EFFORT)
         # Who listens may ask for either: a reliable publisher suits both.

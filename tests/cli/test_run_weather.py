@@ -1,4 +1,4 @@
-"""``derain run`` says how bad the weather is: scan by scan, as a table, with levels that hold."""
+"""``derain run`` measures the weather where asked: scan by scan, as a table, with an alarm."""
 
 import csv
 import json
@@ -47,6 +47,10 @@ def weather_of(folder: Path, out: Path) -> list[ScanWeather]:
     ]
 
 
+def rounded_range(metres: float | None) -> float | None:
+    return None if metres is None or metres == np.inf else round(metres, 2)
+
+
 def objects(text: str) -> list[dict[str, Any]]:
     return [json.loads(line)["weather"] for line in text.splitlines()]
 
@@ -71,26 +75,56 @@ def test_json_says_what_the_labels_that_are_written_say(
         assert item == {
             "rays": weather.rays,
             "met_rain": weather.met_rain,
-            "visibility_m": None if seen.metres is None else round(seen.metres, 2),
-            "visibility_over_m": None if seen.metres is not None else round(seen.at_least, 2),
-            "level": str(alarm.update(seen)),
+            "visibility_m": rounded_range(seen.metres),
+            "visibility_from_m": rounded_range(seen.at_least),
+            "visibility_to_m": rounded_range(seen.at_most),
+            "reach_95_m": rounded_range(weather.range_of(0.95).metres),
+            "reach_99_m": rounded_range(weather.reach.metres),
+            "reach_of_dry": None,
+            "level": str(alarm.level_of(seen)),
+            "alarm": str(alarm.update(seen)),
             "shares": [rounded(row) for row in weather.shares],
         }
-    assert [item["level"] for item in told] == [
+    assert [item["level"] for item in told] == [*["clear"] * 2, *["warning"] * 2, *["clear"] * 2]
+    assert [item["alarm"] for item in told] == [
         *("clear", "clear", "clear", "warning", "warning", "clear")
     ]
 
 
-def test_the_line_of_a_scan_says_visibility_and_level(
+def test_the_line_of_a_scan_has_visibility_level_and_alarm(
     run_derain, recording: Path, tmp_path: Path
 ) -> None:
-    outcome = run_derain("run", "dror", recording, "--out", tmp_path / "out", *LEVELS)
+    arguments = ("--out", tmp_path / "out", "--weather", tmp_path / "w.csv", *LEVELS)
+    outcome = run_derain("run", "dror", recording, *arguments)
     lines = outcome.out.splitlines()[:6]
     told = [f"visibility {w.visibility}" for w in weather_of(recording, tmp_path / "out")]
     for line, visibility in zip(lines, told, strict=True):
-        assert f", {visibility} (" in line
-    assert "(warning)" in lines[3]
+        assert f", {visibility}, reach 15 m (" in line
     assert "(clear)" in lines[0]
+    assert "(warning, alarm clear)" in lines[2]
+    assert "(warning)" in lines[3]
+
+
+@pytest.mark.parametrize("scans", [1, 6, 40])
+def test_without_an_option_that_asks_a_few_scans_are_enough_for_the_last_line(
+    run_derain, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scans: int
+) -> None:
+    for path in sorted(recording.iterdir())[scans:]:
+        path.unlink()
+    for number in range(6, scans):
+        wall(drops=0)[:200].tofile(recording / f"{number:06d}.bin")
+    computed: list[int] = []
+    usual = ScanWeather.of
+
+    def counting(points: Any, rain: NDArray[np.bool_]) -> ScanWeather:
+        computed.append(len(points))
+        return usual(points, rain)
+
+    monkeypatch.setattr(ScanWeather, "of", counting)
+    lines = run_derain("run", "dror", recording, "--out", tmp_path / "out").out.splitlines()
+    assert len(computed) == (0 if scans == 1 else 5)
+    assert not any("visibility" in line for line in lines[:scans])
+    assert ("visibility" in lines[-1] and "(of 5 scans)" in lines[-1]) == (scans > 1)
 
 
 @pytest.mark.parametrize(
@@ -110,7 +144,10 @@ def test_bad_weather_can_be_told_by_the_exit_code_after_all_scans(
     assert ("the weather was" in outcome.err) == bool(told)
     pooled = sum(weather_of(recording, out), ScanWeather.none())
     last = outcome.out.splitlines()[-1]
-    assert f", visibility {pooled.visibility} (4 clear, 2 warning); " in last
+    assert (
+        f", visibility {pooled.visibility}, reach 15 m (4 clear, 2 warning, by rain alone); "
+        in last
+    )
 
 
 def test_a_table_has_a_line_a_scan_and_nothing_where_nothing_is_known(
@@ -124,7 +161,7 @@ def test_a_table_has_a_line_a_scan_and_nothing_where_nothing_is_known(
     assert [row["scan"] for row in rows] == [str(path) for path in sorted(recording.iterdir())]
     weathers, told = weather_of(recording, out), objects(outcome.out)
     for row, weather, item in zip(rows, weathers, told, strict=True):
-        for name in ("rays", "met_rain", "visibility_m", "visibility_over_m", "level"):
+        for name in item.keys() - {"shares"}:
             assert row[name] == ("" if item[name] is None else str(item[name]))
         by_sector = [row[f"share_at_{30 * sector}_deg"] for sector in range(12)]
         by_range = [row[f"share_from_{band}_m"] for band in (0, 5, 10, 20, 40, 80)]
@@ -145,6 +182,26 @@ def test_each_recording_begins_anew(run_derain, recording: Path, tmp_path: Path)
     arguments = ("--out", tmp_path / "out", "--json", *LEVELS)
     outcome = run_derain("run", "dror", rainy, dry, *arguments)
     assert [item["level"] for item in objects(outcome.out)] == ["warning", "clear"]
+    assert [item["alarm"] for item in objects(outcome.out)] == [None, None]
+
+
+def test_scans_that_are_no_recording_have_levels_and_no_alarm(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    for number, name in enumerate(("street", "bridge", "000900", "field", "park", "000100")):
+        (recording / f"{number:06d}.bin").rename(recording / f"{name}.bin")
+    out = tmp_path / "out"
+    arguments = ("run", "dror", recording, "--out", out, "--json", *LEVELS)
+    outcome = run_derain(*arguments, "--fail-at", "warning")
+    told = {
+        Path(json.loads(line)["scan"]).stem: json.loads(line)["weather"]
+        for line in outcome.out.splitlines()
+    }
+    assert [told[name]["level"] for name in ("street", "000900", "field", "park")] == [
+        *("clear", "warning", "warning", "clear")
+    ]
+    assert {item["alarm"] for item in told.values()} == {None}
+    assert outcome.code == 3  # by the scans alone
 
 
 def test_nothing_is_left_of_the_table_where_the_run_fails(
@@ -224,10 +281,58 @@ def test_an_empty_scan_tells_nothing(run_derain, tmp_path: Path) -> None:
     (tmp_path / "empty.bin").write_bytes(b"")
     outcome = run_derain("run", "dror", tmp_path / "empty.bin", "--out", tmp_path / "o", "--json")
     (told,) = objects(outcome.out)
-    assert (told["rays"], told["visibility_m"], told["visibility_over_m"]) == (0, None, None)
-    assert told["shares"] == [[None] * 6] * 12
-    text = run_derain("run", "dror", tmp_path / "empty.bin", "--out", tmp_path / "o").out
-    assert "visibility not known (clear)" in text
+    assert (told.pop("rays"), told.pop("met_rain")) == (0, 0)
+    assert told.pop("shares") == [[None] * 6] * 12
+    assert set(told.values()) == {None}
+    options = ("--out", tmp_path / "o", "--fail-at", "warning")
+    text = run_derain("run", "dror", tmp_path / "empty.bin", *options).out
+    assert "visibility not known (level open)" in text
+
+
+@pytest.fixture
+def fog(tmp_path: Path) -> tuple[Path, Path]:
+    """A dry scan of a long street, and six in fog: nothing returns from beyond 20 m."""
+    generator = np.random.default_rng(0)
+    azimuth = generator.uniform(-np.pi, np.pi, 12_000)
+    reach = np.minimum(6 / np.abs(np.sin(azimuth)), 80) * generator.uniform(0.98, 1, 12_000)
+    direction = np.stack([np.cos(azimuth), np.sin(azimuth), generator.normal(0, 0.05, 12_000)])
+    dry = np.column_stack([reach[:, None] * direction.T, np.full(12_000, 9)]).astype(np.float32)
+    reference, folder = tmp_path / "dry.bin", tmp_path / "fog"
+    folder.mkdir()
+    dry.tofile(reference)
+    for number in range(6):
+        dry[reach < 20].tofile(folder / f"{number:06d}.bin")
+    return reference, folder
+
+
+def test_range_that_is_lost_beside_a_dry_reference_is_a_level(
+    run_derain, fog: tuple[Path, Path], tmp_path: Path
+) -> None:
+    reference, folder = fog
+    arguments = ("run", "ssr", folder, "--out", tmp_path / "out", "--json", "--fail-at", "warning")
+    blind, seeing = run_derain(*arguments), run_derain(*arguments, "--dry", reference)
+    assert (blind.code, seeing.code) == (0, 3)
+    for outcome, level in ((blind, "clear"), (seeing, "warning")):
+        for item in objects(outcome.out):
+            assert (item["level"], item["alarm"]) == (level, level)
+            assert item["reach_95_m"] < item["reach_99_m"] < 21
+    assert all(0.2 < item["reach_of_dry"] < 0.3 for item in objects(seeing.out))
+    assert "(dry 7" in seeing.err
+    assert "(6 clear, by rain alone)" in blind.err
+    assert "(6 warning, by rain and range)" in seeing.err
+
+
+def test_a_reference_that_can_show_no_level_is_refused(
+    run_derain, recording: Path, tmp_path: Path
+) -> None:
+    small = recording / "000000.bin"  # a wall at 15 m
+    arguments = ("run", "dror", recording, "--out", tmp_path / "out", "--dry")
+    outcome = run_derain(*arguments, small)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert f"{small}: its reach is 15" in outcome.err
+    outcome = run_derain(*arguments, small, "--error", "10", "14")
+    assert outcome.code == 0
+    assert "for the error alone" in outcome.err
 
 
 @pytest.mark.parametrize(

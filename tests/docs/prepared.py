@@ -55,7 +55,8 @@ def prepare(folder: Path, simulated: Path) -> None:
         _put(scan, folder / "labelled", rain.astype(np.int64))
         if number < 3:
             _put(scan, folder / "scans", snow)
-    shutil.copy(scans[0], folder / "scan.bin")
+    for name in ("scan.bin", "dry.bin"):
+        shutil.copy(scans[0], folder / name)
     shutil.copy(scans[0], folder / "my_data/sequences/00/lidar")
     shutil.copy(
         folder / "labelled/000000.label", folder / "my_data/sequences/00/classes/000000.label"

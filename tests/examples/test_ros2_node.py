@@ -182,6 +182,7 @@ def test_once_a_second_it_says_what_share_was_rain(ros2_node: ModuleType) -> Non
     assert (values["clouds"], values["points per cloud"]) == ("1", "600")
     assert float(values["share of rain"]) == pytest.approx(share, abs=1e-4)
     assert values["visibility"] == str(visibility)
+    assert values["reach"] == str(judgement.weather.reach)
     assert (silent.level, silent.message) == (DiagnosticStatus.WARN, "no clouds")
 
 
@@ -200,6 +201,33 @@ def test_its_level_is_that_of_the_weather(
     node = Node(model=str(KEPT), threads=1)
     ros2_node.DerainNode(node)
     node.subscriptions["points"][1](message_of(points))
+    node.timers[0][1]()
+    (said,) = node.publishers["/diagnostics"][1]
+    assert said.status[0].level == getattr(DiagnosticStatus, level)
+
+
+@pytest.mark.usefixtures("ros")
+@pytest.mark.parametrize(("compared", "level"), [(False, "OK"), (True, "WARN")])
+def test_beside_a_dry_scan_its_level_is_that_of_range_that_is_lost(
+    ros2_node: ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    compared: bool,
+    level: str,
+) -> None:
+    usual, no_rain = Derainer.judge, np.zeros(800, bool)
+    monkeypatch.setattr(
+        ros2_node.Derainer, "judge", lambda self, scan: replace(usual(self, scan), rain=no_rain)
+    )
+    points = scene(4000)
+    points[:, :3] *= np.linspace(10, 80, 4000)[:, None] / np.linalg.norm(
+        points[:, :3], axis=1, keepdims=True
+    )
+    points.tofile(tmp_path / "dry.bin")
+    dry = str(tmp_path / "dry.bin") if compared else ""
+    node = Node(model=str(KEPT), threads=1, dry=dry)
+    ros2_node.DerainNode(node)
+    node.subscriptions["points"][1](message_of(points[:800]))  # up to 24 m
     node.timers[0][1]()
     (said,) = node.publishers["/diagnostics"][1]
     assert said.status[0].level == getattr(DiagnosticStatus, level)

@@ -10,7 +10,7 @@ from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame, MemoryFrame
-from derain.sources.recordings import irregularities, recordings_of
+from derain.sources.recordings import irregularities, recordings_of, unbroken_recordings
 from derain.views.window import Window
 
 SEVERAL = Window(1, 1)
@@ -48,6 +48,37 @@ def test_what_does_not_suit_is_told(seconds: Sequence[float | None], told: list[
     assert len(sentences) == len(told)
     for sentence, part in zip(sentences, told, strict=True):
         assert part in sentence
+
+
+@pytest.mark.parametrize(
+    ("seconds", "lengths"),
+    [
+        ((0.0, 0.1, 0.2), [3]),
+        ((0.0, 0.1, 5.0, 5.1, 5.1, 9.0), [2, 2]),
+        ((None, None, None), []),
+        ((0.0,), []),
+        ((), []),
+    ],
+)
+def test_times_break_a_recording(seconds: Sequence[float | None], lengths: list[int]) -> None:
+    assert [len(part) for part in unbroken_recordings(frames(*seconds))] == lengths
+
+
+@pytest.mark.parametrize(
+    ("names", "lengths"),
+    [
+        (("000", "002", "004", "014", "100", "102"), [4, 2]),
+        (("1700000000000000000", "1700000000100000000", "1700000000200000000"), [3]),
+        (("0", "1", "street"), []),
+        (("0", "1", "2.5"), []),
+    ],
+)
+def test_names_that_are_numbers_break_a_recording_where_no_times_do(
+    tmp_path: Path, names: Sequence[str], lengths: list[int]
+) -> None:
+    for name in names:
+        scene(10).tofile(tmp_path / f"{name}.bin")
+    assert [len(part) for part in unbroken_recordings(named_frames([tmp_path]))] == lengths
 
 
 def test_a_method_of_one_scan_asks_for_nothing() -> None:

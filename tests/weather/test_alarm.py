@@ -9,17 +9,15 @@ from hypothesis import strategies as st
 
 from derain.errors import InputError
 from derain.weather.alarm import Alarm, Level, Threshold
-from derain.weather.visibility import Visibility
-
-UNKNOWN = Visibility(None, 0.0, 0.0, 1.0)
+from derain.weather.visibility import NOT_KNOWN, Visibility
 
 
 def seen(metres: float) -> Visibility:
-    return Visibility(metres, metres, 10.0, 0.95)
+    return Visibility(metres, metres, metres)
 
 
 def over(metres: float) -> Visibility:
-    return Visibility(None, metres, 10.0, 1.0)
+    return Visibility(None, metres, math.inf)
 
 
 def levels(alarm: Alarm, *visibilities: Visibility) -> list[Level]:
@@ -65,7 +63,7 @@ def test_scans_of_which_nothing_is_known_change_nothing(
     for each, gap in zip(metres, gaps, strict=False):
         if gap:
             before = alarm.level
-            assert alarm.update(UNKNOWN) == before
+            assert alarm.update(NOT_KNOWN) == before
         told.append(alarm.update(seen(each)))
     assert told == without
 
@@ -95,7 +93,7 @@ def test_between_the_thresholds_it_stays_as_it_is() -> None:
 
 def test_the_first_scan_decides_alone() -> None:
     assert Alarm().level == Level.CLEAR
-    assert levels(Alarm(hold=5), UNKNOWN, seen(5), seen(5)) == [0, 2, 2]
+    assert levels(Alarm(hold=5), NOT_KNOWN, seen(5), seen(5)) == [0, 2, 2]
     assert levels(Alarm(hold=5), seen(22), seen(5)) == [1, 1]
     assert levels(Alarm(hold=5), seen(500), seen(5)) == [0, 0]
 
@@ -107,6 +105,56 @@ def test_farther_than_a_scan_can_tell_is_as_far_as_it_tells() -> None:
     assert alarm.update(over(36)) == Level.WARNING
     assert alarm.update(over(40)) == Level.CLEAR
     assert alarm.update(over(20)) == Level.CLEAR
+
+
+def test_an_alarm_rises_only_where_the_whole_interval_lies_below() -> None:
+    alarm = Alarm(hold=1)
+    few_rays = Visibility(13.6, 9.0, 41.0)
+    assert alarm.update(few_rays) == Level.CLEAR
+    assert alarm.update(Visibility(13.6, 9.0, 29.0)) == Level.WARNING
+    assert alarm.update(Visibility(13.6, 9.0, 14.9)) == Level.ERROR
+    assert alarm.update(few_rays) == Level.ERROR  # and ends only where it lies above
+
+
+@pytest.mark.parametrize(
+    ("interval", "level"),
+    [
+        ((9.0, 14.0), Level.ERROR),
+        ((9.0, 29.0), Level.WARNING),
+        ((9.0, 31.0), None),
+        ((30.0, 31.0), Level.CLEAR),
+        ((30.0, math.inf), Level.CLEAR),
+        ((0.0, math.inf), None),
+    ],
+)
+def test_the_level_of_one_scan_is_the_worst_that_is_certain(
+    interval: tuple[float, float], level: Level | None
+) -> None:
+    alarm = Alarm()
+    levels(alarm, *[seen(5.0)] * 9)
+    assert alarm.level_of(Visibility(None, *interval)) == level
+
+
+@pytest.mark.parametrize(
+    ("dry", "reach", "level"),
+    [
+        (None, 22.0, Level.CLEAR),  # as in a small room
+        (80.0, 70.0, Level.CLEAR),
+        (80.0, 22.0, Level.WARNING),
+        (80.0, 12.0, Level.ERROR),
+        (25.0, 22.0, Level.CLEAR),  # the place is as small when dry
+        (25.0, 12.0, Level.ERROR),
+        (18.0, 12.0, Level.CLEAR),
+    ],
+)
+def test_range_that_a_dry_scan_reaches_and_this_one_does_not_counts_like_rain(
+    dry: float | None, reach: float, level: Level
+) -> None:
+    reference = None if dry is None else seen(dry)
+    for visibility in (over(1000), seen(100)):
+        assert Alarm(dry=reference).update(visibility, seen(reach)) == level
+        assert Alarm(dry=reference).level_of(visibility, seen(reach)) == level
+    assert Alarm(dry=reference).level_of(seen(5), seen(reach)) == Level.ERROR
 
 
 def test_levels_are_named() -> None:

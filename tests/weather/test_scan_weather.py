@@ -13,8 +13,9 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.recorded import rain_on_scan
 from derain.simulation.sensor_file import load_sensor
-from derain.weather.rays import RAY_SECTORS
-from derain.weather.scan_weather import RANGE_BANDS, ScanWeather
+from derain.weather.rays import BIN, RAY_SECTORS
+from derain.weather.scan_weather import RANGE_BANDS, ScanWeather, dry_reach
+from derain.weather.visibility import NOT_KNOWN
 
 RATES = (0.0, 5.0, 20.0, 80.0)
 
@@ -122,6 +123,29 @@ def test_scans_add_up() -> None:
     assert pooled.visibility_in(*range(RAY_SECTORS)) == pooled.visibility
 
 
+def test_reach_is_that_of_all_rays_and_does_not_depend_on_what_is_called_rain() -> None:
+    scan = street()
+    drops = scan.range < np.quantile(scan.range, 0.3)
+    for rain in (np.zeros(len(scan), bool), drops):
+        weather = ScanWeather.of(scan, rain)
+        assert weather.reach.metres == pytest.approx(np.quantile(scan.range, 0.99), abs=BIN)
+        assert weather.range_of(0.95).metres == pytest.approx(
+            np.quantile(scan.range, 0.95), abs=BIN
+        )
+
+
+def test_the_dry_reach_is_what_nineteen_scans_of_twenty_reach() -> None:
+    def reaching(metres: int) -> ScanWeather:
+        ends = np.zeros_like(ScanWeather.none().ends)
+        ends[0, 0, int(metres / BIN)] = 10_000
+        return ScanWeather(ends)
+
+    scans = [reaching(metres) for metres in (10, *range(50, 69))]
+    dry = dry_reach([*scans, ScanWeather.none()])
+    assert dry.metres == pytest.approx(50, abs=BIN)
+    assert dry_reach([ScanWeather.none()]) == NOT_KNOWN
+
+
 def test_every_hard_case_has_a_defined_weather() -> None:
     for name, scan in hard_cases():
         for rain in (np.zeros(len(scan), bool), np.ones(len(scan), bool)):
@@ -131,6 +155,7 @@ def test_every_hard_case_has_a_defined_weather() -> None:
             assert weather.rays == 0 or weather.met_rain == rain.any() * weather.rays, name
             assert weather.visibility.at_least >= 0, name
             assert weather.visibility.known or weather.visibility.at_least == 0, name
+            assert weather.reach.known or weather.rays < 100, name
 
 
 @pytest.mark.parametrize("rain", [np.zeros(9, bool), np.zeros((10, 1), bool), np.zeros(10, int)])
