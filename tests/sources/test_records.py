@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from derain.errors import InputError
 from derain.sources.records import Records
-from derain.sources.trajectory import read_trajectory
+from derain.sources.trajectory import Trajectory, read_trajectory
 
 
 def motion(degrees: float, x: float, y: float, z: float) -> np.ndarray:
@@ -106,6 +106,24 @@ def test_poses_by_time_go_to_the_scans_by_their_times(sequence: Path) -> None:
 
 
 @pytest.mark.parametrize("times", [None, "1700000000\n1700000001\n1700000002\n"])
+def test_all_scans_are_compared_with_the_clock_of_the_poses_once(
+    sequence: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (sequence / "times.txt").write_text("0\n1\n2\n")
+    (sequence / "poses.txt").write_text("0 0 0 0 0 0 0 1\n2 4 0 0 0 0 0 1\n")
+    compared, is_by_time = [], Trajectory.is_by_time
+
+    def counted(trajectory: Trajectory, times: np.ndarray) -> bool:
+        compared.append(len(times))
+        return is_by_time(trajectory, times)
+
+    monkeypatch.setattr(Trajectory, "is_by_time", counted)
+    found = records(sequence)
+    for number in (0, 2, 0):
+        assert found.pose_of(scan(sequence, number)) is not None
+    assert compared == [3]
+
+
 def test_poses_by_a_time_that_the_scans_do_not_know_go_line_by_line(
     sequence: Path, times: str | None
 ) -> None:
