@@ -105,7 +105,6 @@ def test_poses_by_time_go_to_the_scans_by_their_times(sequence: Path) -> None:
     np.testing.assert_allclose(ahead, (1, 2, 3))
 
 
-@pytest.mark.parametrize("times", [None, "1700000000\n1700000001\n1700000002\n"])
 def test_all_scans_are_compared_with_the_clock_of_the_poses_once(
     sequence: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -124,6 +123,7 @@ def test_all_scans_are_compared_with_the_clock_of_the_poses_once(
     assert compared == [3]
 
 
+@pytest.mark.parametrize("times", [None, "1700000000\n1700000001\n1700000002\n"])
 def test_poses_by_a_time_that_the_scans_do_not_know_go_line_by_line(
     sequence: Path, times: str | None
 ) -> None:
