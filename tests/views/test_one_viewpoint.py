@@ -60,6 +60,10 @@ def kinds(points: Points) -> list[str]:
     return [oddity.kind for oddity in unlike_one_viewpoint(scan_of(points))]
 
 
+SKYWARD = rays(64, 1024) @ [[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]]
+SKYWARD = SKYWARD[SKYWARD[:, 2] > 0]
+
+
 @pytest.fixture(scope="module")
 def spinning() -> Points:
     return street_from(0.0)
@@ -111,13 +115,24 @@ def test_nor_are_two_returns_of_every_ray_in_dense_snow(spinning: Points) -> Non
         (100, ["points farther off than sensors see"]),
         (0.001, ["points nearer than sensors see"]),
         (1 / 200, ["points nearer than sensors see"]),
-        (3.28084, []),  # feet are a longer street
+        (0.01, ["ground nearer than below any vehicle's sensor"]),
+        (0.1, ["ground nearer than below any vehicle's sensor"]),
+        (3.28084, ["ground farther than below any vehicle's sensor"]),
     ],
 )
-def test_units_are_told_by_how_far_sensors_see(
+def test_units_show_in_how_far_points_and_the_ground_are(
     spinning: Points, factor: float, found: list[str]
 ) -> None:
     assert kinds(spinning * factor) == found
+
+
+@pytest.mark.parametrize(
+    ("directions", "height"), [(rays(64, 1024), 0.4), (rays(64, 1024), 4.0), (SKYWARD, 7.0)]
+)
+def test_a_sensor_on_a_robot_or_a_lorry_and_one_that_sees_no_ground_are_not_odd(
+    directions: Points, height: float
+) -> None:
+    assert kinds(street(directions) * height / HEIGHT) == []
 
 
 @pytest.mark.parametrize(
@@ -218,6 +233,7 @@ def test_every_oddity_says_what_can_be_done(spinning: Points) -> None:
         "divide millimetres": spinning * 1000,
         "neither in kilometres": spinning / 1000,
         "subtract where the sensor was": moved(spinning, 4e5, 5e5),
+        "multiply feet": spinning * 3.28,
         "clean scans one by one": drive(10, 2.0),
         "made for sensors of many beams": street(rays(1, 1000)),
         "is the sensor covered": spinning[:9],
@@ -258,18 +274,36 @@ def test_no_real_scan_is_odd(real: dict[str, Scan]) -> None:
         (lambda xyz: xyz * 1000, "points farther off than sensors see"),
         (lambda xyz: xyz * 100, "points farther off than sensors see"),
         (lambda xyz: xyz / 1000, "points nearer than sensors see"),
+        (lambda xyz: xyz / 100, "nearer"),
+        (lambda xyz: xyz / 10, "nearer"),
         (lambda xyz: xyz + np.float32([4e5, 5e5, 200]), "coordinates of a map"),
         (lambda xyz: xyz * np.float32([1, 1, 1e-4]), "a single beam"),
         (lambda xyz: xyz[:20], "almost empty"),
     ],
-    ids=["millimetres", "centimetres", "kilometres", "map", "plane", "few"],
+    ids=[
+        "millimetres",
+        "centimetres",
+        "kilometres",
+        "hectometres",
+        "decametres",
+        "map",
+        "plane",
+        "few",
+    ],
 )
 def test_every_real_scan_is_once_it_is_changed(
     real: dict[str, Scan], change: Callable[[NDArray[np.float32]], NDArray[np.float32]], kind: str
 ) -> None:
     for name, scan in real.items():
         changed = Scan(change(scan.xyz[scan.valid]))
-        assert [odd.kind for odd in unlike_one_viewpoint(changed)] == [kind], name
+        (oddity,) = unlike_one_viewpoint(changed)
+        assert kind in oddity.kind, name
+
+
+def test_real_scans_in_feet_are_odd_unless_their_sensor_is_low(real: dict[str, Scan]) -> None:
+    changed = {name: Scan(scan.xyz[scan.valid] * np.float32(3.28)) for name, scan in real.items()}
+    missed = {name for name, scan in changed.items() if not [*unlike_one_viewpoint(scan)]}
+    assert missed == {"hesai_at128_front.pcd", "velodyne_vlp16_dual.pcd"}
 
 
 def test_real_scans_of_a_drive_are_odd_once_merged(real: dict[str, Scan]) -> None:
