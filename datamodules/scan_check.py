@@ -6,6 +6,7 @@ from typing import Any
 import lightning
 from lightning.pytorch.trainer.states import TrainerFn
 
+from derain.cards.rain_found import warn_without_rain
 from derain.datamodules.base import Part, ScanDataModule
 from derain.sources.spread import evenly_spaced
 from derain.system.notices import Notices
@@ -22,6 +23,7 @@ class ScanCheck(lightning.Callback):
 
     def __init__(self, scans: int = 10) -> None:
         self.scans = scans
+        self._validated = False
 
     def on_fit_start(self, trainer: lightning.Trainer, model: Any) -> None:
         """Looks at training scans."""
@@ -31,6 +33,16 @@ class ScanCheck(lightning.Callback):
         """Looks at validation scans, where nothing is trained."""
         if trainer.state.fn == TrainerFn.VALIDATING:
             self._look(trainer, model, "validation")
+
+    def on_validation_end(self, trainer: lightning.Trainer, model: Any) -> None:
+        """Warns once where the scans had labels and no rain."""
+        if not (trainer.sanity_checking or self._validated):
+            self._validated = True
+            _warn_without_rain(trainer, model)
+
+    def on_test_end(self, trainer: lightning.Trainer, model: Any) -> None:
+        """Warns where the scans had no rain."""
+        _warn_without_rain(trainer, model)
 
     def on_test_start(self, trainer: lightning.Trainer, model: Any) -> None:
         """Looks at test scans."""
@@ -51,6 +63,13 @@ class ScanCheck(lightning.Callback):
             found = model.spec.oddities(data.read(frame))
             notices.tell(frame.name, [replace(o, detail=_here(o.detail)) for o in found])
         notices.tell_how_many_more()
+
+
+def _warn_without_rain(trainer: lightning.Trainer, model: Any) -> None:
+    # Every process counts, for the counts of all are gathered.
+    labelled, counts = bool(model.metrics.per_scan()), model.metrics.pooled()
+    if trainer.is_global_zero and labelled:
+        warn_without_rain(bool(counts.true_positive + counts.false_negative), model.card)
 
 
 def _here(detail: str) -> str:

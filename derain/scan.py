@@ -4,7 +4,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol, runtime_checkable
+from pathlib import Path
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ FEWEST_ALIKE = 100
 
 # SemanticKITTI-style range images mark a cell without a return by -1 in every column.
 SENTINEL = -1.0
+
+Named = TypeVar("Named")
 
 
 @runtime_checkable
@@ -178,6 +181,9 @@ class Scan:
             float32 (N,), in the column's own unit; NaN where a column of ``fields`` holds nothing
             finite or what no sensor measures. None where the scan has no such channel, or an
             intensity that was not measured.
+
+        Raises:
+            InputError: Several columns could be meant: see :func:`named`.
         """
         match name:
             case "x" | "y" | "z":
@@ -188,8 +194,7 @@ class Scan:
                 return self.measured_intensity
             case "radar" if self.radar is not None:
                 return to_float32(self.radar)
-        columns = {title.lower(): column for title, column in self.fields.items()}
-        column = columns.get(name.lower())
+        column = named(self.fields, name, self.name)
         if column is None or column.ndim > 1 or column.dtype.kind not in "biuf":
             return None
         values = to_float32(column)
@@ -244,6 +249,38 @@ class Scan:
         """Whether any intensity is a number that a sensor can measure."""
         assert self.intensity is not None
         return bool((np.abs(self.intensity) <= LARGEST_VALUE).any())
+
+
+def named(columns: Mapping[str, Named], name: str, subject: str | Path) -> Named | None:
+    """The column of a name: the one spelt exactly so, else the one that differs in case alone.
+
+    Example:
+        >>> named({"X": 1, "x": 2, "Ring": 3}, "x", "scan.csv")
+        2
+        >>> named({"X": 1, "x": 2, "Ring": 3}, "ring", "scan.csv")
+        3
+
+    Args:
+        columns: Columns by name.
+        name: The name.
+        subject: What messages call the file.
+
+    Returns:
+        None where there is no such column.
+
+    Raises:
+        InputError: Several columns differ from the name in case alone.
+    """
+    if name in columns:
+        return columns[name]
+    alike = [title for title in columns if title.lower() == name.lower()]
+    if len(alike) > 1:
+        raise InputError(
+            subject,
+            f"the columns {' and '.join(alike)} differ in case alone, and none is called {name}",
+            f"Rename the one that is meant to {name}.",
+        )
+    return columns[alike[0]] if alike else None
 
 
 def to_float32(array: NDArray[Any]) -> NDArray[np.float32]:

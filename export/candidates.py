@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
+from derain.cards.rain_found import require_rain
 from derain.errors import InputError
 from derain.evaluation.counts import Counts
 from derain.models.base import DerainingModule
@@ -63,12 +64,13 @@ def candidates_of_findings(
         inside: Share of the rain it finds that is to be within the bounds.
 
     Raises:
-        InputError: Scans in which it finds no rain, or none that bounds would tell from the rest;
-            a model that sees several scans at a time, or takes no candidates.
+        InputError: Scans without rain, or in which it finds none, or none that bounds would tell
+            from the rest; a model that sees several scans at a time, or takes no candidates.
     """
     _refuse_unable(model)
     model = model.eval().cpu()
     judged = [_judged(model, scan, card) for scan in scans]
+    require_rain(any(rain.any() for _, _, rain in judged), card, "--candidates")
     candidates = fit_candidates(
         ((scan, called & rain) for scan, called, rain in judged), model.channels, inside
     )

@@ -1,15 +1,16 @@
 """What derainers that learn from labels share: their loss."""
 
+import sys
 from collections.abc import Sequence
 
 import torch
 from torch import Tensor
 
 from derain.cards.card import DataCard
-from derain.errors import InputError
+from derain.cards.rain_found import require_rain
 from derain.learning.batch import Batch
 from derain.learning.losses import SegmentationLoss, class_weights, segmentation_loss
-from derain.learning.task import Task
+from derain.learning.task import Task, TrainingData
 from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.views.candidate_fit import fit_candidates
@@ -35,13 +36,19 @@ class SupervisedModule(DerainingModule):
         """Agrees with the data.
 
         Raises:
-            InputError: Data in which nothing counts as rain, to be trained on.
+            InputError: Data without rain, to be trained on.
         """
         super().setup(stage)
-        if stage == "fit" and not self.card.rain:
-            raise InputError(
-                self.card.name, "has no rain that could be learnt", "Train on data that have."
-            )
+        if stage == "fit":
+            require_rain(self._sees_rain(), self.card, "the training scans")
+
+    def _sees_rain(self) -> bool:
+        """Whether a training scan has rain; those of plain loaders are not read."""
+        data = self.trainer.datamodule  # type: ignore[attr-defined]
+        if not (self.card.rain and isinstance(data, TrainingData)):
+            return bool(self.card.rain)
+        scans = data.training_scans(sys.maxsize, ())  # read one by one, to the first with rain
+        return any(self.card.rain_of(scan).any() for scan in scans)
 
     def take(self, task: Task) -> None:
         """Takes over what was agreed with the data, and weighs the classes by their shares there.

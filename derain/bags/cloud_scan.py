@@ -4,7 +4,7 @@ from pathlib import Path
 
 from derain.bags.point_cloud import PointCloud
 from derain.files.columns import scan_of
-from derain.scan import Scan
+from derain.scan import Scan, named
 
 AXES = ("x", "y", "z")
 
@@ -22,13 +22,14 @@ def scan_of_cloud(name: Path, cloud: PointCloud) -> Scan:
         The scan, every field of the cloud as a column.
 
     Raises:
-        InputError: No x, y and z.
+        InputError: No x, y and z, or several columns that could be one of them.
         ValueError: Coordinates that are not floating-point numbers of one value each, and so in no
             known unit.
     """
     columns = cloud.columns()
-    for axis, column in columns.items():
-        if axis.lower() in AXES and (column.ndim > 1 or column.dtype.kind != "f"):
+    for axis in AXES:
+        column = named(columns, axis, name)
+        if column is not None and (column.ndim > 1 or column.dtype.kind != "f"):
             count = f" of {column.shape[1]} values" if column.ndim > 1 else ""
             raise ValueError(
                 f"{axis} is {column.dtype}{count}, of which nobody says how many make a metre"

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.files.content import check_columns
+from derain.scan import named
 
 # PointField's datatypes, in NumPy's spelling.
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -165,8 +166,9 @@ class PointCloud:
         if not rows.any():
             return self
         data = bytearray(self.data)
-        for field in self.fields:
-            if field.name.lower() in ("x", "y", "z"):
+        by_name = {field.name: field for field in self.fields}
+        for axis in ("x", "y", "z"):
+            if (field := named(by_name, axis, "the cloud")) is not None:
                 if field.datatype not in (FLOAT32_DATATYPE, 8):
                     raise ValueError(f"field '{field.name}' cannot hold what is no number")
                 values: NDArray[Any] = np.ndarray(

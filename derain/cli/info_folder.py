@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from tqdm import tqdm
 
@@ -23,6 +23,10 @@ from derain.evaluation.text_tables import plain_table
 from derain.simulation.manifest import manifest_of
 from derain.sources.folders import find_layout
 
+# What a data card is chosen by. Names of folders that many data sets have make it a guess.
+CardRestsOn = Literal["--card", "manifest", "names of folders"]
+FOLDER_NAMES: CardRestsOn = "names of folders"
+
 
 @dataclass(frozen=True)
 class FolderFacts:
@@ -31,17 +35,22 @@ class FolderFacts:
     Attributes:
         folder: The folder.
         layout: What its folders are called; None where scans lie directly in it.
-        card: Name of the data card that names the classes; None where none does.
-        classes: Names of the classes, by id.
+        card: The data card that names the classes; None where none does.
+        card_rests_on: What the card was chosen by.
         by_rain_rate: What was counted, by rain rate in mm/h in ascending order; None last, for
             where it is not known.
     """
 
     folder: Path
     layout: Layout | None
-    card: str | None
-    classes: Mapping[int, str]
+    card: DataCard | None
+    card_rests_on: CardRestsOn
     by_rain_rate: Mapping[float | None, Contents]
+
+    @property
+    def classes(self) -> Mapping[int, str]:
+        """Names of the classes, by id; none without a data card."""
+        return {} if self.card is None else self.card.classes
 
     @property
     def folders(self) -> list[str] | None:
@@ -61,7 +70,8 @@ class FolderFacts:
         return {
             "folder": str(self.folder),
             "layout": self.folders,
-            "card": self.card,
+            "card": None if self.card is None else self.card.name,
+            "card_rests_on": None if self.card is None else self.card_rests_on,
             **self.total.as_dict(self.classes),
             "by_rain_rate": {
                 "unknown" if rate is None else f"{rate:g}": contents.as_dict(self.classes)
@@ -86,7 +96,20 @@ class FolderFacts:
     @property
     def _explained(self) -> str:
         layout = "a folder of scans" if self.folders is None else " and ".join(self.folders)
-        return f"{layout}; classes: {self.card or 'no data card'}"
+        return f"{layout}; classes: {self._card_explained}"
+
+    @property
+    def _card_explained(self) -> str:
+        if self.card is None:
+            return "no data card"
+        if self.card_rests_on != FOLDER_NAMES or self.card.folders_tell == "rain":
+            return self.card.name
+        text = f"{self.card.name}, guessed from the names of the folders alone"
+        labelled = self.total.labelled
+        if labelled and not labelled.keys() & set(self.card.rain):
+            rain = ", ".join(self.card.classes[id_] for id_ in self.card.rain)
+            text += f"; no point is {rain}, so that it may be another data set: give --card"
+        return text
 
 
 def facts_of_folder(folder: Path, arguments: argparse.Namespace) -> FolderFacts:
@@ -101,7 +124,7 @@ def facts_of_folder(folder: Path, arguments: argparse.Namespace) -> FolderFacts:
     """
     card = None if arguments.card is None else load_card(arguments.card)
     layout = _layout(folder, card, arguments.layout)
-    card = card or _card(folder, layout)
+    card, rests_on = (card, "--card") if card else _card(folder, layout)
     sequences = find_sequences(folder, layout, arguments.columns)
     rates = sorted(
         {sequence.rain_rate for sequence in sequences}, key=lambda rate: (rate is None, rate or 0)
@@ -115,8 +138,7 @@ def facts_of_folder(folder: Path, arguments: argparse.Namespace) -> FolderFacts:
             for frame in sequence.frames:
                 contents.add(count_frame(frame))
                 progress.update()
-    classes = card.classes if card else {}
-    return FolderFacts(folder, layout, card.name if card else None, classes, by_rain_rate)
+    return FolderFacts(folder, layout, card, rests_on, by_rain_rate)
 
 
 def draw(facts: FolderFacts, picture: Path) -> None:
@@ -146,8 +168,8 @@ def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout |
     return replace(card.layout if card else Layout(), scans=scans, labels=labels)
 
 
-def _card(folder: Path, layout: Layout | None) -> DataCard | None:
-    """The data card that a folder tells of by itself."""
+def _card(folder: Path, layout: Layout | None) -> tuple[DataCard | None, CardRestsOn]:
+    """The data card that a folder shows by itself, and by what."""
     if manifest_of(folder):
-        return load_card("simulated")
-    return None if layout is None else card_by_folders(layout, "classes")
+        return load_card("simulated"), "manifest"
+    return (None if layout is None else card_by_folders(layout, "classes")), FOLDER_NAMES

@@ -14,6 +14,7 @@ import yaml
 from tqdm import tqdm
 
 from derain import __version__
+from derain.cards.rain_found import require_rain
 from derain.cli.arguments import add_threads, command_line, count, file_named, share
 from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
@@ -123,8 +124,7 @@ def _tuned_filter(
         LabelledNeighbourhoods.of(read(frame), data.card, neighbours, arguments.threads, candidates)
         for frame in tqdm(frames, desc="finding neighbours", unit="scan", disable=None)
     ]
-    if not any(scan.rain.any() for scan in scans):
-        raise _no_rain(data)
+    require_rain(any(scan.rain.any() for scan in scans), data.card, "--data")
     with tqdm(desc="tuning", unit="trial", total=arguments.trials, disable=None) as progress:
         search = Search(
             arguments.trials,
@@ -186,8 +186,7 @@ def _tuned_model(
     if note is not None:
         tqdm.write(f"derain: warning: {note}", sys.stderr)
     scans = list(judged())
-    if not any(rain.any() for _, rain in scans):
-        raise _no_rain(data)
+    require_rain(any(rain.any() for _, rain in scans), data.card, "--data")
     return tune_threshold(scans, derainer.spec.threshold)
 
 
@@ -203,13 +202,6 @@ def _drawn(frames: Sequence["Frame"], most: int, seed: int) -> list["Frame"]:
     generator = np.random.default_rng(seed)
     chosen = generator.choice(len(frames), min(most, len(frames)), replace=False)
     return [frames[number] for number in np.sort(chosen)]
-
-
-def _no_rain(data: "ScanData") -> InputError:
-    rain = ", ".join(data.card.classes[id_] for id_ in data.card.rain) or "rain"
-    return InputError(
-        "--data", f"no point of these scans is {rain}", "Tune on scans with rain, and their --card."
-    )
 
 
 def _write(arguments: argparse.Namespace, tuned: "Tuned", facts: str) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.files.names import scan_suffix
 from derain.files.text import encode
-from derain.scan import Scan, to_float32
+from derain.scan import Scan, named, to_float32
 
 # KITTI, SemanticKITTI, WADS and REHEARSE-3D.
 DEFAULT_COLUMNS = ("x", "y", "z", "intensity")
@@ -60,41 +60,54 @@ def scan_of(
         path: The file.
         fields: Name → column, each of N rows: either `x`, `y` and `z` (N,) or `xyz` (N, 3), metres
             in the sensor frame; `intensity` (or another of INTENSITY_NAMES) and `radar` (not 0 for
-            points of the radar) if there are; and whatever else the file holds. Upper and
-            lower case are the same.
+            points of the radar) if there are; and whatever else the file holds. A name in
+            another case counts where no column has exactly this one.
         shape: (height, width) of an organised cloud.
         header: What the file says besides its columns, for the writer of its format.
 
     Raises:
-        InputError: No coordinates, or coordinates that are not numbers.
+        InputError: No coordinates, coordinates that are not numbers, or columns of which several
+            could be meant: see :func:`derain.scan.named`.
     """
-    numbers = {
-        name.lower(): column for name, column in fields.items() if column.dtype.kind in "iuf"
-    }
-    flat = {name: column for name, column in numbers.items() if column.ndim == 1}
-    if "xyz" in numbers:
-        # A copy, for what is done to a scan's numbers must not reach the columns of its file.
-        xyz = to_float32(numbers["xyz"]).copy()
-    elif {"x", "y", "z"} <= flat.keys():
-        xyz = np.empty((len(flat["x"]), 3), np.float32)
-        for place, axis in enumerate("xyz"):
-            xyz[:, place] = to_float32(flat[axis])
-    else:
-        raise InputError(
-            path,
-            f"has no x, y and z among its columns ({', '.join(fields)})",
-            "Name the coordinates x, y and z, where the file has no names with --columns.",
-        )
-    intensity = next((to_float32(flat[name]) for name in INTENSITY_NAMES if name in flat), None)
+    flat = _numbers(fields, 1)
+    found = (named(flat, name, path) for name in INTENSITY_NAMES)
+    intensity = next((column for column in found if column is not None), None)
+    radar = named(flat, "radar", path)
     return Scan(
-        xyz,
-        None if intensity is None else intensity.copy(),
-        radar=flat["radar"] != 0 if "radar" in flat else None,
+        _coordinates(path, fields),
+        # A copy, for what is done to a scan's numbers must not reach the columns of its file.
+        None if intensity is None else to_float32(intensity).copy(),
+        radar=None if radar is None else radar != 0,
         fields=dict(fields),
         shape=shape,
         name=str(path),
         header=header,
     )
+
+
+def _numbers(fields: Mapping[str, NDArray[Any]], *axes: int) -> dict[str, NDArray[Any]]:
+    """The columns of so many axes that hold numbers."""
+    return {
+        name: column
+        for name, column in fields.items()
+        if column.dtype.kind in "iuf" and column.ndim in axes
+    }
+
+
+def _coordinates(path: Path, fields: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+    """Coordinates among a file's columns, float32 (N, 3)."""
+    table = named(_numbers(fields, 1, 2), "xyz", path)
+    if table is not None:
+        return to_float32(table).copy()
+    flat = _numbers(fields, 1)
+    axes = [column for axis in "xyz" if (column := named(flat, axis, path)) is not None]
+    if len(axes) < 3:
+        raise InputError(
+            path,
+            f"has no x, y and z among its columns ({', '.join(fields)})",
+            "Name the coordinates x, y and z, where the file has no names with --columns.",
+        )
+    return np.stack([to_float32(axis) for axis in axes], axis=1)
 
 
 def columns_of(scan: Scan) -> dict[str, NDArray[Any]]:

@@ -3,7 +3,7 @@
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -34,12 +34,8 @@ def temporary_beside(path: Path) -> Iterator[Path]:
     suffix = path.suffix if len(os.fsencode(path.suffix)) <= LONGEST_SUFFIX else ""
     temporary = path.with_name(f"{PREFIX}{secrets.token_hex(8)}{suffix}")
     try:
-        descriptor = _made(temporary)
-        try:
+        with _holding(temporary, _made_file):
             yield temporary
-        finally:
-            if descriptor is not None:
-                os.close(descriptor)
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -60,31 +56,42 @@ def temporary_folder(folder: Path) -> Iterator[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     remove_abandoned(folder)
     temporary = folder / f"{PREFIX}{secrets.token_hex(8)}"
-    temporary.mkdir()
     try:
-        descriptor = os.open(temporary, os.O_RDONLY)
-        try:
-            with suppress(OSError):  # a file system without locks, where nobody removes it either
-                lock(descriptor, wait=True)
+        with _holding(temporary, _made_folder):
             yield temporary
-        finally:
-            os.close(descriptor)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _made(file: Path) -> int | None:
-    """Makes a file and holds it locked; None without locks, where nobody removes it either."""
+@contextmanager
+def _holding(path: Path, make: Callable[[Path], int]) -> Iterator[None]:
+    """Makes a file or a folder, and keeps it locked inside the ``with`` block."""
+    while not _locked(descriptor := make(path)):
+        os.close(descriptor)
+    try:
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _made_file(file: Path) -> int:
+    return os.open(file, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
+
+
+def _made_folder(folder: Path) -> int:
     while True:
-        descriptor = os.open(file, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
-        try:
-            lock(descriptor, wait=True)
-        except OSError:
-            os.close(descriptor)
-            return None
-        if os.fstat(descriptor).st_nlink:
-            return descriptor
-        os.close(descriptor)  # somebody took it for abandoned before it was locked
+        folder.mkdir()
+        with suppress(FileNotFoundError):  # another process removed it as abandoned
+            return os.open(folder, os.O_RDONLY)
+
+
+def _locked(descriptor: int) -> bool:
+    """Locks a new file or folder; False where another process removed it before as abandoned."""
+    try:
+        lock(descriptor, wait=True)
+    except OSError:  # a file system without locks, where no process removes anything
+        return True
+    return os.fstat(descriptor).st_nlink > 0
 
 
 @cache

@@ -52,7 +52,7 @@ class Records:
         trajectory = self._trajectory
         if trajectory is None:
             return None
-        if trajectory.times is not None and (time := self._time_on(trajectory, scan)) is not None:
+        if self._poses_by_time and (time := self.time_of(scan)) is not None:
             return trajectory.at(time, scan.name)
         pose: NDArray[np.float64] = trajectory.poses[self._line(scan, POSES, len(trajectory))]
         return pose
@@ -72,17 +72,19 @@ class Records:
         return None if path is None else read_trajectory(path)
 
     @cached_property
+    def _poses_by_time(self) -> bool:
+        """Whether the poses have times, of the clock of the scans."""
+        if self._trajectory is None or self._trajectory.times is None or self._times is None:
+            return False
+        return self._trajectory.is_by_time(self._times)
+
+    @cached_property
     def _scans(self) -> list[Path]:
         return find_scans([self.folder])
 
     @cached_property
     def _places(self) -> dict[str, int]:
         return {scan.name: place for place, scan in enumerate(self._scans)}
-
-    def _time_on(self, trajectory: Trajectory, scan: Path) -> float | None:
-        """When a scan was taken; None where the poses are not told by the clock of the scans."""
-        known = self._times is not None and trajectory.is_by_time(self._times)
-        return self.time_of(scan) if known else None
 
     def _line(self, scan: Path, record: str, lines: int) -> int:
         """The line of a record that belongs to a scan."""

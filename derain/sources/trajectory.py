@@ -64,7 +64,7 @@ class Trajectory:
         if self.times is None or not len(self.times) or not len(times):
             return False
         first, last = self.times[0] - LONGEST_GAP, self.times[-1] + LONGEST_GAP
-        return bool(first <= max(times) and min(times) <= last)
+        return bool(first <= np.max(times) and np.min(times) <= last)
 
     def at(self, time: float, scan: str) -> NDArray[np.float64]:
         """The pose at a time; between two poses, on the way from one to the other.

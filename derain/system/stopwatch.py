@@ -18,10 +18,12 @@ class Stopwatch:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Times what happens inside the ``with`` block."""
+        """Times what happens inside the ``with`` block, also where it raises."""
         outer, self._within = self._within, 0.0
         start = time.perf_counter()
-        yield
-        elapsed = 1e3 * (time.perf_counter() - start)
-        self.milliseconds[name] = self.milliseconds.get(name, 0.0) + elapsed - self._within
-        self._within = outer + elapsed
+        try:
+            yield
+        finally:
+            elapsed = 1e3 * (time.perf_counter() - start)
+            self.milliseconds[name] = self.milliseconds.get(name, 0.0) + elapsed - self._within
+            self._within = outer + elapsed

@@ -64,7 +64,7 @@ def stated_returns(scan: Scan) -> StatedReturns | None:
     """
     columns = {
         name.lower(): column
-        for name, column in scan.fields.items()
+        for name, column in sorted(scan.fields.items())  # lower case last: the exact name wins
         if column.ndim == 1 and column.dtype.kind in "iuf"
     }
     return next((stated for read in _READERS if (stated := read(scan, columns))), None)

@@ -11,6 +11,7 @@ import numpy as np
 from tqdm import tqdm
 
 from derain.cards.card import DataCard, load_card
+from derain.cards.rain_found import warn_without_rain
 from derain.evaluation.scores import score
 from derain.export.bench.contestant import Contestant
 from derain.export.bench.contestants import GivenMethod, contestants
@@ -199,6 +200,8 @@ def run_bench(
         data.distinct,
         list(map(data.rain_rate, data.frames)),
     )
+    rained = any(one.pooled.true_positive + one.pooled.false_negative for one in scores)
+    warn_without_rain(rained, data.card)
     costs = [
         measure_cost(method, timing)
         for method in tqdm(methods, desc="timing", unit="method", disable=None)

@@ -168,3 +168,20 @@ def test_an_empty_folder_is_refused(run_derain, tmp_path: Path) -> None:
     outcome = run_derain("info", tmp_path)
     assert (outcome.code, outcome.out) == (2, "")
     assert "holds no scans" in outcome.err
+
+
+@pytest.mark.parametrize(("rain", "doubted"), [(110, False), (70, True)], ids=["WADS", "KITTI"])
+def test_a_card_that_rests_on_common_names_of_folders_is_a_guess(
+    run_derain, tmp_path: Path, rain: int, doubted: bool
+) -> None:
+    scan = tmp_path / "sequences/00/velodyne/000000.bin"
+    scan.parent.mkdir(parents=True)
+    scene(100).tofile(scan)
+    write_labels(tmp_path / "sequences/00/labels/000000.label", np.repeat([40, rain], 50))
+    head = run_derain("info", tmp_path).out.splitlines()[0]
+    assert "WADS, guessed" in head
+    assert doubted == ("falling-snow" in head) == ("--card" in head)
+    facts = json.loads(run_derain("info", tmp_path, "--json").out)
+    assert facts["card_rests_on"] == "names of folders"
+    stated = run_derain("info", tmp_path, "--card", "wads")
+    assert "guessed" not in stated.out

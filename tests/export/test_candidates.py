@@ -108,8 +108,12 @@ def test_they_are_fitted_to_the_rain_that_the_network_finds(
 
 def test_bounds_of_nothing_are_refused(random_outdet: OutDet, labelled: list[Scan]) -> None:
     dry = [scan.with_label(np.full(len(scan), 40)) for scan in labelled]
-    with pytest.raises(InputError, match=r"--candidates: no bounds tell rain .* leave it out"):
+    with pytest.raises(InputError, match=r"--candidates: no point of these scans is falling-snow"):
         candidates_of_findings(random_outdet, dry, WADS)
+    blind = deepcopy(random_outdet)
+    blind.adopt(replace(blind.spec, threshold=1.0))
+    with pytest.raises(InputError, match=r"--candidates: no bounds tell rain .* leave it out"):
+        candidates_of_findings(blind, labelled, WADS)
 
 
 def test_a_model_that_was_trained_with_candidates_stays_within_them(

@@ -1,12 +1,14 @@
 """A further column stands beside those that a scan has, also beside those of one from no file."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
+from derain.files import read_scan, write_scan
 from derain.files.columns import columns_of, with_column
 from derain.scan import Scan
 
@@ -30,3 +32,48 @@ def test_a_column_of_the_same_name_is_replaced_in_its_place() -> None:
 def test_a_column_has_a_value_for_each_point() -> None:
     with pytest.raises(InputError, match="ring has 9 rows for 10 points"):
         with_column(Scan.of(scene(10)), "ring", np.arange(9))
+
+
+@pytest.mark.parametrize("columns", ["X,y,z,intensity,x", "x,y,z,intensity,X"])
+def test_the_column_of_the_exact_name_is_the_coordinate(tmp_path: Path, columns: str) -> None:
+    path = tmp_path / "scan.bin"
+    np.arange(1, 11, dtype="<f4").reshape(2, 5).tofile(path)
+    x = columns.split(",").index("x")
+    assert read_scan(path, columns.split(",")).xyz[:, 0].tolist() == [1 + x, 6 + x]
+
+
+WITH_NAMES = [".csv", ".ply", ".pcd", ".npz", ".feather"]
+
+
+@pytest.mark.parametrize("suffix", WITH_NAMES)
+@pytest.mark.parametrize(
+    "names", [("X", "y", "z", "x"), ("x", "y", "z", "i", "Intensity", "intensity")]
+)
+def test_of_names_in_two_cases_the_lower_one_counts_in_every_format(
+    tmp_path: Path, suffix: str, names: tuple[str, ...]
+) -> None:
+    path = written(tmp_path / f"scan{suffix}", names)
+    scan = read_scan(path)
+    assert scan.xyz[0].tolist() == [names.index(axis) + 1 for axis in "xyz"]
+    assert scan.intensity is None or scan.intensity[0] == names.index("intensity") + 1
+
+
+@pytest.mark.parametrize("suffix", WITH_NAMES)
+@pytest.mark.parametrize(
+    "names", [("x", "y", "z", "Intensity", "INTENSITY"), ("x", "y", "z", "Radar", "RADAR")]
+)
+def test_two_columns_that_differ_in_case_alone_are_refused(
+    tmp_path: Path, suffix: str, names: tuple[str, ...]
+) -> None:
+    path = written(tmp_path / f"scan{suffix}", names)
+    with pytest.raises(InputError, match=f"{names[3]} and {names[4]}") as refused:
+        read_scan(path)
+    assert str(path) in str(refused.value)
+
+
+def written(path: Path, names: tuple[str, ...]) -> Path:
+    """A file of ten points, whose first holds the place of each column, from 1."""
+    rows = np.arange(1, len(names) + 1, dtype=np.float32) + np.arange(10, dtype=np.float32)[:, None]
+    fields = dict(zip(names, rows.T.copy(), strict=True))
+    write_scan(path, Scan(rows[:, :3].copy(), fields=fields))
+    return path

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,22 +22,46 @@ def test_a_file_has_one_holder_until_it_closes_it(tmp_path: Path) -> None:
     os.close(second)
 
 
-def test_a_file_that_was_taken_for_abandoned_is_made_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    taken: list[Path] = []
+@pytest.fixture
+def taken(
+    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> list[Path]:
+    """What another process removed as abandoned, just before the first call of a function."""
+    module = {"open": os, "lock": temporary}[request.param]
+    called, taken = getattr(module, request.param), list[Path]()
 
-    def taken_first(descriptor: int, *, wait: bool) -> bool:
+    def taken_first(*arguments: Any, **options: Any) -> Any:
         if not taken:
             taken.extend(tmp_path.iterdir())
-            taken[0].unlink()
-        return lock(descriptor, wait=wait)
+            for path in taken:
+                path.rmdir() if path.is_dir() else path.unlink()
+        return called(*arguments, **options)
 
-    monkeypatch.setattr(temporary, "lock", taken_first)
+    monkeypatch.setattr(module, request.param, taken_first)
+    return taken
+
+
+@pytest.mark.parametrize("taken", ["lock"], indirect=True)
+def test_a_file_that_was_taken_for_abandoned_is_made_anew(
+    tmp_path: Path, taken: list[Path]
+) -> None:
     with replacing(tmp_path / "file") as lent:
         lent.write_bytes(b"new")
     assert len(taken) == 1
     assert (tmp_path / "file").read_bytes() == b"new"
+
+
+@pytest.mark.parametrize("taken", ["open", "lock"], indirect=True)
+def test_a_folder_that_was_taken_for_abandoned_is_made_anew(
+    tmp_path: Path, taken: list[Path]
+) -> None:
+    with temporary.temporary_folder(tmp_path) as lent:
+        (lent / "file").write_bytes(b"new")
+        descriptor = os.open(lent, os.O_RDONLY)
+        assert not lock(descriptor, wait=False)
+        os.close(descriptor)
+    assert len(taken) == 1
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.fixture

@@ -178,6 +178,39 @@ def test_a_model_that_was_told_nothing_of_its_batches_says_what_it_lacks(
         make_trainer(epochs=1).fit(OutDet(), loader)
 
 
+def without_rain(memory: InMemory, *parts: str) -> InMemory:
+    """The same scans, those of some parts without rain, as by another data set's labels."""
+    scans = {
+        part: [frame.read().with_label(np.full(300, 40)) for frame in memory.source(part)]
+        if part in parts
+        else memory.source(part)
+        for part in ("train", "validation", "test")
+    }
+    return InMemory(*scans.values(), card="wads", loading=LOADING)
+
+
+def test_training_on_scans_without_rain_is_refused(
+    make_trainer: MakeTrainer, memory: InMemory
+) -> None:
+    with pytest.raises(InputError, match=r"no point of these scans is falling-snow .*WADS"):
+        make_trainer(epochs=1).fit(OutDet(), without_rain(memory, "train"))
+
+
+def test_measuring_on_scans_without_rain_is_warned_of_once(
+    make_trainer: MakeTrainer, memory: InMemory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data, model = without_rain(memory, "validation", "test"), OutDet()
+    warning = "no point of these scans is falling-snow"
+    make_trainer(epochs=2, callbacks=[ScanCheck()]).fit(model, data)
+    assert capsys.readouterr().err.count(warning) == 1
+    for measure in ("validate", "test"):
+        trainer = make_trainer(1, callbacks=[ScanCheck()])
+        getattr(trainer, measure)(model, data, verbose=False)
+        assert capsys.readouterr().err.count(warning) == 1
+        getattr(make_trainer(1, callbacks=[ScanCheck()]), measure)(model, memory, verbose=False)
+        assert warning not in capsys.readouterr().err
+
+
 def test_callbacks_go_without_a_data_module(
     make_trainer: MakeTrainer,
     memory: InMemory,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from derain.errors import InputError
 from derain.sources.records import Records
-from derain.sources.trajectory import read_trajectory
+from derain.sources.trajectory import Trajectory, read_trajectory
 
 
 def motion(degrees: float, x: float, y: float, z: float) -> np.ndarray:
@@ -103,6 +103,24 @@ def test_poses_by_time_go_to_the_scans_by_their_times(sequence: Path) -> None:
     found = records(sequence)
     ahead = [found.pose_of(scan(sequence, number))[0, 3] for number in range(3)]
     np.testing.assert_allclose(ahead, (1, 2, 3))
+
+
+def test_all_scans_are_compared_with_the_clock_of_the_poses_once(
+    sequence: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (sequence / "times.txt").write_text("0\n1\n2\n")
+    (sequence / "poses.txt").write_text("0 0 0 0 0 0 0 1\n2 4 0 0 0 0 0 1\n")
+    compared, is_by_time = [], Trajectory.is_by_time
+
+    def counted(trajectory: Trajectory, times: np.ndarray) -> bool:
+        compared.append(len(times))
+        return is_by_time(trajectory, times)
+
+    monkeypatch.setattr(Trajectory, "is_by_time", counted)
+    found = records(sequence)
+    for number in (0, 2, 0):
+        assert found.pose_of(scan(sequence, number)) is not None
+    assert compared == [3]
 
 
 @pytest.mark.parametrize("times", [None, "1700000000\n1700000001\n1700000002\n"])

@@ -28,3 +28,18 @@ def test_a_stage_within_a_stage_is_not_counted_twice(seconds: list[float]) -> No
     with stopwatch.stage("view"):
         seconds[0] += 4
     assert stopwatch.milliseconds == {"read": 20_000, "wait": 100_000, "view": 7_000}
+
+
+def test_a_stage_that_raises_is_counted_too(seconds: list[float]) -> None:
+    stopwatch = Stopwatch()
+
+    def fail() -> None:
+        with stopwatch.stage("read"):
+            seconds[0] += 10
+            raise ZeroDivisionError
+
+    with stopwatch.stage("view"):
+        seconds[0] += 1
+        with pytest.raises(ZeroDivisionError):
+            fail()
+    assert stopwatch.milliseconds == {"read": 10_000, "view": 1_000}

@@ -17,7 +17,7 @@ from derain.files.columns import columns_of, name_columns, records, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
 from derain.files.reading import reading
-from derain.scan import Scan
+from derain.scan import Scan, named
 
 # NumPy parses an array's header as Python code, which may raise anything on damaged bytes.
 _DAMAGE = Exception
@@ -114,7 +114,7 @@ class Npz(Format):
         path = content.path
         with reading(path, _DAMAGE):
             arrays = _arrays(content)
-        table = _name_of_table(arrays)
+        table = _name_of_table(path, arrays)
         grid = _grid(path, arrays) if table is None else _grid_of_table(arrays[table])
         shape = _organised(path, grid)
         fields, constants, structured = dict[str, NDArray[Any]](), {}, False
@@ -218,12 +218,12 @@ def _columns_of_table(
     return name_columns(path, list(array.reshape(points, array.shape[-1]).T), columns)
 
 
-def _name_of_table(arrays: Mapping[str, NDArray[Any]]) -> str | None:
+def _name_of_table(path: Path, arrays: Mapping[str, NDArray[Any]]) -> str | None:
     """Name of the array that holds all columns; None where each column has its own."""
-    names = {name.lower(): name for name in arrays}
-    if "xyz" in names or "x" in names:
+    names = {name: name for name in arrays}
+    if named(names, "xyz", path) or named(names, "x", path):
         return None
-    return names.get("points", next(iter(arrays)) if len(arrays) == 1 else None)
+    return named(names, "points", path) or (next(iter(arrays)) if len(arrays) == 1 else None)
 
 
 def _grid_of_table(array: NDArray[Any]) -> tuple[int, ...]:
@@ -232,11 +232,11 @@ def _grid_of_table(array: NDArray[Any]) -> tuple[int, ...]:
 
 def _grid(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[int, ...]:
     """Shape of the arrays that hold one value per point."""
-    shapes = {name.lower(): array.shape for name, array in arrays.items()}
-    if "xyz" in shapes:
-        return shapes["xyz"][:-1]
-    if "x" in shapes:
-        return shapes["x"]
+    table, column = named(arrays, "xyz", path), named(arrays, "x", path)
+    if table is not None:
+        return table.shape[:-1]
+    if column is not None:
+        return column.shape
     raise InputError(
         path,
         f"has no coordinates among its arrays ({', '.join(arrays)})",

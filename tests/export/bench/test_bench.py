@@ -178,3 +178,18 @@ def test_a_loaded_model_of_another_threshold_is_made_anew_in_its_process(
     assert row.cost.alone
     assert row.cost.failure is None
     assert row.as_dict()["threshold"] == 0.25
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(("rain", "warned"), [((3,), False), ((9,), True), ((), False)])
+def test_a_bench_without_rain_warns_unless_its_data_are_clean(
+    labelled: LabelledFrames,
+    capsys: pytest.CaptureFixture[str],
+    rain: tuple[int, ...],
+    warned: bool,
+) -> None:
+    frames, card = labelled.frames[1:], replace(labelled.card, rain=rain, unknown=())
+    found = bench(["none"], frames, card, timed=1, repeats=1)
+    name = labelled.card.classes[9]
+    assert (f"no point of these scans is {name}" in capsys.readouterr().err) == warned
+    assert found["none"].scores.pooled.false_positive == 0
