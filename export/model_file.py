@@ -22,6 +22,11 @@ METADATA_KEY = "derain"
 CHECKSUM_KEY = "sha256"
 NO_CHECKSUM = "0" * 64
 
+# Only derain 0.1 wrote models without a checksum. They are known by their layout, and not by the
+# version that they state: all keys of their metadata, and keys that every later Spec has.
+EARLY_METADATA = {"spec", "versions", "proof"}
+LATER_SPEC = {"candidates", "training"}
+
 # Twenty times the largest network of derain; protobuf itself ends at 2 GiB.
 LARGEST_MODEL = 2**29
 
@@ -71,7 +76,8 @@ class ModelFile:
 
         Raises:
             InputError: A file that is missing, too large, not ONNX, not derain's, changed since it
-                was exported, or whose weights are in another file.
+                was exported, without a checksum though not of derain 0.1, or whose weights are in
+                another file.
         """
         with reading(path), path.open("rb") as file:
             content = file.read(LARGEST_MODEL + 1)
@@ -91,6 +97,12 @@ class ModelFile:
             raise InputError(path, "its weights are in another file", "Export it again.")
         if CHECKSUM_KEY in metadata:
             _refuse_changed(path, content, metadata[CHECKSUM_KEY])
+        elif not metadata.keys() <= EARLY_METADATA or metadata["spec"].keys() & LATER_SPEC:
+            raise InputError(
+                path,
+                "it has no checksum, and every model since derain 0.2 has one",
+                "Copy or export it again.",
+            )
         return cls(path, content, metadata, Spec.from_dict(metadata["spec"], path))
 
 
@@ -132,7 +144,7 @@ def _dimensions(tensor: memoryview) -> Iterator[int]:
 
 
 def _refuse_changed(path: Path, content: bytes, checksum: Any) -> None:
-    """Refuses a file that is not as it was when it was proved; earlier ones had no checksum."""
+    """Refuses a file that is not as it was when it was proved."""
     readable = isinstance(checksum, str) and checksum.isascii()
     place = content.rfind(checksum.encode()) if readable else -1
     if place < 0 or _checksum(content, place) != checksum:
