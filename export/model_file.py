@@ -49,6 +49,9 @@ GRAPH, INITIALIZER, DIMENSIONS = 7, 5, 1
 METADATA_PROPS, PROP_KEY, PROP_VALUE = 14, 1, 2
 EXTERNAL_DATA, DATA_LOCATION = 13, 14
 
+# How files of torch.save begin: archives, and before PyTorch 1.6 pickles. No ONNX file does.
+OF_PYTORCH = (b"PK\x03\x04", b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
+
 # Kinds of protobuf fields. Source: https://protobuf.dev/programming-guides/encoding.
 VARINT, COUNTED_BYTES = 0, 2
 SIZES = {1: 8, 5: 4}  # of the others, in bytes
@@ -81,6 +84,13 @@ class ModelFile:
         """
         with reading(path), path.open("rb") as file:
             content = file.read(LARGEST_MODEL + 1)
+        if content.startswith(OF_PYTORCH):
+            raise InputError(
+                path,
+                "not an ONNX model, but an archive or a pickle, as PyTorch saves weights",
+                "Make a checkpoint of weights with `derain import-weights`, and a model of that "
+                "with `derain export`.",
+            )
         if len(content) > LARGEST_MODEL:
             raise _not_a_model(path, f"more than {LARGEST_MODEL:,} bytes")
         try:
@@ -205,7 +215,7 @@ def _fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
         elif kind in SIZES:
             size = SIZES[kind]
         else:
-            raise ValueError(f"a field of kind {kind}")
+            raise ValueError("its bytes are no protobuf message")
         if place + size > len(message):
             raise ValueError("it ends in the middle of a field")
         yield number, message[place : place + size]
