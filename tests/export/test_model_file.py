@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import onnx
 import pytest
+import torch
 from onnx import TensorProto, helper
 
 from derain.default import default_model
@@ -299,6 +300,14 @@ def test_a_file_of_any_size_is_not_read_whole(monkeypatch: pytest.MonkeyPatch) -
 def test_weights_are_counted_as_onnx_counts_them(model: Path) -> None:
     tensors = onnx.load(model).graph.initializer
     assert number_of_weights(model.read_bytes()) == sum(prod(tensor.dims) for tensor in tensors) > 0
+
+
+@pytest.mark.parametrize("archive", [True, False], ids=["archive", "pickle"])
+def test_weights_of_pytorch_lead_to_their_import(tmp_path: Path, archive: bool) -> None:
+    weights = tmp_path / "weights.pt"
+    torch.save({"weight": torch.zeros(3)}, weights, _use_new_zipfile_serialization=archive)
+    with pytest.raises(InputError, match=r"weights\.pt: .*`derain import-weights`"):
+        Derainer(weights)
 
 
 def test_sizes_of_tensors_are_read_in_one_field_and_in_several() -> None:
