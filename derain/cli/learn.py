@@ -33,7 +33,7 @@ from derain.system.extras import OF_EXPORT, OF_TRAINING, require
 from derain.teaching.held_out import FEWEST_SCANS
 from derain.teaching.manifest import HELD_OUT_PART, TAUGHT_MANIFEST, Manifest
 
-SUMMARY = "a derainer from an unlabelled recording, in about ten minutes"
+SUMMARY = "a derainer from an unlabelled recording, in about six minutes"
 
 DESCRIPTION = """\
 Learns to take the rain out of a sensor's scans from a recording of it that nobody labelled:

@@ -173,6 +173,7 @@ def test_a_recording_of_which_too_few_scans_can_be_labelled_is_refused_with_the_
     def run(command: list[str]) -> int:
         if command[0] == "odometry":
             warn("2.bin: not to be trusted: it is of another place")
+            print("poses.txt: 5 scans, 1 not to be trusted")
         else:
             Manifest({"method": "persistence"}, known).write(Path("model_learning/taught"))
         return 0
