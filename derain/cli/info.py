@@ -29,6 +29,7 @@ from derain.files.reading import reading
 from derain.scan import Scan
 from derain.sources.folders import frame_of, named_frames
 from derain.system.extras import MATPLOTLIB, OF_CHECKPOINTS, require
+from derain.system.notices import warn
 from derain.views.candidates import candidates_at
 from derain.views.directions import directions
 from derain.views.grid_fit import fit_grid
@@ -151,6 +152,11 @@ def _describe_default(arguments: argparse.Namespace) -> None:
 def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
     facts = facts_of_folder(folder, arguments)
     say(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
+    if arguments.card is not None and not facts.total.labelled:
+        warn(
+            f"{folder}: no labels are beside its scans or in a folder that the card names. Name "
+            f"the folders of scans and labels, as in --layout {folder.absolute().name},labels"
+        )
     if arguments.picture:
         draw(facts, arguments.picture)
 

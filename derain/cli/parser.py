@@ -24,14 +24,13 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Refuses a command line, with an example of a right one where something is missing."""
         argument, colon, reason = message.removeprefix("argument ").partition(": ")
-        example = self._example()
         if message.startswith("argument ") and colon:
             raise InputError(argument, reason, f"`{self.prog} --help` explains it.")
+        command = self.prog.partition(" ")[2] or "command line"
         # METHOD may be left out, so what is missing is a scan.
-        message = message.replace("[METHOD]", "SCAN")
-        see = f"`{self.prog} --help` explains the rest."
-        command = self.prog.partition(" ")[2] or "COMMAND"
-        raise InputError(command, message, f"For example: `{example}`. {see}" if example else see)
+        reason, example = message.replace("[METHOD]", "SCAN"), self._example()
+        remedy = f"For example: `{example}`. `{self.prog} --help` explains the rest."
+        raise InputError(command, reason, remedy)
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Any = None
@@ -61,7 +60,7 @@ class Parser(argparse.ArgumentParser):
             raise InputError(named, f"there is no {value}", remedy)
 
     def _example(self) -> str:
-        """The first of the examples in the description; empty where there is none."""
+        """The first of the examples in the description."""
         text = re.sub(r" *\\\n *", " ", self.description or "")
         found = re.search(rf"^ *({self.prog} \S.*?)(  |$)", text, re.MULTILINE)
-        return found[1] if found else ""
+        return found[1] if found else f"{self.prog} --help"
