@@ -14,7 +14,7 @@ from derain.cli.learning_student import (
     without_intensity,
 )
 from derain.cli.lesson import PERSISTENCE, Lesson
-from derain.cli.narration import WARNING, Narrator
+from derain.cli.narration import WARNING_OF_DERAIN, Narrator
 from derain.cli.outputs import refuse_unwritable, say
 from derain.cli.pose_options import add_poses
 from derain.cli.results import last_line, proof_of
@@ -188,7 +188,11 @@ def _refuse_too_few_labelled(lesson: Lesson, source: Source, narrator: Narrator)
     scans = Manifest.read(lesson.taught).scans
     if any(scan.part == HELD_OUT_PART for scan in scans):
         return
-    warnings = [line.removeprefix(WARNING) for line in narrator.warned if line.startswith(WARNING)]
+    warnings = [
+        line.removeprefix(WARNING_OF_DERAIN)
+        for line in narrator.warned
+        if line.startswith(WARNING_OF_DERAIN)
+    ]
     reasons = f": {warnings[0]}" if warnings else ""
     raise InputError(
         lesson.recordings[0],

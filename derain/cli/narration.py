@@ -18,7 +18,7 @@ PERIODS = {True: 0.5, False: 15.0}
 
 # How an error of derain's begins, and how a warning does.
 OF_DERAIN = "derain: "
-WARNING = f"{OF_DERAIN}warning: "
+WARNING_OF_DERAIN = f"{OF_DERAIN}warning: "
 
 # A progress bar of Lightning or tqdm: what is counted, and the share that is done.
 _BAR = re.compile(r"(?P<what>[^|\r\n]*?):?\s*(?P<share>\d+%)?\|.*\|\s*\d+/")
@@ -194,7 +194,7 @@ def _in_words(progress: str, epochs: int) -> str:
 
 def _is_error(line: str) -> bool:
     """Whether a line says why a command failed, not only what it warns of."""
-    return line.startswith(OF_DERAIN) and not line.startswith(WARNING)
+    return line.startswith(OF_DERAIN) and not line.startswith(WARNING_OF_DERAIN)
 
 
 def _clock(seconds: float) -> str:
