@@ -1,7 +1,6 @@
 """Which labels are read of a part's scans."""
 
 from derain.datamodules.loading import Part
-from derain.errors import InputError
 from derain.sources.frame import Frame
 from derain.sources.source import Source
 
@@ -25,9 +24,7 @@ def with_needed_labels(source: Source, part: Part, reads_labels: bool) -> Source
     if part == "validation" and not reads_labels:
         return source.map(lambda frame: frame if frame.has_labels else _without_labels(frame))
     for frame in source:
-        if not frame.has_labels:
-            where = f"its labels are not at {frame.label_path}" if frame.label_path else "no labels"
-            raise InputError(frame.name, where, "Add them or leave the scan out.")
+        frame.require_labels()
     return source
 
 

@@ -10,6 +10,7 @@ from derain.datamodules.loading import Loading, Part
 from derain.datamodules.scan_data import ScanData
 from derain.errors import InputError
 from derain.sources.source import Source
+from derain.teaching.held_out import FEWEST_SCANS
 from derain.teaching.manifest import CARD, HELD_OUT_PART, TRAINING_PART, Manifest
 
 
@@ -42,7 +43,8 @@ class TaughtData(ScanData):
         if not len(frames):
             raise InputError(
                 self.root,
-                f"no scan is held out, so that there is none for {part}",
-                "Teach a sequence of three scans or more.",
+                f"none of its labelled scans is for {part}",
+                f"Of a sequence with {FEWEST_SCANS} or more labelled scans the last ones are held "
+                "out: see what `derain teach` warned of.",
             )
         return frames

@@ -1,5 +1,7 @@
-"""The one error a user meets."""
+"""The one error a user meets, and what is said of a name that is misspelt."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
 
 # A reason longer than this hides what it says; what made it so long may be millions of characters.
@@ -38,6 +40,17 @@ class InputError(ValueError):
     def __reduce__(self) -> tuple[type["InputError"], tuple[str | Path, str, str]]:
         # An error crosses the process boundary of a data loader's worker by pickling.
         return type(self), (self.subject, self.reason, self.remedy)
+
+
+def did_you_mean(name: object, names: Iterable[str]) -> str:
+    """The beginning of a remedy for an unknown name: a question, where a known one is much like it.
+
+    Args:
+        name: What the user wrote.
+        names: The names that there are.
+    """
+    alike = get_close_matches(str(name)[:LONGEST_REASON], list(names), n=1)
+    return f"Did you mean {alike[0]}? " if alike else ""
 
 
 def _cut(text: str, longest: int) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from derain.default import DEFAULT
-from derain.errors import InputError, printable
+from derain.errors import InputError, did_you_mean, printable
 from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import Runtime
 from derain.files.reading import is_file
@@ -47,6 +47,17 @@ def titled(text: str) -> tuple[str, str]:
 def method_names() -> list[str]:
     """Names that methods are called by: the model that comes with derain, filters, and others."""
     return [DEFAULT, *FILTERS, *METHODS]
+
+
+def what_to_give(name: str) -> str:
+    """What a user is told to give in place of what is no method; no sentence's end.
+
+    Args:
+        name: What the user gave.
+    """
+    names = method_names()
+    of_names = f"Give a model written by `derain export`, or one of {', '.join(names)}"
+    return f"{did_you_mean(name, names)}{of_names}"
 
 
 def is_method_name(word: str) -> bool:
@@ -89,7 +100,7 @@ def load_method(
         raise InputError(
             name,
             "no such file",
-            f"Give a model written by `derain export`, or one of {', '.join(method_names())}.",
+            f"{what_to_give(name)}.",
         )
     if Path(name).suffix == CHECKPOINT_SUFFIX:
         raise InputError(

@@ -22,6 +22,11 @@ METADATA_KEY = "derain"
 CHECKSUM_KEY = "sha256"
 NO_CHECKSUM = "0" * 64
 
+# Only derain 0.1 wrote models without a checksum. They are known by their layout, and not by the
+# version that they state: all keys of their metadata, and keys that every later Spec has.
+EARLY_METADATA = {"spec", "versions", "proof"}
+LATER_SPEC = {"candidates", "training"}
+
 # Twenty times the largest network of derain; protobuf itself ends at 2 GiB.
 LARGEST_MODEL = 2**29
 
@@ -43,6 +48,9 @@ PARTS = {
 GRAPH, INITIALIZER, DIMENSIONS = 7, 5, 1
 METADATA_PROPS, PROP_KEY, PROP_VALUE = 14, 1, 2
 EXTERNAL_DATA, DATA_LOCATION = 13, 14
+
+# How files of torch.save begin: archives, and before PyTorch 1.6 pickles. No ONNX file does.
+OF_PYTORCH = (b"PK\x03\x04", b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
 
 # Kinds of protobuf fields. Source: https://protobuf.dev/programming-guides/encoding.
 VARINT, COUNTED_BYTES = 0, 2
@@ -71,10 +79,18 @@ class ModelFile:
 
         Raises:
             InputError: A file that is missing, too large, not ONNX, not derain's, changed since it
-                was exported, or whose weights are in another file.
+                was exported, without a checksum though not of derain 0.1, or whose weights are in
+                another file.
         """
         with reading(path), path.open("rb") as file:
             content = file.read(LARGEST_MODEL + 1)
+        if content.startswith(OF_PYTORCH):
+            raise InputError(
+                path,
+                "not an ONNX model, but an archive or a pickle, as PyTorch saves weights",
+                "Make a checkpoint of weights with `derain import-weights`, and a model of that "
+                "with `derain export`.",
+            )
         if len(content) > LARGEST_MODEL:
             raise _not_a_model(path, f"more than {LARGEST_MODEL:,} bytes")
         try:
@@ -91,6 +107,12 @@ class ModelFile:
             raise InputError(path, "its weights are in another file", "Export it again.")
         if CHECKSUM_KEY in metadata:
             _refuse_changed(path, content, metadata[CHECKSUM_KEY])
+        elif not metadata.keys() <= EARLY_METADATA or metadata["spec"].keys() & LATER_SPEC:
+            raise InputError(
+                path,
+                "it has no checksum, and every model since derain 0.2 has one",
+                "Copy or export it again.",
+            )
         return cls(path, content, metadata, Spec.from_dict(metadata["spec"], path))
 
 
@@ -132,7 +154,7 @@ def _dimensions(tensor: memoryview) -> Iterator[int]:
 
 
 def _refuse_changed(path: Path, content: bytes, checksum: Any) -> None:
-    """Refuses a file that is not as it was when it was proved; earlier ones had no checksum."""
+    """Refuses a file that is not as it was when it was proved."""
     readable = isinstance(checksum, str) and checksum.isascii()
     place = content.rfind(checksum.encode()) if readable else -1
     if place < 0 or _checksum(content, place) != checksum:
@@ -193,7 +215,7 @@ def _fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
         elif kind in SIZES:
             size = SIZES[kind]
         else:
-            raise ValueError(f"a field of kind {kind}")
+            raise ValueError("its bytes are no protobuf message")
         if place + size > len(message):
             raise ValueError("it ends in the middle of a field")
         yield number, message[place : place + size]

@@ -4,9 +4,10 @@ import json
 import logging
 import platform
 import warnings
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -66,18 +67,29 @@ def export(
         flushed = flush(proto)
         if calibration:
             proto = quantised(proto, model.spec.make_view(), calibration, model.INTEGER_OPERATORS)
-        _describe(proto, model.spec, {})
-        onnx.save(proto, temporary)
+        temporary.write_bytes(_described(proto, model.spec, {}))
         proof = _proof(model, temporary, calibration, Runtime())
         if not runtime.is_default:
             proof = replace(proof, by_other=_proof(model, temporary, calibration, runtime))
         if not proof.holds:
             raise InputError(path, f"the exported model differs:\n{proof}", "No file was left.")
-        known = {"proof": proof.as_dict(), "flushed": flushed, CHECKSUM_KEY: NO_CHECKSUM}
-        _describe(proto, model.spec, known)
+        known = {"proof": proof.as_dict(), "flushed": flushed}
+        temporary.write_bytes(_described(proto, model.spec, known))
         onnx.checker.check_model(proto, full_check=True)
-        temporary.write_bytes(sealed(proto.SerializeToString()))
     return proof
+
+
+def with_metadata(proto: onnx.ModelProto, metadata: Mapping[str, Any], **texts: str) -> bytes:
+    """An ONNX file of a graph: its bytes, with their checksum among the metadata.
+
+    Args:
+        proto: The graph, whose metadata are replaced.
+        metadata: What derain reads of the file, JSON-able.
+        texts: What people read of it.
+    """
+    known = json.dumps({**metadata, CHECKSUM_KEY: NO_CHECKSUM})
+    onnx.helper.set_model_props(proto, {METADATA_KEY: known, **texts})
+    return sealed(proto.SerializeToString())
 
 
 def flush(proto: onnx.ModelProto) -> int:
@@ -179,8 +191,8 @@ def _example(spec: Spec) -> SeenScan:
     return spec.make_view()(scan)
 
 
-def _describe(proto: onnx.ModelProto, spec: Spec, known: dict[str, object]) -> None:
-    """Writes into the file what a user needs besides its graph."""
+def _described(proto: onnx.ModelProto, spec: Spec, known: dict[str, object]) -> bytes:
+    """An ONNX file of a graph, with what a user needs besides it."""
     versions = {
         "derain": derain.__version__,
         "torch": torch.__version__,
@@ -192,12 +204,10 @@ def _describe(proto: onnx.ModelProto, spec: Spec, known: dict[str, object]) -> N
     description = f"{spec.network} trained on {spec.data}: probability of rain for LiDAR points"
     proto.doc_string = description
     proto.producer_name, proto.producer_version = "derain", derain.__version__
-    onnx.helper.set_model_props(
+    return with_metadata(
         proto,
-        {
-            METADATA_KEY: json.dumps({"spec": spec.as_dict(), "versions": versions, **known}),
-            "description": description,
-            "license": f"network: MIT; training data: {spec.licence}",
-            "version": derain.__version__,
-        },
+        {"spec": spec.as_dict(), "versions": versions, **known},
+        description=description,
+        license=f"network: MIT; training data: {spec.licence}",
+        version=derain.__version__,
     )

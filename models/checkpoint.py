@@ -8,7 +8,7 @@ from typing import Any
 
 import lightning
 
-from derain.errors import InputError
+from derain.errors import InputError, did_you_mean
 from derain.files.documents import shown
 from derain.models.base import DerainingModule
 from derain.models.callbacks.whole_checkpoints import save_whole
@@ -66,7 +66,10 @@ def _model_of(content: Mapping[str, Any], path: Path) -> DerainingModule:
     spec = Spec.from_dict(parameters["spec"], path)
     if spec.network not in NETWORKS:
         raise InputError(
-            path, f"a checkpoint of {shown(spec.network)}", f"Known are {', '.join(NETWORKS)}."
+            path,
+            f"a checkpoint of {shown(spec.network)}, a network that no installed package brings",
+            f"{did_you_mean(spec.network, NETWORKS)}Install the package that names it among the "
+            f"entry points `{NETWORKS.group}`. Known are {', '.join(NETWORKS)}.",
         )
     # Lightning's own entries begin with an underscore.
     arguments = {k: v for k, v in parameters.items() if not str(k).startswith("_")}

@@ -1,6 +1,5 @@
 """Fixtures shared by all tests."""
 
-import json
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +17,6 @@ from hypothesis import settings
 
 from derain.cli.main import main
 from derain.evaluation.hard_cases import scene
-from derain.export.runtime import METADATA_KEY
 from derain.scan import Scan
 
 if TYPE_CHECKING:
@@ -254,16 +252,17 @@ def two_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def saying(onnx_model: Path, tmp_path: Path) -> Callable[[object], Path]:
+def saying(onnx_model: Path, tmp_path: Path) -> Callable[[dict[str, Any]], Path]:
     """Makes a copy of the exported network that says something else of itself."""
     import onnx
 
-    def say(metadata: object) -> Path:
+    from derain.export.onnx_file import with_metadata
+
+    def say(metadata: dict[str, Any]) -> Path:
         proto = onnx.load(onnx_model)
-        onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps(metadata)})
         path = tmp_path / "model" / "changed.onnx"
         path.parent.mkdir(exist_ok=True)
-        onnx.save(proto, path)
+        path.write_bytes(with_metadata(proto, metadata))
         return path
 
     return say

@@ -12,6 +12,25 @@ from derain.errors import printable
 DENIABLE = ("distinct",)
 
 
+def whole(text: str) -> int:
+    """A whole number."""
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number") from None
+
+
+def number(text: str) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text} is not a number")
+    return value
+
+
 def count(text: str) -> int:
     """A whole number of 1 or more."""
     return _at_least(1, text)
@@ -29,15 +48,15 @@ def add_threads(parser: argparse.ArgumentParser) -> None:
 
 def factor(text: str) -> float:
     """A finite number above 0."""
-    value = float(text)
-    if not (value > 0 and math.isfinite(value)):
+    value = number(text)
+    if not value > 0:
         raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
     return value
 
 
 def share(text: str) -> float:
     """A number from 0 to 1."""
-    value = float(text)
+    value = number(text)
     if not 0 <= value <= 1:
         raise argparse.ArgumentTypeError(f"{text} is not a number from 0 to 1")
     return value
@@ -81,7 +100,7 @@ def command_line(arguments: argparse.Namespace, positional: str | None = None) -
 
 
 def _at_least(least: int, text: str) -> int:
-    value = int(text)
+    value = whole(text)
     if value < least:
         raise argparse.ArgumentTypeError(f"{text} is less than {least}")
     return value

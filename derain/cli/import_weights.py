@@ -6,7 +6,7 @@ from pathlib import Path
 
 from derain.cli.arguments import file_named
 from derain.cli.outputs import say
-from derain.errors import InputError
+from derain.errors import InputError, did_you_mean
 from derain.system.extras import OF_CHECKPOINTS, require
 
 SUMMARY = "make a checkpoint from published weights"
@@ -84,4 +84,4 @@ def _not_published(name: str) -> InputError:
 
     known = [name for name, network in NETWORKS.items() if issubclass(network, Published)]
     reason = "no weights of it were published" if name in NETWORKS else "no such network"
-    return InputError(name, reason, f"Known are {', '.join(known)}.")
+    return InputError(name, reason, f"{did_you_mean(name, known)}Known are {', '.join(known)}.")

@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -97,21 +98,31 @@ def main(arguments: argparse.Namespace) -> int:
         fit = fit_grid([frame.read() for frame in frames]).as_dict()
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0
+    code = 0
     for name in arguments.files:
-        if name == DEFAULT:  # ./default is another thing, and a Path would not tell them apart
-            _describe_default(arguments)
-            continue
-        path = in_topic([Path(name)], arguments)[0]
-        if os.path.isdir(path) and not is_bag(path):
-            _describe_folder(path, arguments)
-            continue
-        facts = _facts(path, arguments)
-        if arguments.json:
-            print(json.dumps({"file": str(path), **facts}))
-        else:
-            print(printable(str(path)))
-            say(_indented(_in_brief(facts)))
-    return 0
+        try:
+            _describe(name, arguments)
+        except InputError as error:  # the other files are none the worse for it
+            print(f"derain: {error}", file=sys.stderr)
+            code = 2
+    return code
+
+
+def _describe(name: str, arguments: argparse.Namespace) -> None:
+    """Prints what is in one file or folder."""
+    if name == DEFAULT:  # ./default is another thing, and a Path would not tell them apart
+        _describe_default(arguments)
+        return
+    path = in_topic([Path(name)], arguments)[0]
+    if os.path.isdir(path) and not is_bag(path):
+        _describe_folder(path, arguments)
+        return
+    facts = _facts(path, arguments)
+    if arguments.json:
+        print(json.dumps({"file": str(path), **facts}))
+    else:
+        print(printable(str(path)))
+        say(_indented(_in_brief(facts)))
 
 
 def _refuse_unclear_picture(arguments: argparse.Namespace) -> None:
@@ -142,6 +153,11 @@ def _describe_default(arguments: argparse.Namespace) -> None:
 def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
     facts = facts_of_folder(folder, arguments)
     say(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
+    if arguments.card is not None and not facts.total.labelled:
+        warn(
+            f"{folder}: no labels are beside its scans or in a folder that the card names. Name "
+            f"the folders of scans and labels, as in --layout {folder.absolute().name},labels"
+        )
     if arguments.picture:
         draw(facts, arguments.picture)
 

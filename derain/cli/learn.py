@@ -6,9 +6,15 @@ from pathlib import Path
 
 from derain.cli.arguments import count, file_named
 from derain.cli.bag_options import add_topic, in_topic
-from derain.cli.learning_student import STUDENTS, network_options, with_network, without_intensity
+from derain.cli.learning_student import (
+    STUDENTS,
+    epochs_of,
+    network_options,
+    with_network,
+    without_intensity,
+)
 from derain.cli.lesson import PERSISTENCE, Lesson
-from derain.cli.narration import Narrator
+from derain.cli.narration import WARNING_OF_DERAIN, Narrator
 from derain.cli.outputs import refuse_unwritable, say
 from derain.cli.pose_options import add_poses
 from derain.cli.results import last_line, proof_of
@@ -25,9 +31,9 @@ from derain.sources.records import POSES
 from derain.sources.source import Source
 from derain.system.extras import OF_EXPORT, OF_TRAINING, require
 from derain.teaching.held_out import FEWEST_SCANS
-from derain.teaching.manifest import TAUGHT_MANIFEST, Manifest
+from derain.teaching.manifest import HELD_OUT_PART, TAUGHT_MANIFEST, Manifest
 
-SUMMARY = "a derainer from an unlabelled recording, in about ten minutes"
+SUMMARY = "a derainer from an unlabelled recording, in about six minutes"
 
 DESCRIPTION = """\
 Learns to take the rain out of a sensor's scans from a recording of it that nobody labelled:
@@ -49,6 +55,9 @@ things are where they were, drops are not. Labels that lie beside the scans are 
 --card, they measure the finished model, for the record. Labels, runs and report go to a folder
 beside the model, which a second run clears.
 """
+
+# The commands that it runs; of these, odometry only where nothing says where the sensor was.
+STEPS = ("odometry", "teach", "fit", "export")
 
 # By this file a folder is known for one that a second run may clear.
 MARK = "learning.txt"
@@ -100,7 +109,6 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     require("learn", *OF_TRAINING, *OF_EXPORT)
     out: Path = arguments.out
-    epochs = ("--trainer.max_epochs", str(arguments.epochs)) if arguments.epochs else ()
     learn(
         Lesson(
             recordings=in_topic(arguments.recording, arguments),
@@ -111,7 +119,7 @@ def main(arguments: argparse.Namespace) -> int:
             poses=arguments.poses,
             blind=arguments.blind,
             columns=arguments.columns,
-            fit=epochs,
+            epochs=arguments.epochs,
             card=arguments.card,
             start=arguments.start,
             rerun=arguments.rerun,
@@ -124,7 +132,8 @@ def learn(lesson: Lesson) -> None:
     """Runs every step, and prints its result.
 
     Raises:
-        InputError: Too few scans, a folder that holds something else, or nothing to be learnt.
+        InputError: Too few scans, or too few that can be labelled, a folder that holds something
+            else, or nothing to be learnt.
         SystemExit: A step failed.
     """
     from derain.cli.learning_playback import show_lesson
@@ -138,12 +147,14 @@ def learn(lesson: Lesson) -> None:
     if lesson.rerun is not None:
         refuse_unusable(lesson.rerun)
     _clear(lesson.work)
-    narrator = Narrator(derain, lesson.work / "log.txt")
+    steps = len(STEPS) - (not lesson.needs_odometry(source))
+    narrator = Narrator(derain, lesson.work / "log.txt", steps)
     say(f"{len(source):,} scans to learn from. All but the model goes to {lesson.work}/")
     if not lesson.blind and source[0].read().intensity is None:
         lesson = without_intensity(lesson)
         say("They have no intensities: the network learns without.")
     _teach(narrator, lesson, source)
+    _refuse_too_few_labelled(lesson, source, narrator)
     report = LearningReport(lesson, narrator)
     report.write()  # what the teacher says is worth reading, whatever comes after
     report.refuse_clean()
@@ -172,6 +183,25 @@ def _refuse_too_few(lesson: Lesson, source: Source) -> None:
             "by others",
             f"Record {FEWEST_SCANS} or more, one right after the other; twenty teach a good deal.",
         )
+
+
+def _refuse_too_few_labelled(lesson: Lesson, source: Source, narrator: Narrator) -> None:
+    """Refuses a recording of which so few scans are labelled that none of them is held out."""
+    scans = Manifest.read(lesson.taught).scans
+    if any(scan.part == HELD_OUT_PART for scan in scans):
+        return
+    warnings = [
+        line.removeprefix(WARNING_OF_DERAIN)
+        for line in narrator.warned
+        if line.startswith(WARNING_OF_DERAIN)
+    ]
+    reasons = f": {warnings[0]}" if warnings else ""
+    raise InputError(
+        lesson.recordings[0],
+        f"only {len(scans)} of {len(source)} scans could be labelled, and a recording needs "
+        f"{FEWEST_SCANS}{reasons}",
+        f"See {narrator.log} for each scan, and record scans that overlap.",
+    )
 
 
 def _clear(work: Path) -> None:
@@ -212,10 +242,13 @@ def _teach(narrator: Narrator, lesson: Lesson, source: Source) -> None:
 
 def _fit(narrator: Narrator, lesson: Lesson) -> None:
     """Trains the student, and keeps the epoch that agrees best with the teacher."""
+    epochs = epochs_of(lesson)
     narrator.step(
         *("fit", *network_options(lesson), "--data.root", str(lesson.taught)),
         *("--trainer.logger.save_dir", str(lesson.work / "runs")),
         *("--checkpoint.dirpath", str(lesson.work)),
-        *("--checkpoint.filename", lesson.checkpoint.stem, *lesson.fit),
+        *("--checkpoint.filename", lesson.checkpoint.stem),
+        *("--trainer.max_epochs", str(epochs)),
         result=lambda _: "the student has learnt",
+        epochs=epochs,
     )

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import yaml
+
 from derain.cli.lesson import Lesson
 from derain.cli.start import checkpoint_of
 from derain.errors import InputError
@@ -69,6 +71,15 @@ def network_options(lesson: Lesson) -> tuple[str, ...]:
         return (*_configuration(str(lesson.model)), "--start", lesson.start)
     blind = ("--model.channels", BLIND[str(lesson.model)]) if lesson.blind else ()
     return (*_configuration(str(lesson.model)), *blind)
+
+
+def epochs_of(lesson: Lesson) -> int:
+    """How many epochs the student trains: those asked for, or those of its configuration."""
+    from derain.cli.training.configurations import packaged_configs
+
+    _, name, *_ = _configuration(str(lesson.model))
+    usual = yaml.safe_load(packaged_configs()[name].read_text("utf-8"))["trainer"]["max_epochs"]
+    return lesson.epochs or int(usual)
 
 
 def _configuration(network: str) -> tuple[str, ...]:

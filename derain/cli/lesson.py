@@ -25,7 +25,7 @@ class Lesson:
             and for odometry where nothing does.
         blind: Whether the network is not to see intensities.
         columns: Names of the columns of files that do not name them.
-        fit: Further options of the training.
+        epochs: Epochs of the training; None for those of the network's configuration.
         card: Data card of labels that measure the finished model; None measures nothing.
         rerun: Rerun file that shows teacher and student scan after scan; None writes none.
         start: The trained model whose weights the network begins with; None draws them at random.
@@ -39,7 +39,7 @@ class Lesson:
     poses: str | None = None
     blind: bool = False
     columns: Sequence[str] = DEFAULT_COLUMNS
-    fit: Sequence[str] = ()
+    epochs: int | None = None
     card: str | None = None
     start: str | None = None
     rerun: Path | None = None

@@ -25,6 +25,7 @@ from derain.cli import (
     tune,
     view,
 )
+from derain.cli.parser import Parser
 from derain.cli.signals import interrupting
 from derain.cli.training.configurations import require_configuration
 from derain.cli.training.help import short_help
@@ -166,8 +167,8 @@ def _run(arguments: list[str]) -> int:
     return int(COMMANDS[chosen.command].main(chosen))
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def _parser() -> Parser:
+    parser = Parser(
         "derain", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--version", action="version", version=f"derain {__version__}")

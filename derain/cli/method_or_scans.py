@@ -12,7 +12,7 @@ from derain.export.methods import (
     CHECKPOINT_SUFFIX,
     PARAMETER_SUFFIXES,
     is_method_name,
-    method_names,
+    what_to_give,
 )
 from derain.files.format import FORMATS
 from derain.files.names import scan_suffix
@@ -57,8 +57,7 @@ def method_and_scans(arguments: argparse.Namespace) -> tuple[str, list[Path]]:
         raise InputError(
             first,
             "no such file",
-            "Give a model written by `derain export`, or one of "
-            f"{', '.join(method_names())}, and scans after it; or scans alone.",
+            f"{what_to_give(first)}, and scans after it; or scans alone.",
         )
     if not named and (not others or _may_be_scans(first)):
         return DEFAULT, [Path(first), *others]

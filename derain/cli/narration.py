@@ -7,7 +7,7 @@ import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -16,11 +16,14 @@ from derain.cli.outputs import refuse_unwritable
 # Seconds between reports of how far a command has come: on a terminal (True), and in a file.
 PERIODS = {True: 0.5, False: 15.0}
 
-# How a warning or an error of derain's begins.
+# How an error of derain's begins, and how a warning does.
 OF_DERAIN = "derain: "
+WARNING_OF_DERAIN = f"{OF_DERAIN}warning: "
 
 # A progress bar of Lightning or tqdm: what is counted, and the share that is done.
 _BAR = re.compile(r"(?P<what>[^|\r\n]*?):?\s*(?P<share>\d+%)?\|.*\|\s*\d+/")
+_EPOCH = re.compile(r"Epoch (\d+)")  # as Lightning counts them, from 0
+_MEASURING = re.compile(r"(Sanity Checking|Validation)( DataLoader \d+)?")
 _MOVES_OF_CURSOR = re.compile(r"\x1b\[[A-Z]")
 
 
@@ -74,6 +77,7 @@ class Narrator:
     Args:
         run: Runs a command of derain, and returns its exit code.
         log: File that everything the commands print goes to.
+        steps: How many commands there will be; 0 where that is not known.
 
     Attributes:
         log: That file.
@@ -85,9 +89,10 @@ class Narrator:
         InputError: The file cannot be written.
     """
 
-    def __init__(self, run: Callable[[list[str]], int], log: Path) -> None:
+    def __init__(self, run: Callable[[list[str]], int], log: Path, steps: int = 0) -> None:
         self._run = run
         self.log = log
+        self._steps = steps
         self.commands: list[str] = []
         self.failed = False
         self.warned: list[str] = []
@@ -96,7 +101,11 @@ class Narrator:
         log.write_text("", "utf-8")
 
     def step(
-        self, *command: str, result: Callable[[Transcript], str], leaves: Path | None = None
+        self,
+        *command: str,
+        result: Callable[[Transcript], str],
+        leaves: Path | None = None,
+        epochs: int = 0,
     ) -> list[str]:
         """Runs one command.
 
@@ -105,6 +114,7 @@ class Narrator:
             result: Makes the line that is printed as its result, of what it printed itself.
             leaves: What it leaves where it could not do all, but what could be done; None
                 where there is no such thing.
+            epochs: How many epochs it trains; 0 where that is not known.
 
         Returns:
             The lines that it printed.
@@ -119,8 +129,14 @@ class Narrator:
         with self.log.open("a", encoding="utf-8") as file:
             file.write(f"\n{line}\n")
         printed, warned = Transcript(self.log), Transcript(self.log)
+
+        def progress() -> str:
+            place = f"step {len(self.commands)} of {self._steps}" if self._steps else ""
+            of_step = " ".join(filter(None, (printed.progress, warned.progress)))
+            return ", ".join(filter(None, (place, _in_words(of_step, epochs)))) or "..."
+
         with (
-            _told_how_far((printed, warned), begun),
+            _told_how_far(progress, begun),
             redirect_stdout(printed),
             redirect_stderr(warned),
         ):
@@ -142,15 +158,14 @@ class Narrator:
 
 
 @contextmanager
-def _told_how_far(transcripts: Sequence[Transcript], begun: float) -> Iterator[None]:
+def _told_how_far(progress: Callable[[], str], begun: float) -> Iterator[None]:
     """Shows how far a command has come: on one line of a terminal, or in a file, line by line."""
     out, done = sys.stdout, threading.Event()
     live = out.isatty()
 
     def tell() -> None:
         while not done.wait(PERIODS[live]):
-            progress = " ".join(filter(None, (each.progress for each in transcripts)))
-            text = f"  {_clock(time.monotonic() - begun)}  {progress or '...'}"
+            text = f"  {_clock(time.monotonic() - begun)}  {progress()}"
             if live:
                 width = shutil.get_terminal_size().columns - 1
                 out.write(f"\r\x1b[K{text[:width]}")
@@ -170,9 +185,16 @@ def _told_how_far(transcripts: Sequence[Transcript], begun: float) -> Iterator[N
             out.flush()
 
 
+def _in_words(progress: str, epochs: int) -> str:
+    """The progress of a command, with an epoch counted from 1, of all where that is known."""
+    of_all = f" of {epochs}" if epochs else ""
+    progress = _EPOCH.sub(lambda found: f"epoch {int(found[1]) + 1}{of_all}", progress)
+    return _MEASURING.sub("measuring", progress)
+
+
 def _is_error(line: str) -> bool:
     """Whether a line says why a command failed, not only what it warns of."""
-    return line.startswith(OF_DERAIN) and not line.startswith(f"{OF_DERAIN}warning: ")
+    return line.startswith(OF_DERAIN) and not line.startswith(WARNING_OF_DERAIN)
 
 
 def _clock(seconds: float) -> str:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from derain.bags.names import is_bag
-from derain.cli.arguments import add_threads, count
+from derain.cli.arguments import add_threads, count, whole
 from derain.cli.bag_options import add_topic
 from derain.cli.filter_help import list_methods
 from derain.cli.pose_options import add_poses
@@ -106,5 +106,5 @@ def _numbers(text: str) -> slice:
     """Places of scans, such as ``10:20``, ``10:`` or ``:20``."""
     first, colon, end = text.partition(":")
     if not colon:
-        raise argparse.ArgumentTypeError(f"{text} is not FROM:TO")
-    return slice(*(int(part) if part else None for part in (first, end)))
+        raise argparse.ArgumentTypeError(f"{text} is not FROM:TO, such as 10:20")
+    return slice(*(whole(part) if part else None for part in (first, end)))

@@ -15,7 +15,7 @@ from typing import Any
 
 import yaml
 
-from derain.errors import InputError
+from derain.errors import InputError, did_you_mean
 from derain.files.reading import reading
 
 # Far more than any card, scene or Spec takes, and read in a second.
@@ -168,7 +168,8 @@ class Entry:
         members = self.members()
         for key, entry in members.items():
             if key not in parsers:
-                raise entry.fault("there is no such key", f"Known are {', '.join(parsers)}.")
+                remedy = f"{did_you_mean(key, parsers)}Known are {', '.join(parsers)}."
+                raise entry.fault("there is no such key", remedy)
         for key in required:
             if key not in members:
                 raise self.fault(f"{key} is missing", "Add it.")

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 
-from derain.errors import InputError
+from derain.errors import InputError, did_you_mean
 from derain.files.reading import is_file
 
 
@@ -32,5 +32,6 @@ def packaged_or_own(name: str | Path, files: Mapping[str, Path], kind: str) -> P
     """
     path = files.get(str(name), Path(name))
     if not is_file(path):
-        raise InputError(name, f"no such {kind}", f"Give a YAML file or one of {', '.join(files)}.")
+        remedy = f"{did_you_mean(name, files)}Give a YAML file or one of {', '.join(files)}."
+        raise InputError(name, f"no such {kind}", remedy)
     return path

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from derain.errors import InputError
+from derain.errors import InputError, did_you_mean
 from derain.files.documents import short
 from derain.system.parameters import made_of
 from derain.system.registry import Registry
@@ -25,5 +25,6 @@ def filter_from(name: str, parameters: Mapping[str, Any]) -> "PointFilter":
         InputError: No such filter, no such parameter, or a value that it cannot have.
     """
     if name not in FILTERS:
-        raise InputError(short(name), "no such filter", f"Give one of {', '.join(FILTERS)}.")
+        remedy = f"{did_you_mean(name, FILTERS)}Give one of {', '.join(FILTERS)}."
+        raise InputError(short(name), "no such filter", remedy)
     return made_of(FILTERS[name], name, parameters)

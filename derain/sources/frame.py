@@ -75,6 +75,25 @@ class Frame(ABC):
     def has_labels(self) -> bool:
         """Whether its labels are there to be read."""
 
+    def require_labels(self) -> None:
+        """Refuses a scan without labels, where they are needed.
+
+        Raises:
+            InputError: It has none, or they are not where they are looked for.
+        """
+        if self.has_labels:
+            return
+        if self.label_path is None:
+            raise InputError(self.name, "it has no labels", "Leave the scan out.")
+        folder = Path(self.name).absolute().parent
+        layout = f"layout: {{scans: {folder.name}, labels: FOLDER}}"
+        raise InputError(
+            self.name,
+            f"its labels are not at {self.label_path}",
+            "Put them there or beside the scan. If they are in another folder of "
+            f"{folder.parent}, name it in a YAML data card: `{layout}`.",
+        )
+
     @abstractmethod
     def read(self) -> Scan:
         """Reads the scan, without labels.

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from derain.errors import InputError
+from derain.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -26,6 +26,8 @@ def made_of(kind: type[Made], name: str, parameters: Mapping[str, Any]) -> Made:
     known = [field.name for field in fields(kind)]
     if unknown := sorted(set(parameters) - set(known)):
         raise InputError(
-            name, f"it has no parameter {', '.join(unknown)}", f"It has {', '.join(known)}."
+            name,
+            f"it has no parameter {', '.join(unknown)}",
+            f"{did_you_mean(unknown[0], known)}It has {', '.join(known)}.",
         )
     return kind(**parameters)

@@ -1,10 +1,12 @@
 // The checksum that an exported file carries of itself: SHA-256.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "json.hpp"
 #include "spec.hpp"
@@ -92,9 +94,15 @@ inline std::string sha256(std::string bytes) {
   return text;
 }
 
-// The checksum in a model's metadata; empty where there is none, as in the first models.
-inline std::string stated_checksum(const std::string& model, const std::string& metadata) {
-  return read_metadata(model, metadata)["sha256"].text;
+// Whether metadata are laid out as derain 0.1 wrote them, which knew no checksum.
+inline bool is_early(const Json& metadata) {
+  for (const std::string& key : metadata.keys) {
+    if (key != "spec" && key != "versions" && key != "proof") return false;
+  }
+  const std::vector<std::string>& keys = metadata["spec"].keys;
+  return std::none_of(keys.begin(), keys.end(), [](const std::string& key) {
+    return key == "candidates" || key == "training";
+  });
 }
 
 // SHA-256 of a file with noughts where it states its checksum.

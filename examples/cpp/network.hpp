@@ -85,9 +85,11 @@ class Network {
   }
 
   void refuse_changed(const std::string& content, const std::string& metadata) const {
-    const std::string stated = stated_checksum(name_, metadata);
-    if (!stated.empty() && checksum_of(content, stated) != stated) {
-      throw InputError(name_, "it is not as it was exported: its checksum differs",
+    const Json known = read_metadata(name_, metadata);
+    if (is_early(known)) return;
+    const std::string stated = known["sha256"].text;
+    if (stated.empty() || checksum_of(content, stated) != stated) {
+      throw InputError(name_, "it is not as it was exported: its checksum differs or is missing",
                        "Copy or export it again.");
     }
   }

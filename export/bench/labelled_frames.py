@@ -43,10 +43,7 @@ class LabelledFrames:
         if not self.frames:
             raise InputError("scans", "there are none", "Give one or more labelled scans.")
         for frame in self.frames:
-            if not frame.has_labels:
-                where = f"its labels are not at {frame.label_path}"
-                reason = "it has no labels" if frame.label_path is None else where
-                raise InputError(frame.name, reason, "Add them or leave the scan out.")
+            frame.require_labels()
 
     def read(self, frame: Frame) -> Scan:
         """Reads a scan with its labels.

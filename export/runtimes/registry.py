@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from derain.errors import InputError
+from derain.errors import InputError, did_you_mean
 from derain.export.model_file import ModelFile
 from derain.export.runtimes.session import FLOAT32_PRECISION, Session
 from derain.files.documents import short
@@ -33,7 +33,8 @@ class Runtime:
 
     def __post_init__(self) -> None:
         if self.name not in RUNTIMES:
-            raise InputError(short(self.name), "no such runtime", f"Give {_listed(RUNTIMES)}.")
+            remedy = f"{did_you_mean(self.name, RUNTIMES)}Give {_listed(RUNTIMES)}."
+            raise InputError(short(self.name), "no such runtime", remedy)
         if self.precision not in RUNTIMES[self.name].PRECISIONS:
             able = [name for name, kind in RUNTIMES.items() if self.precision in kind.PRECISIONS]
             raise InputError(

@@ -170,8 +170,25 @@ def test_bars_are_progress_and_lines_are_kept(narrate: Callable[..., list[str]])
 
 
 @pytest.mark.parametrize(("live", "before"), [(False, ""), (True, "\r\x1b[K")])
+@pytest.mark.parametrize(
+    ("bar", "steps", "epochs", "says"),
+    [
+        ("judging", 0, 0, "judging 40%"),
+        ("judging", 4, 0, "step 1 of 4, judging 40%"),
+        ("Epoch 7", 0, 0, "epoch 8 40%"),
+        ("Epoch 7", 4, 20, "step 1 of 4, epoch 8 of 20 40%"),
+        ("Validation DataLoader 0", 4, 20, "step 1 of 4, measuring 40%"),
+    ],
+)
 def test_a_long_step_says_now_and_then_how_far_it_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, live: bool, before: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    live: bool,
+    before: str,
+    bar: str,
+    steps: int,
+    epochs: int,
+    says: str,
 ) -> None:
     told = threading.Event()
 
@@ -180,20 +197,21 @@ def test_a_long_step_says_now_and_then_how_far_it_is(
             return live
 
         def write(self, text: str) -> int:
-            if "judging 40%" in text:
+            if says in text:
                 told.set()
             return super().write(text)
 
     def slow(command: list[str]) -> int:
-        print("\rjudging:  40%|## | 4/10 [00:01<00:01]", end="", file=sys.stderr)
+        print(f"\r{bar}:  40%|## | 4/10 [00:01<00:01]", end="", file=sys.stderr)
         assert told.wait(timeout=30)
         return 0
 
     monkeypatch.setattr(narration, "PERIODS", {True: 0.001, False: 0.001})
     monkeypatch.setattr(sys, "stdout", Screen())
-    Narrator(slow, tmp_path / "log.txt").step("tune", result=lambda _: "tuned")
+    narrator = Narrator(slow, tmp_path / "log.txt", steps)
+    narrator.step("tune", result=lambda _: "tuned", epochs=epochs)
     told_in_all = sys.stdout.getvalue()
     assert told_in_all.startswith("$ derain tune\n" + before)
-    assert f"{before}  0:00  judging 40%" in told_in_all
+    assert f"{before}  0:00  {says}" in told_in_all
     # On a terminal, what was only progress is wiped away.
     assert told_in_all.rpartition("\x1b[K")[2].splitlines()[-1].endswith("  tuned")

@@ -269,7 +269,7 @@ def broken(checkpoint: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("cut.ckpt", "damaged"),
         ("no_spec.ckpt", "not a checkpoint of derain"),
         ("weights_alone.ckpt", "Published weights become one through `derain import-weights`."),
-        ("other_network.ckpt", "a checkpoint of 'resnet'. Known are lisnownet"),
+        ("other_network.ckpt", "a checkpoint of 'resnet', a network that no"),
         ("other_parameters.ckpt", "depth"),
         ("other_weights.ckpt", "its weights do not fit outdet"),
         ("other_size.ckpt", "its weights do not fit outdet"),

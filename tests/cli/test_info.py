@@ -177,6 +177,19 @@ def test_several_files_give_one_object_each(
     assert [item["file"] for item in objects] == [str(scan), str(onnx_model)]
 
 
+def test_a_file_that_cannot_be_read_keeps_no_other_from_being_described(
+    run_derain, scan: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "cut.bin").write_bytes(b"12345")
+    outcome = run_derain("info", "--json", "none.bin", scan, tmp_path / "cut.bin", scan)
+    assert outcome.code == 2
+    assert [json.loads(line)["file"] for line in outcome.out.splitlines()] == [str(scan)] * 2
+    assert [line.split(": ")[1] for line in outcome.err.splitlines()] == [
+        "none.bin",
+        str(tmp_path / "cut.bin"),
+    ]
+
+
 def test_a_model_on_range_images_says_its_grid_and_rule(
     run_derain, image_model: DerainingModule, image_onnx: Path, tmp_path: Path
 ) -> None:

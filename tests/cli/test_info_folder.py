@@ -70,6 +70,18 @@ def test_the_table_has_a_line_a_class_and_a_column_a_rate(run_derain, data_set: 
     ]
 
 
+def test_a_card_without_labels_to_explain_is_warned_of(run_derain, tmp_path: Path) -> None:
+    (tmp_path / "scans").mkdir()
+    scene(50).tofile(tmp_path / "scans/0.bin")
+    write_labels(tmp_path / "truth/0.label", np.full(50, 110))
+    outcome = run_derain("info", tmp_path / "scans", "--card", "wads")
+    assert (outcome.code, outcome.err.count("\n")) == (0, 1)
+    assert "--layout scans,labels" in outcome.err
+    outcome = run_derain("info", tmp_path / "scans", "--card", "wads", "--layout", "scans,truth")
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "falling-snow" in outcome.out
+
+
 def test_the_card_names_the_classes(run_derain, data_set: Path, tmp_path: Path) -> None:
     card = tmp_path / "mine.yaml"
     card.write_text("name: mine\nclasses: {3: wet, 7: grey}\nrain: [3]")

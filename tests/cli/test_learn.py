@@ -19,6 +19,8 @@ from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import read_labels, write_labels
 from derain.scan import Scan
+from derain.system.notices import warn
+from derain.teaching.manifest import Manifest, TaughtScan
 
 QUICK = ("--teacher", "dror", "--epochs", "1")
 
@@ -162,6 +164,29 @@ def test_scans_that_nothing_connects_are_refused_with_the_reason(run_derain) -> 
     assert not Path("model.onnx").exists()
 
 
+def test_a_recording_of_which_too_few_scans_can_be_labelled_is_refused_with_the_reason(
+    write: WriteRecording, monkeypatch: pytest.MonkeyPatch, run_derain
+) -> None:
+    recording = write(scans=5)
+    known = [TaughtScan(name, recording / f"{name}.bin", "", 0, "train") for name in "ab"]
+
+    def run(command: list[str]) -> int:
+        if command[0] == "odometry":
+            warn("2.bin: not to be trusted: it is of another place")
+            print("poses.txt: 5 scans, 1 not to be trusted")
+        else:
+            Manifest({"method": "persistence"}, known).write(Path("model_learning/taught"))
+        return 0
+
+    monkeypatch.setattr(
+        learn, "Narrator", lambda _, log, steps: narration.Narrator(run, log, steps)
+    )
+    outcome = run_derain("learn", recording, "--out", "model.onnx")
+    assert outcome.code == 2
+    assert "only 2 of 5 scans could be labelled" in outcome.err
+    assert "2.bin: not to be trusted: it is of another place" in outcome.err
+
+
 def test_a_clean_recording_is_refused_with_a_report_of_it(
     run_derain, write: WriteRecording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -230,7 +255,7 @@ def test_odometry_is_asked_where_nobody_says_where_the_sensor_was(
         commands.append(command)
         return 2
 
-    monkeypatch.setattr(learn, "Narrator", lambda _, log: narration.Narrator(run, log))
+    monkeypatch.setattr(learn, "Narrator", lambda _, log, steps: narration.Narrator(run, log))
     outcome = run_derain("learn", *folders, "--out", "model.onnx", "--teacher", teacher, *options)
     assert outcome.code == 2
     assert commands[0][0] == ("odometry" if asked else "teach")
@@ -242,7 +267,9 @@ def test_poses_beside_the_scans_are_taken(
 ) -> None:
     recording = write(scans=3)
     recording.with_name("poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
-    monkeypatch.setattr(learn, "Narrator", lambda _, log: narration.Narrator(commands.append, log))
+    monkeypatch.setattr(
+        learn, "Narrator", lambda _, log, steps: narration.Narrator(commands.append, log)
+    )
     commands: list[list[str]] = []
     monkeypatch.setattr(learn, "_fit", None)
     with pytest.raises(InputError, match="taught"):

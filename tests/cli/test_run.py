@@ -185,7 +185,7 @@ def test_a_missing_intensity_is_warned_of_once(
 
 
 def test_a_model_that_was_trained_without_intensity_warns_of_none(
-    run_derain, saying: Callable[[object], Path], onnx_model: Path, scans: Path, tmp_path: Path
+    run_derain, saying: Callable[..., Path], onnx_model: Path, scans: Path, tmp_path: Path
 ) -> None:
     spec = Derainer(onnx_model).metadata["spec"]
     model = saying({"spec": {**spec, "mean": [0.0] * 4}})

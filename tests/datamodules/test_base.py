@@ -218,7 +218,7 @@ def test_a_model_that_learns_from_labels_needs_them_all(
 ) -> None:
     data = connect(folder())
     (tmp_path / "2.label").unlink()
-    with pytest.raises(InputError, match=r"2\.bin: its labels are not at .* Add them or leave"):
+    with pytest.raises(InputError, match=r"2\.bin: its labels are not at .*data card"):
         data.frames(part)
     assert len(data.frames("predict")) == SCANS
 

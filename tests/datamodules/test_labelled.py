@@ -1,13 +1,16 @@
 """Labelled scans are found however a user names them, and measured by the right card."""
 
 import json
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import yaml
 
 from derain.cards.card import load_card
-from derain.cards.layout import sequence_of
+from derain.cards.layout import Layout, sequence_of
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
 from derain.errors import InputError
@@ -53,6 +56,19 @@ def test_files_and_folders_are_taken_with_the_labels_beside_them(
         tmp_path / "labels/0.label",
         tmp_path / "labels/1.label",
     ]
+
+
+def test_labels_that_lie_elsewhere_are_found_by_the_card_that_the_message_shows(
+    tmp_path: Path, write: Write
+) -> None:
+    write(tmp_path / "drive/0.bin", tmp_path / "truth/0.label")
+    with pytest.raises(InputError, match="its labels are not at") as refusal:
+        found([tmp_path / "drive"], "kitti")
+    (layout,) = re.findall(r"layout: (\{.*\})", refusal.value.remedy)
+    names = yaml.safe_load(layout.replace("FOLDER", "truth"))
+    card = replace(load_card("kitti"), layout=Layout(**names))
+    (frame,) = labelled_scans([tmp_path / "drive"], card, Loading()).frames("test")
+    assert frame.label_path == tmp_path / "truth/0.label"
 
 
 def test_a_folder_of_rehearse3d_has_its_labels_in_its_own_sibling(

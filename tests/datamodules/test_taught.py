@@ -130,7 +130,7 @@ def test_without_a_held_out_scan_there_is_none_to_measure(tmp_path: Path) -> Non
     teach(FilterDerainer(DROR(), 1), named_frames([tmp_path / "0.bin"]), tmp_path / "taught")
     data = Taught(str(tmp_path / "taught"))
     assert keys(data, "train") == ["0"]
-    with pytest.raises(InputError, match="no scan is held out, so that there is none for test"):
+    with pytest.raises(InputError, match="none of its labelled scans is for test"):
         data.source("test")
 
 

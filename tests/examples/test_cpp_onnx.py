@@ -1,6 +1,5 @@
 """With onnxruntime's headers, the example in C++ judges as derain judges."""
 
-import json
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from derain.default import default_model
 from derain.evaluation.hard_cases import scene
-from derain.export.model_file import METADATA_KEY, NO_CHECKSUM, sealed
+from derain.export.onnx_file import with_metadata
 from derain.export.runtime import Derainer
 from derain.views.back_projection import BACK_PROJECTIONS
 from derain.views.candidates import Candidates
@@ -71,17 +70,19 @@ def test_and_images_whichever_way_their_scores_come_back(
     view = {**spec.view, "grid": {**spec.view["grid"], "azimuth": azimuth}, "way_back": way_back}
     for bounds in (None, candidates):
         changed = replace(spec, view=view, candidates=bounds)
-        metadata = {"spec": changed.as_dict(), "sha256": NO_CHECKSUM}
-        onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps(metadata)})
-        (tmp_path / "model.onnx").write_bytes(sealed(proto.SerializeToString()))
+        content = with_metadata(proto, {"spec": changed.as_dict()})
+        (tmp_path / "model.onnx").write_bytes(content)
         scans = [*SCANS.values(), np.concatenate([SCANS["ties, copies, invalid rows"], scene(800)])]
         judged_alike(derain_onnx, tmp_path, tmp_path / "model.onnx", scans)
 
 
-def test_a_model_that_has_changed_is_refused(derain_onnx: Program, tmp_path: Path) -> None:
+@pytest.mark.parametrize("text", [b'"numpy"', b'"sha256"'], ids=["versions", "checksum"])
+def test_a_model_that_has_changed_is_refused(
+    derain_onnx: Program, tmp_path: Path, text: bytes
+) -> None:
     scene(50).tofile(tmp_path / "scan.bin")
     model = tmp_path / "model.onnx"
-    model.write_bytes(default_model().read_bytes().replace(b'"numpy"', b'"numpY"'))
+    model.write_bytes(default_model().read_bytes().replace(text, text.upper()))
     done = derain_onnx(model, tmp_path / "out", tmp_path / "scan.bin")
     assert done.returncode == 2
     assert "it is not as it was exported: its checksum differs" in done.stderr
@@ -101,8 +102,7 @@ def test_a_file_that_is_no_model_of_derain_is_refused(derain_onnx: Program, tmp_
     ):
         if metadata is not None:
             proto = onnx.load(KEPT)
-            onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps(metadata)})
-            onnx.save(proto, tmp_path / name)
+            (tmp_path / name).write_bytes(with_metadata(proto, metadata))
         done = derain_onnx(tmp_path / name, tmp_path / "out", tmp_path / "scan.bin")
         assert done.returncode == 2
         assert done.stderr.startswith(f"derain_onnx: {tmp_path / name}: {reason}")

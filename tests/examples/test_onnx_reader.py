@@ -1,6 +1,5 @@
 """Whoever follows the contract, as the reader in NumPy does, calls rain what derain calls rain."""
 
-import json
 import re
 import subprocess
 import sys
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from derain.default import default_model
 from derain.evaluation.hard_cases import scene
-from derain.export.model_file import METADATA_KEY
+from derain.export.onnx_file import with_metadata
 from derain.export.runtime import Derainer
 from derain.spec import Spec
 from derain.views.back_projection import BACK_PROJECTIONS
@@ -29,6 +28,7 @@ from .hard_points import hard_points, hard_scans
 REPOSITORY = Path(__file__).resolve().parents[2]
 EXAMPLE = REPOSITORY / "examples" / "onnx_reader.py"
 CONTRACT = (REPOSITORY / "docs" / "onnx_contract.md").read_text("utf-8")
+KEPT = REPOSITORY / "tests" / "export" / "kept" / "outdet.onnx"
 SCANS = hard_scans()
 
 
@@ -91,9 +91,22 @@ def test_it_carries_scores_of_pixels_back_in_every_way(
     grid = {**spec.view["grid"], "azimuth": azimuth}
     view = {"kind": "range", "grid": grid, "way_back": way_back}
     changed = replace(spec, view=view, candidates=candidates if bounded else None)
-    onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps({"spec": changed.as_dict()})})
-    onnx.save(proto, tmp_path / "changed.onnx")
+    (tmp_path / "changed.onnx").write_bytes(with_metadata(proto, {"spec": changed.as_dict()}))
     agree(reader, tmp_path / "changed.onnx", np.concatenate([hard_points(), scene(800)]))
+
+
+@pytest.mark.parametrize("text", [b'"numpy"', b'"sha256"'], ids=["versions", "checksum"])
+def test_a_model_that_has_changed_is_refused(
+    reader: ModuleType, tmp_path: Path, text: bytes
+) -> None:
+    model = tmp_path / "model.onnx"
+    model.write_bytes(default_model().read_bytes().replace(text, text.upper()))
+    with pytest.raises(SystemExit, match="its checksum differs or is missing"):
+        reader.Model(str(model))
+
+
+def test_a_model_of_an_early_derain_is_read(reader: ModuleType) -> None:
+    agree(reader, KEPT, scene(50))
 
 
 def test_from_the_command_line_it_writes_labels(tmp_path: Path) -> None:
@@ -107,7 +120,8 @@ def test_from_the_command_line_it_writes_labels(tmp_path: Path) -> None:
 
 def test_it_needs_nothing_of_derain() -> None:
     imported = re.findall(r"^(?:import|from) (\w+)", EXAMPLE.read_text("utf-8"), re.MULTILINE)
-    assert set(imported) <= {"json", "math", "sys", "typing", "numpy", "onnxruntime"}
+    beyond = {"hashlib", "json", "math", "pathlib", "sys", "typing", "numpy", "onnxruntime"}
+    assert set(imported) <= beyond
 
 
 def test_the_contract_names_all_that_a_file_may_hold() -> None:

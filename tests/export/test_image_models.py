@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from derain import models
 from derain.evaluation.hard_cases import hard_cases, scene
+from derain.export.onnx_file import with_metadata
 from derain.export.proof import THREADS
-from derain.export.runtime import METADATA_KEY, Derainer
+from derain.export.runtime import Derainer
 from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.views.probability import probability_of_rain
@@ -142,8 +143,7 @@ def with_way_back(derainer: Derainer, model: Path, way_back: str, path: Path) ->
     """The same file, but for the back-projection in its Spec."""
     spec = replace(derainer.spec, view={**derainer.spec.view, "way_back": way_back})
     proto = onnx.load(model)
-    onnx.helper.set_model_props(proto, {METADATA_KEY: json.dumps({"spec": spec.as_dict()})})
-    onnx.save(proto, path)
+    path.write_bytes(with_metadata(proto, {"spec": spec.as_dict()}))
     return Derainer(path, threads=1)
 
 

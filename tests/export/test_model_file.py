@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import onnx
 import pytest
+import torch
 from onnx import TensorProto, helper
 
 from derain.default import default_model
@@ -21,8 +22,8 @@ from derain.export.model_file import (
     PARTS,
     ModelFile,
     number_of_weights,
-    sealed,
 )
+from derain.export.onnx_file import with_metadata
 from derain.export.runtime import Derainer
 
 KEPT = Path(__file__).parent / "kept/outdet.onnx"
@@ -46,11 +47,10 @@ def path(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def exported(path: Path) -> bytes:
-    """The kept model as it is exported today: with a checksum, beside the proof."""
-    proto = onnx.load(KEPT)
-    metadata = ModelFile.read(KEPT).metadata | {CHECKSUM_KEY: "0" * 64}
-    helper.set_model_props(proto, {METADATA_KEY: json.dumps(metadata), "version": "0.1.0"})
-    path.write_bytes(sealed(proto.SerializeToString()))
+    """The kept model as it is exported today: with a checksum, and with all of a Spec."""
+    file = ModelFile.read(KEPT)
+    metadata = file.metadata | {"spec": file.spec.as_dict(), "flushed": 0}
+    path.write_bytes(with_metadata(onnx.load(KEPT), metadata, version="0.1.0"))
     return path.read_bytes()
 
 
@@ -96,6 +96,34 @@ def test_a_file_that_is_not_as_it_was_exported_says_so(
     path.write_bytes(changed)
     with pytest.raises(InputError, match=r"model\.onnx: it is not as it was exported"):
         Derainer(path)
+
+
+def without(metadata: dict[str, Any], *keys: str) -> dict[str, Any]:
+    return {key: value for key, value in metadata.items() if key not in keys}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda known: without(known, CHECKSUM_KEY),
+        lambda known: {**without(known, CHECKSUM_KEY), "sha-256": known[CHECKSUM_KEY]},
+        lambda known: {**without(known, CHECKSUM_KEY), "versions": {"derain": "0.1.0"}},
+        lambda known: without(known, CHECKSUM_KEY, "flushed"),
+        lambda known: {"spec": known["spec"]},
+        lambda known: {"spec": without(known["spec"], "candidates"), "proof": known["proof"]},
+        lambda known: {"spec": without(known["spec"], "training"), "proof": known["proof"]},
+    ],
+    ids=["removed", "renamed", "earlier", "more removed", "the spec", "a part", "another part"],
+)
+def test_a_file_that_has_lost_its_checksum_is_refused(
+    exported: bytes, path: Path, change: Callable[[dict[str, Any]], dict[str, Any]]
+) -> None:
+    proto = onnx.load_from_string(exported)
+    metadata = json.dumps(change(ModelFile.read(path).metadata))
+    helper.set_model_props(proto, {METADATA_KEY: metadata})
+    onnx.save(proto, path)
+    with pytest.raises(InputError, match=r"model\.onnx: it has no checksum"):
+        ModelFile.read(path)
 
 
 def json_checksum(content: bytes) -> bytes:
@@ -272,6 +300,14 @@ def test_a_file_of_any_size_is_not_read_whole(monkeypatch: pytest.MonkeyPatch) -
 def test_weights_are_counted_as_onnx_counts_them(model: Path) -> None:
     tensors = onnx.load(model).graph.initializer
     assert number_of_weights(model.read_bytes()) == sum(prod(tensor.dims) for tensor in tensors) > 0
+
+
+@pytest.mark.parametrize("archive", [True, False], ids=["archive", "pickle"])
+def test_weights_of_pytorch_lead_to_their_import(tmp_path: Path, archive: bool) -> None:
+    weights = tmp_path / "weights.pt"
+    torch.save({"weight": torch.zeros(3)}, weights, _use_new_zipfile_serialization=archive)
+    with pytest.raises(InputError, match=r"weights\.pt: .*`derain import-weights`"):
+        Derainer(weights)
 
 
 def test_sizes_of_tensors_are_read_in_one_field_and_in_several() -> None:

@@ -178,11 +178,11 @@ def test_a_line_of_help_says_what_rain_is(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "parameters", "message"),
     [
-        ("rorr", {}, "rorr: no such filter. Give one of crf, dror, dsor, ror, sor, ssr."),
+        ("rorr", {}, "rorr: no such filter. Did you mean ror? Give one of crf, dror, dsor, ror,"),
         (
             "ror",
             {"radios": 1},
-            "ror: it has no parameter radios. It has neighbours, radius.",
+            "ror: it has no parameter radios. Did you mean radius? It has neighbours, radius.",
         ),
         ("ror", {"radius": -1}, "ror: radius is -1. Give a finite number"),
         ("ror", {"radius": "1e-3 m"}, "ror: radius is '1e-3 m'. Give a finite number"),

@@ -275,6 +275,6 @@ def test_a_scan_without_labels_is_one_error_that_names_it(
 ) -> None:
     data = scenes()
     (tmp_path / missing).unlink()
-    with pytest.raises(InputError, match=r"its labels are not at .*Add them or leave") as refusal:
+    with pytest.raises(InputError, match=r"its labels are not at .*data card") as refusal:
         make_trainer(epochs=1).fit(SalsaNext(small_grid, width=4), data)
     assert refusal.value.subject == str((tmp_path / missing).with_suffix(".bin"))

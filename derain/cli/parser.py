@@ -1,0 +1,66 @@
+"""The parser of the command line: what it cannot understand is one line with a remedy."""
+
+import argparse
+import re
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from derain.cli.arguments import number, whole
+from derain.errors import InputError, did_you_mean
+
+# Options of other programs that choose a GPU.
+OF_GPUS = {"--gpu", "--gpus", "--device", "--cuda", "--accelerator"}
+
+
+class Parser(argparse.ArgumentParser):
+    """Raises InputError for a command line that it cannot understand."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        # In place of Python's own, whose names would stand in the messages.
+        self.register("type", int, whole)
+        self.register("type", float, number)
+
+    def error(self, message: str) -> NoReturn:
+        """Refuses a command line, with an example of a right one where something is missing."""
+        argument, colon, reason = message.removeprefix("argument ").partition(": ")
+        if message.startswith("argument ") and colon:
+            raise InputError(argument, reason, f"`{self.prog} --help` explains it.")
+        command = self.prog.partition(" ")[2] or "command line"
+        # METHOD may be left out, so what is missing is a scan.
+        reason, example = message.replace("[METHOD]", "SCAN"), self._example()
+        remedy = f"For example: `{example}`. `{self.prog} --help` explains the rest."
+        raise InputError(command, reason, remedy)
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: Any = None
+    ) -> tuple[Any, list[str]]:
+        """Parses the options of a command, each of which must be one that there is."""
+        if args is not None and self._subparsers is None:
+            self._refuse_unknown_options(args)
+        return super().parse_known_args(args, namespace)
+
+    def _refuse_unknown_options(self, words: Sequence[str]) -> None:
+        """Refuses a misspelt option, before argparse misses the one that is meant."""
+        options = self._option_string_actions
+        before_names = words[: words.index("--")] if "--" in words else words
+        for word in before_names:
+            name = word.partition("=")[0]
+            if not name.startswith("--") or any(one.startswith(name) for one in options):
+                continue
+            remedy = f"{did_you_mean(name, options)}`{self.prog} --help` lists its options."
+            if name in OF_GPUS:
+                remedy = "Leave it out: derain runs models on the CPU."
+            raise InputError(name, f"`{self.prog}` has no such option", remedy)
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            named = "/".join(action.option_strings) or str(action.metavar)
+            remedy = f"{did_you_mean(value, action.choices)}Known are {', '.join(action.choices)}."
+            raise InputError(named, f"there is no {value}", remedy)
+
+    def _example(self) -> str:
+        """The first of the examples in the description."""
+        text = re.sub(r" *\\\n *", " ", self.description or "")
+        found = re.search(rf"^ *({self.prog} \S.*?)(  |$)", text, re.MULTILINE)
+        return found[1] if found else f"{self.prog} --help"
