@@ -87,7 +87,7 @@ def draw_visibility(
         over_drive.axhline(threshold.below, color=colour, linewidth=1)
         over_drive.axhline(threshold.above, color=colour, linewidth=1, linestyle="--")
     over_drive.set(title="a drive in snow, and the level of the default alarm", xlabel="scan")
-    over_drive.set_ylim(0, None)
+    over_drive.set_ylim(0, 1.5 * WARNING.above)  # the legend has its place above
     over_drive.set_xlim(0.5, len(drive) + 0.5)
     over_drive.set_xticks(scans[::2] + 1)
     for axes in (by_rate, over_drive):
@@ -98,7 +98,7 @@ def draw_visibility(
     levels = [Patch(facecolor=LEVELS[level], edgecolor="0.7", label=str(level)) for level in LEVELS]
     begins = Line2D([], [], color="0.3", linewidth=1, label="a level begins below")
     ends = Line2D([], [], color="0.3", linewidth=1, linestyle="--", label="a level ends above")
-    over_drive.legend(handles=[*levels, begins, ends], fontsize=8, loc="center right")
+    over_drive.legend(handles=[*levels, begins, ends], fontsize=8, loc="upper left", ncols=2)
     save(figure, path)
 
 
