@@ -91,7 +91,7 @@ class Findings:
         """Intersection over union of each class; NaN for one that does not occur."""
         hits = self.table.diagonal()
         errors = self.table.sum(axis=0) + self.table.sum(axis=1) - 2 * hits
-        return intersection_over_union(hits, errors, np.nan)
+        return intersection_over_union(hits, errors)
 
 
 def _reasons(scan: Scan, label: NDArray[np.int64], scene: Scene, plane: Plane) -> dict[str, int]:

@@ -24,7 +24,7 @@ from derain.datamodules.base import Loading
 from derain.datamodules.labelled import labelled_scans
 from derain.evaluation.contents import class_name
 from derain.evaluation.counts import Counts, ratio
-from derain.evaluation.text_tables import markdown_table
+from derain.evaluation.text_tables import markdown_table, number_text
 from derain.export.methods import load_method, named_method
 from derain.export.runtime import Derainer
 from derain.filters import FilterDerainer
@@ -107,9 +107,9 @@ def _table_of_classes(eaten: Mapping[str, Eaten], title: str, card: DataCard) ->
     rain = sum(points for id_, points in of_class.items() if id_ in card.rain)
     dry = of_class.total() - rain
     body = [
-        ["precision", "", *(f"{each.precision:.3f}" for each in counts)],
-        ["recall: rain eaten", f"{rain:,}", *(f"{each.recall:.3f}" for each in counts)],
-        ["IoU", "", *(f"{each.iou:.3f}" for each in counts)],
+        ["precision", "", *(number_text(each.precision) for each in counts)],
+        ["recall: rain eaten", f"{rain:,}", *(number_text(each.recall) for each in counts)],
+        ["IoU", "", *(number_text(each.iou) for each in counts)],
         ["objects eaten", f"{dry:,}", *(_percent(each.false_positive, dry) for each in counts)],
     ]
     for id_, points in of_class.most_common():
@@ -150,7 +150,7 @@ def _unit_of(method: Method) -> float | None:
 
 
 def _percent(part: int, whole: int) -> str:
-    return f"{float(ratio(part, whole, 0.0)):.2%}"
+    return number_text(float(ratio(part, whole)), ".2%")
 
 
 if __name__ == "__main__":

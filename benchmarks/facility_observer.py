@@ -30,7 +30,7 @@ from derain.evaluation.baselines import PositionPrior, all_points
 from derain.evaluation.contents import find_sequences
 from derain.evaluation.counts import Counts
 from derain.evaluation.intensity_rule import IntensityRule
-from derain.evaluation.text_tables import markdown_table
+from derain.evaluation.text_tables import markdown_table, number_text
 from derain.files import read_scan
 from derain.models.outdet import OutDet
 from derain.models.published import read_state_dict
@@ -168,7 +168,7 @@ def _scores(methods: Mapping[str, Method], examples: Sequence[Example]) -> str:
             lidar = np.arange(lidar_points)
             alone += Counts.of(method(scan.take(lidar)), rain[lidar])
         values = fused.precision, fused.recall, fused.iou, *(each.iou for each in of_rate.values())
-        body.append([name, *(f"{value:.3f}" for value in (*values, alone.iou))])
+        body.append([name, *map(number_text, (*values, alone.iou))])
     rule = methods["intensity"]
     assert isinstance(rule, IntensityRule)
     learnt = f"intensity: at most {rule.intensity:.1f}, and not beyond {rule.range:.1f} m"

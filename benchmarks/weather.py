@@ -83,8 +83,6 @@ def main() -> None:
         {title.removesuffix(", simulated"): _seen(pairs[1:]) for title, pairs in places.items()},
         RATES[1:],
         _seen([pair for _, *pair in drive]),
-        Alarm(**CROSSED, hold=HELD),
-        ", ".join(f"{name} {t.below:g} {t.above:g}" for name, t in CROSSED.items()),
         arguments.out / "weather.png",
     )
 

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from derain.pictures.palette import LINES
 from derain.pictures.scan_pictures import save
-from derain.weather.alarm import Alarm, Level
+from derain.weather.alarm import ERROR, WARNING, Alarm, Level
 from derain.weather.scan_weather import RANGE_BANDS, ScanWeather
 from derain.weather.visibility import Visibility
 
@@ -56,21 +57,14 @@ def draw_rose(weather: ScanWeather, path: Path) -> None:
 
 
 def draw_visibility(
-    places: Mapping[str, ByBoth],
-    rates: Sequence[float],
-    drive: ByBoth,
-    alarm: Alarm,
-    bounds: str,
-    path: Path,
+    places: Mapping[str, ByBoth], rates: Sequence[float], drive: ByBoth, path: Path
 ) -> None:
-    """Draws visibility by the rate of rain, and over a drive with the level of an alarm.
+    """Draws visibility by the rate of rain, and over a drive with the level of the default alarm.
 
     Args:
         places: What is told of a place at each of the rates, by its name.
         rates: Rates of rain, mm/h, rising.
         drive: What is told of the scans of a drive, in order.
-        alarm: What the model's visibility on the drive is given to.
-        bounds: Its thresholds, as the title has them.
         path: Picture to write.
     """
     figure = Figure(figsize=(10, 3.8), layout="constrained")
@@ -84,12 +78,16 @@ def draw_visibility(
     metres = (5, 10, 20, 50, 100, 200)
     by_rate.set_yticks(metres, [f"{number}" for number in metres])
     by_rate.set(title="simulated rain", xlabel="mm/h", ylabel="visibility, m")
-    scans = np.arange(1, len(drive) + 1)
+    scans, alarm = np.arange(1, len(drive) + 1), Alarm()
     for scan, (_, by_model) in zip(scans, drive, strict=True):
         colour = LEVELS[alarm.update(by_model)]
         over_drive.axvspan(scan - 0.5, scan + 0.5, color=colour, linewidth=0)
     _draw_both(over_drive, scans, drive, LINES[4], "snow")
-    over_drive.set(title=f"a drive in snow, alarm: {bounds} m", xlabel="scan")
+    for threshold, colour in ((WARNING, "#d98200"), (ERROR, "#c53030")):
+        over_drive.axhline(threshold.below, color=colour, linewidth=1)
+        over_drive.axhline(threshold.above, color=colour, linewidth=1, linestyle="--")
+    over_drive.set(title="a drive in snow, and the level of the default alarm", xlabel="scan")
+    over_drive.set_ylim(0, 1.5 * WARNING.above)  # the legend has its place above
     over_drive.set_xlim(0.5, len(drive) + 0.5)
     over_drive.set_xticks(scans[::2] + 1)
     for axes in (by_rate, over_drive):
@@ -98,7 +96,9 @@ def draw_visibility(
     by_rate.plot([], [], color="0.3", marker=".", label="by the default model")
     by_rate.legend(fontsize=8)
     levels = [Patch(facecolor=LEVELS[level], edgecolor="0.7", label=str(level)) for level in LEVELS]
-    over_drive.legend(handles=levels, fontsize=8, loc="upper left")
+    begins = Line2D([], [], color="0.3", linewidth=1, label="a level begins below")
+    ends = Line2D([], [], color="0.3", linewidth=1, linestyle="--", label="a level ends above")
+    over_drive.legend(handles=[*levels, begins, ends], fontsize=8, loc="upper left", ncols=2)
     save(figure, path)
 
 

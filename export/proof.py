@@ -12,7 +12,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from derain.evaluation.counts import ratio
+from derain.evaluation.counts import or_none, ratio
+from derain.evaluation.text_tables import number_text
 from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
 from derain.scan import Scan
@@ -112,7 +113,7 @@ class Proof:
         """Whether every case does, and both find enough of the same rain."""
         if self.by_other is not None and not self.by_other.holds:
             return False
-        return all(case.holds for case in self.cases) and self.rain_iou >= self.least_rain_iou
+        return all(case.holds for case in self.cases) and self.finds_enough
 
     @property
     def least_rain_iou(self) -> float:
@@ -120,14 +121,19 @@ class Proof:
         return max((case.bounds.rain_iou or 0.0 for case in self.cases), default=0.0)
 
     @property
+    def finds_enough(self) -> bool:
+        """Whether the IoU of the rain is as great as it must be; if it is undefined, it is not."""
+        return not self.least_rain_iou or self.rain_iou >= self.least_rain_iou
+
+    @property
     def rain_iou(self) -> float:
         """IoU of what the two call rain, over the scans that it is bounded on, or over all.
 
-        Where there is no rain it is 0: nothing has been shown to be found.
+        It is NaN where neither calls anything rain.
         """
         bounded = [case for case in self.cases if case.bounds.rain_iou is not None] or self.cases
         either = sum(case.either for case in bounded)
-        return float(ratio(sum(case.both for case in bounded), either, undefined=0.0))
+        return float(ratio(sum(case.both for case in bounded), either))
 
     @property
     def worst(self) -> Case:
@@ -151,7 +157,7 @@ class Proof:
             "largest_difference": self.worst.difference,
             "flipped": self.flipped,
             "points": self.points,
-            "rain_iou": self.rain_iou,
+            "rain_iou": or_none(self.rain_iou),
             "cases": [asdict(case) for case in self.cases],
             **other,
         }
@@ -169,9 +175,9 @@ class Proof:
         lines.append(
             f"{by}{len(self.cases)} cases, {self.points:,} points or pixels: largest logit "
             f"difference {self.worst.difference:.1e}, {self.flipped} labels flipped, "
-            f"IoU of the rain {self.rain_iou:.4f}"
+            f"IoU of the rain {number_text(self.rain_iou, '.4f')}"
         )
-        if self.rain_iou < self.least_rain_iou:
+        if not self.finds_enough:
             lines.append(f"{by}FAILED: the IoU of the rain must be {self.least_rain_iou:g}")
         return "\n".join(lines if self.by_other is None else [*lines, str(self.by_other)])
 

@@ -183,7 +183,7 @@ def tune_threshold(
 
 
 def pooled_iou(filter: PointFilter, scans: Sequence[LabelledNeighbourhoods]) -> float:
-    """IoU of rain over the points of all scans; 1 where there is none and none is found."""
+    """IoU of rain over the points of all scans; NaN where there is none and none is found."""
     total = Counts()
     for scan in scans:
         known = scan.rain | scan.solid

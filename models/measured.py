@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import lightning
 import numpy as np
 import torch
+from lightning.pytorch.trainer.states import TrainerFn
 from numpy.typing import NDArray
 from torch import Tensor
 
@@ -20,11 +21,12 @@ from derain.learning.mean_losses import MeanLosses
 from derain.learning.task import ReadableScans
 from derain.scan import Scan
 from derain.spec import Spec
+from derain.system.notices import warn
 from derain.views.probability import probability_of_rain
 
 # The monitor, by which the best checkpoint of a run is chosen, the more the better: the IoU of the
-# validation scans where a network learns from labels, and minus the loss where it does not. Logs,
-# checkpoints and configurations have it under this name.
+# validation scans where a network learns from labels and there is rain in them, else minus the
+# loss. Logs, checkpoints and configurations have it under this name.
 MONITOR = "val/merit"
 
 
@@ -49,6 +51,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
         self.mean_losses = MeanLosses()
         # Of the checkpoint that is tested: where its scores stand in the log of its training.
         self.trained_steps: int | None = None
+        self.warned_of_no_rain = False
 
     @property
     @abstractmethod
@@ -116,9 +119,8 @@ class MeasuredModule(lightning.LightningModule, ABC):
         """Logs losses and scores of the epoch."""
         losses = self.mean_losses.compute()
         self._log_alike({f"val/{name}": loss for name, loss in losses.items()})
-        if not self.LEARNS_FROM_LABELS:
-            self._log_alike({MONITOR: -losses["loss"]})
         self._log_scores("val")
+        self._log_alike({MONITOR: self._merit(losses["loss"])})
 
     def on_test_epoch_start(self) -> None:
         """Forgets the scores of another test."""
@@ -168,8 +170,22 @@ class MeasuredModule(lightning.LightningModule, ABC):
         for name, ids in self.card.parts.items():
             self._log_of_one(f"{part}/{name}", self.metrics.pooled_over(ids))
         if part == "val":
-            monitor = {MONITOR: scores["iou"]} if self.LEARNS_FROM_LABELS else {}
-            self._log_alike({"hp_metric": scores["iou"], **monitor})
+            self._log_alike({"hp_metric": scores["iou"]})
+
+    def _merit(self, loss: Tensor) -> Tensor:
+        """What the best checkpoint is chosen by, given the loss of the validation scans."""
+        if not self.LEARNS_FROM_LABELS:
+            return -loss
+        counts = self.metrics.pooled()
+        if counts.true_positive + counts.false_negative:
+            return torch.tensor(counts.iou, dtype=torch.float32, device=loss.device)
+        # Without rain the IoU is undefined, or 0 because of a single point.
+        trainer = self.trainer
+        fitting = trainer.state.fn == TrainerFn.FITTING and not trainer.sanity_checking
+        if fitting and trainer.is_global_zero and not self.warned_of_no_rain:
+            warn("the validation scans have no rain: the best checkpoint is chosen by their loss")
+            self.warned_of_no_rain = True
+        return -loss
 
     def _log_of_one(self, title: str, counts: Counts) -> None:
         """Logs the scores of one of several data sets, where any scan of it was measured."""

@@ -1,5 +1,6 @@
 """One column of a table across sensors, and how it is written."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -49,7 +50,7 @@ class Column:
     def text(self, method: str) -> str:
         """What a method has in it, as written in the table."""
         cell = self.cells.get(method)
-        if cell is None:
+        if cell is None or math.isnan(cell.value):
             return "-"
         return _written(cell.value, self.unit) + (LEARNT_MARK if cell.learnt else "")
 

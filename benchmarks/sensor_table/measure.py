@@ -177,4 +177,4 @@ def _most_of(clean: Sequence[Column]) -> Column:
 
 def _share(called: int, points: int) -> Cell:
     counts = {"points": points, "called_rain": called}
-    return Cell(float(ratio(called, points, 0.0)), counts=counts)
+    return Cell(float(ratio(called, points)), counts=counts)

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from textwrap import wrap
 
 from derain.default import ModelCard, ModelScore
+from derain.evaluation.text_tables import number_text
 
 # Letters of a line, as in every document of derain.
 LINE_LENGTH = 100
@@ -50,18 +51,12 @@ def _scores(scores: Sequence[ModelScore]) -> list[str]:
     if not scores:
         return ["not measured"]
     width = max(len(score.data) for score in scores)
-    rows = [
-        (_share(score.precision), _share(score.recall), _share(score.iou), _share(score.taken, "%"))
-        for score in scores
-    ]
     return [
         f"{'':{width}}      P      R    IoU    taken",
         *(
-            f"{score.data:{width}}  {precision:>5}  {recall:>5}  {iou:>5}  {taken:>7}"
-            for score, (precision, recall, iou, taken) in zip(scores, rows, strict=True)
+            f"{score.data:{width}}  {number_text(score.precision):>5}"
+            f"  {number_text(score.recall):>5}  {number_text(score.iou):>5}"
+            f"  {number_text(score.taken, '.3%'):>7}"
+            for score in scores
         ),
     ]
-
-
-def _share(value: float | None, kind: str = "f") -> str:
-    return "-" if value is None else f"{value:.3{kind}}"

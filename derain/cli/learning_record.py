@@ -12,7 +12,7 @@ from derain.errors import InputError
 from derain.evaluation.answers import NOT_KNOWN, RAIN, answer_of
 from derain.evaluation.counts import SCORES
 from derain.evaluation.rain_counts import RainCounts
-from derain.evaluation.text_tables import markdown_table
+from derain.evaluation.text_tables import markdown_table, number_text
 from derain.scan import Scan
 from derain.sources.bag_frame import BagFrame
 from derain.sources.file_frame import FileFrame
@@ -73,7 +73,7 @@ def _measured(
 def _tables(card: DataCard, metrics: Mapping[str, RainCounts]) -> str:
     """Scores over the points of all scans, and what was called rain of each class."""
     scores = [
-        [title, *(f"{getattr(measured.pooled(), score):.3f}" for score in SCORES)]
+        [title, *(number_text(getattr(measured.pooled(), score)) for score in SCORES)]
         for title, measured in metrics.items()
     ]
     of_classes = {title: measured.by_class() for title, measured in metrics.items()}

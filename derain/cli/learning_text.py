@@ -6,7 +6,7 @@ from pathlib import Path
 
 from derain.evaluation.answers import Answers, AnswersOfScan, coarse_bands, total
 from derain.evaluation.counts import Counts
-from derain.evaluation.text_tables import markdown_table
+from derain.evaluation.text_tables import markdown_table, number_text
 
 # Shares of the points that a teacher is sure of. Less than a thousandth of a scan is what a few
 # moving things make of clean air. Of simulated dry streets persistence calls up to .7 % rain, the
@@ -108,14 +108,15 @@ def summary(learnt: Learnt) -> str:
     """Two or three sentences for the screen."""
     _, rain, unknown = learnt.taught.shares
     text = (
-        f"{learnt.teacher} says of {len(learnt.scans):,} scans: {rain:.1%} of the points are rain, "
-        f"of {unknown:.1%} it does not know."
+        f"{learnt.teacher} says of {len(learnt.scans):,} scans: {number_text(rain, '.1%')} of the "
+        f"points are rain, of {number_text(unknown, '.1%')} it does not know."
     )
     if learnt.asked:
         agreement, removed = learnt.student_says.agreement, learnt.student_says.removed
         text += (
-            f" {learnt.student} agrees with it on held-out scans to an IoU of {agreement.iou:.3f}, "
-            f"and removes {removed:.1%} of their points."
+            f" {learnt.student} agrees with it on held-out scans to an IoU of "
+            f"{number_text(agreement.iou)}, "
+            f"and removes {number_text(removed, '.1%')} of their points."
         )
     first = next(doubts(learnt), None)
     return text if first is None else f"{text}\nMind: {first}"
@@ -220,9 +221,7 @@ def _student_table(answers: Answers) -> str:
 
 
 def _scores(counts: Counts) -> list[str]:
-    if not counts.true_positive + counts.false_negative + counts.false_positive:
-        return ["-"] * 3  # no rain, and none called so
-    return [f"{score:.3f}" for score in (counts.precision, counts.recall, counts.iou)]
+    return [number_text(score) for score in (counts.precision, counts.recall, counts.iou)]
 
 
 def _pictures(pictures: Mapping[Path, str], beginning: str) -> list[str]:

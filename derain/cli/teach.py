@@ -17,6 +17,8 @@ from derain.cli.runtime_options import add_runtime
 from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError, printable
+from derain.evaluation.counts import or_none
+from derain.evaluation.text_tables import number_text
 from derain.sources.folders import named_frames
 from derain.sources.recordings import irregularities
 from derain.system.memory import keep_freed_memory
@@ -61,7 +63,7 @@ class TaughtFacts:
     Attributes:
         scan: Its file.
         points: Its points that can be judged.
-        rain: Share of them called rain.
+        rain: Share of them called rain; None, as for those below, where there are no such points.
         not_rain: Share of them called something else.
         not_known: Share of them of which it is not known.
         milliseconds: By stage.
@@ -69,15 +71,16 @@ class TaughtFacts:
 
     scan: str
     points: int
-    rain: float
-    not_rain: float
-    not_known: float
+    rain: float | None
+    not_rain: float | None
+    not_known: float | None
     milliseconds: dict[str, float]
 
     def __str__(self) -> str:
         return (
-            f"{printable(self.scan)}: {self.points:,} valid points, {self.rain:.1%} rain, "
-            f"{self.not_rain:.1%} not rain, {self.not_known:.1%} not known, "
+            f"{printable(self.scan)}: {self.points:,} valid points, "
+            f"{number_text(self.rain, '.1%')} rain, {number_text(self.not_rain, '.1%')} not rain, "
+            f"{number_text(self.not_known, '.1%')} not known, "
             f"{sum(self.milliseconds.values()):.0f} ms"
         )
 
@@ -157,7 +160,7 @@ class _Telling:
         self.judged += 1
         odd = [*self.method.oddities(judgement), *much_removed(judgement.share_of_rain)]
         self.notices.tell(frame.name, odd)
-        not_rain, rain, unknown = self.shares.add(judgement.scan, labels).tolist()
+        not_rain, rain, unknown = map(or_none, self.shares.add(judgement.scan, labels).tolist())
         points = int(judgement.scan.valid.sum())
         times = dict(stopwatch.milliseconds)
         tell(TaughtFacts(frame.name, points, rain, not_rain, unknown, times), self.as_json)

@@ -90,19 +90,19 @@ class Answers:
 
     @property
     def shares(self) -> NDArray[np.float64]:
-        """Share of each answer of the teacher, float64 (3,); 0 where there are no points."""
-        return ratio(self.table.sum(axis=(0, 2)), self.points, undefined=0)
+        """Share of each answer of the teacher, float64 (3,); NaN where there are no points."""
+        return ratio(self.table.sum(axis=(0, 2)), self.points)
 
     @property
     def rain_among_known(self) -> float:
-        """Share of rain among the points of which the teacher is sure; 0 where there are none."""
+        """Share of rain among the points of which the teacher is sure; NaN where there are none."""
         not_rain, rain, _ = self.table.sum(axis=(0, 2))
-        return float(ratio(rain, not_rain + rain, undefined=0))
+        return float(ratio(rain, not_rain + rain))
 
     @property
     def removed(self) -> float:
-        """Share of the points that the student calls rain; 0 where there are none."""
-        return float(ratio(self.table[..., 1].sum(), self.points, undefined=0))
+        """Share of the points that the student calls rain; NaN where there are none."""
+        return float(ratio(self.table[..., 1].sum(), self.points))
 
     @property
     def agreement(self) -> Counts:

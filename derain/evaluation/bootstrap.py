@@ -18,13 +18,14 @@ class Bootstrap:
     """95 % intervals of every method's pooled IoU.
 
     Attributes:
-        iou: Interval of the IoU itself, one a method.
+        iou: Interval of the IoU itself, one a method; None where no draw has an IoU.
         behind_best: Interval of the best method's IoU minus this method's, on the same draws, one a
-            method. Where it holds 0, these scans cannot tell which of the two is better.
+            method. Where it holds 0, these scans cannot tell which of the two is better. None where
+            in no draw both have an IoU.
     """
 
-    iou: list[Interval]
-    behind_best: list[Interval]
+    iou: list[Interval | None]
+    behind_best: list[Interval | None]
 
 
 def bootstrap(
@@ -34,7 +35,8 @@ def bootstrap(
 
     Every method is scored on the same draws: a hard scan then lowers the IoU of all of them alike,
     and hardly changes the difference between two. Scans that follow each other in a sequence are
-    alike, so that intervals over the scans of few sequences are too narrow.
+    alike, so that intervals over the scans of few sequences are too narrow. A draw without rain in
+    which none is found has no IoU, and is left out.
 
     Args:
         found: Rain called rain, by method and scan, int64 (methods, scans).
@@ -48,11 +50,18 @@ def bootstrap(
     # How often each scan is drawn.
     times = generator.multinomial(scans, np.full(scans, 1 / scans), DRAWS)
     iou = intersection_over_union(found @ times.T, errors @ times.T)
-    best = np.argmax(intersection_over_union(found.sum(axis=1), errors.sum(axis=1)))
+    pooled = intersection_over_union(found.sum(axis=1), errors.sum(axis=1))
+    best = np.argmax(np.nan_to_num(pooled, nan=-1))
     return Bootstrap(_intervals(iou), _intervals(iou[best] - iou))
 
 
-def _intervals(draws: NDArray[np.float64]) -> list[Interval]:
+def _intervals(draws: NDArray[np.float64]) -> list[Interval | None]:
+    return [_interval(each[~np.isnan(each)]) for each in draws]
+
+
+def _interval(draws: NDArray[np.float64]) -> Interval | None:
+    if not len(draws):
+        return None
     tail = 50 * (1 - CONFIDENCE)
-    low, high = np.percentile(draws, [tail, 100 - tail], axis=1)
-    return list(zip(low.tolist(), high.tolist(), strict=True))
+    low, high = np.percentile(draws, [tail, 100 - tail]).tolist()
+    return low, high

@@ -1,5 +1,6 @@
 """Points by what they are and what they were called, and the scores that follow from them."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 
@@ -9,40 +10,40 @@ from numpy.typing import ArrayLike, NDArray
 SCORES = ("precision", "recall", "f1", "iou")
 
 
-def ratio(part: ArrayLike, whole: ArrayLike, undefined: float = 1.0) -> NDArray[np.float64]:
+def ratio(part: ArrayLike, whole: ArrayLike) -> NDArray[np.float64]:
     """What share each part is of its whole, float64, of the shape that the two have together.
+
+    It is NaN where the whole is 0.
 
     Args:
         part: Numbers, or one.
         whole: Numbers, or one.
-        undefined: The share where the whole is 0; 1 says that nothing was there to be got wrong.
     """
     part, whole = np.broadcast_arrays(part, whole)
-    shares = np.full(whole.shape, undefined, np.float64)
+    shares = np.full(whole.shape, np.nan)
     np.divide(part, whole, out=shares, where=whole != 0)
     return shares
 
 
-def intersection_over_union(
-    hits: ArrayLike, errors: ArrayLike, undefined: float = 1.0
-) -> NDArray[np.float64]:
+def intersection_over_union(hits: ArrayLike, errors: ArrayLike) -> NDArray[np.float64]:
     """IoU of rain, float64, of the shape that hits and errors have together.
+
+    It is NaN where no point is rain or called rain.
 
     Args:
         hits: Points of rain called rain, or one number of them for each choice.
         errors: Rain not called rain and other points called rain, together.
-        undefined: The IoU where no point is rain or called rain.
     """
-    return ratio(hits, np.add(hits, errors), undefined)
+    return ratio(hits, np.add(hits, errors))
 
 
 @dataclass(frozen=True)
 class Counts:
     """Points by what they are and what they were called; rain is the positive class.
 
-    A score whose denominator is zero is 1: nothing was there to be got wrong. So a rain-free scan
-    left as it is scores 1 throughout, and one point falsely called rain takes its precision, F1
-    and IoU to 0 (its recall stays 1). No points at all score 1.
+    A score whose denominator is zero is undefined: it is NaN. A scan without rain has no recall; if
+    no point of it is called rain either, it has no score at all, and one point falsely called rain
+    gives it a precision, an F1 and an IoU of 0.
 
     Attributes:
         true_positive: Rain called rain.
@@ -74,32 +75,39 @@ class Counts:
 
     @property
     def precision(self) -> float:
-        """Share of rain among the points called rain; 1 where none was."""
+        """Share of rain among the points called rain; NaN where none was."""
         return float(ratio(self.true_positive, self.true_positive + self.false_positive))
 
     @property
     def recall(self) -> float:
-        """Share of the rain that was called rain; 1 where there is none."""
+        """Share of the rain that was called rain; NaN where there is none."""
         return float(ratio(self.true_positive, self.true_positive + self.false_negative))
 
     @property
     def f1(self) -> float:
-        """Harmonic mean of precision and recall; 1 where no point is rain or called rain."""
+        """Harmonic mean of precision and recall; NaN where no point is rain or called rain."""
         errors = self.false_positive + self.false_negative
         return float(ratio(2 * self.true_positive, 2 * self.true_positive + errors))
 
     @property
     def iou(self) -> float:
-        """Intersection over union of rain; 1 where no point is rain or called rain."""
+        """Intersection over union of rain; NaN where no point is rain or called rain."""
         errors = self.false_positive + self.false_negative
         return float(intersection_over_union(self.true_positive, errors))
 
 
 def mean_over_scans(per_scan: Sequence[Counts], score: str) -> float:
-    """Mean of the scores of single scans; 1 where there is none, as for no points at all.
+    """Mean of the scores of the scans that have it; NaN where none has.
 
     Args:
         per_scan: Counts of each scan.
         score: One of ``SCORES``.
     """
-    return float(np.mean([getattr(counts, score) for counts in per_scan])) if per_scan else 1.0
+    scores = np.array([getattr(counts, score) for counts in per_scan])
+    defined = scores[~np.isnan(scores)]
+    return float(defined.mean()) if len(defined) else math.nan
+
+
+def or_none(score: float) -> float | None:
+    """The score, and None in place of NaN, which JSON does not have."""
+    return None if math.isnan(score) else score

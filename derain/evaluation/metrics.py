@@ -131,7 +131,8 @@ class RainMetrics(Metric):
         """Every score over all points, and as the mean over scans (``…_per_scan``).
 
         Returns:
-            float32 scalars by name. Compare like with like: in table II of the REHEARSE-3D paper
+            float32 scalars by name, NaN where a score is undefined; a mean over scans is over
+            those that have the score. Compare like with like: in table II of the REHEARSE-3D paper
             the rows agree with pooled counts, save LiSnowNet's, which fit means over scans.
         """
         pooled, per_scan = self._pooled(), self._per_scan()

@@ -1,5 +1,6 @@
 """What a method would find at other thresholds: precision and recall, counted at many at once."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -42,17 +43,17 @@ class OperatingPoints:
 
     @property
     def precision(self) -> NDArray[np.float64]:
-        """Share of rain among what is called rain, float64 (T,); 1 where nothing is."""
+        """Share of rain among what is called rain, float64 (T,); NaN where nothing is."""
         return ratio(self.true_positive, self.true_positive + self.false_positive)
 
     @property
     def recall(self) -> NDArray[np.float64]:
-        """Share of the rain that is called rain, float64 (T,); 1 where there is none."""
+        """Share of the rain that is called rain, float64 (T,); NaN where there is none."""
         return ratio(self.true_positive, self.rain)
 
     @property
     def iou(self) -> NDArray[np.float64]:
-        """IoU of rain, float64 (T,)."""
+        """IoU of rain, float64 (T,); NaN where no point is rain or called rain."""
         missed = self.rain - self.true_positive
         return intersection_over_union(self.true_positive, self.false_positive + missed)
 
@@ -60,15 +61,23 @@ class OperatingPoints:
     def average_precision(self) -> float:
         """Mean of the precision over the recall, in steps from one threshold to the next.
 
+        It is NaN where there is no rain.
+
         Source: the sum over thresholds of (R_n - R_{n-1}) P_n, as scikit-learn's
         ``average_precision_score`` defines it.
         """
+        if not self.rain:
+            return math.nan
         gained = self.recall - np.append(self.recall[1:], 0)
-        return float(gained @ self.precision)
+        some = gained > 0  # elsewhere the precision may be undefined
+        return float(gained[some] @ self.precision[some])
 
     @property
     def best(self) -> int:
-        """Number of the threshold with the greatest IoU; of equal ones, that of the middle."""
+        """Number of the threshold with the greatest IoU; of equal ones, that of the middle.
+
+        There must be rain.
+        """
         best = np.flatnonzero(self.iou == self.iou.max())
         return int(best[len(best) // 2])
 

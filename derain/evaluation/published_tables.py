@@ -1,6 +1,5 @@
 """The tables of the REHEARSE-3D paper, and ours beside them."""
 
-import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, Protocol, TypeVar
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import SCORES, mean_over_scans
-from derain.evaluation.text_tables import markdown_table
+from derain.evaluation.text_tables import markdown_table, number_text
 from derain.files.documents import Entry
 from derain.files.packaged import packaged
 
@@ -163,7 +162,7 @@ def _beside(published: Sequence[PublishedRow], rows: Sequence[MeasuredRow]) -> l
 def _published_cells(row: PublishedRow) -> list[str]:
     title = f"{row.method}, published{' (*)' if row.misprint else ''}"
     scores = [f"{score:.2f}" for score in row.scores]
-    return [title, *scores, "-" if row.ms is None else f"{row.ms:g}", row.average]
+    return [title, *scores, number_text(row.ms, "g"), row.average]
 
 
 def _our_cells(row: MeasuredRow, average: str) -> list[str]:
@@ -172,5 +171,5 @@ def _our_cells(row: MeasuredRow, average: str) -> list[str]:
         getattr(pooled, score) if average == "pooled" else mean_over_scans(per_scan, score)
         for score in SCORES
     ]
-    ms = "-" if math.isnan(row.milliseconds) else f"{row.milliseconds:.0f}"
-    return [f"{row.title}, ours", *(f"{100 * value:.2f}" for value in values), ms, average]
+    cells = (number_text(100 * value, ".2f") for value in values)
+    return [f"{row.title}, ours", *cells, number_text(row.milliseconds, ".0f"), average]

@@ -33,9 +33,9 @@ class ClassCounts:
     def share_lost(self) -> float:
         """Share of the class called rain: its recall if it is rain, else its false positives.
 
-        A class without points has the share of a perfect answer: 1 if it is rain, else 0.
+        It is NaN for a class without points.
         """
-        return float(ratio(self.called_rain, self.points, undefined=float(self.rain)))
+        return float(ratio(self.called_rain, self.points))
 
     @property
     def wrong(self) -> int:
@@ -44,8 +44,8 @@ class ClassCounts:
 
     @property
     def share_wrong(self) -> float:
-        """Share of the class judged wrongly; 0 of no points."""
-        return float(ratio(self.wrong, self.points, undefined=0.0))
+        """Share of the class judged wrongly; NaN for a class without points."""
+        return float(ratio(self.wrong, self.points))
 
     def __add__(self, other: "ClassCounts") -> "ClassCounts":
         """Counts of the points of two classes, or of two parts of one."""

@@ -1,6 +1,17 @@
 """Tables as text, with columns that line up."""
 
+import math
 from collections.abc import Sequence
+
+
+def number_text(value: float | None, form: str = ".3f") -> str:
+    """A number as text; ``-`` where it is undefined or unknown.
+
+    Args:
+        value: The number; NaN or None where there is none.
+        form: Its format, as Python's ``format`` takes it.
+    """
+    return "-" if value is None or math.isnan(value) else format(value, form)
 
 
 def markdown_table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:

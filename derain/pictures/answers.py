@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 from numpy.typing import NDArray
 
@@ -24,7 +23,7 @@ from derain.evaluation.answers import (
 )
 from derain.evaluation.counts import ratio
 from derain.pictures.palette import OUTCOMES
-from derain.pictures.scan_pictures import draw_from_above
+from derain.pictures.scan_pictures import draw_from_above, explain_colours
 from derain.scan import Scan
 
 # Told apart by colour-blind eyes and in grey.
@@ -155,12 +154,7 @@ def answers_figure(
     row[0].set(xlim=(-1.2 * half, 1.2 * half), ylim=(-half, half))
     row[0].set_ylabel("forward / m")
     colours = list(OUTCOMES.values())
-    figure.legend(
-        handles=[Patch(color=colours[number], label=name) for name, number in meanings.items()],
-        loc="outside lower center",
-        ncols=len(meanings),
-        frameon=False,
-    )
+    explain_colours(figure, {name: colours[number] for name, number in meanings.items()})
     return figure
 
 
@@ -198,6 +192,7 @@ def _draw_shares(
 ) -> None:
     """Stacked bars: rain, and on it what is not known; what is left to 1 is not rain."""
     shares = np.array([one.shares for one in answers]).reshape(-1, len(TEACHERS_ANSWERS))
+    shares = np.nan_to_num(shares)  # of no points there is no bar
     bottom = np.zeros(len(answers))
     for answer in (RAIN, NOT_KNOWN):
         axes.bar(
@@ -223,4 +218,4 @@ def _shares(
     part: NDArray[np.int64], whole: NDArray[np.int64], drawn: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """What each part is of its whole; NaN where it is not drawn."""
-    return np.where(drawn, ratio(part, whole, undefined=0), np.nan)
+    return np.where(drawn, ratio(part, whole), np.nan)

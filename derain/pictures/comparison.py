@@ -8,11 +8,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from derain.evaluation.counts import Counts
-from derain.pictures.palette import outcomes
+from derain.evaluation.text_tables import number_text
+from derain.pictures.palette import OUTCOMES, WITHOUT_LABELS, outcomes
 from derain.pictures.scan_pictures import (
     draw_as_seen,
     draw_from_above,
     explain_colours,
+    input_title,
     label_once,
 )
 from derain.scan import Scan
@@ -39,7 +41,7 @@ def comparison_figure(
             that a method removes counts as rain.
         title: Heading.
     """
-    panels = dict(_panels(predicted, rain))
+    panels = {input_title(scan): None, **dict(_panels(predicted, rain))}
     blocks = -(-len(panels) // MOST_PANELS_IN_A_ROW)
     columns = -(-len(panels) // blocks)  # blocks of one width, as far as the panels allow
     figure = Figure(figsize=(4 * columns, 6 * blocks + 1), layout="constrained")
@@ -54,19 +56,18 @@ def comparison_figure(
     for unused in pairs[len(panels) :].flat:
         unused.set_axis_off()
     label_once(pairs[0])
-    explain_colours(figure)
+    explain_colours(figure, WITHOUT_LABELS if rain is None else OUTCOMES)
     return figure
 
 
 def _panels(
     predicted: Mapping[str, NDArray[np.bool_]], rain: NDArray[np.bool_] | None
-) -> Iterator[tuple[str, NDArray[np.int64] | None]]:
-    yield "input: intensity", None
+) -> Iterator[tuple[str, NDArray[np.int64]]]:
     if rain is not None:
         yield f"truth: {rain.sum():,} points of rain", rain.astype(np.int64)
     for name, called_rain in predicted.items():
         if rain is None:
             yield f"{name}: {called_rain.sum():,} points removed", called_rain.astype(np.int64)
         else:
-            iou = Counts.of(called_rain, rain).iou
-            yield f"{name}: IoU {iou:.3f}", outcomes(called_rain, rain)
+            iou = number_text(Counts.of(called_rain, rain).iou)
+            yield f"{name}: IoU {iou}", outcomes(called_rain, rain)

@@ -10,6 +10,7 @@ from matplotlib.patches import Patch
 
 from derain.evaluation.operating_points import OperatingPoints
 from derain.evaluation.rain_counts import ClassCounts
+from derain.evaluation.text_tables import number_text
 from derain.pictures.palette import LOST, MISSED
 
 # Classes that a table has rows for; what is left of the others stands in one row.
@@ -141,7 +142,7 @@ def _draw_curve(axes: Axes, points: OperatingPoints, chosen: int, best: int) -> 
             markersize=8,
             linestyle="none",
             zorder=3,
-            label=f"{name}: threshold {threshold:.4g}\nprecision {counts.precision:.3f}, "
+            label=f"{name}: threshold {threshold:.4g}\nprecision {number_text(counts.precision)}, "
             f"recall {counts.recall:.3f}, IoU {counts.iou:.3f}",
         )
     axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="recall", ylabel="precision")

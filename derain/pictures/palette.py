@@ -21,6 +21,9 @@ OUTCOMES = {
     "solid, lost": LOST,
 }
 
+# The same where it is not known which points are rain.
+WITHOUT_LABELS = {"kept": SOLID, "removed": RAIN}
+
 # A probability from 0 to 1: dark, the colour of rain, white, ever brighter.
 PROBABILITY = ("#2b3440", RAIN, "#ffffff")
 

@@ -1,5 +1,6 @@
 """Pictures of scans: from above, as the sensor sees them, and what a derainer made of them."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,13 @@ from derain.scan import Scan
 # Steps of brightness that intensity is shown in.
 SHADES = 64
 
+# Colours whose channels differ by less are grey.
+GREY = 0.2
+
+# Area of a coloured point, in points of print squared: the first over the root of how many there
+# are of its colour, and at most the second.
+ALONE, LARGEST = 60, 16
+
 
 def judgement_figure(
     scan: Scan, predicted: NDArray[np.bool_], rain: NDArray[np.bool_], title: str
@@ -34,7 +42,7 @@ def judgement_figure(
     figure.suptitle(title)
     columns = figure.subplots(2, 4, sharex="row", sharey="row").T
     colourings = {
-        "input: intensity": None,
+        input_title(scan): None,
         "truth": rain.astype(int),
         "prediction": predicted.astype(int),
         "error": outcomes(predicted, rain),
@@ -88,14 +96,24 @@ def save(figure: Figure, path: Path) -> None:
         figure.savefig(temporary, dpi=110)
 
 
-def explain_colours(figure: Figure) -> None:
-    """Puts a legend of ``OUTCOMES`` below everything else."""
+def explain_colours(figure: Figure, colours: Mapping[str, str] = OUTCOMES) -> None:
+    """Puts a legend below everything else.
+
+    Args:
+        figure: The figure.
+        colours: Colours by what they mean.
+    """
     figure.legend(
-        handles=[Patch(color=colour, label=name) for name, colour in OUTCOMES.items()],
+        handles=[Patch(color=colour, label=name) for name, colour in colours.items()],
         loc="outside lower center",
-        ncols=len(OUTCOMES),
+        ncols=len(colours),
         frameon=False,
     )
+
+
+def input_title(scan: Scan) -> str:
+    """The heading of a panel that shows a scan as it came."""
+    return "input" if scan.intensity is None else "input: intensity"
 
 
 def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
@@ -161,14 +179,17 @@ def _scatter(
     number: NDArray[np.int64],
 ) -> None:
     size = np.clip(60_000 / max(len(x), 1), 0.3, 3)  # small where there are many
-    # Colour by colour, which matplotlib draws several times as fast; grey first, so that the few
-    # coloured points lie on top.
-    for chosen in np.argsort(np.ptp(colours[:, :3], axis=1), kind="stable"):
+    points = np.bincount(number, minlength=len(colours))
+    is_grey = np.ptp(colours[:, :3], axis=1) < GREY
+    # Colour by colour, which matplotlib draws several times as fast; grey first, and of the others
+    # the rarest last, so that it lies on top.
+    for chosen in np.lexsort([-points, ~is_grey]):
         rows = number == chosen
-        if rows.any():
-            axes.scatter(
-                x[rows], y[rows], s=size, color=colours[chosen], linewidths=0, rasterized=True
-            )
+        if not rows.any():
+            continue
+        by_number = np.clip(ALONE / np.sqrt(points[chosen]), size, LARGEST)
+        area = size if is_grey[chosen] else by_number
+        axes.scatter(x[rows], y[rows], s=area, color=colours[chosen], linewidths=0, rasterized=True)
     axes.set_facecolor(BACKGROUND)
     axes.tick_params(labelsize=8)
 

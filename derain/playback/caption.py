@@ -3,16 +3,13 @@
 from pathlib import Path
 
 from derain.errors import printable
-from derain.pictures.palette import LOST, MISSED, OUTCOMES, RAIN, SOLID
+from derain.pictures.palette import LOST, MISSED, OUTCOMES, RAIN, SOLID, WITHOUT_LABELS
 from derain.playback.labels import Labels
 from derain.scan import Scan
 from derain.sources.frame import Frame
 
 # What the colours of the palette are called.
 COLOUR_NAMES = {SOLID: "grey", RAIN: "blue", MISSED: "yellow", LOST: "red"}
-
-# What the colours mean where nobody knows what is rain.
-WITHOUT_LABELS = {"kept": SOLID, "removed": RAIN}
 
 PROBABILITY_TEXT = "Probability of rain: dark, blue, white, ever higher"
 

@@ -1,5 +1,7 @@
 """What is written of each scan: its points, what labels say of them, and what methods do."""
 
+import math
+
 import numpy as np
 import rerun
 from numpy.typing import NDArray
@@ -154,14 +156,17 @@ class PlaybackWriter:
         judged = scan.valid & found.known
         missed = scan.xyz[judged & found.rain & ~rain]
         self.file.log(stand_at.missed, rerun.Points3D(missed, class_ids=CLASS_MISSED))
-        counts = Counts.of(rain[judged], found.rain[judged])
-        self.file.log(stand_at.iou, rerun.Scalars(counts.iou))
+        self._number(stand_at.iou, Counts.of(rain[judged], found.rain[judged]).iou)
 
     def _share(self, path: str, part: NDArray[np.bool_], scan: Scan) -> None:
         """Writes which share some points are of those that can be judged, per cent."""
         whole = np.count_nonzero(scan.valid)
-        share = ratio(np.count_nonzero(part & scan.valid), whole, undefined=0)
-        self.file.log(path, rerun.Scalars(100 * float(share)))
+        self._number(path, 100 * float(ratio(np.count_nonzero(part & scan.valid), whole)))
+
+    def _number(self, path: str, value: float) -> None:
+        """Writes a number of a line; where it is undefined, the line has a gap."""
+        undefined = math.isnan(value)
+        self.file.log(path, rerun.Clear(recursive=False) if undefined else rerun.Scalars(value))
 
     def _at(self, frame: Frame) -> None:
         selection = self.selection

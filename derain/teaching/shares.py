@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.evaluation.counts import ratio
-from derain.evaluation.text_tables import plain_table
+from derain.evaluation.text_tables import number_text, plain_table
 from derain.scan import Scan
 from derain.teaching.labels import CLASSES
 
@@ -33,7 +33,8 @@ class TaughtShares:
             labels: What the teacher says of them, uint32 (N,).
 
         Returns:
-            Shares of the classes in its points, in the order of ``CLASSES``, float64 (3,).
+            Shares of the classes in its points, in the order of ``CLASSES``, float64 (3,); NaN
+            where it has none that can be judged.
         """
         rows = np.flatnonzero(scan.valid)
         band = np.searchsorted(STARTS, scan.range[rows], side="right") - 1
@@ -41,7 +42,7 @@ class TaughtShares:
         table = np.zeros_like(self.table)
         np.add.at(table, (band, column), 1)
         self.table += table
-        return _shares(table.sum(axis=0))
+        return ratio(table.sum(axis=0), table.sum())
 
     @property
     def rain(self) -> int:
@@ -57,8 +58,5 @@ class TaughtShares:
 
 
 def _row(name: str, counts: NDArray[np.int64]) -> Sequence[str]:
-    return [name, f"{counts.sum():,}", *(f"{share:.1%}" for share in _shares(counts))]
-
-
-def _shares(counts: NDArray[np.int64]) -> NDArray[np.float64]:
-    return ratio(counts, counts.sum(), undefined=0.0)
+    shares = ratio(counts, counts.sum())
+    return [name, f"{counts.sum():,}", *(number_text(share, ".1%") for share in shares)]

@@ -4,7 +4,7 @@ from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import Counts
 from derain.evaluation.rain_counts import RainCounts
-from derain.evaluation.text_tables import plain_table
+from derain.evaluation.text_tables import number_text, plain_table
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.views.morton import first_rows
@@ -61,7 +61,7 @@ class TruthRecord:
         sure = self._sure.by_class()
         for name, counts in self._all.by_class().items():
             if counts.points:
-                of_sure = f"{sure[name].share_lost:.2%}" if sure[name].points else "-"
+                of_sure = number_text(sure[name].share_lost, ".2%")
                 title = f"{name} (rain)" if counts.rain else name
                 classes.append([title, f"{counts.points:,}", f"{counts.share_lost:.2%}", of_sure])
         return f"{plain_table(scores)}\n{plain_table(classes)}"
@@ -70,4 +70,4 @@ class TruthRecord:
 def _scores(counts: Counts) -> list[str]:
     points = sum((counts.true_positive, counts.false_positive, counts.false_negative))
     points += counts.true_negative
-    return [f"{points:,}", *(f"{s:.3f}" for s in (counts.precision, counts.recall, counts.iou))]
+    return [f"{points:,}", *map(number_text, (counts.precision, counts.recall, counts.iou))]

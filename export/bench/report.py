@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from derain.evaluation.counts import SCORES, Counts
-from derain.evaluation.text_tables import markdown_table
+from derain.evaluation.text_tables import markdown_table, number_text
 from derain.export.bench.rows import Row
 from derain.export.timing import STAGES
 from derain.files.atomic import replacing
@@ -21,6 +21,8 @@ SIMULATED_IS_EASY = (
 READING = """\
 - precision, recall, F1 and IoU are rain's, counted over the points of all scans; `per scan` is the
   mean over scans. Points that a failed method left in a scan count as not found.
+- `-` is a score that is undefined: precision where no point was called rain, recall where none is
+  rain, F1 and IoU where neither holds. A mean over scans is over the scans that have the score.
 - `IoU 95 %` is the bootstrap interval over scans, `behind best` that of the difference to the best
   IoU, on the same draws: one that reaches 0 says that these scans do not tell the two apart. Scans
   that follow each other are alike, which makes both too narrow.
@@ -123,7 +125,7 @@ def _changed_cells(row: Mapping[str, Any]) -> list[str]:
         f"{scans}, {row['points']:,} points or pixels",
         f"{row['largest_difference']:.1e}",
         f"{row['flipped']:,}",
-        f"{row['rain_iou']:.4f}",
+        number_text(row["rain_iou"], ".4f"),
     ]
 
 
@@ -131,15 +133,15 @@ def _main_cells(row: Row) -> list[str]:
     values = row.as_dict()
     return [
         row.title + (" (!)" if row.scores.failures or row.cost.failure else ""),
-        *(f"{values[score]:.3f}" for score in SCORES),
+        *(number_text(values[score]) for score in SCORES),
         _interval(row.iou_interval),
         _interval(row.behind_best),
-        f"{values['f1_per_scan']:.3f}",
-        f"{values['iou_per_scan']:.3f}",
-        _number(values["ms"]),
-        _number(values["ms_p95"]),
+        number_text(values["f1_per_scan"]),
+        number_text(values["iou_per_scan"]),
+        number_text(values["ms"], ",.1f"),
+        number_text(values["ms_p95"], ",.1f"),
         f"{values['weights']:,}" if "weights" in values else "-",
-        _number(row.cost.peak_memory, decimals=0),
+        number_text(row.cost.peak_memory, ",.0f"),
     ]
 
 
@@ -158,7 +160,7 @@ def _by_class(rows: Sequence[Row]) -> str:
 
 def _groups(rows: Sequence[Row], groups_of: Callable[[Row], Mapping[str, Counts]]) -> str:
     names = list(groups_of(rows[0]))
-    body = [[row.title, *(f"{groups_of(row)[name].iou:.3f}" for name in names)] for row in rows]
+    body = [[row.title, *(number_text(groups_of(row)[name].iou) for name in names)] for row in rows]
     return markdown_table(["method", *names], body)
 
 
@@ -166,9 +168,8 @@ def _by_stage(rows: Sequence[Row]) -> str:
     body = []
     for row in rows:
         times = row.as_dict()["stages"].values()
-        body.append(
-            [row.title, *(f"{_number(time['p50'])} / {_number(time['p95'])}" for time in times)]
-        )
+        cells = [[number_text(time[p], ",.1f") for p in ("p50", "p95")] for time in times]
+        body.append([row.title, *map(" / ".join, cells)])
     return markdown_table(["method", *STAGES], body)
 
 
@@ -192,10 +193,6 @@ def _failures(rows: Sequence[Row]) -> str:
         if row.cost.failure:
             lines.append(f"- {row.title} could not be timed: {row.cost.failure}")
     return "\n".join(lines)
-
-
-def _number(value: float | None, decimals: int = 1) -> str:
-    return "-" if value is None else f"{value:,.{decimals}f}"
 
 
 def _interval(interval: tuple[float, float] | None) -> str:

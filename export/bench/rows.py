@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from derain.evaluation.bootstrap import Bootstrap, Interval, bootstrap
-from derain.evaluation.counts import SCORES, Counts, mean_over_scans
+from derain.evaluation.counts import SCORES, Counts, mean_over_scans, or_none
 from derain.evaluation.scores import Scores
 from derain.export.bench.contestant import Contestant
 from derain.export.bench.cost import Cost
@@ -22,7 +22,8 @@ class Row:
         contestant: The method.
         scores: What it scored.
         cost: What it cost.
-        iou_interval: 95 % interval of its IoU over scans; None for fewer than two scans.
+        iou_interval: 95 % interval of its IoU over scans; None for fewer than two scans, and where
+            the IoU is undefined.
         behind_best: That of what the best method's IoU has over its own.
     """
 
@@ -48,19 +49,22 @@ class Row:
         return self.cost.times.percentile(50)
 
     def as_dict(self) -> dict[str, Any]:
-        """The row as JSON-able primitives; what is not known is None."""
+        """The row as JSON-able primitives; what is undefined or not known is None."""
         scores, times = self.scores, self.cost.times
         return {
             "method": self.title,
             "kind": self.kind,
             **_scores(scores.pooled),
-            **{f"{name}_per_scan": mean_over_scans(scores.per_scan, name) for name in SCORES},
+            **{
+                f"{name}_per_scan": or_none(mean_over_scans(scores.per_scan, name))
+                for name in SCORES
+            },
             "iou_interval": self.iou_interval,
             "iou_behind_best_interval": self.behind_best,
-            "ms": _known(self.milliseconds),
-            "ms_p95": _known(times.percentile(95)),
+            "ms": or_none(self.milliseconds),
+            "ms_p95": or_none(times.percentile(95)),
             "stages": {
-                stage: {f"p{p}": _known(times.percentile(p, stage)) for p in (50, 95)}
+                stage: {f"p{p}": or_none(times.percentile(p, stage)) for p in (50, 95)}
                 for stage in STAGES
             },
             "peak_memory_mib": self.cost.peak_memory,
@@ -108,14 +112,9 @@ def _intervals(
     return drawn.iou, drawn.behind_best
 
 
-def _scores(counts: Counts) -> dict[str, float]:
-    return {name: getattr(counts, name) for name in SCORES}
+def _scores(counts: Counts) -> dict[str, float | None]:
+    return {name: or_none(getattr(counts, name)) for name in SCORES}
 
 
-def _all_scores(groups: Mapping[str, Counts]) -> dict[str, dict[str, float]]:
+def _all_scores(groups: Mapping[str, Counts]) -> dict[str, dict[str, float | None]]:
     return {name: {**_scores(counts), **asdict(counts)} for name, counts in groups.items()}
-
-
-def _known(value: float) -> float | None:
-    # JSON has no word for what is not a number.
-    return None if np.isnan(value) else value

@@ -1,5 +1,6 @@
 """Draws a bench."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ from derain.pictures.speed_error import Standing, speed_error_figure
 
 
 def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) -> None:
-    """Writes the picture of error against time of all methods that could be timed.
+    """Writes the picture of error against time.
+
+    Methods that could not be timed, or whose IoU is undefined, are left out.
 
     Args:
         rows: The rows of the table.
@@ -31,7 +34,7 @@ def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) 
             row.contestant.facts.get(FILE_SIZE),
         )
         for row in rows
-        if row.cost.failure is None
+        if row.cost.failure is None and not math.isnan(row.scores.pooled.iou)
     ]
     title = f"{facts['title']}, {facts['processor']}"
     save(speed_error_figure(standings, title), path)

@@ -7,8 +7,9 @@ import lightning
 from lightning.pytorch.loggers import TensorBoardLogger
 
 from derain.errors import printable
-from derain.evaluation.counts import SCORES
+from derain.evaluation.counts import SCORES, or_none
 from derain.evaluation.metrics import RainMetrics
+from derain.evaluation.text_tables import number_text
 from derain.files.atomic import replacing
 from derain.models.base import DerainingModule
 
@@ -46,23 +47,23 @@ def _tested(trainer: lightning.Trainer) -> str | None:
 
 
 def as_dict(metrics: RainMetrics) -> dict[str, object]:
-    """Scores and counts as JSON-able primitives."""
+    """Scores and counts as JSON-able primitives; a score that is undefined is None."""
     return {
-        "scores": {name: float(score) for name, score in metrics.compute().items()},
+        "scores": {name: or_none(float(score)) for name, score in metrics.compute().items()},
         "scans": len(metrics.per_scan()),
         "classes": {
             name: {"points": counts.points, "called_rain": counts.called_rain, "rain": counts.rain}
             for name, counts in metrics.by_class().items()
         },
         "ranges": {
-            name: {score: getattr(counts, score) for score in SCORES}
+            name: {score: or_none(getattr(counts, score)) for score in SCORES}
             for name, counts in metrics.by_range().items()
         },
     }
 
 
 def as_text(metrics: RainMetrics, data: str) -> str:
-    """Scores and counts as three small tables."""
+    """Scores and counts as three small tables; ``-`` is a score that is undefined."""
     scores = {name: float(score) for name, score in metrics.compute().items()}
     lines = [
         f"{data}, {len(metrics.per_scan())} scans      precision  recall      F1     IoU",
@@ -84,4 +85,5 @@ def as_text(metrics: RainMetrics, data: str) -> str:
 
 
 def _row(scores: list[float]) -> str:
-    return "".join(f"{score:{width}.4f}" for score, width in zip(scores, (9, 8, 8, 8), strict=True))
+    cells = [number_text(score, ".4f") for score in scores]
+    return "".join(cell.rjust(width) for cell, width in zip(cells, (9, 8, 8, 8), strict=True))

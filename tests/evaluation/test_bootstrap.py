@@ -40,9 +40,17 @@ def test_a_method_that_is_worse_on_every_scan_is_told_apart_though_scans_differ_
     assert 0 < low <= high < 0.03
 
 
-def test_no_rain_and_none_found_scores_1() -> None:
-    drawn = bootstrap(np.zeros((1, 4), np.int64), np.zeros((1, 4), np.int64), generator(0))
-    assert drawn.iou == [(1.0, 1.0)]
+def test_a_method_without_an_iou_has_no_interval_and_is_not_the_best() -> None:
+    found, errors = np.array([[0, 0], [0, 0]]), np.array([[0, 0], [2, 3]])
+    drawn = bootstrap(found, errors, generator(0))
+    assert drawn.iou == [None, (0.0, 0.0)]
+    assert drawn.behind_best == [None, (0.0, 0.0)]
+
+
+def test_draws_without_rain_are_left_out() -> None:
+    # One of two scans has no rain, and the method finds none there: every fourth draw has no IoU.
+    drawn = bootstrap(np.array([[3, 0]]), np.array([[1, 0]]), generator(0))
+    assert drawn.iou == [(0.75, 0.75)]
 
 
 def test_one_seed_gives_one_answer() -> None:

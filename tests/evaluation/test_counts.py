@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from derain.evaluation.counts import SCORES, Counts, intersection_over_union, ratio
+from derain.evaluation.counts import (
+    SCORES,
+    Counts,
+    intersection_over_union,
+    mean_over_scans,
+    ratio,
+)
 
 points = st.lists(st.tuples(st.booleans(), st.booleans()), max_size=30)
 numbers = st.integers(0, 2**40)
@@ -35,16 +41,25 @@ def test_counts_of_parts_add_up(
 def test_many_scores_at_once_are_those_of_each_alone(pairs: list[tuple[int, int]]) -> None:
     hits, errors = np.array(pairs).T
     # Python divides integers with correct rounding.
-    expected = [hit / (hit + error) if hit + error else 1 for hit, error in pairs]
-    assert intersection_over_union(hits, errors).tolist() == expected
-    assert [Counts(hit, 0, error, 0).iou for hit, error in pairs] == expected
-    assert [Counts(hit, error, 0, 0).iou for hit, error in pairs] == expected
+    expected = [hit / (hit + error) if hit + error else math.nan for hit, error in pairs]
+    for found in (
+        intersection_over_union(hits, errors),
+        [Counts(hit, 0, error, 0).iou for hit, error in pairs],
+        [Counts(hit, error, 0, 0).iou for hit, error in pairs],
+    ):
+        np.testing.assert_array_equal(found, expected)
 
 
-def test_what_is_no_share_is_what_the_caller_says() -> None:
-    assert ratio([1, 0], [2, 0]).tolist() == [0.5, 1]
-    assert ratio([1, 0], [2, 0], undefined=0).tolist() == [0.5, 0]
-    assert math.isnan(ratio(0, 0, math.nan))
+def test_a_share_of_nothing_is_undefined() -> None:
+    np.testing.assert_array_equal(ratio([1, 0], [2, 0]), [0.5, math.nan])
+
+
+def test_a_mean_over_scans_leaves_out_those_without_the_score() -> None:
+    scans = [Counts(1, 1, 0, 8), Counts(0, 0, 0, 10), Counts(0, 1, 0, 9), Counts(0, 0, 2, 8)]
+    means = [mean_over_scans(scans, score) for score in SCORES]
+    assert means == pytest.approx([(1 / 2 + 0) / 2, (1 + 0) / 2, (2 / 3 + 0 + 0) / 3, 0.5 / 3])
+    assert math.isnan(mean_over_scans(scans[1:2], "iou"))
+    assert math.isnan(mean_over_scans([], "iou"))
 
 
 @pytest.mark.parametrize("score", SCORES)

@@ -3,6 +3,7 @@
 import math
 import pickle
 from dataclasses import astuple
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,12 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from derain.errors import InputError
+from derain.evaluation.counts import or_none
 from derain.evaluation.metrics import SCORES, ClassCounts, Counts, RainMetrics
 
 CLASSES = {0: "ground", 3: "rain", 7: "car", 110: "snow"}
+NAN = math.nan
+approx = partial(pytest.approx, nan_ok=True)
 RAIN = (3, 110)
 Batch = tuple[Tensor, Tensor, Tensor, Tensor, int]
 
@@ -60,16 +64,11 @@ def reference_scores(truth: NDArray[np.bool_], predicted: NDArray[np.bool_]) -> 
     # Imported here so that the processes that a test below starts do without it.
     from sklearn import metrics
 
-    functions = (
-        metrics.precision_score,
-        metrics.recall_score,
-        metrics.f1_score,
-        metrics.jaccard_score,
-    )
-    return {
-        score: float(function(truth, predicted, zero_division=1.0))
-        for score, function in zip(SCORES, functions, strict=True)
-    }
+    functions = (metrics.precision_score, metrics.recall_score, metrics.f1_score)
+    scores = [float(function(truth, predicted, zero_division=NAN)) for function in functions]
+    # This one takes no NaN.
+    iou = metrics.jaccard_score(truth, predicted) if (truth | predicted).any() else NAN
+    return dict(zip(SCORES, [*scores, float(iou)], strict=True))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -89,19 +88,20 @@ def test_scores_are_those_of_scikit_learn(seed: int, labels: tuple[int, ...]) ->
     metrics = counted(*batches)
     expected = dict(pooled)
     for score in SCORES:
-        expected[f"{score}_per_scan"] = float(np.mean([scores[score] for scores in per_scan]))
-        assert getattr(metrics.pooled(), score) == pytest.approx(pooled[score], rel=1e-12)
-        assert [getattr(scan, score) for scan in metrics.per_scan()] == pytest.approx(
+        of_scans = [scores[score] for scores in per_scan if not math.isnan(scores[score])]
+        expected[f"{score}_per_scan"] = float(np.mean(of_scans)) if of_scans else math.nan
+        assert getattr(metrics.pooled(), score) == approx(pooled[score], rel=1e-12)
+        assert [getattr(scan, score) for scan in metrics.per_scan()] == approx(
             [scores[score] for scores in per_scan], rel=1e-12
         )
     computed = metrics.compute()
-    assert {name: value.item() for name, value in computed.items()} == pytest.approx(expected)
+    assert {name: value.item() for name, value in computed.items()} == approx(expected)
     assert {(value.shape, value.dtype) for value in computed.values()} == {((), torch.float32)}
 
 
 @given(any_counts)
 def test_f1_and_iou_are_one_score_on_two_scales(counts: Counts) -> None:
-    assert counts.f1 == pytest.approx(2 * counts.iou / (1 + counts.iou), rel=1e-12)
+    assert counts.f1 == approx(2 * counts.iou / (1 + counts.iou), rel=1e-12)
 
 
 @given(any_counts)
@@ -114,17 +114,19 @@ def test_f1_is_the_harmonic_mean_of_precision_and_recall(counts: Counts) -> None
 @pytest.mark.parametrize(
     ("counts", "scores"),
     [
-        (Counts(0, 0, 0, 0), (1, 1, 1, 1)),
-        (Counts(0, 0, 0, 9), (1, 1, 1, 1)),
-        (Counts(0, 1, 0, 8), (0, 1, 0, 0)),
-        (Counts(0, 0, 1, 8), (1, 0, 0, 0)),
+        (Counts(0, 0, 0, 0), (NAN, NAN, NAN, NAN)),
+        (Counts(0, 0, 0, 9), (NAN, NAN, NAN, NAN)),
+        (Counts(0, 1, 0, 8), (0, NAN, 0, 0)),
+        (Counts(0, 0, 1, 8), (NAN, 0, 0, 0)),
         (Counts(0, 1, 1, 7), (0, 0, 0, 0)),
         (Counts(9, 0, 0, 0), (1, 1, 1, 1)),
     ],
     ids=["no points", "no rain", "no rain, one error", "rain missed", "all wrong", "only rain"],
 )
-def test_every_score_is_defined(counts: Counts, scores: tuple[int, ...]) -> None:
-    assert (counts.precision, counts.recall, counts.f1, counts.iou) == scores
+def test_a_score_is_undefined_where_its_denominator_is_zero(
+    counts: Counts, scores: tuple[float, ...]
+) -> None:
+    assert (counts.precision, counts.recall, counts.f1, counts.iou) == approx(scores)
 
 
 @given(st.lists(st.integers(0, 2**31), max_size=5), st.integers(0, 3), st.integers(0, 40))
@@ -152,7 +154,7 @@ def test_each_class_tells_what_it_lost() -> None:
         "car": ClassCounts(0, 0, rain=False),
         "snow": ClassCounts(0, 0, rain=True),
     }
-    assert [c.share_lost for c in by_class.values()] == [1 / 4, 2 / 3, 0, 1]
+    assert [c.share_lost for c in by_class.values()] == approx([1 / 4, 2 / 3, NAN, NAN])
 
 
 def test_a_band_starts_at_its_edge_and_the_last_takes_what_is_not_finite() -> None:
@@ -175,11 +177,11 @@ def test_a_single_band_holds_everything() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:The ``compute`` method of metric RainMetrics was called before")
-def test_nothing_counted_scores_one() -> None:
+def test_nothing_counted_has_no_score() -> None:
     metrics = counted()
     assert metrics.per_scan() == []
     assert metrics.pooled() == Counts(0, 0, 0, 0)
-    assert {value.item() for value in metrics.compute().values()} == {1}
+    assert all(value.isnan() for value in metrics.compute().values())
 
 
 def test_a_scan_without_points_is_a_scan() -> None:
@@ -253,8 +255,9 @@ def test_half_precision_leaves_the_counts_alone() -> None:
 
 
 def report(metrics: RainMetrics) -> dict[str, Any]:
+    computed = {name: value.item() for name, value in metrics.compute().items()}
     return {
-        "compute": {name: value.item() for name, value in metrics.compute().items()},
+        "compute": {name: or_none(value) for name, value in computed.items()},  # NaN is not NaN
         "pooled": metrics.pooled(),
         "per scan": metrics.per_scan(),
         "by class": metrics.by_class(),

@@ -1,6 +1,17 @@
 """Tables whose columns line up."""
 
-from derain.evaluation.text_tables import markdown_table, plain_table
+import math
+
+import pytest
+
+from derain.evaluation.text_tables import markdown_table, number_text, plain_table
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.12345, "0.123"), (0, "0.000"), (math.nan, "-"), (None, "-")]
+)
+def test_a_number_that_is_undefined_is_a_dash(value: float | None, text: str) -> None:
+    assert number_text(value) == text
 
 
 def test_a_table_in_markdown_lines_up() -> None:

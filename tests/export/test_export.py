@@ -204,7 +204,8 @@ def test_in_eight_bits_seven_tenths_of_the_rain_is_found_alike(
     assert proof.holds == holds
     assert ("FAILED: the IoU of the rain must be 0.7" in str(proof)) != holds
     pooled = [sum(column) for column in zip(*found, strict=True)]
-    assert proof.as_dict()["rain_iou"] == (pooled[0] / pooled[1] if pooled[1] else 0.0)
+    assert proof.as_dict()["rain_iou"] == (pooled[0] / pooled[1] if pooled[1] else None)
+    assert ("IoU of the rain -" in str(proof)) != bool(pooled[1])
 
 
 class SpoiltFarAway(nn.Module):

@@ -43,7 +43,8 @@ def test_two_processes_find_what_one_finds(folder: Path) -> None:
     for network in two_processes.NETWORKS:
         found = json.loads((folder / network / "found.json").read_text())
         alone = two_processes.measure(folder, folder / network, 1)
-        assert found["scores"] == alone
+        # As text, for a score that is undefined is not equal to itself.
+        assert json.dumps(found["scores"], indent=1) == json.dumps(alone, indent=1)
         assert alone["report"]["scans"] == len(POINTS)
         counted = alone["report"]["classes"].values()
         assert sum(counts["points"] for counts in counted) == sum(POINTS)

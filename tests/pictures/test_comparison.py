@@ -14,6 +14,7 @@ from derain.evaluation.hard_cases import hard_cases, scene
 from derain.pictures.comparison import MOST_PANELS_IN_A_ROW, comparison_figure
 from derain.pictures.comparison_window import show_comparison
 from derain.pictures.palette import OUTCOMES
+from derain.pictures.scan_pictures import judgement_figure
 from derain.scan import Scan
 
 
@@ -28,6 +29,11 @@ def coloured(figure: Figure, panel: int, outcome: str) -> int:
 
 def titles(figure: Figure) -> list[str]:
     return [axes.get_title() for axes in figure.axes if axes.get_title()]
+
+
+def legend_of(figure: Figure) -> list[str]:
+    (legend,) = figure.legends
+    return [text.get_text() for text in legend.get_texts()]
 
 
 def test_each_method_shows_what_it_removes_leaves_and_loses() -> None:
@@ -46,6 +52,7 @@ def test_each_method_shows_what_it_removes_leaves_and_loses() -> None:
             assert coloured(figure, panel, "rain, removed") == (rain & called).sum()
             assert coloured(figure, panel, "rain, left") == (rain & ~called).sum()
             assert coloured(figure, panel, "solid, lost") == (~rain & called).sum()
+    assert legend_of(figure) == [*OUTCOMES]
 
 
 def test_without_truth_what_is_removed_is_shown() -> None:
@@ -55,6 +62,17 @@ def test_without_truth_what_is_removed_is_shown() -> None:
     assert titles(figure) == ["input: intensity", "only: 20 points removed"]
     assert coloured(figure, 1, "rain, removed") == 20
     assert coloured(figure, 1, "solid, kept") == 180
+    assert legend_of(figure) == ["kept", "removed"]
+
+
+@pytest.mark.parametrize("points", [scene(20), scene(20)[:, :3]], ids=["intensity", "none"])
+def test_the_input_is_called_intensity_where_there_is_some(points: np.ndarray) -> None:
+    scan, nothing = Scan.of(points), np.zeros(20, bool)
+    for figure in (
+        comparison_figure(scan, {"none": nothing}, None, "a scan"),
+        judgement_figure(scan, nothing, nothing, "a scan"),
+    ):
+        assert ("intensity" in titles(figure)[0]) == (points.shape[1] == 4)
 
 
 def test_panels_that_do_not_fit_side_by_side_go_below() -> None:
@@ -93,8 +111,7 @@ def test_a_scan_with_nothing_to_see_is_drawn(name: str, scan: Scan) -> None:
         warnings.simplefilter("error")
         figure = comparison_figure(scan, {"none": nothing}, nothing, name)
         figure.draw_without_rendering()
-    # Nothing was there to be got wrong.
-    assert titles(figure) == ["input: intensity", "truth: 0 points of rain", "none: IoU 1.000"]
+    assert titles(figure)[1:] == ["truth: 0 points of rain", "none: IoU -"]
     assert len(figure.axes) == 6
     assert not any(len(drawn.get_offsets()) for axes in figure.axes for drawn in axes.collections)
 

@@ -54,3 +54,11 @@ def test_the_curve_is_marked_where_the_threshold_is() -> None:
     assert chosen.get_xdata() == pytest.approx([(called & rain).sum() / rain.sum()])
     assert chosen.get_ydata() == pytest.approx([(called & rain).sum() / called.sum()])
     assert "threshold 0.123" in str(chosen.get_label())
+
+
+def test_a_threshold_that_nothing_exceeds_has_no_precision() -> None:
+    metric = ThresholdCounts()
+    metric.update(np.full(10, 0.5, np.float32), np.arange(10) < 5)
+    curve, _ = operating_points_figure(metric.points(), 1.0, "title").axes
+    (chosen,) = (line for line in curve.lines if str(line.get_label()).startswith("chosen"))
+    assert "precision -, recall 0.000, IoU 0.000" in str(chosen.get_label())

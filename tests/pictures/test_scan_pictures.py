@@ -80,6 +80,18 @@ def test_the_panels_of_a_judgement_count_what_became_of_the_points(
         assert len(dots(figure, panel)) == seen.sum() == 196
 
 
+def test_rare_outcomes_are_drawn_larger_and_on_top() -> None:
+    scan = Scan.of(scene(100_000))
+    predicted, rain = np.arange(100_000) >= 99_970, np.arange(100_000) >= 99_000
+    figure = judgement_figure(scan, predicted, rain, "a scan")
+    above, _ = panels(figure)["error"]
+    drawn = figure.axes[above].collections  # from the lowest to the topmost
+    assert [len(each.get_offsets()) for each in drawn] == [99_000, 970, 30]
+    kept, left, removed = (each.get_sizes()[0] for each in drawn)
+    assert removed > 4 * left > 4 * kept
+    assert removed > 10  # points of print squared: 40 pixels and more
+
+
 def test_the_two_views_are_in_the_sensor_frame() -> None:
     # One point ahead and 1 m to the left, one ahead and 1 m to the right and 1 m up.
     scan = Scan.of(np.array([[2, 1, 0, 9], [1, -1, 1, 9]], np.float32))

@@ -121,6 +121,12 @@ def test_every_packaged_configuration_is_put_to_the_test() -> None:
     assert packaged_configs().keys() - with_tests_of_their_own == PREPARATIONS.keys()
 
 
+def test_3d_outdet_learns_from_every_point_of_the_ten_scans() -> None:
+    # As its figures in BENCHMARK.md were measured; bounds are for the export.
+    config = yaml.safe_load(packaged_configs()["outdet_wads36.yaml"].read_text())
+    assert "candidates" not in config["model"]["init_args"]
+
+
 @pytest.mark.usefixtures("one_block", "two_sizes")
 @pytest.mark.parametrize(("config", "prepare"), PREPARATIONS.items(), ids=PREPARATIONS.keys())
 def test_a_packaged_configuration_is_trained_and_measured_and_some_are_deployed(
@@ -151,7 +157,7 @@ def test_a_packaged_configuration_is_trained_and_measured_and_some_are_deployed(
     report = json.loads((run / "version_0/test.json").read_text())
     scans = sorted(test_folder.glob("*.bin"))
     assert report["scans"] == len(scans) > 0
-    assert all(0 <= score <= 1 for score in report["scores"].values())
+    assert all(score is None or 0 <= score <= 1 for score in report["scores"].values())
 
     if config not in DEPLOYED:
         return

@@ -10,6 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from derain.evaluation.counts import Counts, or_none
 from derain.evaluation.scores import Scores, score
 from derain.export.bench.contestant import FILE_SIZE, Contestant
 from derain.export.bench.contestants import contestants
@@ -67,7 +68,8 @@ def test_json_and_csv_hold_the_same_figures(rows: list[Row], tmp_path: Path) -> 
     for row, in_json, in_csv in zip(rows, content["rows"], lines, strict=True):
         assert in_json["method"] == in_csv["method"] == row.title
         for name in ("precision", "recall", "f1", "iou"):
-            assert in_json[name] == float(in_csv[name]) == getattr(row.scores.pooled, name)
+            assert in_json[name] == or_none(getattr(row.scores.pooled, name))
+            assert in_csv[name] == ("" if in_json[name] is None else str(in_json[name]))
         assert in_json["iou_interval"] == [
             float(in_csv["iou_interval.low"]),
             float(in_csv["iou_interval.high"]),
@@ -78,6 +80,8 @@ def test_json_and_csv_hold_the_same_figures(rows: list[Row], tmp_path: Path) -> 
     assert [row["ms"] for row in content["rows"]] == [40.0, 4.0, None]
     assert [line["ms"] for line in lines] == ["40.0", "4.0", ""]
     assert content["rows"][0]["parameters"]["azimuth_resolution"] == 0.16
+    assert content["rows"][2]["precision"] is None  # it called nothing rain
+    assert content["rows"][2]["by_range"]["80+ m"]["iou"] is None  # no point is as far
 
 
 def test_the_tables_name_every_method_and_what_failed(rows: list[Row]) -> None:
@@ -89,6 +93,23 @@ def test_the_tables_name_every_method_and_what_failed(rows: list[Row]) -> None:
     assert "broken: 3 of 3 scans, first" in text
     assert "broken could not be timed: no room" in text
     assert "IoU by sensor" not in text
+
+
+def test_a_score_that_is_undefined_is_a_dash(rows: list[Row]) -> None:
+    text = as_markdown(rows, FACTS)
+    (main,) = [line for line in text.splitlines() if line.startswith("| broken (!) |")]
+    assert [cell.strip() for cell in main.split("|")[2:6]] == ["-", "0.000", "0.000", "0.000"]
+    (by_range,) = [part for part in text.split("\n## ") if part.startswith("IoU by range")]
+    assert all(line.split()[-2] == "-" for line in by_range.splitlines() if "dror" in line)
+
+
+def test_the_picture_leaves_out_methods_without_an_iou(
+    rows: list[Row], tmp_path: Path, saved_figures: list[Figure]
+) -> None:
+    dry = [replace(row, scores=replace(row.scores, pooled=Counts())) for row in rows]
+    draw_speed_error(dry, FACTS, tmp_path / "picture.png")
+    ((axes,),) = [figure.axes for figure in saved_figures]
+    assert not axes.texts
 
 
 def test_simulated_data_are_called_so(rows: list[Row]) -> None:

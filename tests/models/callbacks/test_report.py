@@ -10,8 +10,21 @@ import pytest
 from derain.cards.card import load_card
 from derain.evaluation.hard_cases import scene
 from derain.evaluation.metrics import RainMetrics
-from derain.models.callbacks.report import TestReport
+from derain.models.callbacks.report import TestReport, as_dict, as_text
 from derain.scan import Scan
+
+
+def test_a_score_that_is_undefined_is_a_dash_in_text_and_null_in_json() -> None:
+    card = load_card("wads")
+    metrics = RainMetrics(card.classes, card.rain)
+    near = Scan.of(np.tile([3.0, 0, 0], (4, 1))).with_label(np.array([0, 0, 0, 110]))
+    metrics.update_scan(near, np.zeros(4, bool))  # rain that is left
+    lines = as_text(metrics, "WADS").splitlines()
+    assert lines[1].split()[-4:] == ["-", "0.0000", "0.0000", "0.0000"]
+    assert [line.split()[-4:] for line in lines if line.startswith("10-20 m")] == [["-"] * 4]
+    report = json.loads(json.dumps(as_dict(metrics), allow_nan=False))
+    assert report["scores"]["precision"] is None
+    assert set(report["ranges"]["10-20 m"].values()) == {None}
 
 
 def test_the_folder_is_printed_with_escapes(
