@@ -89,7 +89,7 @@ def draw_visibility(
         colour = LEVELS[alarm.update(by_model)]
         over_drive.axvspan(scan - 0.5, scan + 0.5, color=colour, linewidth=0)
     _draw_both(over_drive, scans, drive, LINES[4], "snow")
-    over_drive.set(title=f"a drive in snow, alarm: {bounds} m", xlabel="scan")
+    over_drive.set(title=f"a drive in snow\nalarm: {bounds} m", xlabel="scan")
     over_drive.set_xlim(0.5, len(drive) + 0.5)
     over_drive.set_xticks(scans[::2] + 1)
     for axes in (by_rate, over_drive):
