@@ -38,7 +38,7 @@ class Visibility:
         metres: The estimate; None where the range is farther than the scan can show, and where
             nothing is known.
         at_least: Near end of the interval, metres; 0 where nothing is known.
-        at_most: Far end, metres; infinite where the scan does not bound it.
+        at_most: Far end, metres; infinite where it is farther than the scan can show.
     """
 
     metres: float | None
@@ -108,7 +108,11 @@ def visibility_of(other: NDArray[np.int64], rain: NDArray[np.int64]) -> Visibili
         -math.log(SHARE_THROUGH) * metres_gone / count if count else math.inf
         for count in (most, drops, least)
     )
-    return Visibility(metres if metres <= CLEAR_AIR else None, min(near, CLEAR_AIR), far)
+    return Visibility(
+        metres if metres <= CLEAR_AIR else None,
+        min(near, CLEAR_AIR),
+        far if far <= CLEAR_AIR else math.inf,
+    )
 
 
 def reach_of(ending: NDArray[np.int64], share: float) -> Visibility:
