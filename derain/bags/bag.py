@@ -17,7 +17,7 @@ from derain.bags.mcap_bag import McapBag
 from derain.bags.names import ROS1_SUFFIX
 from derain.bags.ros2_metadata import FILE, MESSAGE, Ros2Metadata
 from derain.bags.rosbags_reader import rosbags_reader
-from derain.bags.unpacked_files import unpacked_files
+from derain.bags.unpacked_files import UnpackedBag, unpacked_bag
 from derain.bags.unpacking import unpack
 from derain.bags.vendors import decoder_of
 from derain.errors import InputError, reason_of
@@ -77,6 +77,7 @@ class Bag:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._unpacked: UnpackedBag | None = None
 
     @property
     def is_ros1(self) -> bool:
@@ -159,15 +160,11 @@ class Bag:
         """
         with self.reading():
             metadata = self.metadata
-            if metadata is None or metadata.compression != FILE:
-                with self._reader(self.path, metadata) as reader:
-                    yield reader
-            else:
-                with (
-                    unpacked_files(self.path, metadata) as folder,
-                    self._reader(folder, metadata.unpacked()) as reader,
-                ):
-                    yield reader
+            path = self.path
+            if metadata is not None and metadata.compression == FILE:
+                path, metadata = self._unpacked_path(metadata), metadata.unpacked()
+            with self._reader(path, metadata) as reader:
+                yield reader
 
     @contextmanager
     def reading(self) -> Iterator[None]:
@@ -228,6 +225,12 @@ class Bag:
         if self.storage == "mcap":
             return McapBag(path, metadata)
         return rosbags_reader(path, self.is_ros1)
+
+    def _unpacked_path(self, metadata: Ros2Metadata) -> Path:
+        """The folder with the unpacked files, perhaps of the process that this one works for."""
+        if self._unpacked is None or not os.path.isdir(self._unpacked.path):
+            self._unpacked = unpacked_bag(self.path, metadata)
+        return self._unpacked.path
 
     @property
     def _packs_messages(self) -> bool:

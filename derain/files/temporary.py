@@ -48,8 +48,8 @@ def temporary_beside(path: Path) -> Iterator[Path]:
 def temporary_folder(folder: Path) -> Iterator[Path]:
     """Lends an empty hidden folder in another, which is made if missing.
 
-    It is gone when the block ends, with what is in it then. A process that is killed leaves it; it
-    is locked, so that others can tell.
+    It is gone when the block ends in this process, with what is in it then; a fork of the process
+    leaves it. A process that is killed leaves it; it is locked, so that others can tell.
 
     Args:
         folder: The other folder.
@@ -61,6 +61,7 @@ def temporary_folder(folder: Path) -> Iterator[Path]:
     remove_abandoned(folder)
     temporary = folder / f"{PREFIX}{secrets.token_hex(8)}"
     temporary.mkdir()
+    process = os.getpid()
     try:
         descriptor = os.open(temporary, os.O_RDONLY)
         try:
@@ -70,7 +71,8 @@ def temporary_folder(folder: Path) -> Iterator[Path]:
         finally:
             os.close(descriptor)
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        if os.getpid() == process:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _made(file: Path) -> int | None:
