@@ -137,14 +137,16 @@ class ChunkUnpacker:
 
 def _records(file: BinaryIO) -> Iterator[tuple[int, int]]:
     """Place and kind of records of ROS 1 that follow one another."""
-    while size := file.read(SIZE.size):
+    while head := file.read(SIZE.size):
         place = file.tell() - SIZE.size
-        header = file.read(*SIZE.unpack(size))
+        (size,) = SIZE.unpack(head)
+        header = file.read(size)
         kind = header.partition(OP)[2][:1]
         if not kind:
             raise ValueError(f"a record without a kind at byte {place:,}")
         yield place, kind[0]
-        file.seek(*SIZE.unpack(file.read(SIZE.size)), os.SEEK_CUR)
+        (size,) = SIZE.unpack(file.read(SIZE.size))
+        file.seek(size, os.SEEK_CUR)
 
 
 def _chunk_places(path: Path) -> Iterator[int]:
