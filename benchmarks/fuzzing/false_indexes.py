@@ -9,7 +9,7 @@ from mcap.records import Channel, ChunkIndex, Footer, McapRecord, Statistics, Su
 from mcap.stream_reader import StreamReader
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
-FOOTER = struct.Struct("<BQQQI")
+FOOTER_RECORD = struct.Struct("<BQQQI")
 
 
 def with_summary(
@@ -22,8 +22,8 @@ def with_summary(
         change: Makes the records of the summary out of those that there are.
         data: Records to be added to the end of the data.
     """
-    footer = len(file) - len(MCAP_MAGIC) - FOOTER.size
-    start = FOOTER.unpack_from(file, footer)[2]
+    footer = len(file) - len(MCAP_MAGIC) - FOOTER_RECORD.size
+    start = FOOTER_RECORD.unpack_from(file, footer)[2]
     records = StreamReader(BytesIO(file[start:]), skip_magic=True).records
     kept = [each for each in records if not isinstance(each, (Footer, SummaryOffset))]
     builder = RecordBuilder()

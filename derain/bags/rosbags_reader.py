@@ -18,13 +18,13 @@ from derain.system.extras import APSW, ROSBAGS
 MOST_TOPICS = 4096
 
 # What ROS 2 has in a database.
-TABLES = {"schema", "metadata", "topics", "message_definitions", "messages"}
+ROS2_TABLES = {"schema", "metadata", "topics", "message_definitions", "messages"}
 
 # Records of ROS 1 begin with the size of their header and the header, then the size of their data.
 # Source: the bag format 2.0 (http://wiki.ros.org/Bags/Format/2.0).
-SIZE = Struct("<I")
+RECORD_SIZE = Struct("<I")
 OP = b"\4\0\0\0op="
-MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = range(2, 8)
+OP_MESSAGE, OP_BAG_HEADER, OP_INDEX, OP_CHUNK, OP_CHUNK_INFO, OP_CONNECTION = range(2, 8)
 
 
 @contextmanager
@@ -74,7 +74,7 @@ def other_tables(reader: Any) -> list[str]:
     """
     tables = "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite_%'"
     found = {name for each in _databases(reader) for (name,) in each.dbconn.execute(tables)}
-    return sorted(found - TABLES)
+    return sorted(found - ROS2_TABLES)
 
 
 def stored_messages(reader: Any) -> int:
@@ -129,7 +129,7 @@ class ChunkUnpacker:
             ValueError: They are damaged, too many, or other messages than the index has.
         """
         content = unpack(data, self.compression)
-        found = sum(kind == MESSAGE for _, kind in _records(BytesIO(content)))
+        found = sum(kind == OP_MESSAGE for _, kind in _records(BytesIO(content)))
         if found != self.messages:
             raise ValueError(f"its index has {self.messages:,} of {found:,} messages of a chunk")
         return content
@@ -137,15 +137,15 @@ class ChunkUnpacker:
 
 def _records(file: BinaryIO) -> Iterator[tuple[int, int]]:
     """Place and kind of records of ROS 1 that follow one another."""
-    while head := file.read(SIZE.size):
-        place = file.tell() - SIZE.size
-        (size,) = SIZE.unpack(head)
+    while head := file.read(RECORD_SIZE.size):
+        place = file.tell() - RECORD_SIZE.size
+        (size,) = RECORD_SIZE.unpack(head)
         header = file.read(size)
         kind = header.partition(OP)[2][:1]
         if not kind:
             raise ValueError(f"a record without a kind at byte {place:,}")
         yield place, kind[0]
-        (size,) = SIZE.unpack(file.read(SIZE.size))
+        (size,) = RECORD_SIZE.unpack(file.read(RECORD_SIZE.size))
         file.seek(size, os.SEEK_CUR)
 
 
@@ -153,9 +153,9 @@ def _chunk_places(path: Path) -> Iterator[int]:
     with path.open("rb") as file:
         file.readline()  # the version
         for place, kind in _records(file):
-            if kind == CHUNK:
+            if kind == OP_CHUNK:
                 yield place
-            elif kind not in (BAG_HEADER, INDEX, CHUNK_INFO, CONNECTION):
+            elif kind not in (OP_BAG_HEADER, OP_INDEX, OP_CHUNK_INFO, OP_CONNECTION):
                 raise ValueError(f"a record outside its chunks (op {kind}) is in no index")
 
 
