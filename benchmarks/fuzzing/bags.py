@@ -5,7 +5,8 @@ import sqlite3
 import struct
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
+from dataclasses import replace
 from functools import cache, partial
 from io import BytesIO
 from pathlib import Path
@@ -18,6 +19,14 @@ import mcap.writer
 import zstandard
 from mcap.data_stream import RecordBuilder
 
+from benchmarks.fuzzing.false_indexes import (
+    MCAP_MAGIC,
+    chunks_times,
+    renamed,
+    ros1_with_index,
+    stating,
+    with_summary,
+)
 from benchmarks.fuzzing.format_inputs import BOMB, POINTS
 from benchmarks.fuzzing.mutations import damaged
 from benchmarks.fuzzing.reader import Reader
@@ -31,13 +40,18 @@ from benchmarks.recorded_bags import (
     table_of,
     write_bag,
 )
+from benchmarks.recorded_bags import (
+    POINTS as POINTS_TOPIC,
+)
 from derain.bags.bag_copy import BagCopy
 from derain.evaluation.hard_cases import scene
 from derain.sources.bag_frame import clouds_at
 from derain.sources.folders import named_frames
 
 MILLION_ZEROS = bytes(10**6)
-MAGIC = b"\x89MCAP0\r\n"
+
+# More topics than a recording has, and than a database of derain's fuzzer takes long to make.
+TOPICS = 30_000
 
 # What a file of a storage is called.
 FILES: dict[Storage, str] = {"ros1": "drive.bag", "sqlite3": "drive.db3", "mcap": "drive.mcap"}
@@ -188,6 +202,12 @@ def _with(recorded: Recorded, message: bytes) -> Recorded:
     return Recorded(recorded.topic, recorded.type, recorded.time, message)
 
 
+def _with_nul(storage: Storage) -> bytes:
+    """A bag with a NUL in the name of a topic."""
+    messages = _messages(storage)
+    return _written(storage, [replace(each, topic=f"{each.topic}\0") for each in messages])
+
+
 def _lying(storage: Storage, lie: tuple[int, int, int, int]) -> bytes:
     """A bag with a cloud that says what is not so."""
     messages = _messages(storage)
@@ -206,6 +226,9 @@ def _hostile_ros1() -> list[Callable[[], bytes]]:
         lambda: _ros1_packed("bz2", lambda _: _bz2_bomb()),
         lambda: _ros1_packed("lz4", lambda _: _lz4_bomb()),
         lambda: _ros1_packed("lz4", lambda _: b""),
+        lambda: _with_nul("ros1"),
+        lambda: ros1_with_index(_ros1()[0], topics=TOPICS),
+        lambda: ros1_with_index(_ros1()[0], chunk_times=TOPICS),
     ]
 
 
@@ -223,6 +246,15 @@ def _hostile_sqlite3() -> list[Callable[[], bytes]]:
         lambda: _database(
             "CREATE VIEW messages AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM"
             " n) SELECT i AS id, 1 AS topic_id, i AS timestamp, zeroblob(100) AS data FROM n"
+        ),
+        lambda: _with_nul("sqlite3"),
+        _database_of_many_topics,
+        lambda: _database(
+            "CREATE TABLE messages(id INTEGER, topic_id, timestamp, data)",
+            "DROP TABLE message_definitions",
+            "CREATE VIEW message_definitions AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT"
+            " i + 1 FROM n) SELECT i AS id, i AS topic_type, 'ros2msg' AS encoding,"
+            " '' AS encoded_message_definition, '' AS type_description_hash FROM n",
         ),
     ]
 
@@ -243,6 +275,18 @@ def _database(*statements: str) -> bytes:
         return path.read_bytes()
 
 
+def _database_of_many_topics() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "drive.db3"
+        path.write_bytes(_sqlite3()[0])
+        with closing(sqlite3.connect(path)) as database, database:
+            rows = [(1000 + n, f"/{n}", f"a/msg/B{n}", "cdr", "", "") for n in range(TOPICS)]
+            database.executemany("INSERT INTO topics VALUES(?, ?, ?, ?, ?, ?)", rows)
+            rows = [(1000 + n, f"a/msg/B{n}", "ros2msg", "", "") for n in range(TOPICS)]
+            database.executemany("INSERT INTO message_definitions VALUES(?, ?, ?, ?, ?)", rows)
+        return path.read_bytes()
+
+
 def _hostile_mcap() -> list[Callable[[], bytes]]:
     content = partial(lambda: _chunk_of(_mcap()[1]))
     return [
@@ -254,6 +298,19 @@ def _hostile_mcap() -> list[Callable[[], bytes]]:
         lambda: _of_chunks([_heavy_chunk()] * 12),
         lambda: _of_chunks([struct.pack("<BQ", 5, 2**62)]),
         lambda: _of_chunks([struct.pack("<BQ", 6, 2**62)]),
+        lambda: _with_nul("mcap"),
+        lambda: _of_chunks([_empty_messages()]),
+        lambda: with_summary(_mcap()[1], stating(10**15)),
+        lambda: with_summary(_mcap()[1], chunks_times(10_000)),
+        lambda: with_summary(_mcap()[1], renamed(POINTS_TOPIC, "/other")),
+        lambda: with_summary(_mcap()[1], _with_channels),
+    ]
+
+
+def _with_channels(records: list[mcap.records.McapRecord]) -> list[mcap.records.McapRecord]:
+    """A summary with many topics that have no messages."""
+    return records + [
+        mcap.records.Channel(1000 + number, f"/{number}", "cdr", {}, 0) for number in range(TOPICS)
     ]
 
 
@@ -304,6 +361,14 @@ def _heavy_chunk() -> bytes:
     return _chunk(content + message, zstandard.compress(content + message), "zstd")
 
 
+@cache
+def _empty_messages() -> bytes:
+    """A chunk of five million messages without data, in a few kilobytes."""
+    message = struct.pack("<BQHIQQ", 5, 22, 1, 0, START, START)
+    content = _chunk_of(_mcap()[1]) + message * 5_000_000
+    return _chunk(content, zstandard.compress(content), "zstd")
+
+
 def _of_chunks(chunks: Sequence[bytes]) -> bytes:
     """A file of chunks, without a summary."""
     builder = RecordBuilder()
@@ -311,7 +376,7 @@ def _of_chunks(chunks: Sequence[bytes]) -> bytes:
     header = builder.end()
     mcap.records.DataEnd(0).write(builder)
     mcap.records.Footer(0, 0, 0).write(builder)
-    return MAGIC + header + b"".join(chunks) + builder.end() + MAGIC
+    return MCAP_MAGIC + header + b"".join(chunks) + builder.end() + MCAP_MAGIC
 
 
 def _megabytes() -> Iterator[bytes]:

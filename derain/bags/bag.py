@@ -5,7 +5,7 @@ raises for what they do not. Here each is one InputError.
 """
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,8 +16,8 @@ from derain.bags.cloud_message import CDR, ROS1
 from derain.bags.mcap_bag import McapBag
 from derain.bags.names import ROS1_SUFFIX
 from derain.bags.ros2_metadata import FILE, MESSAGE, Ros2Metadata
-from derain.bags.rosbags_reader import rosbags_reader
-from derain.bags.unpacked_files import unpacked_files
+from derain.bags.rosbags_reader import MOST_TOPICS, rosbags_reader, stored_messages
+from derain.bags.unpacked_files import UnpackedBag, unpacked_bag
 from derain.bags.unpacking import unpack
 from derain.bags.vendors import decoder_of
 from derain.errors import InputError, reason_of
@@ -77,6 +77,7 @@ class Bag:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._unpacked: UnpackedBag | None = None
 
     @property
     def is_ros1(self) -> bool:
@@ -118,8 +119,9 @@ class Bag:
             for connection in reader.connections:
                 name = (str(connection.topic), str(connection.msgtype))
                 before = found[name].messages if name in found else 0
-                messages = before + max(connection.msgcount, 0)
+                messages = before + max(int(connection.msgcount), 0)
                 found[name] = Topic(*name, messages, self._encoding_of(connection))
+            self._check(found.values())
         return tuple(topic for _, topic in sorted(found.items()))
 
     def cloud_topic(self, name: str = "") -> Topic:
@@ -159,15 +161,13 @@ class Bag:
         """
         with self.reading():
             metadata = self.metadata
-            if metadata is None or metadata.compression != FILE:
-                with self._reader(self.path, metadata) as reader:
-                    yield reader
-            else:
-                with (
-                    unpacked_files(self.path, metadata) as folder,
-                    self._reader(folder, metadata.unpacked()) as reader,
-                ):
-                    yield reader
+            path = self.path
+            if metadata is not None and metadata.compression == FILE:
+                path, metadata = self._unpacked_path(metadata), metadata.unpacked()
+            with self._reader(path, metadata) as reader:
+                if len(reader.connections) > MOST_TOPICS:
+                    raise ValueError(f"it has more than {MOST_TOPICS:,} topics")
+                yield reader
 
     @contextmanager
     def reading(self) -> Iterator[None]:
@@ -214,27 +214,59 @@ class Bag:
                 before.
             topic: As for :meth:`messages`.
             start: As for :meth:`messages`.
+
+        Raises:
+            InputError: As for :meth:`messages`; or all messages are asked for, and the bag holds
+                some that cannot be read by its index and its topics.
         """
         with self.reading():
             chosen = [c for c in reader.connections if topic is None or topic.has(c)]
             if not chosen:
                 return
             packed = self.storage == "sqlite3" and self._packs_messages
+            stored = None
+            if topic is None and start is None:
+                stored = reader.stored_messages() if self._is_mcap else stored_messages(reader)
+            number = 0
             for connection, time, data, *more in reader.messages(chosen, start=start):
                 data = unpack(data, "zstd") if packed else bytes(data)
+                number += 1
                 yield Message(connection, time, data, *more)
+            if stored is not None and number != stored:
+                raise ValueError(f"its topics have {number:,} of {stored:,} messages")
 
     def _reader(self, path: Path, metadata: Ros2Metadata | None) -> Any:
-        if self.storage == "mcap":
+        if self._is_mcap:
             return McapBag(path, metadata)
         return rosbags_reader(path, self.is_ros1)
+
+    def _unpacked_path(self, metadata: Ros2Metadata) -> Path:
+        """The folder with the unpacked files, perhaps of the process that this one works for."""
+        if self._unpacked is None or not os.path.isdir(self._unpacked.path):
+            self._unpacked = unpacked_bag(self.path, metadata)
+        return self._unpacked.path
+
+    def _check(self, topics: Collection[Topic]) -> None:
+        """Refuses names and numbers that no recording has, before anything is made of them."""
+        for topic in topics:
+            if "\0" in topic.name:
+                raise ValueError(f"the topic {topic.name} has a NUL in its name")
+        names = [""] if self.metadata is None else self.metadata.files
+        size = sum((self.path / name).stat().st_size for name in names)
+        messages = sum(topic.messages for topic in topics)
+        if messages > size:
+            raise ValueError(f"{messages:,} messages are stated in {size:,} bytes")
+
+    @property
+    def _is_mcap(self) -> bool:
+        return self.storage == "mcap"
 
     @property
     def _packs_messages(self) -> bool:
         return self.metadata is not None and self.metadata.compression == MESSAGE
 
     def _encoding_of(self, connection: Any) -> str:
-        if self.storage == "mcap":
+        if self._is_mcap:
             return str(connection.encoding)
         return ROS1 if self.is_ros1 else CDR
 

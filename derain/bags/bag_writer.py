@@ -9,8 +9,9 @@ from derain.bags.bag import Bag, Message
 from derain.bags.mcap_writer import McapWriter
 from derain.bags.names import stem
 from derain.bags.ros2_metadata import NEWEST_VERSION, OLDER_VERSION
-from derain.bags.rosbags_reader import compressions_of
+from derain.bags.rosbags_reader import compressions_of, other_tables
 from derain.system.extras import LZ4, ROSBAGS
+from derain.system.notices import warn
 
 
 def writer_like(bag: Bag, reader: Any, folder: Path) -> "BagWriter | McapWriter":
@@ -153,6 +154,8 @@ def _ros2(bag: Bag, reader: Any, path: Path) -> Any:
     if bag.metadata is not None and bag.metadata.compression:
         mode = library.CompressionMode[bag.metadata.compression.upper()]
         writer.set_compression(mode, library.CompressionFormat.ZSTD)
+    for table in other_tables(reader):
+        warn(f"{bag.path}: its table '{table}' is none of ROS 2, and its copy does not have it")
     for key, value in (reader.storage.metadata.custom or {}).items():
         writer.set_custom_data(str(key), str(value))
     return writer

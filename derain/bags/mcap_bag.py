@@ -121,6 +121,21 @@ class McapBag:
                     message.sequence,
                 )
 
+    def stored_messages(self) -> int:
+        """Number of messages, once nothing but them and what describes them is in the files.
+
+        Raises:
+            ValueError: As for McapFile.check_whole.
+        """
+        for file in self._files:
+            file.check_whole()
+        return self.message_count
+
+    def private_records(self) -> Iterator[bytes]:
+        """Records of kinds that MCAP leaves to applications, byte for byte."""
+        for file in self._files:
+            yield from file.records.private()
+
     def attachments_and_metadata(self) -> Iterator[tuple[int, Any]]:
         """Kind and content of every record that is neither a message nor about messages.
 

@@ -14,6 +14,7 @@ from derain.bags.mcap_records import (
     CHANNEL,
     CHUNK,
     CHUNK_INDEX,
+    DATA_END,
     MESSAGE,
     METADATA,
     SCHEMA,
@@ -102,6 +103,28 @@ class McapFile:
         if start is None and count != told:
             raise ValueError(f"it has {count:,} messages where its index says {told:,}")
 
+    def check_whole(self) -> None:
+        """Checks that reading all messages leaves nothing of the file unread.
+
+        Raises:
+            ValueError: A wrong checksum of the data, or a summary that differs from them in chunks,
+                messages, channels or schemas.
+        """
+        chunks, messages = set(), 0
+        for place in self.records.places():
+            if place.kind == CHUNK:
+                chunks.add(place.offset)
+            elif place.kind == MESSAGE:
+                messages += 1
+            elif place.kind in (SCHEMA, CHANNEL):
+                self._learn(place.kind, self.records.read(place.offset, place.kind))
+            elif place.kind == DATA_END:
+                self.records.check_data(place)
+        if chunks != {chunk.offset for chunk in self.chunks}:
+            raise ValueError("its summary names other chunks than there are")
+        if messages != len(self._times):
+            raise ValueError(f"its summary lacks {messages:,} messages that are in no chunk")
+
     def attachments_and_metadata(self) -> Iterator[tuple[int, Any]]:
         """Kind and content of every record that is neither a message nor about messages.
 
@@ -131,6 +154,8 @@ class McapFile:
                 statistics = record
             else:
                 self._learn(kind, record)
+        if len({chunk.offset for chunk in self.chunks}) < len(self.chunks):
+            raise ValueError("its summary names a chunk more than once")
         if statistics is None or len(self.chunks) != statistics.chunk_count:
             return False
         self.counts.update(statistics.channel_message_counts)
@@ -164,8 +189,12 @@ class McapFile:
         self.start, self.end = min(self.start, message.time), max(self.end, message.time)
 
     def _learn(self, kind: int, record: Any) -> None:
+        """Takes a schema or a channel; all of one number must be the same, wherever they are."""
         if kind in (SCHEMA, CHANNEL):
-            (self.schemas if kind == SCHEMA else self.channels).setdefault(record.id, record)
+            known = self.schemas if kind == SCHEMA else self.channels
+            if known.setdefault(record.id, record) != record:
+                name = type(record).__name__.lower()
+                raise ValueError(f"it defines {name} {record.id} in two ways")
 
     def _add_chunk(self, record: Any, offset: int, channels: frozenset[int] | None) -> None:
         times = record.message_start_time, record.message_end_time
@@ -175,11 +204,12 @@ class McapFile:
         self, channels: Container[int], start: int
     ) -> Iterator[tuple[int, int, McapMessage]]:
         """Time, chunk and message; a chunk is unpacked when its time has come."""
+        whole = self._are_all(channels)
         waiting: list[tuple[int, int, int, McapMessage | None]] = [
             (chunk.start, chunk.offset, -1, None)
             for chunk in self.chunks
             if chunk.end >= start
-            and (chunk.channels is None or any(each in channels for each in chunk.channels))
+            and (whole or chunk.channels is None or any(c in channels for c in chunk.channels))
         ]
         heapq.heapify(waiting)
         held = 0
@@ -191,9 +221,16 @@ class McapFile:
                 continue
             parts = self.records.in_chunk(self.records.read(offset, CHUNK))
             for number, (kind, record) in enumerate(parts):
-                if kind == MESSAGE and record.channel in channels and record.time >= start:
-                    held += len(record.data)
-                    heapq.heappush(waiting, (record.time, offset, number, record))
+                if kind != MESSAGE:
+                    self._learn(kind, record)
+                    if whole and kind not in (SCHEMA, CHANNEL):
+                        raise ValueError(f"a chunk holds a record that no chunk has (kind {kind})")
+                elif record.channel in channels:
+                    if record.time >= start:
+                        held += len(record.data)
+                        heapq.heappush(waiting, (record.time, offset, number, record))
+                elif whole:
+                    raise _stray(record)
             if held > MOST_HELD:
                 raise ValueError(
                     f"messages of more than {MOST_HELD // 10**6} MB in chunks of one time"
@@ -203,9 +240,20 @@ class McapFile:
         self, channels: Container[int], start: int
     ) -> Iterator[tuple[int, int, McapMessage]]:
         """The same of messages that are in no chunk."""
+        whole = self._are_all(channels)
         for place in np.argsort(np.asarray(self._times), kind="stable"):
             if self._times[place] >= start:
                 offset = self._offsets[place]
                 message = self.records.read(offset, MESSAGE)
                 if message.channel in channels:
                     yield message.time, offset, message
+                elif whole:
+                    raise _stray(message)
+
+    def _are_all(self, channels: Container[int]) -> bool:
+        """Whether all messages are asked for, so that none may be left out."""
+        return all(number in channels for number in self.channels)
+
+
+def _stray(message: McapMessage) -> ValueError:
+    return ValueError(f"a message is of channel {message.channel}, which nothing defines")

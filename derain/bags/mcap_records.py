@@ -21,6 +21,10 @@ MAGIC = b"\x89MCAP0\r\n"
 
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = range(1, 7)
 CHUNK_INDEX, ATTACHMENT, STATISTICS, METADATA = 8, 9, 11, 12
+DATA_END = 15
+
+# Kinds that the specification defines; those from 0x80 on are private records of an application.
+SPECIFIED = range(1, DATA_END + 1)
 
 # What the library calls those that it is asked for.
 RECORD_NAMES = {
@@ -38,6 +42,9 @@ RECORD_NAMES = {
 # and when it was recorded and published. A footer has two places and a checksum.
 HEAD, MESSAGE_HEAD = struct.Struct("<BQ"), struct.Struct("<HIQQ")
 FOOTER_BODY, CHECKSUM = struct.Struct("<QQI"), struct.Struct("<I")
+
+# What is read at once of a file whose checksum is computed, bytes.
+PORTION = 2**22
 
 
 class Place(NamedTuple):
@@ -114,6 +121,31 @@ class McapRecords:
         """Where the records of the data are, without those within chunks."""
         return _places(self._file, *self.data)
 
+    def private(self) -> Iterator[bytes]:
+        """Private records of the data and of the summary, whole."""
+        for begin, end in (self.data, self.summary):
+            for place in _places(self._file, begin, end):
+                if place.kind not in SPECIFIED:
+                    yield self._bytes(place.offset, HEAD.size + place.size)
+
+    def check_data(self, end: Place) -> None:
+        """Compares the checksum of the data with their bytes, where the file has one.
+
+        Args:
+            end: The record that ends the data.
+
+        Raises:
+            ValueError: They differ.
+        """
+        (stated,) = CHECKSUM.unpack(self._body(end.offset, DATA_END))
+        if not stated:
+            return
+        found = 0
+        for start in range(0, end.offset, PORTION):
+            found = crc32(self._bytes(start, min(PORTION, end.offset - start)), found)
+        if found != stated:
+            raise ValueError("the checksum of its data is wrong")
+
     def read(self, offset: int, kind: int) -> Any:
         """The record at a place.
 
@@ -142,7 +174,7 @@ class McapRecords:
             footer = self._bytes(end, HEAD.size + FOOTER_BODY.size - CHECKSUM.size)
             if crc32(footer, crc32(content)) != self._summary_checksum:
                 raise ValueError("the checksum of its summary is wrong")
-        return self._parts(content)
+        return self._parts(content, most=len(content))
 
     def in_chunk(self, chunk: Any) -> Iterator[tuple[int, Any]]:
         """The same of the records of a chunk.
@@ -158,16 +190,27 @@ class McapRecords:
             )
         if chunk.uncompressed_crc and crc32(content) != chunk.uncompressed_crc:
             raise ValueError("the checksum of a chunk is wrong")
-        return self._parts(content)
+        return self._parts(content, most=len(chunk.data))
 
-    def _parts(self, content: bytes) -> Iterator[tuple[int, Any]]:
+    def _parts(self, content: bytes, most: int) -> Iterator[tuple[int, Any]]:
+        """Kind and content of each record; None is the content of private records.
+
+        Args:
+            content: The records.
+            most: How many there may be. The time of each message differs, so a chunk that unpacks
+                to more records than it has bytes is made to fill the memory.
+        """
         view = memoryview(content)
-        for kind, offset, size in _places(BytesIO(content), 0, len(content)):
+        for number, (kind, offset, size) in enumerate(_places(BytesIO(content), 0, len(content))):
+            if number >= most:
+                raise ValueError(f"a chunk of {most:,} bytes unpacks to more records than that")
             body = view[offset + HEAD.size :][:size]
             if kind == MESSAGE:
                 yield kind, McapMessage.parse(body)
             elif kind in RECORD_NAMES:
                 yield kind, self._parsed(kind, bytes(body))
+            elif kind not in SPECIFIED:
+                yield kind, None
 
     def _read_frame(self) -> None:
         """Finds where the data and the summary are."""

@@ -33,8 +33,8 @@ QOS, TYPE_HASH = "offered_qos_profiles", "topic_type_hash"
 class McapWriter:
     """Writes messages to a folder of ROS 2 with one file of MCAP.
 
-    Channels keep their schemas and notes, and messages their numbers and times; attachments and
-    metadata follow when the bag is ended.
+    Channels keep their schemas and notes, and messages their numbers and times; attachments,
+    metadata and private records follow when the bag is ended.
 
     Args:
         bag: The other bag, open.
@@ -102,6 +102,8 @@ class McapWriter:
         metadata = self._metadata()
         text = yaml.safe_dump(metadata.content, sort_keys=False)
         self._writer.add_metadata(ROS2_RECORD, {ROS2_NOTE: text})
+        for private in self.bag.private_records():  # the library writes none
+            self._file.write(private)
         self._writer.finish()
         self._file.close()
         if self._compression == FILE:

@@ -1,13 +1,30 @@
 """Opens bags of ROS 1 and SQLite by the library, which then unpacks no more than a bag needs."""
 
-from collections.abc import Iterator
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
+from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from struct import Struct
+from typing import Any, BinaryIO
 
 from derain.bags.unpacking import MOST_UNPACKED, unpack
 from derain.system.extras import APSW, ROSBAGS
+
+# The most topics of a bag, each publisher of ROS 1 counted: the time that the library takes grows
+# with the square, and a metadata.yaml that lists many more is too large to be read.
+MOST_TOPICS = 4096
+
+# What ROS 2 has in a database.
+ROS2_TABLES = {"schema", "metadata", "topics", "message_definitions", "messages"}
+
+# Records of ROS 1 begin with the size of their header and the header, then the size of their data.
+# Source: the bag format 2.0 (http://wiki.ros.org/Bags/Format/2.0).
+RECORD_SIZE = Struct("<I")
+OP = b"\4\0\0\0op="
+OP_MESSAGE, OP_BAG_HEADER, OP_INDEX, OP_CHUNK, OP_CHUNK_INFO, OP_CONNECTION = range(2, 8)
 
 
 @contextmanager
@@ -21,8 +38,13 @@ def rosbags_reader(path: Path, is_ros1: bool) -> Iterator[Any]:
         is_ros1: Whether it is ROS 1's.
     """
     if is_ros1:
-        with ROSBAGS.load(path, "rosbag1").Reader(path) as reader:
-            reader.chunks = {place: _bounded(chunk) for place, chunk in reader.chunks.items()}
+        reader = ROSBAGS.load(path, "rosbag1").Reader(path)
+        reader.read_chunk_info = _each_chunk_once(reader.read_chunk_info)
+        with reader:
+            entries = Counter(e.chunk_pos for index in reader.indexes.values() for e in index)
+            reader.chunks = {
+                place: _bounded(chunk, entries[place]) for place, chunk in reader.chunks.items()
+            }
             yield reader
         return
     reader = ROSBAGS.load(path, "rosbag2").Reader(path)
@@ -41,24 +63,138 @@ def compressions_of(reader: Any) -> set[str]:
     Args:
         reader: What :func:`rosbags_reader` lends.
     """
-    return {chunk.decompressor.keywords["compression"] for chunk in reader.chunks.values()}
+    return {chunk.decompressor.compression for chunk in reader.chunks.values()}
 
 
-def _bounded(chunk: Any) -> Any:
+def other_tables(reader: Any) -> list[str]:
+    """Names of tables in the databases of a bag that ROS 2 does not know.
+
+    Args:
+        reader: What :func:`rosbags_reader` lends.
+    """
+    tables = "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite_%'"
+    found = {name for each in _databases(reader) for (name,) in each.dbconn.execute(tables)}
+    return sorted(found - ROS2_TABLES)
+
+
+def stored_messages(reader: Any) -> int:
+    """Number of messages in the files of a bag, be they of a topic that it names or not.
+
+    Args:
+        reader: What :func:`rosbags_reader` lends.
+
+    Raises:
+        ValueError: A bag of ROS 1 with chunks or messages that its index does not name, or a
+            database with messages of none of its topics, or of several.
+    """
+    if not hasattr(reader, "chunks"):
+        return sum(map(_stored_in_database, _databases(reader)))
+    if reader.chunks.keys() != set(_chunk_places(reader.path)):
+        raise ValueError("its index does not name all chunks")
+    for chunk in reader.chunks.values():
+        if not chunk.decompressor.messages:  # nobody unpacks it for a message
+            reader.bio.seek(chunk.datapos)
+            chunk.decompressor(reader.bio.read(chunk.datasize))
+    return sum(map(len, reader.indexes.values()))
+
+
+def _stored_in_database(database: Any) -> int:
+    stored: int = database.metadata.message_count
+    of_topics = sum(topic.msgcount for topic in database.connections)
+    if of_topics != stored:
+        raise ValueError(f"its topics have {of_topics:,} of {stored:,} messages")
+    return stored
+
+
+def _databases(reader: Any) -> list[Any]:
+    return list(getattr(reader.storage, "storages", [reader.storage]))
+
+
+@dataclass(frozen=True)
+class ChunkUnpacker:
+    """Unpacks a chunk of ROS 1.
+
+    Attributes:
+        compression: How it is compressed.
+        messages: How many messages the index has of it.
+    """
+
+    compression: str
+    messages: int
+
+    def __call__(self, data: bytes) -> bytes:
+        """Unpacks its bytes.
+
+        Raises:
+            ValueError: They are damaged, too many, or other messages than the index has.
+        """
+        content = unpack(data, self.compression)
+        found = sum(kind == OP_MESSAGE for _, kind in _records(BytesIO(content)))
+        if found != self.messages:
+            raise ValueError(f"its index has {self.messages:,} of {found:,} messages of a chunk")
+        return content
+
+
+def _records(file: BinaryIO) -> Iterator[tuple[int, int]]:
+    """Place and kind of records of ROS 1 that follow one another."""
+    while head := file.read(RECORD_SIZE.size):
+        place = file.tell() - RECORD_SIZE.size
+        (size,) = RECORD_SIZE.unpack(head)
+        header = file.read(size)
+        kind = header.partition(OP)[2][:1]
+        if not kind:
+            raise ValueError(f"a record without a kind at byte {place:,}")
+        yield place, kind[0]
+        (size,) = RECORD_SIZE.unpack(file.read(RECORD_SIZE.size))
+        file.seek(size, os.SEEK_CUR)
+
+
+def _chunk_places(path: Path) -> Iterator[int]:
+    with path.open("rb") as file:
+        file.readline()  # the version
+        for place, kind in _records(file):
+            if kind == OP_CHUNK:
+                yield place
+            elif kind not in (OP_BAG_HEADER, OP_INDEX, OP_CHUNK_INFO, OP_CONNECTION):
+                raise ValueError(f"a record outside its chunks (op {kind}) is in no index")
+
+
+def _each_chunk_once(read_chunk_info: Callable[[], Any]) -> Callable[[], Any]:
+    """Reads what the index of ROS 1 has of one chunk after the other, and of none again."""
+    places: set[int] = set()
+
+    def read() -> Any:
+        found = read_chunk_info()
+        if found.pos in places:
+            raise ValueError("its index names a chunk more than once")
+        places.add(found.pos)
+        return found
+
+    return read
+
+
+def _bounded(chunk: Any, messages: int) -> Any:
     """A chunk of ROS 1 that is unpacked by derain."""
     by_name = ROSBAGS.load("bags", "rosbag1.reader").decompressors
     names = {function: name for name, function in by_name.items()}
-    unpacking = partial(unpack, compression=names[chunk.decompressor])
-    return chunk._replace(decompressor=unpacking)
+    return chunk._replace(decompressor=ChunkUnpacker(names[chunk.decompressor], messages))
 
 
 @contextmanager
 def _bounded_databases(path: Path) -> Iterator[None]:
-    """Has SQLite refuse values that are larger than any message, in what is opened meanwhile."""
+    """Has SQLite refuse values larger than any message, and too many topics.
+
+    It holds for what is opened in the block.
+    """
     apsw = APSW.load(path)
 
     def bound(database: Any) -> None:
         database.limit(apsw.SQLITE_LIMIT_LENGTH, MOST_UNPACKED)
+        listed = "SELECT name FROM sqlite_schema WHERE name IN ('topics', 'message_definitions')"
+        for (table,) in database.execute(listed).fetchall():
+            rows = f"SELECT count(*) FROM (SELECT 1 FROM {table} LIMIT {MOST_TOPICS + 1})"
+            if database.execute(rows).get > MOST_TOPICS:
+                raise ValueError(f"it has more than {MOST_TOPICS:,} topics")
 
     apsw.connection_hooks.append(bound)
     try:

@@ -44,8 +44,8 @@ def temporary_beside(path: Path) -> Iterator[Path]:
 def temporary_folder(folder: Path) -> Iterator[Path]:
     """Lends an empty hidden folder in another, which is made if missing.
 
-    It is gone when the block ends, with what is in it then. A process that is killed leaves it; it
-    is locked, so that others can tell.
+    It is gone when the block ends in this process, with what is in it then; a fork of the process
+    leaves it. A process that is killed leaves it; it is locked, so that others can tell.
 
     Args:
         folder: The other folder.
@@ -56,11 +56,13 @@ def temporary_folder(folder: Path) -> Iterator[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     remove_abandoned(folder)
     temporary = folder / f"{PREFIX}{secrets.token_hex(8)}"
+    process = os.getpid()
     try:
         with _holding(temporary, _made_folder):
             yield temporary
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        if os.getpid() == process:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """Bags written anew without the rain in their clouds."""
 
 import os
+import re
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -18,6 +19,11 @@ from derain.files.temporary import temporary_folder
 from derain.sources.bag_frame import BagFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
+
+# Names of topics in ROS 1 and ROS 2, of which each word begins with no digit.
+# Source: http://wiki.ros.org/Names and https://design.ros2.org/articles/topic_and_service_names.html
+ROS1_NAME = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
+ROS2_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 # What the column of probabilities is called, of files and of clouds; its values are float32.
 RAIN_PROBABILITY = "rain_probability"
@@ -157,16 +163,25 @@ class CleanedBags:
     def _refuse_clashes(self, clouds: CloudTopic) -> None:
         target, bag = self.out / written_name(clouds.bag), clouds.bag.path
         remedy = "Give --out another folder."
-        there = os.path.realpath(target)
-        if there in (os.path.realpath(bag), os.path.realpath(bag.parent)):
+        there, within = Path(os.path.realpath(target)), Path(os.path.realpath(bag))
+        if there in (within, within.parent):
             raise InputError(self.out, f"would overwrite {bag}", remedy)
+        if there.is_relative_to(within):
+            raise InputError(self.out, f"is inside {bag}", remedy)
         if os.path.lexists(target) and not is_bag(target):
             raise InputError(target, "is there already, and no bag", remedy)
+        pattern = ROS1_NAME if clouds.bag.is_ros1 else ROS2_NAME
         names = {topic.name for topic in clouds.bag.topics}
         for option, name in (
             ("--cleaned-topic", self.options.cleaned_topic),
             ("--removed-topic", self.options.removed_topic),
         ):
+            if name is not None and not pattern.fullmatch(name):
+                raise InputError(
+                    option,
+                    f"{name!r} is not a name of a topic",
+                    "Join words of letters, digits and _ by /, such as /points_clean.",
+                )
             if name in names:
                 raise InputError(option, f"{bag} has a topic {name} already", "Name another.")
 

@@ -20,6 +20,10 @@ from benchmarks.recorded_bags import (
     Storage,
     write_bag,
 )
+from derain.bags import bag as bag_module
+from derain.bags import rosbags_reader
+from derain.bags.bag import Bag
+from derain.bags.bag_copy import BagCopy
 from derain.bags.vendors import PACKET_DECODERS, decoder_of
 from derain.errors import InputError
 from derain.sources.folders import named_frames
@@ -211,6 +215,41 @@ def say_there_are(bag: Path, clouds: int) -> None:
         if topic["topic_metadata"]["name"] == "/velodyne_points":
             topic["message_count"] = clouds
     (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
+
+
+def test_a_bag_of_more_messages_than_bytes_is_refused(tmp_path: Path) -> None:
+    bag = small_bag(tmp_path, "sqlite3")
+    say_there_are(bag, 10**15)
+    assert "messages are stated in" in refusal(lambda: named_frames([bag]))
+
+
+def test_a_topic_with_a_nul_in_its_name_is_refused(tmp_path: Path, storage: Storage) -> None:
+    text = Recorded("/dri\0ver", TEXT_TYPE, START, Ros(storage).text("no cloud"))
+    bag = small_bag(tmp_path, storage, more=[text])
+    assert "NUL" in refusal(lambda: named_frames([bag]))
+
+
+@pytest.mark.parametrize("name", ["/ros 1/é.drops", "points", "/1/2"])
+def test_a_topic_of_an_odd_name_is_read_and_copied(
+    tmp_path: Path, storage: Storage, name: str
+) -> None:
+    ros, (table,) = Ros(storage), tables(1)
+    cloud = Recorded(name, CLOUD_TYPE, START, ros.cloud(table, START))
+    bag = Bag(small_bag(tmp_path, storage, clouds=[], more=[cloud]))
+    assert read_all(bag.path) == 1
+    (tmp_path / "out").mkdir()
+    with BagCopy(bag, bag.cloud_topic(), tmp_path / "out") as copy:
+        made = Bag(copy.finish())
+    assert made.topics == bag.topics
+
+
+def test_more_topics_than_a_recording_has_are_refused(
+    tmp_path: Path, storage: Storage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bag = small_bag(tmp_path, storage)
+    for module in (bag_module, rosbags_reader):
+        monkeypatch.setattr(module, "MOST_TOPICS", 2)
+    assert "more than 2 topics" in refusal(lambda: named_frames([bag]))
 
 
 def test_a_bag_with_fewer_clouds_than_it_says_is_refused(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """What only MCAP has: times of publication, numbers, attachments, metadata, and no index."""
 
+import struct
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -9,6 +11,13 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 from small_bags import small_bag, tables
 
+from benchmarks.fuzzing.false_indexes import (
+    chunks_times,
+    renamed,
+    stating,
+    with_summary,
+    without_a_chunk,
+)
 from benchmarks.recorded_bags import CLOUD_TYPE, IMU, POINTS, START, STORAGES, Ros, drive
 from derain.bags import mcap_file
 from derain.bags.bag import Bag
@@ -32,13 +41,21 @@ KINDS: dict[str, dict[str, Any]] = {
 NOTES = {"offered_qos_profiles": "", "topic_type_hash": "RIHS01_5"}
 
 
-def record(path: Path, ros: Ros, backwards: bool = False, **options: Any) -> Path:
+def record(
+    path: Path,
+    ros: Ros,
+    backwards: bool = False,
+    extra: Callable[[Writer], None] | None = None,
+    **options: Any,
+) -> Path:
     """A file by the library of MCAP's makers."""
     profile, encoding = ("ros1", "ros1") if ros.is_ros1 else ("ros2", "cdr")
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=5000, **options)
         writer.start(profile)
         writer.add_metadata("trip", {"driver": "nobody"})
+        if extra is not None:
+            extra(writer)
         channels: dict[str, int] = {}
         messages = drive(ros, tables(3))
         for number, each in enumerate(reversed(messages) if backwards else messages):
@@ -119,6 +136,85 @@ def test_a_damaged_attachment_is_told(tmp_path: Path) -> None:
         BagCopy(copied, copied.cloud_topic(), tmp_path / "out") as copy,
     ):
         copy.finish()
+
+
+def copied(path: Path, out: Path) -> Path:
+    bag = Bag(path)
+    with BagCopy(bag, bag.cloud_topic(), out) as copy:
+        return copy.finish()
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (stating(10**15), "messages are stated in"),
+        (chunks_times(50), "more than once"),
+        (renamed(POINTS, "/other"), "defines channel . in two ways"),
+        (without_a_chunk, "other chunks than there are"),
+    ],
+)
+def test_a_summary_that_differs_from_the_data_is_refused(
+    tmp_path: Path, change: Any, reason: str
+) -> None:
+    bag = record(tmp_path / "drive.mcap", Ros("mcap"))
+    bag.write_bytes(with_summary(bag.read_bytes(), change))
+    with pytest.raises(InputError, match=reason):
+        copied(bag, tmp_path / "out")
+
+
+PRIVATE = struct.pack("<BQ", 0x90, 5) + b"notes"
+
+
+def test_private_records_are_copied(tmp_path: Path) -> None:
+    bag = record(tmp_path / "drive.mcap", Ros("mcap"))
+    bag.write_bytes(with_summary(bag.read_bytes(), list, data=PRIVATE))
+    made = copied(bag, tmp_path / "out")
+    with (made / "drive.mcap").open("rb") as file:
+        assert len(list(make_reader(file).iter_messages())) == 12
+    assert (made / "drive.mcap").read_bytes().count(PRIVATE) == 1
+
+
+def add_stray(writer: Writer) -> None:
+    writer.add_message(99, START, b"", START, 0)
+
+
+def add_private(writer: Any) -> None:
+    writer._Writer__chunk_builder.record_writer.write(PRIVATE)
+
+
+@pytest.mark.parametrize(
+    ("kind", "extra", "reason"),
+    [
+        ("zstd", add_stray, "channel 99, which nothing defines"),
+        ("not chunked", add_stray, "channel 99, which nothing defines"),
+        ("no summary", add_stray, "channel 99, which nothing defines"),
+        ("zstd", add_private, "kind 144"),
+    ],
+)
+def test_what_a_copy_would_drop_is_refused_and_does_not_matter_to_reading(
+    tmp_path: Path, kind: str, extra: Callable[[Writer], None], reason: str
+) -> None:
+    bag = record(tmp_path / "drive.mcap", Ros("mcap"), extra=extra, **KINDS[kind])
+    assert [len(frame.read()) for frame in named_frames([bag])] == [300] * 3
+    with pytest.raises(InputError, match=reason):
+        copied(bag, tmp_path / "out")
+
+
+def test_messages_outside_chunks_are_not_dropped(tmp_path: Path) -> None:
+    bag = record(tmp_path / "drive.mcap", Ros("mcap"))
+    message = struct.pack("<BQHIQQ", 5, 22, 1, 0, START, START)
+    bag.write_bytes(with_summary(bag.read_bytes(), list, data=message))
+    with pytest.raises(InputError, match="lacks 1 messages"):
+        copied(bag, tmp_path / "out")
+
+
+@pytest.mark.parametrize("kind", ["zstd", "not chunked"])
+def test_the_checksum_of_the_data_is_compared(tmp_path: Path, kind: str) -> None:
+    bag = record(tmp_path / "drive.mcap", Ros("mcap"), enable_data_crcs=True, **KINDS[kind])
+    copied(bag, tmp_path / "whole")
+    bag.write_bytes(bag.read_bytes().replace(b"nobody", b"n0body", 1))
+    with pytest.raises(InputError, match="checksum of its data"):
+        copied(bag, tmp_path / "out")
 
 
 @pytest.mark.parametrize("storage", STORAGES)

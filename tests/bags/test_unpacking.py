@@ -1,6 +1,11 @@
 """What is compressed in bags is unpacked up to a size, and no further."""
 
 import bz2
+import gc
+import os
+import pickle
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -43,9 +48,9 @@ def test_what_is_cut_off_or_no_such_thing_is_refused(compression: str) -> None:
             unpack(damaged, compression)
 
 
-def test_files_that_do_not_fit_on_the_disk_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def compressed_bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A bag whose file is compressed as a whole; it is unpacked to ``tmp``."""
     bag = small_bag(tmp_path, "sqlite3")
     file = storage_file(bag)
     file.with_name(f"{file.name}.zstd").write_bytes(zstandard.compress(file.read_bytes()))
@@ -57,11 +62,68 @@ def test_files_that_do_not_fit_on_the_disk_are_refused(
     file.unlink()
     (tmp_path / "tmp").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
+    return bag
 
-    assert len(named_frames([bag])) == 3
+
+def test_files_that_do_not_fit_on_the_disk_are_refused(
+    compressed_bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(unpacked_files, "LEFT", 2**62)
     with pytest.raises(InputError, match="more than there is room for"):
-        named_frames([bag])
+        named_frames([compressed_bag])
+    assert not list((tmp_path / "tmp").iterdir())
+
+
+def test_a_bag_is_unpacked_once_for_all_who_read_it(
+    compressed_bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames = named_frames([compressed_bag])
+    (folder,) = (tmp_path / "tmp").iterdir()
+    again = named_frames([compressed_bag / "000001"])
+    # What another process gets, which holds nothing.
+    others = pickle.loads(pickle.dumps(frames))
+    monkeypatch.setattr(unpacked_files, "_HELD", {})
+    monkeypatch.setattr(unpacked_files, "_unpack", None)
+    assert [len(frame.read()) for frame in (*frames, *again, *others)] == [300] * 7
+    assert list((tmp_path / "tmp").iterdir()) == [folder]
+
+    del others
+    gc.collect()
+    assert folder.exists()
+    del frames, again
+    gc.collect()
+    assert not folder.exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
+def test_a_fork_leaves_what_its_parent_has_unpacked(compressed_bag: Path, tmp_path: Path) -> None:
+    frames = named_frames([compressed_bag])
+    assert len(frames[0].read()) == 300
+    process = os.fork()
+    if not process:
+        try:
+            right = len(frames[1].read()) == 300
+            del frames
+            gc.collect()
+            os._exit(not right)
+        finally:
+            os._exit(1)
+    assert os.waitpid(process, 0)[1] == 0
+    assert len(frames[2].read()) == 300
+    assert len(list((tmp_path / "tmp").iterdir())) == 1
+
+
+def test_what_is_unpacked_is_gone_when_the_process_ends(
+    compressed_bag: Path, tmp_path: Path
+) -> None:
+    code = (
+        "import sys, tempfile; from pathlib import Path\n"
+        "from derain.sources.folders import named_frames\n"
+        "tempfile.tempdir = sys.argv[2]\n"
+        "frames = named_frames([Path(sys.argv[1])])\n"
+        "assert len(list(Path(sys.argv[2]).iterdir())) == 1\n"
+    )
+    subprocess.run([sys.executable, "-c", code, compressed_bag, tmp_path / "tmp"], check=True)
     assert not list((tmp_path / "tmp").iterdir())
 
 

@@ -277,6 +277,28 @@ def test_topics_without_definition_or_hash_are_copied(tmp_path: Path, run_derain
     ]
 
 
+@pytest.mark.parametrize("option", ["--cleaned-topic", "--removed-topic"])
+@pytest.mark.parametrize("name", ["a b", "/a\nb", "/a\udcff", "/a//b", "/a/", "/é", ""])
+def test_a_name_that_no_topic_may_have_is_refused(
+    tmp_path: Path, run_derain, option: str, name: str
+) -> None:
+    bag = small_bag(tmp_path, "ros1")
+    outcome = run_derain(*RUN, bag, "--out", tmp_path / "out", option, name)
+    assert outcome.code == 2
+    assert option in outcome.err
+    assert outcome.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_nothing_is_written_into_the_folder_of_a_bag(tmp_path: Path, run_derain) -> None:
+    bag = small_bag(tmp_path, "mcap")
+    before = sorted(bag.iterdir())
+    outcome = run_derain(*RUN, bag, "--out", bag / "cleaned")
+    assert outcome.code == 2
+    assert f"inside {bag}" in outcome.err
+    assert sorted(bag.iterdir()) == before
+
+
 def test_a_name_of_a_topic_that_is_taken_is_refused(tmp_path: Path, run_derain) -> None:
     bag = small_bag(tmp_path, "mcap")
     outcome = run_derain(*RUN, bag, "--out", tmp_path / "out", "--cleaned-topic", "/imu/data")

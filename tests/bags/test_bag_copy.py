@@ -1,0 +1,95 @@
+"""What a bag holds besides the messages of its topics is copied, told, or a reason to refuse."""
+
+import re
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+import yaml
+from small_bags import small_bag, storage_file
+
+from benchmarks.fuzzing.false_indexes import ros1_with_index
+from derain.bags.bag import Bag
+from derain.bags.bag_copy import BagCopy
+from derain.errors import InputError
+
+
+def copied(path: Path, out: Path) -> Bag:
+    bag = Bag(path)
+    out.mkdir()
+    with BagCopy(bag, bag.cloud_topic(), out) as copy:
+        return Bag(copy.finish())
+
+
+def change_database(bag: Path, statement: str) -> None:
+    with closing(sqlite3.connect(storage_file(bag))) as database, database:
+        database.execute(statement)
+
+
+def without_a_topic(bag: Path) -> None:
+    """Leaves a topic out of the metadata, which still has its messages in the database."""
+    metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
+    topics = metadata["rosbag2_bagfile_information"]["topics_with_message_count"]
+    topics[:] = [t for t in topics if t["topic_metadata"]["name"] != "/driver"]
+    (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda bag: change_database(bag, "UPDATE messages SET topic_id = 99 WHERE id = 1"),
+        without_a_topic,
+    ],
+)
+def test_messages_of_unknown_topics_of_a_database_are_not_dropped(
+    tmp_path: Path, change: Callable[[Path], None]
+) -> None:
+    bag = small_bag(tmp_path, "sqlite3")
+    change(bag)
+    with pytest.raises(InputError, match=r"its topics have \d+ of 12 messages"):
+        copied(bag, tmp_path / "out")
+
+
+def test_a_table_that_ros_2_does_not_know_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = small_bag(tmp_path, "sqlite3")
+    change_database(bag, "CREATE TABLE notes(note TEXT)")
+    copied(bag, tmp_path / "out")
+    assert "'notes'" in capsys.readouterr().err
+
+
+def of_no_topic(content: bytes) -> bytes:
+    """The index of the first chunk's first topic becomes that of a topic that there is not."""
+    place = re.search(rb"op=\x04.{16}conn=", content, re.DOTALL).end()
+    return content[:place] + b"\x63\0\0\0" + content[place + 4 :]
+
+
+def without_a_chunk(content: bytes) -> bytes:
+    """The chunk is there twice, and the index has one of them."""
+    start = content.index(b"\4\0\0\0op=\5") - 4
+    index = int.from_bytes(content[(place := content.index(b"index_pos=") + 10) :][:8], "little")
+    longer = (index + index - start).to_bytes(8, "little")
+    head = content[:place] + longer + content[place + 8 : start]
+    return head + content[start:index] * 2 + content[index:]
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (of_no_topic, "its index has"),
+        (without_a_chunk, "does not name all chunks"),
+        (lambda content: ros1_with_index(content, chunk_times=2), "more than once"),
+    ],
+)
+def test_an_index_of_ros_1_that_differs_from_the_chunks_is_refused(
+    tmp_path: Path, change: Callable[[bytes], bytes], reason: str
+) -> None:
+    bag = small_bag(tmp_path, "ros1")
+    changed = change(bag.read_bytes())
+    assert changed != bag.read_bytes()
+    bag.write_bytes(changed)
+    with pytest.raises(InputError, match=reason):
+        copied(bag, tmp_path / "out")
