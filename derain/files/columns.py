@@ -73,8 +73,7 @@ def scan_of(
     }
     flat = {name: column for name, column in numbers.items() if column.ndim == 1}
     if "xyz" in numbers:
-        # A copy, for what is done to a scan's numbers must not reach the columns of its file.
-        xyz = to_float32(numbers["xyz"]).copy()
+        xyz = to_float32(numbers["xyz"])
     elif {"x", "y", "z"} <= flat.keys():
         xyz = np.empty((len(flat["x"]), 3), np.float32)
         for place, axis in enumerate("xyz"):
@@ -88,7 +87,7 @@ def scan_of(
     intensity = next((to_float32(flat[name]) for name in INTENSITY_NAMES if name in flat), None)
     return Scan(
         xyz,
-        None if intensity is None else intensity.copy(),
+        intensity,
         radar=flat["radar"] != 0 if "radar" in flat else None,
         fields=dict(fields),
         shape=shape,
