@@ -31,7 +31,7 @@ LARGEST_ID = 0xFFFF
 
 # No sensor gives so many columns: an array that is wider than this, and than it is long, holds its
 # points as columns.
-MOST_COLUMNS = 64
+WIDEST_ARRAY = 64
 
 
 @runtime_checkable
@@ -345,7 +345,7 @@ def _refuse_other_shapes(given: object, array: NDArray[Any], name: str) -> None:
             remedy = "Stack x, y, z and intensity by numpy.column_stack."
         case _ if array.ndim == 0 and array.dtype == object:
             reason = f"{type(given).__name__} is not an array of points"
-        case _ if array.ndim == 2 and max(len(array), MOST_COLUMNS) < array.shape[1]:
+        case _ if array.ndim == 2 and max(len(array), WIDEST_ARRAY) < array.shape[1]:
             remedy = "Give a point as a row, not as a column: array.T."
         case _ if array.ndim == 2 and array.shape[1] >= 3:
             return

@@ -6,6 +6,9 @@ Every column of a file comes back in `Scan.fields`, in its own dtype, and is wri
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.atomic import replacing
@@ -66,7 +69,7 @@ def count_points(path: Path, columns: Sequence[str] = DEFAULT_COLUMNS) -> int:
     return len(read_scan(path, columns)) if counted is None else counted
 
 
-def write_scan(path: Path | str, scan: Scan) -> None:
+def write_scan(path: Path | str, scan: Scan | NDArray[Any]) -> None:
     """Writes one scan: every column of the file it came from, else coordinates and intensity.
 
     Example:
@@ -77,14 +80,14 @@ def write_scan(path: Path | str, scan: Scan) -> None:
 
     Args:
         path: The file, in any of FORMATS; compressed as a whole if its name ends in .gz.
-        scan: The scan.
+        scan: The scan, or an array of points as :meth:`derain.scan.Scan.of` takes it.
 
     Raises:
-        InputError: An unknown format, a column that the format cannot hold, or a file that cannot
-            be written.
+        InputError: No scan, an unknown format, a column that the format cannot hold, or a file that
+            cannot be written.
     """
     path = Path(path)
-    content = format_of(path).encode(path, scan)
+    content = format_of(path).encode(path, Scan.of(scan))
     with replacing(path) as temporary:
         temporary.write_bytes(compressed(content) if is_compressed(path) else content)
 

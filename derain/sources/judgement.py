@@ -39,6 +39,11 @@ class Judgement:
         return self.judged if self.known is None else self.judged & self.known
 
     @property
+    def share_of_rain(self) -> float:
+        """Share of rain among the points that can be judged; 0 where there are none."""
+        return int(self.rain.sum()) / max(int(self.scan.valid.sum()), 1)
+
+    @property
     def weather(self) -> ScanWeather:
         """How bad the weather is that the scan shows: where its rays meet rain, and how far on."""
         return ScanWeather.of(self.scan, self.rain)

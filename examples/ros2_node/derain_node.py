@@ -223,7 +223,9 @@ class DerainNode:
         }
         refuse(asked)
         self.organised: bool = asked["organised"]
-        self.remover = RainRemover(Derainer(asked["model"] or None, threads=asked["threads"]))
+        derainer = Derainer(asked["model"] or None, threads=asked["threads"])
+        derainer.warns = False  # what is odd goes to the node's log
+        self.remover = RainRemover(derainer)
         # A sensor's driver repeats no cloud that was lost, and asking it to would find no driver.
         newest = QoSProfile(depth=asked["queue"], reliability=ReliabilityPolicy.BEST_EFFORT)
         # Who listens may ask for either: a reliable publisher suits both.
