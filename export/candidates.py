@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import Counts
+from derain.export.evaluation_mode import evaluation_on_cpu
 from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.views.candidate_fit import RAIN_INSIDE, fit_candidates
@@ -67,8 +68,8 @@ def candidates_of_findings(
             a model that sees several scans at a time, or takes no candidates.
     """
     _refuse_unable(model)
-    model = model.eval().cpu()
-    judged = [_judged(model, scan, card) for scan in scans]
+    with evaluation_on_cpu(model):
+        judged = [_judged(model, scan, card) for scan in scans]
     candidates = fit_candidates(
         ((scan, called & rain) for scan, called, rain in judged), model.channels, inside
     )

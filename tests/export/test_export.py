@@ -1,5 +1,6 @@
 """Export writes one whole ONNX file that has been proved, or none."""
 
+from contextlib import nullcontext
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -314,3 +315,28 @@ def test_a_whole_number_of_0_is_left_alone() -> None:
 def _rows(model: OutDet) -> np.ndarray:
     """For every row of the scene, the point of the network that answers for it."""
     return model.spec.make_view()(SCENE[0][1]).inverse
+
+
+@pytest.mark.parametrize("succeeds", [True, False])
+def test_a_model_is_left_in_the_modes_that_it_was_in(
+    random_outdet: OutDet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, succeeds: bool
+) -> None:
+    model = deepcopy(random_outdet).train()
+    frozen = next(module for module in model.modules() if isinstance(module, nn.BatchNorm1d))
+    frozen.eval()
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: SCENE)
+    if not succeeds:
+        monkeypatch.setattr(onnx_file, "flush", lambda proto: 1 / 0)
+    with nullcontext() if succeeds else pytest.raises(ZeroDivisionError):
+        export(model, tmp_path / "model.onnx")
+    assert [module for module in model.modules() if not module.training] == [frozen]
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
+def test_a_model_is_left_on_its_device(
+    random_outdet: OutDet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = deepcopy(random_outdet).cuda()
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: SCENE)
+    export(model, tmp_path / "model.onnx")
+    assert {parameter.device.type for parameter in model.parameters()} == {"cuda"}
