@@ -16,6 +16,7 @@ from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file
+from derain.export.evaluation_mode import evaluation_on_cpu
 from derain.export.onnx_file import export
 from derain.export.proof import FINITE, FLOAT32, INT8, THREADS, Case, Proof, prove
 from derain.export.runtime import Derainer
@@ -332,11 +333,12 @@ def test_a_model_is_left_in_the_modes_that_it_was_in(
     assert [module for module in model.modules() if not module.training] == [frozen]
 
 
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")
-def test_a_model_is_left_on_its_device(
-    random_outdet: OutDet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_model_is_taken_back_to_its_device(
+    random_outdet: OutDet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model = deepcopy(random_outdet).cuda()
-    monkeypatch.setattr(onnx_file, "hard_cases", lambda: SCENE)
-    export(model, tmp_path / "model.onnx")
-    assert {parameter.device.type for parameter in model.parameters()} == {"cuda"}
+    device, moved = torch.device("cuda:0"), list[torch.device]()
+    monkeypatch.setattr(OutDet, "device", device)  # as if it were there
+    monkeypatch.setattr(random_outdet, "to", moved.append)
+    with evaluation_on_cpu(random_outdet):
+        assert moved == []
+    assert moved == [device]
