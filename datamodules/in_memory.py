@@ -8,7 +8,7 @@ from derain.errors import InputError
 from derain.scan import Scan
 from derain.sources.source import Frames, Source
 
-Scans = Sequence[Scan] | Source
+Scans = Scan | Sequence[Scan] | Source
 
 
 class InMemory(ScanDataModule):
@@ -33,14 +33,14 @@ class InMemory(ScanDataModule):
         (100,)
 
     Args:
-        train: The training scans, in time order, with the labels that they have.
+        train: The training scan or scans, in time order, with the labels that they have.
         validation: The validation scans.
         test: The scans that are tested and predicted.
         card: Their data card: itself, the name of a packaged one, or a YAML file.
         loading: How the scans are batched.
 
     Raises:
-        InputError: No such data card.
+        InputError: No such data card, or something else than scans.
     """
 
     def __init__(
@@ -72,4 +72,6 @@ class InMemory(ScanDataModule):
 
 
 def _source(scans: Scans) -> Source:
-    return scans if isinstance(scans, Source) else Frames.of_scans(scans)
+    if isinstance(scans, Source):
+        return scans
+    return Frames.of_scans([scans] if isinstance(scans, Scan) else scans)

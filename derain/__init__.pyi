@@ -16,6 +16,7 @@ from derain.datamodules.taught import Taught as Taught
 from derain.datamodules.wads import Wads as Wads
 from derain.datamodules.worlds import Worlds as Worlds
 from derain.errors import InputError as InputError
+from derain.errors import ScanWarning as ScanWarning
 from derain.export.bench.bench import bench as bench
 from derain.export.runtime import Derainer as Derainer
 from derain.files import read_scan as read_scan
@@ -33,6 +34,8 @@ from derain.models.lisnownet import LiSnowNet as LiSnowNet
 from derain.models.lisnownet import LiSnowNetwork as LiSnowNetwork
 from derain.models.outdet import OutDet as OutDet
 from derain.models.outdet import OutDetNetwork as OutDetNetwork
+from derain.models.relative_outdet import RelativeOutDet as RelativeOutDet
+from derain.models.relative_outdet import RelativeOutDetNetwork as RelativeOutDetNetwork
 from derain.models.salsanext import SalsaNext as SalsaNext
 from derain.models.salsanext import SalsaNextNetwork as SalsaNextNetwork
 from derain.models.salsanext_lite import SalsaNextLite as SalsaNextLite

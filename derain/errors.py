@@ -1,4 +1,4 @@
-"""The one error a user meets, and what is said of a name that is misspelt."""
+"""The error and the warning that a user meets, and the name that a misspelt one may stand for."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -51,6 +51,25 @@ def did_you_mean(name: object, names: Iterable[str]) -> str:
     """
     alike = get_close_matches(str(name)[:LONGEST_REASON], list(names), n=1)
     return f"Did you mean {alike[0]}? " if alike else ""
+
+
+class ScanWarning(UserWarning):
+    """A scan may not suit the method that judges it: a Python program is warned by this category.
+
+    What it warns of is what commands print on stderr: coordinates that are not those of one sensor
+    in metres, intensities of another unit or not measured, channels that the scan has not got, many
+    points outside the grid of a model, or more points called rain than rain ever was. A method
+    warns of each of these once. It examines its first scan and one in a hundred after that, and
+    looks in every scan at the share that is called rain.
+
+    Example:
+        >>> import warnings
+        >>> with warnings.catch_warnings(record=True) as caught:
+        ...     warnings.simplefilter("always")
+        ...     rain = derain.Derainer()(np.random.default_rng(0).normal(0, 0.1, (1000, 3)))
+        >>> [warning.category.__name__ for warning in caught][0]
+        'ScanWarning'
+    """
 
 
 def _cut(text: str, longest: int) -> str:

@@ -1,7 +1,7 @@
 """One LiDAR scan, possibly fused with radar: the data everything in derain starts from."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.errors import InputError
+from derain.errors import InputError, reason_of
 
 # No sensor measures beyond 1,000 km, and no intensity or other column reaches 10 million: what does
 # is damaged. The bounds also keep every float32 computation downstream finite.
@@ -27,6 +27,13 @@ FEWEST_ALIKE = 100
 SENTINEL = -1.0
 
 Named = TypeVar("Named")
+
+# Ids of semantic classes have 16 bits. A label of 32 bits has its instance in the other 16.
+LARGEST_ID = 0xFFFF
+
+# No sensor gives so many columns: an array that is wider than this, and than it is long, holds its
+# points as columns.
+WIDEST_ARRAY = 64
 
 
 @runtime_checkable
@@ -50,6 +57,9 @@ class PartialHeader(Protocol):
 class Scan:
     """One point cloud, in the order of its file; rows are never dropped or reordered.
 
+    A scan copies the arrays that it is given, so that a buffer may be filled anew while scans made
+    of it are in use.
+
     Example:
         >>> scan = Scan.of(np.array([[8.0, 6.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0]]))
         >>> scan.range
@@ -61,10 +71,12 @@ class Scan:
         xyz: Coordinates, float32 (N, 3), metres in the sensor frame (x forward, y left, z up).
         intensity: Return intensity, float32 (N,), in the file's own unit; None where the file has
             none.
-        label: Semantic class ids, int64 (N,), or None.
+        label: Semantic class ids, int64 (N,), or None. Whole numbers of any dtype are converted;
+            of uint32 labels, as in label files, the class is in the low 16 bits.
         radar: True for points of the radar, bool (N,), or None where the source is not known.
         fields: Every column of the file as it was read, by name, each of N rows in its own dtype;
-            what a writer needs to give the file back bit for bit. Empty for a scan made in memory.
+            what a writer needs to give the file back bit for bit. Read-only. Empty for a scan made
+            in memory.
         shape: (height, width) of an organised cloud, rows in row-major order; else None.
         name: Where the scan came from, for messages.
         header: What the file says besides its columns, such as the encoding of a PCD. Only the
@@ -72,7 +84,8 @@ class Scan:
             PointHeader, one that says what will not be written a PartialHeader.
 
     Raises:
-        InputError: Columns of different lengths.
+        InputError: Columns of different lengths, of another shape or without numbers; class ids
+            that are not whole.
     """
 
     xyz: NDArray[np.float32]
@@ -85,13 +98,24 @@ class Scan:
     header: object = None
 
     def __post_init__(self) -> None:
+        for title, convert in _CONVERTERS.items():
+            if getattr(self, title) is not None:
+                object.__setattr__(self, title, self._copied(title, convert))
         if self.xyz.ndim != 2 or self.xyz.shape[1] != 3:
             raise InputError(
                 self.name,
                 f"coordinates have shape {self.xyz.shape}",
                 "Give an array of shape (N, 3).",
             )
+        if any(column.flags.writeable for column in self.fields.values()):
+            own = {title: _read_only(column) for title, column in self.fields.items()}
+            object.__setattr__(self, "fields", own)
         columns = {"intensity": self.intensity, "label": self.label, "radar": self.radar}
+        for title, column in columns.items():
+            if column is not None and column.ndim != 1:
+                raise InputError(
+                    self.name, f"{title} has shape {column.shape}", "Give one value per point."
+                )
         for title, column in {**columns, **self.fields}.items():
             if column is not None and len(column) != len(self.xyz):
                 raise InputError(
@@ -100,9 +124,20 @@ class Scan:
                     "Give one value per point.",
                 )
 
+    def _copied(self, title: str, convert: Callable[[Any], NDArray[Any]]) -> NDArray[Any]:
+        """A copy of a column that was given, in the dtype that it has in a scan."""
+        try:
+            return convert(getattr(self, title))
+        except (TypeError, ValueError, RuntimeError) as error:  # the last of tensors of PyTorch
+            raise InputError(
+                self.name,
+                f"{title} cannot be converted ({reason_of(error)})",
+                "Give an array of numbers.",
+            ) from error
+
     @classmethod
     def of(cls, points: "Scan | NDArray[Any]", name: str = "array") -> "Scan":
-        """Wraps an array of points; a Scan comes back as it is.
+        """Makes a scan of an array of points, which is copied; a Scan comes back as it is.
 
         Args:
             points: A Scan, or (N, ≥ 3) numbers: x, y, z in metres, then intensity if there is a
@@ -110,17 +145,17 @@ class Scan:
             name: What to call the array in messages.
 
         Raises:
-            InputError: An array of another shape.
+            InputError: Something else than an array of numbers, or one of another shape.
         """
         if isinstance(points, Scan):
             return points
-        array = np.asarray(points)
-        if array.ndim != 2 or array.shape[1] < 3:
-            raise InputError(
-                name, f"points have shape {array.shape}", "Give an array of shape (N, 4) or wider."
-            )
-        intensity = to_float32(array[:, 3]) if array.shape[1] > 3 else None
-        return cls(to_float32(array[:, :3]), intensity, name=name)
+        try:
+            array = np.asarray(points)
+        except (TypeError, ValueError, RuntimeError) as error:
+            reason = f"points cannot be converted to an array ({reason_of(error)})"
+            raise InputError(name, reason, "Give an array of shape (N, 4).") from error
+        _refuse_other_shapes(points, array, name)
+        return cls(array[:, :3], array[:, 3] if array.shape[1] > 3 else None, name=name)
 
     def __len__(self) -> int:
         return len(self.xyz)
@@ -200,8 +235,12 @@ class Scan:
         values = to_float32(column)
         return np.where(np.abs(values) <= LARGEST_VALUE, values, np.float32(np.nan))
 
-    def with_label(self, label: NDArray[np.int64]) -> "Scan":
-        """The same scan with semantic class ids, int64 (N,)."""
+    def with_label(self, label: NDArray[Any]) -> "Scan":
+        """The same scan with semantic class ids, whole numbers (N,), which are copied.
+
+        Raises:
+            InputError: Other than one whole number for each point.
+        """
         return replace(self, label=label)
 
     def with_intensity_times(self, factor: float) -> "Scan":
@@ -287,3 +326,63 @@ def to_float32(array: NDArray[Any]) -> NDArray[np.float32]:
     """Converts to contiguous float32; what is beyond its reach becomes infinite, silently."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.ascontiguousarray(array, dtype=np.float32)
+
+
+def class_ids(label: NDArray[Any]) -> NDArray[np.int64]:
+    """A copy of semantic class ids, int64 (N,); of uint32, as in label files, the low 16 bits.
+
+    Raises:
+        ValueError: Numbers that are not whole.
+    """
+    label = np.asarray(label)
+    if label.dtype == np.uint32:
+        label = label & LARGEST_ID
+    with np.errstate(invalid="ignore"):
+        ids = label.astype(np.int64)
+    if label.dtype.kind not in "biu" and not (ids == label).all():
+        raise ValueError("class ids have to be whole numbers")
+    return ids
+
+
+def _copied_to_float32(values: NDArray[Any]) -> NDArray[np.float32]:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.array(values, np.float32, order="C")
+
+
+def _copied_to_bool(values: NDArray[Any]) -> NDArray[np.bool_]:
+    return np.array(values, bool)
+
+
+# What makes a column of a scan of an array that is given.
+_CONVERTERS: dict[str, Callable[[Any], NDArray[Any]]] = {
+    "xyz": _copied_to_float32,
+    "intensity": _copied_to_float32,
+    "label": class_ids,
+    "radar": _copied_to_bool,
+}
+
+
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """The array itself if it is read-only, else a read-only copy."""
+    if array.flags.writeable:
+        array = array.copy()
+        array.setflags(write=False)
+    return array
+
+
+def _refuse_other_shapes(given: object, array: NDArray[Any], name: str) -> None:
+    """Refuses what is no array of points, with what the user may have meant."""
+    reason, remedy = f"points have shape {array.shape}", "Give an array of shape (N, 4) or wider."
+    match given:
+        case str() | Path():
+            reason, remedy = "a path is not an array of points", "Read it by derain.read_scan."
+        case _ if array.dtype.names:
+            reason = f"an array with the fields {', '.join(array.dtype.names)}, not of shape (N, 4)"
+            remedy = "Stack x, y, z and intensity by numpy.column_stack."
+        case _ if array.ndim == 0 and array.dtype == object:
+            reason = f"{type(given).__name__} is not an array of points"
+        case _ if array.ndim == 2 and max(len(array), WIDEST_ARRAY) < array.shape[1]:
+            remedy = "Give a point as a row, not as a column: array.T."
+        case _ if array.ndim == 2 and array.shape[1] >= 3:
+            return
+    raise InputError(str(given) if isinstance(given, str | Path) else name, reason, remedy)

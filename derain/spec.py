@@ -8,8 +8,7 @@ from typing import Any
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
-from derain.files.labels import LARGEST_ID
-from derain.scan import Scan
+from derain.scan import LARGEST_ID, Scan
 from derain.views.candidates import Candidates, bounded_channels, candidates_at
 from derain.views.channels import MOST_CHANNELS, channel_of
 from derain.views.oddities import Oddity, intensity_unlike_training, missing_channels

@@ -12,6 +12,7 @@ from derain.cards.card import DataCard
 from derain.cards.rain_found import require_rain
 from derain.errors import InputError
 from derain.evaluation.counts import Counts
+from derain.export.evaluation_mode import evaluation_on_cpu
 from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.views.candidate_fit import RAIN_INSIDE, fit_candidates
@@ -68,8 +69,8 @@ def candidates_of_findings(
             from the rest; a model that sees several scans at a time, or takes no candidates.
     """
     _refuse_unable(model)
-    model = model.eval().cpu()
-    judged = [_judged(model, scan, card) for scan in scans]
+    with evaluation_on_cpu(model):
+        judged = [_judged(model, scan, card) for scan in scans]
     require_rain(any(rain.any() for _, _, rain in judged), card, "--candidates")
     candidates = fit_candidates(
         ((scan, called & rain) for scan, called, rain in judged), model.channels, inside

@@ -68,7 +68,7 @@ def is_method_name(word: str) -> bool:
 def load_method(
     name: str, parameters: Mapping[str, Any], threads: int = 0, runtime: Runtime = Runtime()
 ) -> Method:
-    """Makes a method ready to judge scans.
+    """Makes a method ready to judge scans, which leaves warnings to who asks for it.
 
     Args:
         name: ``default``, the model that comes with derain; a filter (one of ``FILTERS``), a method
@@ -83,6 +83,12 @@ def load_method(
         InputError: No such method, a parameter that it does not have, or one out of its bounds; a
             runtime that cannot run it, or any but the usual for what has no network.
     """
+    method = _loaded(name, parameters, threads, runtime)
+    method.warns = False
+    return method
+
+
+def _loaded(name: str, parameters: Mapping[str, Any], threads: int, runtime: Runtime) -> Method:
     if name == DEFAULT:
         return _with_threshold(
             Derainer(None, threads, runtime.name, runtime.precision), name, parameters

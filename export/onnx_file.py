@@ -17,6 +17,7 @@ import torch
 import derain
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
+from derain.export.evaluation_mode import evaluation_on_cpu
 from derain.export.model_file import CHECKSUM_KEY, METADATA_KEY, NO_CHECKSUM, sealed
 from derain.export.proof import BF16, FINITE, FLOAT32, INT8, Proof, prove
 from derain.export.quantisation import quantised
@@ -48,7 +49,7 @@ def export(
     """Exports a model, proves it, and only then puts the file in its place.
 
     Args:
-        model: A trained model.
+        model: A trained model; its device and training mode are restored.
         path: The ONNX file to write.
         calibration: Scans like those that the model will see, to export it in eight bits; none
             exports it in float32. They are gone through twice, one at a time.
@@ -61,8 +62,7 @@ def export(
         InputError: A model without a Spec, an output that cannot be written, a runtime that cannot
             run it, or a proof that fails; no file is left then.
     """
-    model = model.eval().cpu()
-    with replacing(path) as temporary:
+    with evaluation_on_cpu(model), replacing(path) as temporary:
         proto = _traced(model, model.spec)
         flushed = flush(proto)
         if calibration:

@@ -1,9 +1,10 @@
 """Runs an exported model on a CPU: NumPy, one runtime and the kNN library, nothing else."""
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
-from derain.system.cores import usable_cores
+from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.oddities import Oddity, outside_view
 from derain.views.probability import probability_of_rain
@@ -41,8 +42,8 @@ class Derainer(Method):
         >>> clean = points[~Derainer()(points)]  # by the model that comes with derain
 
     Args:
-        model: ONNX file written by ``derain export``; None takes the model that comes with derain,
-            of which ``derain info default`` says what it is.
+        model: ONNX file written by ``derain export``; None, or ``default``, takes the model that
+            comes with derain, of which ``derain info default`` says what it is.
         threads: Threads for view and network; 0 takes every core this process may use.
         runtime: What runs the network: ``onnxruntime``, or ``openvino``, which has to be installed
             (``pip install 'derain[openvino]'``).
@@ -59,8 +60,9 @@ class Derainer(Method):
 
     Raises:
         InputError: A missing file, one that is not ONNX, one that derain did not export or that
-            has changed since; a negative number of threads; a runtime that there is not or that
-            is not installed, or a precision that it or the processor has not.
+            has changed since; a filter, or its name; threads that are no number from 0 on; a
+            runtime that there is not or that is not installed, or a precision that it or the
+            processor has not.
     """
 
     def __init__(
@@ -70,13 +72,12 @@ class Derainer(Method):
         runtime: str = DEFAULT_RUNTIME,
         precision: str = FLOAT32_PRECISION,
     ) -> None:
-        if threads < 0:
-            raise InputError("threads", f"{threads} is negative", "Give 0 for every core.")
         self.runtime = Runtime(runtime, precision)
-        file = ModelFile.read(default_model() if model is None else Path(model))
+        of_derain = model is None or str(model) == DEFAULT
+        file = ModelFile.read(default_model() if of_derain else _path_of(model))
         self.path = file.path
-        self.name = DEFAULT if model is None else str(file.path)
-        self.threads = threads or usable_cores()
+        self.name = DEFAULT if of_derain else str(file.path)
+        self.threads = threads_of(threads)
         self.metadata, self.spec = file.metadata, file.spec
         self.view = self.spec.make_view(self.threads)
         self.session = self.runtime.open(file, self.threads)
@@ -233,6 +234,12 @@ class Derainer(Method):
         """What commands call the model, and what it calls rain by."""
         return {"method": self.name, "threshold": self.spec.threshold}
 
+    def __reduce__(self) -> tuple[type[Self], tuple[Any, ...], dict[str, Any]]:
+        # A runtime's session cannot be pickled: a copy, as in another process, reads the file anew
+        # and begins a recording of its own.
+        options = (self.name, self.threads, self.runtime.name, self.runtime.precision)
+        return type(self), options, {"spec": self.spec, "warns": self.warns}
+
     def logits(self, view: SeenScan) -> NDArray[np.float32]:
         """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).
 
@@ -260,7 +267,9 @@ class Derainer(Method):
             self._refuse_senseless(logits, view, scan)
         with stopwatch.stage("back"):
             probability = view.back(probability_of_rain(logits))
-            return Judgement(probability, probability > self.spec.threshold, view.judged, scan)
+            rain = probability > self.spec.threshold
+            judgement = Judgement(probability, rain, view.judged, scan)
+        return self.with_warnings(judgement)
 
     def _refuse_senseless(self, logits: NDArray[np.float32], view: SeenScan, scan: Scan) -> None:
         """Refuses scores that would count as "not rain" because nothing compares with them."""
@@ -271,6 +280,33 @@ class Derainer(Method):
                 f"{view.size:,} cells",
                 "Export the model again; if others judge the scan neither, look at its values.",
             )
+
+
+def _path_of(model: object) -> Path:
+    """The path of a model.
+
+    Raises:
+        InputError: Something else, such as a filter or the name of one.
+    """
+    if isinstance(model, str | Path) and (Path(model).suffix or os.path.exists(model)):
+        return Path(model)
+    # Imported here, for what runs a model needs neither.
+    from derain.filters import FILTERS, PointFilter
+    from derain.methods.registry import METHODS
+
+    match model:
+        case PointFilter():
+            subject, remedy = model.name, "Call it by derain.FilterDerainer."
+        case str() if model in FILTERS:
+            subject = model
+            remedy = f"Call it by derain.FilterDerainer(derain.{FILTERS[model].__name__}())."
+        case str() if model in METHODS:
+            subject, remedy = model, f"Use derain.{METHODS[model].__name__}()."
+        case str() | Path():
+            return Path(model)
+        case _:
+            subject, remedy = repr(model), "Give the path of an ONNX file."
+    raise InputError(subject, "it is not a model", remedy)
 
 
 def _refuse_other_network(session: Session, view: View, path: Path) -> None:

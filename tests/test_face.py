@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any
@@ -18,6 +19,10 @@ import torch
 from lightning import Trainer
 
 import derain
+import derain.datamodules
+from derain.cli.training.train import choices
+from derain.datamodules.base import ScanDataModule
+from derain.models.registry import NETWORKS
 
 from .folder_of_examples import prepare
 
@@ -47,6 +52,32 @@ def test_the_table_is_every_import_of_the_type_stub() -> None:
     imports = [node for node in ast.parse(STUB.read_text("utf-8")).body if _is_import(node)]
     assert [alias.asname for node in imports for alias in node.names] == OFFERED
     assert len(set(OFFERED)) == len(OFFERED) > 20
+
+
+def test_every_network_is_offered() -> None:
+    own = {network.__name__ for network in NETWORKS.values() if _is_of_derain(network)}
+    assert len(own) > 3
+    assert own <= {*OFFERED}
+
+
+def test_every_data_module_is_offered_and_known_to_configurations() -> None:
+    modules = {module.name for module in iter_modules(derain.datamodules.__path__)}
+    for name in modules:
+        import_module(f"derain.datamodules.{name}")
+    concrete = {kind for kind in _subclasses(ScanDataModule) if not _subclasses(kind)}
+    assert {kind.__name__ for kind in concrete} <= {*OFFERED}
+    assert {*choices()["data"]} == concrete - {derain.InMemory}  # which no file can hold
+
+
+def _subclasses(kind: type) -> set[type]:
+    """Derain's own classes below a class."""
+    below = kind.__subclasses__()
+    deeper = {each for one in below for each in _subclasses(one)}
+    return {one for one in below if _is_of_derain(one)} | deeper
+
+
+def _is_of_derain(kind: type) -> bool:
+    return kind.__module__.startswith("derain.")
 
 
 def _is_import(node: ast.AST) -> bool:

@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -150,6 +151,81 @@ def test_an_array_that_is_not_rows_of_points_is_refused(shape: tuple[int, ...]) 
         Scan.of(np.zeros(shape), name="mine")
 
 
+@pytest.mark.parametrize("rows", [3, 4])
+def test_a_transposed_array_is_refused(rows: int) -> None:
+    with pytest.raises(InputError, match=r"\.T\.$"):
+        Scan.of(np.zeros((rows, 100)))
+
+
+def test_what_is_no_array_of_points_is_refused_with_what_to_give_instead() -> None:
+    structured = np.zeros(5, [("x", "f4"), ("y", "f4")])
+    for given_, hint in (
+        ("drive/scan.bin", r"drive/scan\.bin: .*derain\.read_scan"),
+        (Path("drive/scan.bin"), r"drive/scan\.bin: .*derain\.read_scan"),
+        (structured, "fields x, y.*column_stack"),
+        (None, "NoneType"),
+        ([[1, 2, 3], [4]], "array"),
+        (np.array([["a", "b", "c"]]), "xyz"),
+    ):
+        with pytest.raises(InputError, match=hint):
+            Scan.of(given_)
+
+
+@pytest.mark.parametrize("columns", [3, 4])
+def test_a_buffer_may_be_filled_anew_while_a_scan_of_it_is_in_use(columns: int) -> None:
+    buffer = np.ones((5, columns), np.float32)
+    scan = Scan.of(buffer)
+    buffer[:] = 2
+    assert (scan.xyz == 1).all()
+    assert columns == 3 or (scan.intensity == 1).all()
+
+
+def test_every_array_that_a_scan_is_given_is_copied() -> None:
+    given_ = {
+        "xyz": np.ones((5, 3), np.float32),
+        "intensity": np.ones(5, np.float32),
+        "label": np.ones(5, np.int64),
+        "radar": np.ones(5, bool),
+    }
+    scan = Scan(**given_, fields={"ring": (ring := np.ones(5))})
+    labelled = scan.with_label(label := np.ones(5, np.int64))
+    for array in (*given_.values(), ring, label):
+        array[:] = 0
+    for name in given_:
+        assert getattr(scan, name).all()
+    assert scan.fields["ring"].all()
+    assert labelled.label.all()
+
+
+@pytest.mark.parametrize("dtype", [np.uint32, np.uint16, np.int32, np.uint8, float])
+def test_class_ids_of_any_dtype_are_taken(dtype: type) -> None:
+    label = Scan.of(np.ones((2, 3))).with_label(np.array([40, 110], dtype)).label
+    assert label.dtype == np.int64
+    assert label.tolist() == [40, 110]
+
+
+def test_labels_of_label_files_are_taken_without_their_instances() -> None:
+    raw = np.array([40, 7 << 16 | 110], np.uint32)
+    assert Scan.of(np.ones((2, 3))).with_label(raw).label.tolist() == [40, 110]
+
+
+@pytest.mark.parametrize("label", [[0.5, 1], [math.nan, 1], ["snow", "rain"]])
+def test_class_ids_that_are_not_whole_numbers_are_refused(label: list[Any]) -> None:
+    with pytest.raises(InputError, match="array: label"):
+        Scan.of(np.ones((2, 3))).with_label(np.array(label))
+
+
+def test_coordinates_of_float64_are_converted() -> None:
+    scan = Scan(np.ones((2, 3)), np.ones(2))
+    assert scan.xyz.dtype == scan.intensity.dtype == np.float32
+
+
+@pytest.mark.parametrize("column", ["intensity", "label", "radar"])
+def test_a_column_of_two_axes_is_refused(column: str) -> None:
+    with pytest.raises(InputError, match=rf"{column} has shape \(3, 1\)"):
+        Scan(np.ones((3, 3)), **{column: np.ones((3, 1))})
+
+
 @pytest.mark.parametrize("column", ["intensity", "label", "radar", "fields"])
 def test_a_column_of_another_length_is_refused(column: str) -> None:
     short = np.zeros(2)
@@ -198,7 +274,7 @@ def test_labels_are_added_to_a_copy() -> None:
     assert scan.label is None
     assert labelled.label is not None
     assert labelled.label.tolist() == [0, 1, 2, 3]
-    assert labelled.xyz is scan.xyz
+    np.testing.assert_array_equal(labelled.xyz, scan.xyz)
     assert labelled.name == "street.bin"
 
 

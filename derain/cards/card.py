@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from derain.cards.layout import Layout
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
-from derain.files.labels import LARGEST_ID
 from derain.files.packaged import packaged, packaged_or_own
-from derain.scan import Scan
+from derain.scan import LARGEST_ID, Scan
 from derain.views.channels import UNITS
 
 Parsed = TypeVar("Parsed")

@@ -5,6 +5,7 @@ import io
 import os
 import signal
 import sys
+import warnings
 from contextlib import suppress
 from types import ModuleType
 
@@ -29,7 +30,7 @@ from derain.cli.parser import Parser
 from derain.cli.signals import interrupting
 from derain.cli.training.configurations import require_configuration
 from derain.cli.training.help import short_help
-from derain.errors import InputError
+from derain.errors import InputError, ScanWarning
 from derain.system.extras import OF_TRAINING, missing_extra, require
 
 DESCRIPTION = """\
@@ -88,6 +89,7 @@ def main(arguments: list[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names may hold what is no text
+    warnings.simplefilter("ignore", ScanWarning)  # commands print what is odd about scans
     try:
         with interrupting():
             code = _run(arguments)

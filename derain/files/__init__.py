@@ -4,10 +4,14 @@ Every column of a file comes back in `Scan.fields`, in its own dtype, and is wri
 `write_scan(path, scan.take(~rain))` is the file without its rain and otherwise the same.
 """
 
+import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
-from derain.errors import InputError
+from numpy.typing import NDArray
+
+from derain.errors import InputError, ScanWarning
 from derain.files.atomic import replacing
 from derain.files.columns import DEFAULT_COLUMNS
 from derain.files.content import compressed, read_content
@@ -15,7 +19,7 @@ from derain.files.format import FORMATS, format_of
 from derain.files.frame_times import METADATA
 from derain.files.names import is_compressed, scan_suffix
 from derain.files.reading import reading
-from derain.scan import Scan
+from derain.scan import PartialHeader, Scan
 
 __all__ = ["DEFAULT_COLUMNS", "count_points", "find_scans", "read_scan", "write_scan"]
 
@@ -66,8 +70,10 @@ def count_points(path: Path, columns: Sequence[str] = DEFAULT_COLUMNS) -> int:
     return len(read_scan(path, columns)) if counted is None else counted
 
 
-def write_scan(path: Path | str, scan: Scan) -> None:
+def write_scan(path: Path | str, scan: Scan | NDArray[Any]) -> None:
     """Writes one scan: every column of the file it came from, else coordinates and intensity.
+
+    What the scan's file holds besides and cannot be written is warned of by ScanWarning.
 
     Example:
         >>> scan = read_scan("scan.bin")
@@ -77,14 +83,19 @@ def write_scan(path: Path | str, scan: Scan) -> None:
 
     Args:
         path: The file, in any of FORMATS; compressed as a whole if its name ends in .gz.
-        scan: The scan.
+        scan: The scan, or an array of points as :meth:`derain.scan.Scan.of` takes it.
 
     Raises:
-        InputError: An unknown format, a column that the format cannot hold, or a file that cannot
-            be written.
+        InputError: No scan, an unknown format, a column that the format cannot hold, or a file that
+            cannot be written.
     """
-    path = Path(path)
+    path, scan = Path(path), Scan.of(scan)
     content = format_of(path).encode(path, scan)
+    if isinstance(scan.header, PartialHeader) and scan.header.left_out:
+        parts = ", ".join(scan.header.left_out)
+        warnings.warn(
+            f"what is written of {scan.name} lacks its {parts}", ScanWarning, stacklevel=2
+        )
     with replacing(path) as temporary:
         temporary.write_bytes(compressed(content) if is_compressed(path) else content)
 

@@ -75,8 +75,7 @@ def scan_of(
     radar = named(flat, "radar", path)
     return Scan(
         _coordinates(path, fields),
-        # A copy, for what is done to a scan's numbers must not reach the columns of its file.
-        None if intensity is None else to_float32(intensity).copy(),
+        None if intensity is None else to_float32(intensity),
         radar=None if radar is None else radar != 0,
         fields=dict(fields),
         shape=shape,
@@ -98,7 +97,7 @@ def _coordinates(path: Path, fields: Mapping[str, NDArray[Any]]) -> NDArray[np.f
     """Coordinates among a file's columns, float32 (N, 3)."""
     table = named(_numbers(fields, 1, 2), "xyz", path)
     if table is not None:
-        return to_float32(table).copy()
+        return to_float32(table)
     flat = _numbers(fields, 1)
     axes = [column for axis in "xyz" if (column := named(flat, axis, path)) is not None]
     if len(axes) < 3:

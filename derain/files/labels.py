@@ -14,10 +14,9 @@ from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.files.names import beside
 from derain.files.reading import file_size, read_bytes, reading
+from derain.scan import LARGEST_ID, class_ids
 
 LABEL = ".label"
-
-LARGEST_ID = 0xFFFF
 
 
 def label_beside(scan: Path) -> Path:
@@ -59,7 +58,7 @@ def read_labels(path: Path, points: int) -> NDArray[np.uint32]:
 
 def semantic(raw: NDArray[np.uint32]) -> NDArray[np.int64]:
     """Semantic class ids, int64 (N,), of labels as `read_labels` gives them."""
-    return (raw & LARGEST_ID).astype(np.int64)
+    return class_ids(raw)
 
 
 def instance(raw: NDArray[np.uint32]) -> NDArray[np.int64]:

@@ -14,7 +14,7 @@ from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
-from derain.system.cores import usable_cores
+from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.oddities import Oddity
@@ -39,16 +39,18 @@ class FilterDerainer(Method):
         candidates: Bounds outside which nothing is rain; None where anything may be.
 
     Raises:
-        InputError: A negative number of threads.
+        InputError: Something else than a filter, or threads that are no number from 0 on.
     """
 
     def __init__(
         self, filter: PointFilter, threads: int = 0, candidates: Candidates | None = None
     ) -> None:
-        if threads < 0:
-            raise InputError("threads", f"{threads} is negative", "Give 0 for every core.")
+        if not isinstance(filter, PointFilter):
+            raise InputError(
+                "filter", f"{filter!r} is no filter", "Give one, such as derain.DROR()."
+            )
         self.filter = filter
-        self.threads = threads or usable_cores()
+        self.threads = threads_of(threads)
         self.candidates = candidates
 
     def __call__(
@@ -75,7 +77,7 @@ class FilterDerainer(Method):
         """
         scan, stopwatch = Scan.of(points), stopwatch or Stopwatch()
         rain, judged = self.filter.judge_scan(scan, self.threads, self.candidates, stopwatch)
-        return Judgement(rain.astype(np.float32), rain, judged, scan)
+        return self.with_warnings(Judgement(rain.astype(np.float32), rain, judged, scan))
 
     def weather(self, points: Scan | NDArray[Any]) -> ScanWeather:
         """Says how bad the weather is that a scan shows.

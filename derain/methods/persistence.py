@@ -22,7 +22,7 @@ from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
-from derain.system.cores import usable_cores
+from derain.system.cores import threads_of
 from derain.system.parameters import made_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.oddities import Oddity
@@ -110,10 +110,11 @@ class PersistenceDerainer(RecordingMethod):
     """
 
     HELP: ClassVar[str] = "rain is not where it was: rays of other scans went through its place"
+    EXAMINED_OF: ClassVar[int] = 1  # any scan may be one whose place is not known
 
     def __init__(self, persistence: Persistence = Persistence(), threads: int = 0) -> None:
         self.persistence = persistence
-        self.threads = threads or usable_cores()
+        self.threads = threads_of(threads)
         self._end_recording()
 
     @classmethod
@@ -183,6 +184,10 @@ class PersistenceDerainer(RecordingMethod):
         """Its name and parameters."""
         return {"method": METHODS.name_of(type(self)), **asdict(self.persistence)}
 
+    def __reduce__(self) -> tuple[type[Self], tuple[Persistence, int], dict[str, Any]]:
+        # A copy, as in another process, begins a recording of its own.
+        return type(self), (self.persistence, self.threads), {"warns": self.warns}
+
     def _end_recording(self) -> None:
         self._recent = RecentFrames(self.window)
         self._odometry = FrameOdometry(self.threads)
@@ -226,7 +231,8 @@ class PersistenceDerainer(RecordingMethod):
             known = (evidence is not None) & (np.minimum(agreed, alone) > sure)
             known |= (evidence is not None) & (np.maximum(agreed, alone) < -sure)
         with stopwatch.stage("back"):
-            return _by_row(scan, points, agreed, known, ready.frame)
+            judgement = _by_row(scan, points, agreed, known, ready.frame)
+        return self.with_warnings(judgement)
 
     def _evidence(self, scans: WindowOfScans) -> RayEvidence | None:
         """What the rays of the other scans say of the places of the points; None without any."""

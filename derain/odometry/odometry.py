@@ -7,7 +7,7 @@ from derain.odometry.registration import Registration
 from derain.odometry.surfaces import Fit, Surfaces
 from derain.odometry.trust import Trust
 from derain.scan import Scan
-from derain.system.cores import usable_cores
+from derain.system.cores import threads_of
 
 # How far apart partners may be, metres: around the motion that is expected, and where nothing is
 # expected: six scans of WADS on, 7.9 m, are found by the wider one.
@@ -37,7 +37,7 @@ class Odometry:
     """
 
     def __init__(self, threads: int = 0) -> None:
-        self._threads = threads or usable_cores()
+        self._threads = threads_of(threads)
         self.restart()
 
     def restart(self) -> None:

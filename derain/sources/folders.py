@@ -28,7 +28,7 @@ TEXTS = (".csv", ".txt")
 
 
 def named_frames(
-    paths: Iterable[Path],
+    paths: str | Path | Iterable[str | Path],
     columns: Sequence[str] = DEFAULT_COLUMNS,
     labelled: bool = False,
     layouts: Sequence[Layout] | None = None,
@@ -37,13 +37,13 @@ def named_frames(
     """The scans that a user names.
 
     Example:
-        >>> source = named_frames([Path("scan.bin")], labelled=True)
+        >>> source = named_frames("scan.bin", labelled=True)
         >>> [(frame.key, len(frame.read()), frame.has_labels) for frame in source]
         [('scan', 820, True)]
 
     Args:
-        paths: Scans, folders with scans directly in them, data sets or parts of them whose folders
-            are called as a layout says, bags, and paths into bags
+        paths: One path or several: scans, folders with scans directly in them, data sets or parts
+            of them whose folders are called as a layout says, bags, and paths into bags
             (:func:`~derain.sources.bag_frame.bag_frames`).
         columns: Names of the columns of files that do not name them.
         labelled: Whether labels are to be read, from where :func:`~derain.cards.known.label_of`
@@ -61,13 +61,13 @@ def named_frames(
         InputError: A path that does not exist, a folder without scans, or a bag that cannot be
             read.
     """
-    paths = list(paths)
-    in_bags = {path: _paths_into_bags(path, layouts) for path in paths}
+    named = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
+    in_bags = {path: _paths_into_bags(path, layouts) for path in named}
     if any(in_bags.values()):
-        return _with_bags(paths, in_bags, columns, labelled, layouts, recordings)
+        return _with_bags(named, in_bags, columns, labelled, layouts, recordings)
     scans: list[Path] = []
     of_data_set = False
-    for path in paths:
+    for path in named:
         folders = _scan_folders_in(path, layouts)
         of_data_set = of_data_set or len(folders) > 1
         scans += listed_scans(folders or [path])

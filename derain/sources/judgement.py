@@ -40,7 +40,7 @@ class Judgement:
 
     @property
     def share_of_rain(self) -> float:
-        """Share of rain in the points that can be judged; 0 where there are none."""
+        """Share of rain among the points that can be judged; 0 where there are none."""
         return int(self.rain.sum()) / max(int(self.scan.valid.sum()), 1)
 
     @property

@@ -2,13 +2,15 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import Any
+from functools import cached_property
+from typing import Any, ClassVar
 
 from numpy.typing import NDArray
 
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
+from derain.sources.scan_warnings import EXAMINED_OF, ScanWarnings
 from derain.system.stopwatch import Stopwatch
 from derain.views.oddities import Oddity
 from derain.views.window import Window
@@ -28,7 +30,16 @@ class Method(ABC):
         answers += method.flush()
 
     :func:`derain.sources.judging.judgements` does it.
+
+    Attributes:
+        EXAMINED_OF: One scan in so many is examined for what :meth:`oddities` gives.
+        warns: Whether it warns of that, by :class:`~derain.errors.ScanWarning`. What prints the
+            oddities itself sets it to False.
     """
+
+    EXAMINED_OF: ClassVar[int] = EXAMINED_OF
+
+    warns: bool = True
 
     @property
     @abstractmethod
@@ -92,6 +103,16 @@ class Method(ABC):
         Args:
             judgement: What it said of the scan.
         """
+
+    def with_warnings(self, judgement: Judgement) -> Judgement:
+        """Gives back what it said of a scan, after a warning where something is odd about it."""
+        if self.warns:
+            self._warnings.look(judgement)
+        return judgement
+
+    @cached_property
+    def _warnings(self) -> ScanWarnings:
+        return ScanWarnings(self.oddities, self.EXAMINED_OF)
 
     @abstractmethod
     def as_dict(self) -> dict[str, Any]:

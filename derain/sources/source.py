@@ -2,7 +2,9 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
-from typing import overload
+from typing import Any, overload
+
+from numpy.typing import NDArray
 
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
@@ -54,19 +56,23 @@ class Frames(Source):
         self._frames = tuple(frames)
 
     @classmethod
-    def of_scans(cls, scans: Iterable[Scan], sequence: str = "") -> "Frames":
+    def of_scans(cls, scans: Iterable[Scan | NDArray[Any]], sequence: str = "") -> "Frames":
         """Scans in memory as one sequence, with the labels that they have.
 
         Several sequences are one source by ``Frames([*first, *second])``.
 
         Args:
-            scans: The scans, in time order.
+            scans: The scans, or arrays of points as :meth:`derain.scan.Scan.of` takes them, in time
+                order.
             sequence: What the sequence is called; its frames have keys such as ``drive/000001``.
+
+        Raises:
+            InputError: Something that is neither a scan nor an array of points.
         """
         folder = f"{sequence}/" if sequence else ""
         return cls(
             MemoryFrame(key=f"{folder}{number:06d}", sequence=sequence, number=number, scan=scan)
-            for number, scan in enumerate(scans)
+            for number, scan in enumerate(map(Scan.of, scans))
         )
 
     def __len__(self) -> int:

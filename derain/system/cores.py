@@ -3,7 +3,11 @@
 import os
 from collections.abc import Iterator
 from contextlib import suppress
+from numbers import Integral
 from pathlib import Path, PurePosixPath
+from typing import Any
+
+from derain.errors import InputError
 
 # Where Linux says which control groups a process is in, and where it keeps them.
 MEMBERSHIP = Path("/proc/self/cgroup")
@@ -21,6 +25,19 @@ def usable_cores(membership: Path = MEMBERSHIP, groups: Path = GROUPS) -> int:
         groups: Folder that they are mounted below.
     """
     return max(1, min([_allowed_cores(), *_quotas(membership, groups)]))
+
+
+def threads_of(threads: Any) -> int:
+    """The number of threads that a user means by a number, 0 being one per core.
+
+    Raises:
+        InputError: Anything but a whole number from 0 on.
+    """
+    if not isinstance(threads, Integral) or threads < 0:
+        raise InputError(
+            "threads", f"{threads!r} is not a whole number from 0 on", "Give 0 for every core."
+        )
+    return int(threads) or usable_cores()
 
 
 def _allowed_cores() -> int:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.system.cores import usable_cores
+from derain.system.cores import threads_of
 from derain.system.waiting import sleeping_threads
 
 with sleeping_threads():
@@ -33,7 +33,7 @@ class NeighbourSearch:
     ) -> None:
         self._xyz = xyz.astype(np.float64)
         self._rank = np.arange(len(xyz)) if rank is None else rank
-        self._threads = threads or usable_cores()
+        self._threads = threads_of(threads)
         self._tree = small_gicp.KdTree(self._xyz, num_threads=self._threads) if len(xyz) else None
 
     def __call__(

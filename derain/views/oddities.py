@@ -93,7 +93,7 @@ def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> 
         yield Oddity(
             _other_unit(found < mean),
             f"mean intensity {found:.3g}, but {mean:.3g} where the model was trained "
-            f"(unit {unit}): see --intensity-scale",
+            f"(unit {unit}): see --intensity-scale or Scan.with_intensity_times",
         )
     elif full_scale := SCALE_OF_UNIT.get(unit):
         yield from intensity_of_another_scale(scan, full_scale, data)
@@ -117,7 +117,8 @@ def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Itera
     if scale != expected:
         yield Oddity(
             _other_unit(scale < expected),
-            f"intensities of 0..{scale:g}, but 0..{expected:g} for {whose}: see --intensity-scale",
+            f"intensities of 0..{scale:g}, but 0..{expected:g} for {whose}: see --intensity-scale "
+            "or Scan.with_intensity_times",
         )
 
 

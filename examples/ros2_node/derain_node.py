@@ -249,8 +249,10 @@ class DerainNode:
         }
         refuse(asked)
         self.organised: bool = asked["organised"]
+        derainer = Derainer(asked["model"] or None, threads=asked["threads"])
+        derainer.warns = False  # what is odd goes to the node's log
         self.remover = RainRemover(
-            Derainer(asked["model"] or None, threads=asked["threads"]),
+            derainer,
             alarm=Alarm(dry=reach_of(asked["dry"]) if asked["dry"] else None),
         )
         # A sensor's driver repeats no cloud that was lost, and asking it to would find no driver.

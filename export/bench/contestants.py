@@ -26,6 +26,7 @@ from derain.export.runtimes.registry import Runtime
 from derain.filters import FilterDerainer, PointFilter
 from derain.filters.parameters import CANDIDATES
 from derain.scan import Scan
+from derain.views.candidates import Candidates
 
 # A method as a user gives it: a name or a file, a derainer, a filter, or a function that says which
 # points of a scan are rain, bool (N,).
@@ -126,8 +127,16 @@ def _filter(title: str, derainer: FilterDerainer) -> Contestant:
     facts: dict[str, Any] = {"parameters": filter.as_dict()}
     if candidates is not None:
         facts[CANDIDATES] = str(candidates)
-    ready = partial(FilterDerainer, filter, candidates=candidates)
+    ready = partial(_ready_filter, filter, candidates)
     return Contestant(title, filter.name, ready, facts, filter, candidates, judges_by=filter)
+
+
+def _ready_filter(
+    filter: PointFilter, candidates: Candidates | None, threads: int
+) -> FilterDerainer:
+    derainer = FilterDerainer(filter, threads, candidates)
+    derainer.warns = False  # a bench itself prints what is odd
+    return derainer
 
 
 def _model(

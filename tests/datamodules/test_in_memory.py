@@ -34,6 +34,13 @@ def test_scans_are_read_as_they_are_given() -> None:
     assert data.card is WADS
 
 
+def test_one_scan_is_taken_and_what_is_no_scan_is_refused() -> None:
+    data = InMemory(labelled(0), card=WADS)
+    assert len(data.frames("train")) == 1
+    with pytest.raises(InputError, match=r"scan\.bin: .*derain\.read_scan"):
+        InMemory(["scan.bin"], card=WADS)
+
+
 def test_intensities_are_taken_to_the_unit_of_the_card() -> None:
     data = InMemory([labelled(0)], card="wads", loading=Loading(intensity_scale=2.0))
     scan = data.read(data.frames("train")[0])

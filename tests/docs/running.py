@@ -29,6 +29,8 @@ def run(words: list[str], line: str, folder: Path) -> tuple[int, str]:
     Returns:
         Its exit code and all that it printed.
     """
+    if words[0] == "python":  # this one, whatever is first on the path
+        return _finished([sys.executable, *words[1:]], {})
     if words[0] != "derain":
         return _finished(["bash", "-c", line], {})
     arguments = words[1:]

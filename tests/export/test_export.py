@@ -1,5 +1,6 @@
 """Export writes one whole ONNX file that has been proved, or none."""
 
+from contextlib import nullcontext
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file
+from derain.export.evaluation_mode import evaluation_on_cpu
 from derain.export.onnx_file import export
 from derain.export.proof import FINITE, FLOAT32, INT8, THREADS, Case, Proof, prove
 from derain.export.runtime import Derainer
@@ -315,3 +317,29 @@ def test_a_whole_number_of_0_is_left_alone() -> None:
 def _rows(model: OutDet) -> np.ndarray:
     """For every row of the scene, the point of the network that answers for it."""
     return model.spec.make_view()(SCENE[0][1]).inverse
+
+
+@pytest.mark.parametrize("succeeds", [True, False])
+def test_a_model_is_left_in_the_modes_that_it_was_in(
+    random_outdet: OutDet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, succeeds: bool
+) -> None:
+    model = deepcopy(random_outdet).train()
+    frozen = next(module for module in model.modules() if isinstance(module, nn.BatchNorm1d))
+    frozen.eval()
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: SCENE)
+    if not succeeds:
+        monkeypatch.setattr(onnx_file, "flush", lambda proto: 1 / 0)
+    with nullcontext() if succeeds else pytest.raises(ZeroDivisionError):
+        export(model, tmp_path / "model.onnx")
+    assert [module for module in model.modules() if not module.training] == [frozen]
+
+
+def test_a_model_is_taken_back_to_its_device(
+    random_outdet: OutDet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    device, moved = torch.device("cuda:0"), list[torch.device]()
+    monkeypatch.setattr(OutDet, "device", device)  # as if it were there
+    monkeypatch.setattr(random_outdet, "to", moved.append)
+    with evaluation_on_cpu(random_outdet):
+        assert moved == []
+    assert moved == [device]

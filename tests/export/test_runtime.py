@@ -1,9 +1,11 @@
 """The runtime gives PyTorch's answers, for any array and in its order, without torch."""
 
 import json
+import pickle
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.runtime import Derainer
+from derain.filters import DROR
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 
@@ -217,3 +220,32 @@ def test_a_missing_model_is_reported(tmp_path: Path) -> None:
         Derainer(tmp_path / "none.onnx")
     with pytest.raises(InputError, match="is a folder"):
         Derainer(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("given_", "hint"),
+    [
+        ("dror", r"derain\.FilterDerainer\(derain\.DROR\(\)\)"),
+        ("persistence", r"derain\.PersistenceDerainer\(\)"),
+        (DROR(), r"derain\.FilterDerainer"),
+        (np.zeros((5, 4)), "path of an ONNX file"),
+    ],
+    ids=["filter", "method", "object", "array"],
+)
+def test_what_is_no_model_is_refused_with_what_to_use_instead(given_: Any, hint: str) -> None:
+    with pytest.raises(InputError, match=hint):
+        Derainer(given_)
+
+
+def test_default_is_the_model_that_comes_with_derain() -> None:
+    assert Derainer("default").path == Derainer().path
+
+
+def test_a_derainer_can_be_pickled(onnx_model: Path) -> None:
+    derainer = Derainer(onnx_model, threads=2)
+    derainer.spec, derainer.warns = replace(derainer.spec, threshold=0.9), False
+    again = pickle.loads(pickle.dumps(derainer))
+    assert (again.name, again.threads, again.runtime) == (str(onnx_model), 2, derainer.runtime)
+    assert (again.spec, again.warns) == (derainer.spec, False)
+    np.testing.assert_array_equal(again(scene()), derainer(scene()))
+    assert pickle.loads(pickle.dumps(Derainer())).name == "default"

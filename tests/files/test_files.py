@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from derain import InputError, Scan
+from derain import InputError, Scan, ScanWarning
 from derain.files import DEFAULT_COLUMNS, find_scans, read_scan, write_scan
 from derain.files.format import FORMATS
 from derain.files.formats.pcd.header import PcdHeader
+from derain.files.formats.ply import PlyHeader
 
 RADAR = (
     *("x", "y", "z", "range_rate", "rcs", "range"),
@@ -210,3 +211,14 @@ def test_reading_scans_needs_no_heavy_library() -> None:
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"
+
+
+def test_what_a_written_file_lacks_is_warned_of(tmp_path: Path) -> None:
+    header = PlyHeader("ascii", left_out=("camera", "edge"))
+    with pytest.warns(ScanWarning, match="camera, edge"):
+        write_scan(tmp_path / "a.ply", Scan(np.ones((2, 3)), header=header))
+
+
+def test_an_array_is_written_as_a_scan_of_it_is(tmp_path: Path) -> None:
+    write_scan(tmp_path / "a.bin", np.ones((2, 4)))
+    assert len(read_scan(tmp_path / "a.bin")) == 2

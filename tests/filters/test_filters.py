@@ -212,7 +212,7 @@ def test_parameters_that_make_no_sense_are_refused(
 
 
 def test_a_negative_number_of_threads_is_refused() -> None:
-    with pytest.raises(InputError, match="threads: -1 is negative"):
+    with pytest.raises(InputError, match="threads: -1"):
         FilterDerainer(ROR(), threads=-1)
 
 
@@ -250,3 +250,9 @@ def test_a_file_that_holds_no_parameters_is_refused(tmp_path: Path, content: str
 def test_a_missing_file_of_parameters_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none.yaml: there is no such file"):
         read_parameters(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize("given_", ["dror", DROR])
+def test_what_is_no_filter_is_refused(given_: Any) -> None:
+    with pytest.raises(InputError, match=r"derain\.DROR\(\)"):
+        FilterDerainer(given_)

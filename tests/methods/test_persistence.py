@@ -1,5 +1,6 @@
 """Persistence as a method: what a drive past walls, drops and cars comes to."""
 
+import pickle
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.evaluation.hard_cases import hard_cases
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.methods import load_method
 from derain.files import write_scan
 from derain.methods.persistence import Persistence, PersistenceDerainer
@@ -245,3 +246,10 @@ def test_real_snow_is_found_by_free_space(shared: Path) -> None:
         wrong += (rain & ~truth).sum()
         missed += (truth & ~rain).sum()
     assert found / (found + wrong + missed) > 0.87
+
+
+def test_it_can_be_pickled_and_begins_a_recording_of_its_own() -> None:
+    method = PersistenceDerainer(Persistence(before=2, sure=5.0), threads=1)
+    method.push(scene(100))
+    again = pickle.loads(pickle.dumps(method))
+    assert (again.persistence, again.threads, again.waiting) == (method.persistence, 1, 0)

@@ -28,6 +28,12 @@ def touch(*paths: Path) -> None:
         path.touch()
 
 
+def test_one_path_is_named_as_a_list_of_it_is(tmp_path: Path) -> None:
+    touch(tmp_path / "a.bin", tmp_path / "b.bin")
+    for named in (tmp_path, str(tmp_path), [str(tmp_path)]):
+        assert [frame.key for frame in named_frames(named)] == ["a", "b"]
+
+
 @pytest.fixture
 def wads(tmp_path: Path) -> Path:
     """A data set of two sequences of two scans each, and one that is not finished."""

@@ -3,11 +3,13 @@
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from derain.errors import InputError
 from derain.system import cores
-from derain.system.cores import usable_cores
+from derain.system.cores import threads_of, usable_cores
 
 CoresIn = Callable[[str, Mapping[str, str]], int]
 
@@ -77,3 +79,14 @@ def test_where_there_are_no_control_groups_it_is_the_cores_it_may_run_on(tmp_pat
     finally:
         os.sched_setaffinity(0, before)
     assert usable_cores(tmp_path / "none", tmp_path / "none") == len(before)
+
+
+def test_no_threads_are_one_for_each_core() -> None:
+    assert threads_of(0) == usable_cores()
+    assert threads_of(3) == 3
+
+
+@pytest.mark.parametrize("threads", [-1, 1.5, "2", None])
+def test_what_is_no_number_of_threads_is_refused(threads: Any) -> None:
+    with pytest.raises(InputError, match="threads: "):
+        threads_of(threads)

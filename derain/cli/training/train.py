@@ -35,6 +35,7 @@ from derain.datamodules.sequences import Sequences
 from derain.datamodules.simulated import Simulated
 from derain.datamodules.taught import Taught
 from derain.datamodules.wads import Wads
+from derain.datamodules.worlds import Worlds
 from derain.errors import InputError
 from derain.models.base import DerainingModule
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
@@ -62,25 +63,13 @@ class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatt
     """Leaves the line breaks of the examples alone."""
 
 
-__all__ = [
-    "Folder",
-    "Mixture",
-    "Rehearse3D",
-    "Sequences",
-    "Simulated",
-    "Taught",
-    "Wads",
-    "train",
-]
-
-
 def choices() -> dict[str, tuple[type, ...]]:
     """What has options of its own, by the option that chooses it.
 
     They are loaded then, and a configuration may name their classes without a module.
     """
     return {
-        "data": (Folder, Mixture, Rehearse3D, Sequences, Simulated, Taught, Wads),
+        "data": (Folder, Mixture, Rehearse3D, Sequences, Simulated, Taught, Wads, Worlds),
         "model": tuple(NETWORKS.values()),
         "trainer.logger": (TensorBoardLogger,),
     }
