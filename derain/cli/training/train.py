@@ -51,7 +51,7 @@ from derain.models.registry import NETWORKS
 from derain.models.start import started
 from derain.system.cores import usable_cores
 from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
-from derain.system.open3d_import import make_open3d_loadable
+from derain.system.open3d_import import warn_where_tensorboard_cannot_start
 from derain.system.workers import end_with_launcher
 
 # What `--ckpt_path` may be besides a file: checkpoints that Lightning looks for itself.
@@ -179,7 +179,8 @@ def train(arguments: list[str]) -> None:
     """
     arguments = ["--help" if argument == ALL else argument for argument in arguments]
     silence_advertisements()
-    make_open3d_loadable()  # TensorBoard is to start, and show what this run logs
+    if arguments[0] == "fit":
+        warn_where_tensorboard_cannot_start()
     # Lightning means the mixing of both; arguments of the command line are all that we pass on.
     warnings.filterwarnings("ignore", message="LightningCLI's args parameter")
     # Lightning 2.6 uses a name that torch 2.13 deprecates.
