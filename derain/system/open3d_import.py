@@ -95,5 +95,8 @@ def _lacking_library() -> tuple[Path, Path] | None:
 
 
 if __name__ == "__main__":
-    made = link_libusb()
+    try:
+        made = link_libusb()
+    except InputError as error:
+        sys.exit(f"derain: {error}")
     print(f"Linked {made}" if made else f"Open3D needs no link to {LIBUSB} here")
