@@ -14,7 +14,7 @@ from derain.errors import InputError
 from derain.files.documents import Entry, shown
 from derain.models.base import DerainingModule
 from derain.models.callbacks.whole_checkpoints import refuse_not_finite, save_whole
-from derain.models.likeness import REMEDY, like
+from derain.models.likeness import LARGEST_COUNT, REMEDY, like
 from derain.models.limits import check_hyperparameters
 from derain.models.published import MISFITS, read_checkpoint, with_tensors
 from derain.models.registry import NETWORKS
@@ -25,9 +25,6 @@ STATE_OF_TRAINING = {"optimizer_states", "lr_schedulers", "loops", "callbacks"}
 
 # Lightning rewrites the checkpoints of those before it; none of them is derain's.
 FIRST_LIGHTNING = Version("2.0")
-
-# More than any training takes, and a number that a float holds.
-MOST_STEPS = 2**53
 
 
 def load_model(path: Path | str) -> DerainingModule:
@@ -134,7 +131,7 @@ def _check_progress(content: Mapping[str, Any], path: Path) -> None:
     if not known:
         raise InputError(path, f"written by Lightning {shown(version)}", REMEDY)
     for name in ("epoch", "global_step"):
-        Entry(path, name, content.get(name)).whole(0, MOST_STEPS)
+        Entry(path, name, content.get(name)).whole(0, LARGEST_COUNT)
     for state in Entry(path, "callbacks", content.get("callbacks", {})).members().values():
         state.members()
     if "loops" in content:

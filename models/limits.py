@@ -4,8 +4,11 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from derain.files.documents import DEEPEST, Entry, shown
+from derain.files.documents import Entry, shown
 from derain.views.neighbours import MOST_NETWORK_NEIGHBOURS
+
+# Its multiples, by what an optimiser divides it by, still are numbers of 32 bits.
+LARGEST_NUMBER = 1e30
 
 
 def check_hyperparameters(
@@ -22,20 +25,24 @@ def check_hyperparameters(
             or values of another kind than the defaults.
     """
     for name, entry in parameters.items():
-        _refuse_what_is_not_plain(entry.value, entry)
+        _refuse_what_is_not_plain(entry)
         _refuse_another_kind(entry, defaults.get(name))
         if name in _LIMITS:
             _LIMITS[name](entry)
 
 
-def _refuse_what_is_not_plain(value: Any, entry: Entry, depth: int = 0) -> None:
-    if isinstance(value, float) and not math.isfinite(value):
-        raise entry.fault(f"{value} is not finite", "Give a finite number.")
-    if isinstance(value, list | tuple | dict) and depth < DEEPEST:
-        for part in value.values() if isinstance(value, dict) else value:
-            _refuse_what_is_not_plain(part, entry, depth + 1)
-    elif not isinstance(value, str | bool | int | float | None):
-        raise entry.fault(f"{shown(value)} is no plain value", "Give numbers and texts.")
+def _refuse_what_is_not_plain(entry: Entry) -> None:
+    left, seen = [entry.value], set[int]()
+    while left:
+        value = left.pop()
+        if isinstance(value, list | tuple | dict):
+            if id(value) not in seen:  # a file may hold one list in itself, or in a million places
+                left += value.values() if isinstance(value, dict) else value
+            seen.add(id(value))
+        elif isinstance(value, float) and not math.isfinite(value):
+            raise entry.fault(f"{value} is not finite", "Give a finite number.")
+        elif not isinstance(value, str | bool | int | float | None):
+            raise entry.fault(f"{shown(value)} is no plain value", "Give numbers and texts.")
 
 
 def _refuse_another_kind(entry: Entry, default: Any) -> None:
@@ -51,15 +58,8 @@ def _refuse_another_kind(entry: Entry, default: Any) -> None:
         entry.number()
 
 
-def _number(least: float, most: float = math.inf) -> Callable[[Entry], object]:
-    def check(entry: Entry) -> None:
-        if not least <= entry.number() <= most:
-            bounds = (
-                f"between {least:g} and {most:g}" if most < math.inf else f"not below {least:g}"
-            )
-            raise entry.fault(f"{shown(entry.value)} is out of bounds", f"Give a number {bounds}.")
-
-    return check
+def _number(least: float, most: float = LARGEST_NUMBER) -> Callable[[Entry], object]:
+    return lambda entry: entry.within(least, most)
 
 
 # A network reads only those that it has.

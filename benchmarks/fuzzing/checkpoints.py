@@ -62,6 +62,14 @@ def _tensor(*shape: int) -> Any:
     return torch.ones(shape)
 
 
+def _nested(depth: int) -> list[Any]:
+    """A list that takes little in a file, and more than any memory where each part is looked at."""
+    parts: list[Any] = [1]
+    for _ in range(depth):
+        parts = [parts, parts]
+    return parts
+
+
 GROUP = ("optimizer_states", 0, "param_groups", 0)
 STATE = ("optimizer_states", 0, "state", 0)
 PROGRESS = ("loops", "fit_loop", "epoch_loop.batch_progress")
@@ -85,6 +93,7 @@ HOSTILE: dict[str, Change] = {
     "learning rate of NaN": _setting("hyper_parameters", "learning_rate", float("nan")),
     "infinite weight decay": _setting("hyper_parameters", "weight_decay", float("inf")),
     "milestones that are a text": _setting("hyper_parameters", "milestones", "soon"),
+    "milestones that unfold": _setting("hyper_parameters", "milestones", _nested(40)),
     "argument that no network has": _setting("hyper_parameters", "layers", 3),
     "no weights": _setting("state_dict", {}),
     "weights in a list": _setting("state_dict", [1]),
@@ -116,6 +125,7 @@ HOSTILE: dict[str, Change] = {
         0
     ]["params"].reverse(),
     "group whose rate is a text": _setting(*GROUP, "lr", "fast"),
+    "group whose rate overflows": _setting(*GROUP, "lr", 1e38),
     "group whose rate is NaN": _setting(*GROUP, "lr", float("nan")),
     "moment of another shape": lambda content: _setting(*STATE, "exp_avg", _tensor(7))(content),
     "moment that is missing": _dropping(*STATE, "exp_avg"),

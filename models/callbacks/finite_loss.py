@@ -31,7 +31,8 @@ class FiniteLoss(lightning.Callback):
         Raises:
             InputError: A loss was not finite.
         """
-        self._sum += outputs["loss"].detach()
+        if outputs and "loss" in outputs:  # not of a step that was left out
+            self._sum += outputs["loss"].detach()
         every: int = trainer.log_every_n_steps  # type: ignore[attr-defined]
         if every > 0 and trainer.global_step % every == 0:
             self._check(trainer)

@@ -92,14 +92,14 @@ def test_a_checkpoint_chooses_no_module_to_import(
     outcome = run_derain("validate", *wads, "--ckpt_path", "foreign.ckpt")
     assert outcome.code == 0, outcome.err
     written = yaml.safe_load(Path("runs/outdet_wads/version_0/config.yaml").read_text())
-    assert written["model"]["class_path"] == "derain.models.outdet.OutDet"
+    assert written["model"]["class_path"] == "derain.models.outdet.module.OutDet"
 
 
 def test_a_training_that_diverges_is_one_line_and_leaves_no_checkpoint_of_it(
     run_derain, wads: list[str]
 ) -> None:
     quick = ["--panels.scans", "0", "--errors.pictures", "0", "--trainer.max_epochs", "3"]
-    outcome = run_derain("fit", *wads, *quick, "--model.learning_rate", "1e38")
+    outcome = run_derain("fit", *wads, *quick, "--model.learning_rate", "1e30")
     assert outcome.code == 2
     line = outcome.err.splitlines()[-1]
     assert line.startswith("derain: ")
@@ -270,7 +270,7 @@ def test_training_goes_on_from_a_checkpoint(run_derain, wads: list[str]) -> None
     trained = run_derain("fit", *wads, *short, "1")
     assert trained.code == 0
     export = shlex.split(trained.out.splitlines()[-1])
-    assert export == ["derain", "export", str(last.with_name("best.ckpt").resolve()), *TO_ONNX]
+    assert export == ["derain", "export", str(last.with_name("best.ckpt")), *TO_ONNX]
     assert run_derain("fit", *wads, *short, "2", "--ckpt_path", last).code == 0
     first = torch.load(last, weights_only=True)
     second = torch.load(str(last).replace("version_0", "version_1"), weights_only=True)
