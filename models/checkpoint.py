@@ -1,6 +1,7 @@
 """Checkpoints on disk: written whole, and read without trust."""
 
 import logging
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from inspect import signature
@@ -8,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import lightning
-from packaging.version import InvalidVersion, Version
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
@@ -23,8 +23,9 @@ from derain.spec import Spec
 # What Lightning asks of a checkpoint that a training goes on from.
 STATE_OF_TRAINING = {"optimizer_states", "lr_schedulers", "loops", "callbacks"}
 
-# Lightning rewrites the checkpoints of those before it; none of them is derain's.
-FIRST_LIGHTNING = Version("2.0")
+# Versions from 2.0 on: Lightning rewrites the checkpoints of those before, and none is derain's.
+# Source: PEP 440.
+LIGHTNING_VERSION = re.compile(r"([2-9]|[1-9]\d+)(\.\d+)+((a|b|rc|\.post|\.?dev)\d+)?(\+[\w.]+)?")
 
 
 def load_model(path: Path | str) -> DerainingModule:
@@ -124,11 +125,7 @@ def _check_progress(content: Mapping[str, Any], path: Path) -> None:
         InputError: Another version of Lightning, or parts of another kind than Lightning writes.
     """
     version = content.get("pytorch-lightning_version")
-    try:
-        known = Version(version) >= FIRST_LIGHTNING
-    except (InvalidVersion, TypeError):
-        known = False
-    if not known:
+    if not isinstance(version, str) or not LIGHTNING_VERSION.fullmatch(version):
         raise InputError(path, f"written by Lightning {shown(version)}", REMEDY)
     for name in ("epoch", "global_step"):
         Entry(path, name, content.get(name)).whole(0, LARGEST_COUNT)

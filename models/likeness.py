@@ -8,7 +8,7 @@ from torch import Tensor
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
-from derain.models.limits import LARGEST_NUMBER
+from derain.models.limits import LARGEST_COMPUTABLE
 
 # Of epochs, batches and steps: more than any training takes, and a number that a float holds.
 LARGEST_COUNT = 2**53
@@ -82,5 +82,5 @@ def _refuse_another_number(found: Entry, own: float) -> None:
         raise found.fault(f"{number:g} is not a whole number", REMEDY)
     if number < 0 <= own:
         raise found.fault(f"{number:g} is negative", REMEDY)
-    if abs(number) > (LARGEST_COUNT if isinstance(own, int) else LARGEST_NUMBER):
+    if abs(number) > (LARGEST_COUNT if isinstance(own, int) else LARGEST_COMPUTABLE):
         raise found.fault(f"{number:g} is too large", REMEDY)

@@ -8,7 +8,7 @@ from derain.files.documents import Entry, shown
 from derain.views.neighbours import MOST_NETWORK_NEIGHBOURS
 
 # Its multiples, by what an optimiser divides it by, still are numbers of 32 bits.
-LARGEST_NUMBER = 1e30
+LARGEST_COMPUTABLE = 1e30
 
 
 def check_hyperparameters(
@@ -58,7 +58,7 @@ def _refuse_another_kind(entry: Entry, default: Any) -> None:
         entry.number()
 
 
-def _number(least: float, most: float = LARGEST_NUMBER) -> Callable[[Entry], object]:
+def _number(least: float, most: float = LARGEST_COMPUTABLE) -> Callable[[Entry], object]:
     return lambda entry: entry.within(least, most)
 
 

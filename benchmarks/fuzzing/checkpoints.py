@@ -111,6 +111,7 @@ HOSTILE: dict[str, Change] = {
     ),
     "best checkpoints in a list": _of_each_callback("best_k_models", ["best.ckpt"]),
     "scores that are texts": _of_each_callback("best_k_models", {"best.ckpt": "high"}),
+    "best checkpoint without a name": _of_each_callback("best_k_models", {"": 0.5}),
     "folder that is a number": _of_each_callback("dirpath", 5),
     "loops in a list": _setting("loops", [1]),
     "no loop of a training": _dropping("loops", "fit_loop"),

@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
@@ -82,9 +83,13 @@ class BestCheckpoint(ModelCheckpoint):
     def _own_file(self, folder: Path, name: str) -> Path | None:
         """A file in a folder if this callback may have written it there, else None."""
         pattern = re.sub(r"{.*?}", "*", self.filename or "*")
-        file = folder / name
-        own = file.resolve().is_relative_to(folder.resolve()) and file.is_file()
-        return file if own and fnmatch(name, f"{pattern}*{self.FILE_EXTENSION}") else None
+        if not fnmatch(name, f"{pattern}*{self.FILE_EXTENSION}"):
+            return None
+        with suppress(OSError, ValueError):  # what no file can be called
+            file = (folder / name).resolve()
+            if file.is_relative_to(folder.resolve()) and file.is_file():
+                return file
+        return None
 
 
 def _folder_and_scores(state: Mapping[str, Any], path: Any) -> tuple[str, dict[str, Tensor]]:
@@ -95,7 +100,7 @@ def _folder_and_scores(state: Mapping[str, Any], path: Any) -> tuple[str, dict[s
     """
     folder, scores = state.get("dirpath"), state.get("best_k_models")
     sound = isinstance(folder, str) and isinstance(scores, dict)
-    if not sound or not all(isinstance(k, str) and _is_score(v) for k, v in scores.items()):
+    if not sound or not all(k and isinstance(k, str) and _is_score(scores[k]) for k in scores):
         raise InputError(
             str(path),
             f"the scores of its best checkpoints are {shown(scores)}, in {shown(folder)}",

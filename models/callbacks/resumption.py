@@ -36,9 +36,7 @@ class Resumption(lightning.Callback):
         states = checkpoint["callbacks"]
         for callback in trainer.callbacks:  # type: ignore[attr-defined]
             key = callback.state_key
-            if key not in states:
-                continue
-            if isinstance(callback, BestCheckpoint):
+            if key not in states or isinstance(callback, BestCheckpoint):
                 continue
             if isinstance(callback, ModelCheckpoint):
                 del states[key]

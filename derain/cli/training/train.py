@@ -39,6 +39,7 @@ from derain.datamodules.sequences import Sequences
 from derain.datamodules.simulated import Simulated
 from derain.datamodules.taught import Taught
 from derain.datamodules.wads import Wads
+from derain.default.model_card import LARGEST_SEED
 from derain.errors import InputError, reason_of
 from derain.files.documents import Entry
 from derain.models.base import DerainingModule
@@ -71,9 +72,6 @@ LEAST = {
     "panels.pictures": 0,
     "errors.pictures": 0,
 }
-
-# Source: NumPy's RandomState, which Lightning seeds.
-LARGEST_SEED = 2**32 - 1
 
 
 class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatter):
