@@ -41,7 +41,7 @@ $(READY): pyproject.toml constraints.txt
 	python3 -m venv $(VENV)
 	$(PYTHON) -m pip install --quiet -c constraints.txt torch
 	$(PYTHON) -m pip install --quiet -c constraints.txt -e ".[dev]"
-	$(PYTHON) -c "from derain.system.open3d_import import make_open3d_loadable; make_open3d_loadable()"
+	$(PYTHON) -m derain.system.open3d_import
 	touch $@
 
 clean:

@@ -3,10 +3,11 @@
     python -m benchmarks.fuzz --inputs 100000 --workers 2
     python -m benchmarks.fuzz --replay runs/fuzz/pcd-0-1234
 
-Readers are those of scans, labels, bags, small documents, exported models and checkpoints. An input
-comes to a right result or is refused with an InputError; anything else is a finding: another
-exception, the end of the process, more than 1 GB of memory or 10 seconds of computing. Findings lie
-in --out. The exit code is 1 where there are any.
+Readers are those of scans, labels, bags, small documents, exported models and checkpoints, and
+`resume`, a training that goes on from a checkpoint. An input comes to a right result or is refused
+with an InputError; anything else is a finding: another exception, the end of the process, more than
+1 GB of memory or 10 seconds of computing. Findings lie in --out. The exit code is 1 where there are
+any.
 """
 
 import argparse
@@ -24,7 +25,7 @@ from threading import Lock
 
 from tqdm import tqdm
 
-from benchmarks.fuzzing import bags, documents, models, records, scans
+from benchmarks.fuzzing import bags, checkpoints, documents, models, records, scans
 from benchmarks.fuzzing.reader import Reader
 from benchmarks.fuzzing.worker import REFUSED, RIGHT, Outcome, Worker
 
@@ -62,6 +63,7 @@ def all_readers(models_folder: Path) -> dict[str, Reader]:
         *records.readers(),
         *bags.readers(),
         *models.readers(models_folder),
+        *checkpoints.readers(),
     ]
     return {reader.name: reader for reader in found}
 

@@ -5,6 +5,7 @@ from typing import Literal
 
 from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
+from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 
 Part = Literal["train", "validation", "test", "predict"]
@@ -24,6 +25,9 @@ class Loading:
         augmentation: What training changes about its scans.
         kept_megabytes: Memory for what no epoch changes of the training scans, and as much for the
             validation scans, so that it is not read and viewed again. Workers share it out.
+
+    Raises:
+        InputError: Fewer scans, processes or megabytes than there can be.
     """
 
     batch_size: int = 1
@@ -33,6 +37,14 @@ class Loading:
     deduplicate: bool | None = None
     augmentation: Augmentation = field(default_factory=Augmentation)
     kept_megabytes: int = 512
+
+    def __post_init__(self) -> None:
+        least = {"batch_size": 1, "workers": 0, "kept_megabytes": 0}
+        for name, fewest in least.items():
+            if getattr(self, name) < fewest:
+                raise InputError(
+                    name, f"{getattr(self, name)} is too few", f"Give {fewest} or more."
+                )
 
     def counts_once(self, card: DataCard) -> bool:
         """Whether points at one position are measured once."""

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import torch
+from lightning import Callback
 from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor, nn
 
@@ -17,6 +18,8 @@ from derain.learning.batch import Batch
 from derain.learning.seeds import Draw, generator_of, run_seed
 from derain.learning.start import Start
 from derain.learning.task import Task, TrainingData, agree
+from derain.models.callbacks.finite_loss import FiniteLoss
+from derain.models.callbacks.resumption import Resumption
 from derain.models.hyperparameters import enter
 from derain.models.measured import MeasuredModule
 from derain.scan import Scan
@@ -247,6 +250,10 @@ class DerainingModule(MeasuredModule):
                 )
         elif stage == "fit" or self.has_spec:
             agree(self, data, training=stage == "fit")
+
+    def configure_callbacks(self) -> list[Callback]:
+        """What guards a training of any network, whoever makes the trainer."""
+        return [FiniteLoss(), Resumption()]
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """Takes the Spec from the checkpoint that a run starts from.

@@ -1,23 +1,31 @@
 """Checkpoints on disk: written whole, and read without trust."""
 
 import logging
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
 import lightning
 
 from derain.errors import InputError, did_you_mean
-from derain.files.documents import shown
+from derain.files.documents import Entry, shown
 from derain.models.base import DerainingModule
-from derain.models.callbacks.whole_checkpoints import save_whole
+from derain.models.callbacks.whole_checkpoints import refuse_not_finite, save_whole
+from derain.models.likeness import LARGEST_COUNT, REMEDY, like
+from derain.models.limits import check_hyperparameters
 from derain.models.published import MISFITS, read_checkpoint, with_tensors
 from derain.models.registry import NETWORKS
 from derain.spec import Spec
 
 # What Lightning asks of a checkpoint that a training goes on from.
-STATE_OF_TRAINING = {"optimizer_states", "lr_schedulers", "loops"}
+STATE_OF_TRAINING = {"optimizer_states", "lr_schedulers", "loops", "callbacks"}
+
+# Versions from 2.0 on: Lightning rewrites the checkpoints of those before, and none is derain's.
+# Source: PEP 440.
+LIGHTNING_VERSION = re.compile(r"([2-9]|[1-9]\d+)(\.\d+)+((a|b|rc|\.post|\.?dev)\d+)?(\+[\w.]+)?")
 
 
 def load_model(path: Path | str) -> DerainingModule:
@@ -51,6 +59,22 @@ def check_resumable(path: Path) -> None:
         )
 
 
+def network_of_checkpoint(path: Path) -> tuple[type[DerainingModule], dict[str, Any]]:
+    """The class of a checkpoint's network, by its name in the registry, and its arguments.
+
+    Raises:
+        InputError: What `load_model` raises.
+    """
+    content = read_checkpoint(path)
+    model = _model_of(content, path)
+    return type(model), _arguments(content["hyper_parameters"])
+
+
+def class_path(network: type[DerainingModule]) -> str:
+    """The name by which a configuration finds the class of a network."""
+    return f"{network.__module__}.{network.__qualname__}"
+
+
 def _model_of(content: Mapping[str, Any], path: Path) -> DerainingModule:
     parameters, weights = content.get("hyper_parameters"), content.get("state_dict")
     if not (
@@ -71,17 +95,64 @@ def _model_of(content: Mapping[str, Any], path: Path) -> DerainingModule:
             f"{did_you_mean(spec.network, NETWORKS)}Install the package that names it among the "
             f"entry points `{NETWORKS.group}`. Known are {', '.join(NETWORKS)}.",
         )
-    # Lightning's own entries begin with an underscore.
-    arguments = {k: v for k, v in parameters.items() if not str(k).startswith("_")}
+    network, arguments = NETWORKS[spec.network], _arguments(parameters)
+    defaults = {name: each.default for name, each in signature(network).parameters.items()}
     try:
-        model = with_tensors(lambda: NETWORKS[spec.network](**arguments), weights)
+        _check_progress(content, path)
+        check_hyperparameters(Entry(path, "hyper_parameters", arguments).members(), defaults)
+    except InputError as error:
+        raise InputError(error.subject, error.reason, REMEDY) from error
+    try:
+        model = with_tensors(lambda: network(**arguments), weights)
     except MISFITS as error:
         raise InputError(
             path,
             f"its weights do not fit {spec.network} ({error})",
             "Train or import the model again.",
         ) from error
+    refuse_not_finite(model.state_dict(), path)
     return model.eval()
+
+
+def _arguments(parameters: Mapping[Any, Any]) -> dict[str, Any]:
+    """Arguments of a network; Lightning's own entries begin with an underscore."""
+    return {k: v for k, v in parameters.items() if not str(k).startswith("_")}
+
+
+def _check_progress(content: Mapping[str, Any], path: Path) -> None:
+    """Refuses what Lightning reads of every checkpoint besides the model, where it cannot.
+
+    What a training goes on from, :class:`Resumption` compares with the training's own.
+
+    Raises:
+        InputError: Another version of Lightning, or parts of another kind than Lightning writes.
+    """
+    version = content.get("pytorch-lightning_version")
+    if not isinstance(version, str) or not LIGHTNING_VERSION.fullmatch(version):
+        raise InputError(path, f"written by Lightning {shown(version)}", REMEDY)
+    for name in ("epoch", "global_step"):
+        Entry(path, name, content.get(name)).whole(0, LARGEST_COUNT)
+    for state in Entry(path, "callbacks", content.get("callbacks", {})).members().values():
+        state.members()
+    if "loops" in content:
+        _check_loops(Entry(path, "loops", content["loops"]))
+
+
+def _check_loops(loops: Entry) -> None:
+    fresh = _fresh_loops()
+    like(loops, {name: {} for name in fresh})  # all of them are there
+    for name, own in fresh.items():
+        parts = loops.members()[name].members()
+        for key in own.keys() & parts.keys():
+            if like(parts[key], own[key]) != parts[key].value:
+                raise parts[key].fault("holds more than Lightning writes", REMEDY)
+
+
+def _fresh_loops() -> dict[str, dict[str, Any]]:
+    """States of a trainer's loops before there is any progress, as checkpoints have them."""
+    trainer = _idle_trainer()
+    names = (f"{stage}_loop" for stage in ("fit", "validate", "test", "predict"))
+    return {name: getattr(trainer, name).state_dict() for name in names}
 
 
 def save_model(model: DerainingModule, path: Path) -> None:
@@ -92,14 +163,18 @@ def save_model(model: DerainingModule, path: Path) -> None:
     Raises:
         InputError: An output that cannot be written.
     """
-    # LightningCLI finds the class of a checkpoint's model by this name.
-    model.hparams["_class_path"] = f"{type(model).__module__}.{type(model).__qualname__}"
-    with _quiet():
-        trainer = lightning.Trainer(
-            accelerator="cpu", logger=False, enable_checkpointing=False, enable_model_summary=False
-        )
+    # Lightning's own command line would find the class by this name; derain's does not ask it.
+    model.hparams["_class_path"] = class_path(type(model))
+    trainer = _idle_trainer()
     trainer.strategy.connect(model)
     save_whole(trainer).save_checkpoint(path, weights_only=True)
+
+
+def _idle_trainer() -> lightning.Trainer:
+    with _quiet():
+        return lightning.Trainer(
+            accelerator="cpu", logger=False, enable_checkpointing=False, enable_model_summary=False
+        )
 
 
 @contextmanager

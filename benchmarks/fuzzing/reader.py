@@ -21,7 +21,7 @@ class Reader:
         read: Reads a file as derain does. It returns where the result is right, and raises
             InputError where the file is refused; anything else is a finding.
         seeds: Makes files that are right, and must be read.
-        hostile: Files that somebody thought out; they come first.
+        hostile: Files that somebody thought out; they come after those.
         change: Makes a damaged file in a way of its own, knowing what is in it; half of the inputs.
     """
 
@@ -38,19 +38,19 @@ class Reader:
 
     def must_read(self, number: int) -> bool:
         """Whether an input is undamaged."""
-        return 0 <= number - len(self.hostile) < len(self._seeds)
+        return number < len(self._seeds)
 
     def content(self, seed: int, number: int) -> bytes:
-        """An input: the hostile ones, then those that are right, then damaged ones without end.
+        """An input: those that are right, then the hostile ones, then damaged ones without end.
 
         Args:
             seed: Of the whole run.
             number: Which one; it does not depend on those before it.
         """
-        if number < len(self.hostile):
-            return self.hostile[number]()
         if self.must_read(number):
-            return self._seeds[number - len(self.hostile)]
+            return self._seeds[number]
+        if number < len(self._seeds) + len(self.hostile):
+            return self.hostile[number - len(self._seeds)]()
         generator = Random(f"{seed} {self.name} {number}")
         if self.change is not None and generator.random() < 0.5:
             return self.change(generator)

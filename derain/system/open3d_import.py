@@ -1,4 +1,14 @@
-"""Imports Open3D, which is optional, and lets it find libusb, which a bare Debian lacks."""
+"""Imports Open3D, which is optional, and lets it find libusb, which a bare Debian lacks.
+
+On Linux, Open3D links against libusb-1.0.so.0, which the wheel libusb-package carries. derain loads
+that into its own process before Open3D. TensorBoard, however, loads Open3D's plug-in whenever it
+starts, and dies where it cannot. For TensorBoard there has to be a link to the library beside
+Open3D's own libraries, which look there first. No command writes into installed packages unasked;
+
+    python -m derain.system.open3d_import
+
+makes the link, and prints where it is.
+"""
 
 import contextlib
 import ctypes
@@ -8,10 +18,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
+from derain.errors import InputError
 from derain.system.extras import OPEN3D
+from derain.system.notices import warn
 
 # What Open3D links against, as the dynamic linker calls it.
 LIBUSB = "libusb-1.0.so.0"
+
+SET_UP = "python -m derain.system.open3d_import"
 
 
 def import_open3d() -> ModuleType:
@@ -24,40 +38,65 @@ def import_open3d() -> ModuleType:
         MissingExtraError: Open3D is not installed.
         InputError: A library that it links against is missing.
     """
-    make_open3d_loadable()
+    lacking = _lacking_library()
+    if lacking is not None and not lacking[0].exists():
+        with contextlib.suppress(OSError):  # importing Open3D then reports what it lacks
+            ctypes.CDLL(str(lacking[1]), ctypes.RTLD_GLOBAL)
     return OPEN3D.load("what casts rays or shows a window")
 
 
-def make_open3d_loadable() -> None:
-    """Lets every program load Open3D, not derain alone, where it is installed.
+def warn_where_tensorboard_cannot_start() -> None:
+    """Warns, with the remedy, where TensorBoard would die of Open3D's plug-in."""
+    lacking = _lacking_library()
+    if lacking is not None and not lacking[0].exists():
+        warn(f"TensorBoard cannot start: Open3D lacks {LIBUSB}; `{SET_UP}` links it")
 
-    On Linux, Open3D links against libusb-1.0.so.0, which the wheel libusb-package carries. Loading
-    that before Open3D would serve this process alone. TensorBoard, however, loads Open3D's plug-in
-    whenever it starts, and dies where it cannot. So a link to the library is left beside Open3D's
-    own libraries, which look there first for what they need. Where that folder cannot be written
-    to, the library is loaded into this process.
+
+def link_libusb() -> Path | None:
+    """Links to libusb beside Open3D's libraries, for TensorBoard.
+
+    Returns:
+        The link; None where none is needed.
+
+    Raises:
+        InputError: The folder of Open3D cannot be written.
     """
-    open3d = find_spec("open3d")
-    if sys.platform != "linux" or open3d is None or open3d.origin is None:
-        return
-    with contextlib.suppress(OSError):
-        ctypes.CDLL(LIBUSB)
-        return  # the system has it
-    with contextlib.suppress(ImportError, OSError):  # importing Open3D then says what it lacks
-        import libusb_package
-
-        if library := libusb_package.get_library_path():
-            _lay_beside(Path(open3d.origin).parent, library)
-
-
-def _lay_beside(folder: Path, library: Path) -> None:
-    """Links to the library in a folder, or loads it where that cannot be done."""
-    link = folder / LIBUSB
+    lacking = _lacking_library()
+    if lacking is None:
+        return None
+    link, library = lacking
     try:
         if not link.exists():
             link.unlink(missing_ok=True)  # it points to a package that was there once
-            link.symlink_to(os.path.relpath(library, folder))
+            link.symlink_to(os.path.relpath(library, link.parent))
     except FileExistsError:
         pass  # another process has just made it
-    except OSError:
-        ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
+    except OSError as error:
+        raise InputError(
+            link, f"cannot be made ({error.strerror})", "Install libusb: apt install libusb-1.0-0."
+        ) from error
+    return link
+
+
+def _lacking_library() -> tuple[Path, Path] | None:
+    """Where a link belongs, and the library; None where Open3D has that, or is not there."""
+    open3d = find_spec("open3d")
+    if sys.platform != "linux" or open3d is None or open3d.origin is None:
+        return None
+    with contextlib.suppress(OSError):
+        ctypes.CDLL(LIBUSB)
+        return None  # the system has it
+    with contextlib.suppress(ImportError, OSError):
+        import libusb_package
+
+        if library := libusb_package.get_library_path():
+            return Path(open3d.origin).parent / LIBUSB, library
+    return None
+
+
+if __name__ == "__main__":
+    try:
+        made = link_libusb()
+    except InputError as error:
+        sys.exit(f"derain: {error}")
+    print(f"Linked {made}" if made else f"Open3D needs no link to {LIBUSB} here")

@@ -1,16 +1,22 @@
 """The best checkpoint of a training run, which a run that goes on takes along."""
 
 import os
+import re
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
 import lightning
+import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
 from torch import Tensor
 
+from derain.errors import InputError
 from derain.files.atomic import replacing
+from derain.files.documents import shown
 from derain.system.notices import warn
 
 
@@ -20,9 +26,13 @@ class BestCheckpoint(ModelCheckpoint):
     Lightning forgets what was best when the folder changes, and calls the first epoch there the
     best, however poor. This one goes on with the scores and with copies of the files; those of the
     earlier run stay.
+
+    Lightning removes files that it has kept once there are better ones, and a checkpoint is not
+    trusted to name them. So they are looked for beside the checkpoint, or in the run's own folder
+    where it wrote there before, and only under names that this callback gives.
     """
 
-    _earlier: Mapping[str, Any] | None = None  # state of a run that wrote to another folder
+    _earlier: Mapping[str, Any] | None = None  # state of the run that this one goes on from
 
     @property
     def state_key(self) -> str:
@@ -30,17 +40,14 @@ class BestCheckpoint(ModelCheckpoint):
         return super().state_key.replace(type(self).__qualname__, ModelCheckpoint.__qualname__, 1)
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
-        """Takes over the state; that of another folder when the training starts, if it does."""
-        if state_dict.get("dirpath", self.dirpath) == self.dirpath:
-            super().load_state_dict(state_dict)
-        else:
-            self._earlier = state_dict
+        """Keeps the state until the training starts, if it does."""
+        self._earlier = state_dict
 
     def on_train_start(self, trainer: lightning.Trainer, pl_module: Any) -> None:
-        """Goes on with what was best in another folder.
+        """Goes on with what was best before.
 
         Raises:
-            InputError: A copy cannot be written.
+            InputError: A state that holds no scores of checkpoints, or a copy cannot be written.
         """
         super().on_train_start(trainer, pl_module)
         if self._earlier is not None and not trainer.fast_dev_run:  # type: ignore[attr-defined]
@@ -48,38 +55,69 @@ class BestCheckpoint(ModelCheckpoint):
         self._earlier = None
 
     def _go_on_from(self, trainer: lightning.Trainer, earlier: Mapping[str, Any]) -> None:
-        found = earlier.get("best_k_models", {})
-        ranking = sorted(found, key=lambda path: float(found[path]), reverse=self.mode == "max")
-        scores: dict[str, Tensor] = {}  # the best first
+        before, scores = _folder_and_scores(earlier, trainer.ckpt_path)
+        folder = Path(trainer.ckpt_path or "").parent if before != self.dirpath else Path(before)
+        kept: dict[str, Tensor] = {}  # the best first
+        ranking = sorted(scores, key=lambda path: float(scores[path]), reverse=self.mode == "max")
         for path in ranking[: None if self.save_top_k < 0 else self.save_top_k]:
-            copy = os.path.join(str(self.dirpath), os.path.basename(path))
-            if _copied(trainer, path, copy):
-                scores[copy] = found[path]
+            name = os.path.relpath(path, before)
+            copy = os.path.join(str(self.dirpath), name)
+            if _copied(trainer, self._own_file(folder, name), copy):
+                kept[copy] = scores[path]
             elif trainer.is_global_zero:
                 warn(f"{path}: not found; the best checkpoint is chosen from here on, without it")
-        if not scores:
+        if not kept:
             return
-        paths = list(scores)
+        paths = list(kept)
         super().load_state_dict(
             {
                 "dirpath": self.dirpath,
-                "best_k_models": scores,
+                "best_k_models": kept,
                 "best_model_path": paths[0],
-                "best_model_score": scores[paths[0]],
+                "best_model_score": kept[paths[0]],
                 "kth_best_model_path": paths[-1],
-                "kth_value": scores[paths[-1]],
+                "kth_value": kept[paths[-1]],
             }
         )
 
+    def _own_file(self, folder: Path, name: str) -> Path | None:
+        """A file in a folder if this callback may have written it there, else None."""
+        pattern = re.sub(r"{.*?}", "*", self.filename or "*")
+        if not fnmatch(name, f"{pattern}*{self.FILE_EXTENSION}"):
+            return None
+        with suppress(OSError, ValueError):  # what no file can be called
+            file = (folder / name).resolve()
+            if file.is_relative_to(folder.resolve()) and file.is_file():
+                return file
+        return None
 
-def _copied(trainer: lightning.Trainer, path: str, copy: str) -> bool:
+
+def _folder_and_scores(state: Mapping[str, Any], path: Any) -> tuple[str, dict[str, Tensor]]:
+    """The folder of the run that a state is of, and the scores of its checkpoints by their paths.
+
+    Raises:
+        InputError: The state holds something else.
+    """
+    folder, scores = state.get("dirpath"), state.get("best_k_models")
+    sound = isinstance(folder, str) and isinstance(scores, dict)
+    if not sound or not all(k and isinstance(k, str) and _is_score(scores[k]) for k in scores):
+        raise InputError(
+            str(path),
+            f"the scores of its best checkpoints are {shown(scores)}, in {shown(folder)}",
+            "Give a checkpoint that derain wrote.",
+        )
+    return folder, scores
+
+
+def _is_score(value: Any) -> bool:
+    if isinstance(value, Tensor):
+        return value.ndim == 0 and not value.is_complex() and not bool(torch.isnan(value))
+    return type(value) in (int, float) and value == value
+
+
+def _copied(trainer: lightning.Trainer, found: Path | None, copy: str) -> bool:
     """Copies a checkpoint of an earlier run, in the first process; whether it was there."""
-    found = None
-    if trainer.is_global_zero and "://" not in copy:
-        # A folder that was moved, or named from another one, is where the run goes on from.
-        beside = Path(trainer.ckpt_path or path).parent / os.path.basename(path)
-        found = next((file for file in (beside, Path(path)) if file.is_file()), None)
-    if found is not None:
+    if trainer.is_global_zero and found is not None:
         with replacing(Path(copy)) as temporary:
             shutil.copyfile(found, temporary)
     return bool(trainer.strategy.broadcast(found is not None))

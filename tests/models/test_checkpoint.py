@@ -160,7 +160,7 @@ def test_hyper_parameters_that_cannot_be_take_no_memory(
     content["hyper_parameters"].update(change)
     torch.save(content, path)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    with pytest.raises(InputError, match=r"model\.ckpt: its weights do not fit outdet"):
+    with pytest.raises(InputError, match=r"model\.ckpt: "):
         load_model(path)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000  # KiB
 

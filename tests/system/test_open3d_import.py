@@ -1,16 +1,17 @@
 """Open3D is imported, or the user is told what is missing; and TensorBoard starts beside it."""
 
+import errno
 import os
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
 import derain.system.open3d_import
 from derain.errors import InputError
-from derain.system.open3d_import import LIBUSB, import_open3d, make_open3d_loadable
+from derain.system.open3d_import import LIBUSB, SET_UP, import_open3d, link_libusb
 
 
 @pytest.fixture
@@ -38,8 +39,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespac
 
 
 def test_the_library_lies_where_open3d_looks(installed: SimpleNamespace) -> None:
-    make_open3d_loadable()
-    make_open3d_loadable()
+    assert link_libusb() == link_libusb() == installed.link
     assert installed.link.samefile(installed.library)
     assert not os.path.isabs(installed.link.readlink())  # an environment may be moved
     assert installed.loaded == []
@@ -47,31 +47,49 @@ def test_the_library_lies_where_open3d_looks(installed: SimpleNamespace) -> None
 
 def test_a_link_to_a_package_that_is_gone_is_made_again(installed: SimpleNamespace) -> None:
     installed.link.symlink_to("gone/libusb-1.0.so")
-    make_open3d_loadable()
+    link_libusb()
     assert installed.link.samefile(installed.library)
 
 
-def test_where_no_link_can_be_made_this_process_loads_the_library(
+def test_a_link_that_cannot_be_made_is_reported(
     installed: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*paths: object) -> None:
-        raise PermissionError
+        raise PermissionError(errno.EACCES, "Permission denied")
 
     monkeypatch.setattr(Path, "symlink_to", refuse)
-    make_open3d_loadable()
-    assert installed.loaded == [str(installed.library)]
-    assert not installed.link.exists()
+    with pytest.raises(InputError, match=LIBUSB):
+        link_libusb()
 
 
 def test_a_library_of_the_system_is_left_to_serve(
     installed: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(derain.system.open3d_import.ctypes, "CDLL", lambda name: None)
-    make_open3d_loadable()
+    assert link_libusb() is None
     assert not installed.link.exists()
 
 
-def test_tensorboard_loads_its_plug_ins_once_derain_has_used_open3d() -> None:
+def test_a_command_loads_the_library_and_writes_nothing_beside_open3d(
+    installed: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "open3d", ModuleType("open3d"))
+    import_open3d()
+    assert installed.loaded == [str(installed.library)]
+    assert not installed.link.is_symlink()
+
+
+def test_a_training_warns_of_what_tensorboard_lacks_and_writes_nothing_beside_open3d(
+    installed: SimpleNamespace, run_derain, capsys: pytest.CaptureFixture[str]
+) -> None:
+    outcome = run_derain("fit", "--config", "outdet_wads.yaml", "--trainer.max_epoch", "1")
+    assert f"{LIBUSB}; `{SET_UP}`" in outcome.err
+    assert not installed.link.is_symlink()
+    link_libusb()
+    assert SET_UP not in run_derain("fit", "--config", "outdet_wads.yaml", "--colour", "1").err
+
+
+def test_tensorboard_loads_its_plug_ins_once_the_link_is_made() -> None:
     try:
         import_open3d()
     except InputError as error:

@@ -1,7 +1,10 @@
 """``derain fit``, ``validate``, ``test`` and ``predict``: Lightning's own command line."""
 
 import argparse
+import shlex
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +16,7 @@ from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
 from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
 from lightning.pytorch.loggers import TensorBoardLogger
 
+from derain.cli.outputs import say
 from derain.cli.start import START_HELP, checkpoint_of
 from derain.cli.training.configurations import own_configurations, with_packaged_configs
 from derain.cli.training.errors import as_input_error, read_configuration
@@ -36,7 +40,9 @@ from derain.datamodules.simulated import Simulated
 from derain.datamodules.taught import Taught
 from derain.datamodules.wads import Wads
 from derain.datamodules.worlds import Worlds
-from derain.errors import InputError
+from derain.default.model_card import LARGEST_SEED
+from derain.errors import InputError, reason_of
+from derain.files.documents import Entry
 from derain.models.base import DerainingModule
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
 from derain.models.callbacks.dashboard import Dashboard
@@ -46,17 +52,27 @@ from derain.models.callbacks.prediction import PredictionWriter
 from derain.models.callbacks.report import TestReport
 from derain.models.callbacks.step_times import StepTimes
 from derain.models.callbacks.whole_checkpoints import save_whole
-from derain.models.checkpoint import check_resumable, load_model
+from derain.models.checkpoint import check_resumable, class_path, load_model, network_of_checkpoint
+from derain.models.limits import check_hyperparameters
 from derain.models.measured import MONITOR
 from derain.models.registry import NETWORKS
 from derain.models.start import started
 from derain.system.cores import usable_cores
 from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
-from derain.system.open3d_import import make_open3d_loadable
+from derain.system.open3d_import import warn_where_tensorboard_cannot_start
 from derain.system.workers import end_with_launcher
 
 # What `--ckpt_path` may be besides a file: checkpoints that Lightning looks for itself.
 FOUND_BY_LIGHTNING = ("last", "hpc")
+
+# Numbers that Lightning and the callbacks take as they are.
+LEAST = {
+    "trainer.accumulate_grad_batches": 1,
+    "trainer.log_every_n_steps": 0,
+    "panels.scans": 0,
+    "panels.pictures": 0,
+    "errors.pictures": 0,
+}
 
 
 class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatter):
@@ -114,6 +130,7 @@ class DerainCLI(LightningCLI):
             super().parse_arguments(parser, args)
         except argparse.ArgumentError as error:
             raise as_input_error(error.message, known, files) from error
+        self._check_options()
         path = self.config[self.config.subcommand].get("ckpt_path")
         if path in (None, *FOUND_BY_LIGHTNING):
             return
@@ -123,6 +140,38 @@ class DerainCLI(LightningCLI):
         check(Path(path))
         if self.config.subcommand == "test":
             self._log_beside(Path(path), arguments)
+
+    def _parse_ckpt_path(self) -> None:
+        """Takes the model's class and arguments from the checkpoint, as Lightning does.
+
+        Lightning would import whatever class the file names; here it is that of the registry.
+        """
+        config = self.config[self.config.subcommand]
+        path = config.get("ckpt_path")
+        if path not in (None, *FOUND_BY_LIGHTNING):
+            network, arguments = network_of_checkpoint(Path(path))
+            model = {"class_path": class_path(network), "dict_kwargs": arguments}
+            try:
+                self.config = self.parser.parse_object(
+                    {self.config.subcommand: {"model": model}}, self.config
+                )
+            except argparse.ArgumentError as error:
+                raise InputError(path, reason_of(error), "Give a checkpoint of derain.") from error
+
+    def _check_options(self) -> None:
+        """Refuses values of options that torch or Lightning would stumble over later."""
+        config = self.config[self.config.subcommand]
+        seed = Entry("--seed_everything", "", config.seed_everything)
+        if not isinstance(seed.value, bool):
+            seed.whole(0, LARGEST_SEED)
+        for option, least in LEAST.items():
+            number = config.get(option)
+            if isinstance(number, int) and number < least:
+                raise InputError(f"--{option}", f"{number} is too few", f"Give {least} or more.")
+        arguments = config.model.get("init_args") or {}
+        check_hyperparameters(
+            {name: Entry(f"--model.{name}", "", value) for name, value in arguments.items()}
+        )
 
     def _log_beside(self, checkpoint: Path, arguments: list[str]) -> None:
         """Has a test log into the folder of its training, unless it was told where to."""
@@ -136,16 +185,27 @@ class DerainCLI(LightningCLI):
                 logger.init_args[name] = value
 
     def instantiate_trainer(self, **kwargs: Any) -> Trainer:
-        """Makes the trainer, which writes its checkpoints whole or not at all."""
-        return save_whole(super().instantiate_trainer(**kwargs))
+        """Makes the trainer, which writes its checkpoints whole or not at all.
+
+        Raises:
+            InputError: Options that no trainer can be made with.
+        """
+        try:
+            return save_whole(super().instantiate_trainer(**kwargs))
+        except (ValueError, TypeError) as error:  # Lightning checks some options in these ways
+            raise _of_the_trainer(error) from error
+
+    def after_fit(self) -> None:
+        """Prints where the best checkpoint is, and the command that makes a model of it."""
+        best = self.trainer.checkpoint_callback.best_model_path
+        if best and self.trainer.is_global_zero and not self.trainer.fast_dev_run:
+            say(f"Best checkpoint: {best}")
+            say(f"derain export {shlex.quote(best)} --out model.onnx")
 
     def instantiate_classes(self) -> None:
         """Instantiates data, model and trainer; what they find wrong is not the parser's error."""
         try:
             super().instantiate_classes()
-        except MisconfigurationException as error:
-            reason = str(error).rstrip(".")
-            raise InputError("--trainer", reason, "Correct the option that it names.") from error
         except ValueError as error:
             if isinstance(error.__cause__, InputError):
                 raise error.__cause__ from None
@@ -153,6 +213,24 @@ class DerainCLI(LightningCLI):
         start = self.config[self.config.subcommand].get("start")
         if start is not None and self.config.subcommand == "fit":
             self.model = started(self.model, checkpoint_of(start), start)
+
+
+def _of_the_trainer(error: Exception) -> InputError:
+    """What Lightning finds wrong with its options; it names them itself."""
+    return InputError("--trainer", str(error).rstrip("."), "Correct the option that it names.")
+
+
+@contextmanager
+def naming_the_trainer() -> Iterator[None]:
+    """Turns what Lightning refuses, before a training or in it, into one line.
+
+    Raises:
+        InputError: Lightning refused something.
+    """
+    try:
+        yield
+    except MisconfigurationException as error:
+        raise _of_the_trainer(error) from error
 
 
 def train(arguments: list[str]) -> None:
@@ -168,7 +246,8 @@ def train(arguments: list[str]) -> None:
     """
     arguments = ["--help" if argument == ALL else argument for argument in arguments]
     silence_advertisements()
-    make_open3d_loadable()  # TensorBoard is to start, and show what this run logs
+    if arguments[0] == "fit":
+        warn_where_tensorboard_cannot_start()
     # Lightning means the mixing of both; arguments of the command line are all that we pass on.
     warnings.filterwarnings("ignore", message="LightningCLI's args parameter")
     # Lightning 2.6 uses a name that torch 2.13 deprecates.
@@ -185,7 +264,7 @@ def train(arguments: list[str]) -> None:
         "allow_abbrev": False,  # a misspelling is no abbreviation
         "exit_on_error": False,  # what is wrong we say ourselves
     }
-    with writing_to_the_run_folder():
+    with writing_to_the_run_folder(), naming_the_trainer():
         DerainCLI(
             DerainingModule,
             ScanDataModule,

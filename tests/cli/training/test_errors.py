@@ -61,6 +61,29 @@ def test_a_configuration_is_refused_in_a_line(run_derain, content: str, said: st
     assert refusal(run_derain, "--config", "mine.yaml").startswith(f"mine.yaml: {said}")
 
 
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("--model.learning_rate", "-1"),
+        ("--model.learning_rate", "1e400"),
+        ("--model.neighbours", "0"),
+        ("--model.neighbours", "1000000000"),
+        ("--data.loading.batch_size", "0"),
+        ("--data.loading.workers", "-1"),
+        ("--seed_everything", "-1"),
+        ("--seed_everything", "100000000000000000000"),
+        ("--trainer.devices", "-1"),
+        ("--trainer.strategy", "foo"),
+        ("--trainer.accumulate_grad_batches", "0"),
+        ("--panels.pictures", "-1"),
+    ],
+)
+def test_a_value_that_cannot_be_is_refused_by_its_option(
+    run_derain, option: str, value: str
+) -> None:
+    assert option.split(".")[-1].removeprefix("--") in refusal(run_derain, f"{option}={value}")
+
+
 def test_what_the_trainer_cannot_use_is_one_line(run_derain) -> None:
     line = refusal(run_derain, "--trainer.max_epochs", "-3")
     assert line.startswith("--trainer: `max_epochs` must be")

@@ -1,6 +1,7 @@
 """``derain fit|validate|test|predict``: Lightning's command line, and what it cannot use."""
 
 import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -78,6 +79,34 @@ def test_a_checkpoint_that_cannot_be_used_is_one_line(
     assert line.startswith(f"derain: {path}: ")
     assert reason in line
     assert not Path("runs").exists()
+
+
+def test_a_checkpoint_chooses_no_module_to_import(
+    run_derain, wads: list[str], checkpoint: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("foreign.py").write_text("raise RuntimeError('imported')")
+    monkeypatch.syspath_prepend(str(Path.cwd()))
+    content = torch.load(checkpoint, weights_only=True)
+    content["hyper_parameters"]["_class_path"] = "foreign.Network"
+    torch.save(content, "foreign.ckpt")
+    outcome = run_derain("validate", *wads, "--ckpt_path", "foreign.ckpt")
+    assert outcome.code == 0, outcome.err
+    written = yaml.safe_load(Path("runs/outdet_wads/version_0/config.yaml").read_text())
+    assert written["model"]["class_path"] == "derain.models.outdet.module.OutDet"
+
+
+def test_a_training_that_diverges_is_one_line_and_leaves_no_checkpoint_of_it(
+    run_derain, wads: list[str]
+) -> None:
+    quick = ["--panels.scans", "0", "--errors.pictures", "0", "--trainer.max_epochs", "3"]
+    outcome = run_derain("fit", *wads, *quick, "--model.learning_rate", "1e30")
+    assert outcome.code == 2
+    line = outcome.err.splitlines()[-1]
+    assert line.startswith("derain: ")
+    assert "not finite" in line
+    assert "learning" in line
+    for path in Path("runs").rglob("*.ckpt"):
+        load_model(path)
 
 
 def test_no_training_goes_on_from_weights_alone(
@@ -232,10 +261,16 @@ def test_nothing_but_derain_reports_on_a_run(
     assert "Tip" not in caplog.text
 
 
+TO_ONNX = ("--out", "model.onnx")
+
+
 def test_training_goes_on_from_a_checkpoint(run_derain, wads: list[str]) -> None:
     last = Path("runs/outdet_wads/version_0/checkpoints/last.ckpt")
     short = ["--panels.scans", "0", "--errors.pictures", "0", "--trainer.max_epochs"]
-    assert run_derain("fit", *wads, *short, "1").code == 0
+    trained = run_derain("fit", *wads, *short, "1")
+    assert trained.code == 0
+    export = shlex.split(trained.out.splitlines()[-1])
+    assert export == ["derain", "export", str(last.with_name("best.ckpt")), *TO_ONNX]
     assert run_derain("fit", *wads, *short, "2", "--ckpt_path", last).code == 0
     first = torch.load(last, weights_only=True)
     second = torch.load(str(last).replace("version_0", "version_1"), weights_only=True)

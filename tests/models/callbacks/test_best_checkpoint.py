@@ -12,9 +12,14 @@ from lightning.pytorch.callbacks import ModelCheckpoint
 from torch import Tensor
 
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
+from derain.models.callbacks.resumption import Resumption
 
 MakeTrainer = Callable[..., lightning.Trainer]
 Fit = Callable[..., ModelCheckpoint]
+
+
+# As derain's command line has it: a run in the same folder writes under the same names.
+NAMED = {"enable_version_counter": False}
 
 
 class Counter(lightning.LightningModule):
@@ -47,10 +52,13 @@ def fit(make_trainer: MakeTrainer, tmp_path: Path) -> Fit:
         kind: type[ModelCheckpoint] = BestCheckpoint,
         **options: Any,
     ) -> ModelCheckpoint:
-        best = kind(tmp_path / folder, monitor="score", **{"filename": "best", **options})
-        last = ModelCheckpoint(tmp_path / folder, filename="last")
+        best = kind(tmp_path / folder, monitor="score", **{**NAMED, "filename": "best", **options})
+        last = ModelCheckpoint(tmp_path / folder, **NAMED, filename="last")
         trainer = make_trainer(
-            epochs, callbacks=[best, last], enable_checkpointing=True, log_every_n_steps=1
+            epochs,
+            callbacks=[best, last, Resumption()],
+            enable_checkpointing=True,
+            log_every_n_steps=1,
         )
         data = torch.utils.data.DataLoader(torch.ones(1))
         path = tmp_path / earlier / "last.ckpt" if earlier else None
@@ -120,6 +128,43 @@ def test_nothing_of_the_earlier_run_is_removed_from_a_folder_within(
     assert weights(tmp_path / "runs") == {"epoch=2.ckpt": 3}
 
 
+@pytest.mark.parametrize(
+    "named", ["../precious.ckpt", "notes.txt", "other.ckpt", "..", "../../precious.ckpt"]
+)
+@pytest.mark.parametrize("folder", ["runs/first", "runs/second"])
+def test_no_file_is_lost_that_a_checkpoint_names(
+    fit: Fit, tmp_path: Path, folder: str, named: str
+) -> None:
+    scores = (1.0, 2.0, 3.0)
+    run = tmp_path / "runs/first"
+    fit("runs/first", 1, scores, mode="max")
+    precious = [tmp_path / "precious.ckpt", tmp_path / "runs/precious.ckpt"]
+    precious += [run / "notes.txt", run / "other.ckpt"]
+    for file in precious:
+        file.write_text("precious")
+    content = torch.load(run / "last.ckpt", weights_only=True)
+    path = f"{run}/{named}"
+    for state in content["callbacks"].values():
+        state.update(best_model_path=path, kth_best_model_path=path, last_model_path=path)
+        state.update(best_k_models={path: torch.tensor(0.5)})
+    torch.save(content, run / "last.ckpt")
+    fit(folder, 3, scores, earlier="runs/first", mode="max")
+    assert [file.read_text() for file in precious] == ["precious"] * len(precious)
+    assert torch.load(tmp_path / folder / "best.ckpt", weights_only=True)["epoch"] == 2
+
+
+def test_a_run_that_goes_on_in_its_folder_replaces_what_it_has_kept(
+    fit: Fit, tmp_path: Path
+) -> None:
+    scores = (2.0, 1.0, 3.0)
+    options = {"mode": "max", "filename": "{epoch}"}
+    fit("run", 1, scores, **options)
+    fit("run", 2, scores, earlier="run", **options)
+    assert weights(tmp_path / "run") == {"epoch=0.ckpt": 1}
+    fit("run", 3, scores, earlier="run", **options)
+    assert weights(tmp_path / "run") == {"epoch=2.ckpt": 3}
+
+
 def test_a_run_that_was_moved_goes_on_with_its_best(fit: Fit, tmp_path: Path) -> None:
     scores = (3.0, 1.0, 2.0)
     fit("first", 1, scores, mode="max")
@@ -156,7 +201,10 @@ def test_only_the_first_process_copies(fit: Fit, tmp_path: Path, first: bool) ->
     best.load_state_dict(state)
     told = SimpleNamespace(broadcast=lambda _: True)
     trainer = SimpleNamespace(
-        is_global_zero=first, ckpt_path=None, fast_dev_run=False, strategy=told
+        is_global_zero=first,
+        ckpt_path=tmp_path / "first/last.ckpt",
+        fast_dev_run=False,
+        strategy=told,
     )
     best.on_train_start(trainer, None)
     assert (tmp_path / "second/best.ckpt").exists() == first

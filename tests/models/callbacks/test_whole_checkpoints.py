@@ -1,5 +1,6 @@
 """Checkpoints of training runs are written whole or not at all."""
 
+import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 import torch
 from lightning.pytorch.plugins.io import TorchCheckpointIO
 
+from derain.errors import InputError
 from derain.models.callbacks.whole_checkpoints import WholeCheckpoints, save_whole
 from derain.models.checkpoint import load_model, save_model
 from derain.models.outdet import OutDet
@@ -41,6 +43,17 @@ def test_the_checkpoint_that_is_there_stays_until_the_next_is_whole(
         save_model(outdet(seed=1), path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_weights_that_are_not_finite_take_no_checkpoints_place(
+    tmp_path: Path, value: float
+) -> None:
+    path = tmp_path / "best.ckpt"
+    path.write_bytes(b"the last good one")
+    with pytest.raises(InputError, match=r"best\.ckpt: the weights head are not finite"):
+        WholeCheckpoints().save_checkpoint({"state_dict": {"head": torch.tensor(value)}}, path)
+    assert path.read_bytes() == b"the last good one"
 
 
 def test_an_address_is_left_to_lightning() -> None:

@@ -1,0 +1,76 @@
+"""What the hyper-parameters of a network can be, whether a user or a file gives them."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from derain.files.documents import Entry, shown
+from derain.views.neighbours import MOST_NETWORK_NEIGHBOURS
+
+# Its multiples, by what an optimiser divides it by, still are numbers of 32 bits.
+LARGEST_COMPUTABLE = 1e30
+
+
+def check_hyperparameters(
+    parameters: Mapping[str, Entry], defaults: Mapping[str, Any] = {}
+) -> None:
+    """Refuses hyper-parameters that no network can be trained with.
+
+    Args:
+        parameters: Each by its name; a network may have others than those limited here.
+        defaults: The network's own, which they are to be like; those not named may be anything.
+
+    Raises:
+        InputError: Anything but plain values, numbers that are not finite or out of their limits,
+            or values of another kind than the defaults.
+    """
+    for name, entry in parameters.items():
+        _refuse_what_is_not_plain(entry)
+        _refuse_another_kind(entry, defaults.get(name))
+        if name in _LIMITS:
+            _LIMITS[name](entry)
+
+
+def _refuse_what_is_not_plain(entry: Entry) -> None:
+    left, seen = [entry.value], set[int]()
+    while left:
+        value = left.pop()
+        if isinstance(value, list | tuple | dict):
+            if id(value) not in seen:  # a file may hold one list in itself, or in a million places
+                left += value.values() if isinstance(value, dict) else value
+            seen.add(id(value))
+        elif isinstance(value, float) and not math.isfinite(value):
+            raise entry.fault(f"{value} is not finite", "Give a finite number.")
+        elif not isinstance(value, str | bool | int | float | None):
+            raise entry.fault(f"{shown(value)} is no plain value", "Give numbers and texts.")
+
+
+def _refuse_another_kind(entry: Entry, default: Any) -> None:
+    """Refuses what is not like a default that is a number, true or false, or some of a kind."""
+    if isinstance(default, tuple) and default and isinstance(entry.value, list | tuple):
+        for number, value in enumerate(entry.value):
+            _refuse_another_kind(Entry(entry.source, f"{entry.key}[{number}]", value), default[0])
+    elif isinstance(default, tuple):
+        entry.items()
+    elif isinstance(default, bool):
+        entry.truth()
+    elif isinstance(default, int | float):
+        entry.number()
+
+
+def _number(least: float, most: float = LARGEST_COMPUTABLE) -> Callable[[Entry], object]:
+    return lambda entry: entry.within(least, most)
+
+
+# A network reads only those that it has.
+_LIMITS: dict[str, Callable[[Entry], object]] = {
+    "learning_rate": _number(0),
+    "weight_decay": _number(0),
+    "decay": _number(0),
+    "balance": _number(0),
+    "warm_up": _number(0),
+    "momentum": _number(0, 1),
+    "dropout": _number(0, 1),
+    "threshold": _number(0, 1),
+    "neighbours": lambda entry: entry.whole(1, MOST_NETWORK_NEIGHBOURS),
+}
