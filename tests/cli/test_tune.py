@@ -174,7 +174,7 @@ def test_intensities_of_another_unit_are_warned_of_and_scaled(
     outcome = run_derain("tune", "ssr", *data, *options)
     assert outcome.said == [
         f"derain: warning: {tmp_path / 'velodyne/0.bin'}: intensities of 0..1, but 0..255 for "
-        "ssr: see --intensity-scale",
+        "ssr: see --intensity-scale or Scan.with_intensity_times",
         "derain: warning: 2 more scans: intensity of a smaller unit",
     ]
     scaled = run_derain("tune", "ssr", *data, *options, "--intensity-scale", "256")

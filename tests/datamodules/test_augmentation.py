@@ -68,8 +68,8 @@ def test_a_mirror_changes_left_and_right_and_nothing_else() -> None:
     scan = street()
     mirrored = MIRROR(scan, np.random.default_rng(0))
     np.testing.assert_array_equal(mirrored.xyz, scan.xyz * [1, -1, 1])
-    assert mirrored.intensity is scan.intensity
-    assert mirrored.label is scan.label
+    np.testing.assert_array_equal(mirrored.intensity, scan.intensity)
+    np.testing.assert_array_equal(mirrored.label, scan.label)
 
 
 @given(st.integers(0, 2**32))
@@ -138,8 +138,8 @@ def test_everything_else_stays() -> None:
     scan = street()
     before = scan.xyz.copy()
     changed = BOTH(scan, np.random.default_rng(0))
-    assert changed.intensity is scan.intensity
-    assert changed.label is scan.label
+    np.testing.assert_array_equal(changed.intensity, scan.intensity)
+    np.testing.assert_array_equal(changed.label, scan.label)
     assert changed.xyz.dtype == np.float32
     np.testing.assert_array_equal(scan.xyz, before)
 
