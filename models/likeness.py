@@ -48,12 +48,12 @@ def like(found: Entry, own: Any) -> Any:
     return value
 
 
-def _like_mapping(found: Entry, own: Mapping[Any, Any]) -> dict[Any, Any]:
+def _like_mapping(found: Entry, own: Mapping[Any, Any]) -> Any:
     public = {key for key in own if isinstance(key, str) and not key.startswith("_")}
     if missing := public - found.value.keys():
         raise found.fault(f"{min(missing)} is missing", REMEDY)
     taken = {key: like(_part(found, key), own[key]) for key in found.value if key in own}
-    return type(found.value)(taken)
+    return type(own)(taken)  # type: ignore[call-arg]  # a dict or a Counter
 
 
 def _part(whole: Entry, key: Any) -> Entry:

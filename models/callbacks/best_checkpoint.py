@@ -99,14 +99,17 @@ def _folder_and_scores(state: Mapping[str, Any], path: Any) -> tuple[str, dict[s
         InputError: The state holds something else.
     """
     folder, scores = state.get("dirpath"), state.get("best_k_models")
-    sound = isinstance(folder, str) and isinstance(scores, dict)
-    if not sound or not all(k and isinstance(k, str) and _is_score(scores[k]) for k in scores):
-        raise InputError(
-            str(path),
-            f"the scores of its best checkpoints are {shown(scores)}, in {shown(folder)}",
-            "Give a checkpoint that derain wrote.",
-        )
-    return folder, scores
+    if (
+        isinstance(folder, str)
+        and isinstance(scores, dict)
+        and all(key and isinstance(key, str) and _is_score(scores[key]) for key in scores)
+    ):
+        return folder, scores
+    raise InputError(
+        str(path),
+        f"the scores of its best checkpoints are {shown(scores)}, in {shown(folder)}",
+        "Give a checkpoint that derain wrote.",
+    )
 
 
 def _is_score(value: Any) -> bool:

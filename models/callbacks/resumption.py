@@ -41,7 +41,7 @@ class Resumption(lightning.Callback):
             if isinstance(callback, ModelCheckpoint):
                 del states[key]
             else:
-                found = Entry(trainer.ckpt_path, f"callbacks.{key}", states[key])
+                found = Entry(str(trainer.ckpt_path), f"callbacks.{key}", states[key])
                 states[key] = like(found, callback.state_dict())
         self._checkpoint = checkpoint
 
@@ -56,20 +56,23 @@ class Resumption(lightning.Callback):
             return
         precision = trainer.precision_plugin
         schedulers = [config.scheduler for config in trainer.lr_scheduler_configs]
-        own = {
-            "optimizer_states": [_state_after_a_step(each) for each in trainer.optimizers],
+        optimizers = [_state_after_a_step(each) for each in trainer.optimizers]
+        own: dict[str, Any] = {
+            "optimizer_states": optimizers,
             "lr_schedulers": [scheduler.state_dict() for scheduler in schedulers],
             type(precision).__qualname__: precision.state_dict(),
         }
         checkpoint.pop("native_amp_scaling_state", None)  # of Lightning before 1.6
-        for name, state in own.items():
-            if name in checkpoint:
-                checkpoint[name] = like(Entry(trainer.ckpt_path, name, checkpoint[name]), state)
-        for number, state in enumerate(own["optimizer_states"]):
-            groups = checkpoint["optimizer_states"][number]["param_groups"]
-            if [g["params"] for g in groups] != [g["params"] for g in state["param_groups"]]:
-                name = f"optimizer_states.{number}.param_groups"
-                raise Entry(trainer.ckpt_path, name, None).fault("orders them otherwise", REMEDY)
+        whole = {name: Entry(str(trainer.ckpt_path), name, checkpoint.get(name)) for name in own}
+        for name in own.keys() & checkpoint.keys():
+            checkpoint[name] = like(whole[name], own[name])
+        for found, state in zip(checkpoint["optimizer_states"], optimizers, strict=True):
+            if _order(found) != _order(state):
+                raise whole["optimizer_states"].fault("orders parameters otherwise", REMEDY)
+
+
+def _order(state: dict[str, Any]) -> list[Any]:
+    return [group["params"] for group in state["param_groups"]]
 
 
 def _state_after_a_step(optimizer: Optimizer) -> dict[str, Any]:

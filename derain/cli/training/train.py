@@ -197,8 +197,8 @@ class DerainCLI(LightningCLI):
 
     def after_fit(self) -> None:
         """Prints where the best checkpoint is, and the command that makes a model of it."""
-        best = self.trainer.checkpoint_callback.best_model_path
-        if best and self.trainer.is_global_zero and not self.trainer.fast_dev_run:
+        best = getattr(self.trainer.checkpoint_callback, "best_model_path", "")
+        if best and self.trainer.is_global_zero:
             say(f"Best checkpoint: {best}")
             say(f"derain export {shlex.quote(best)} --out model.onnx")
 
