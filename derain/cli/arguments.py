@@ -20,10 +20,7 @@ def whole(text: str) -> int:
 
 def number(text: str) -> float:
     """A finite number."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = _float(text)
     if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f"{text} is not a number")
     return value
@@ -46,15 +43,15 @@ def add_threads(parser: argparse.ArgumentParser) -> None:
 
 def factor(text: str) -> float:
     """A finite number above 0."""
-    value = number(text)
-    if not value > 0:
+    value = _float(text)
+    if not (value > 0 and math.isfinite(value)):
         raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
     return value
 
 
 def share(text: str) -> float:
     """A number from 0 to 1."""
-    value = number(text)
+    value = _float(text)
     if not 0 <= value <= 1:
         raise argparse.ArgumentTypeError(f"{text} is not a number from 0 to 1")
     return value
@@ -80,6 +77,14 @@ def command_line(arguments: argparse.Namespace, positional: str | None = None) -
         elif not isinstance(value, bool):
             words.append(str(value))
     return printable(shlex.join(words))
+
+
+def _float(text: str) -> float:
+    """The number that a text is; NaN where it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def _at_least(least: int, text: str) -> int:

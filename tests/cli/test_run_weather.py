@@ -188,7 +188,7 @@ def test_an_empty_scan_tells_nothing(run_derain, tmp_path: Path) -> None:
         (("--warning", "40", "30"), "Give two numbers of metres, the second one greater"),
         (("--error", "35", "38"), "does not lie below the warning"),
         (("--hold", "0"), "--hold: 0 is less than 1"),
-        (("--warning", "nan", "30"), "Give two numbers of metres, the second one greater"),
+        (("--warning", "nan", "30"), "--warning: nan is not a number"),
     ],
 )
 def test_levels_that_cannot_be_are_refused_before_any_work(

@@ -253,7 +253,7 @@ def test_clean_scans_are_not_overwritten(run_derain, clean: Path) -> None:
     ("arguments", "message"),
     [
         (["--rain", "-1"], "rain rate: -1.0 mm/h is no rain rate. Give up to 2000 mm/h."),
-        (["--rain", "nan"], "rain rate: nan mm/h is no rain rate. Give up to 2000 mm/h."),
+        (["--rain", "nan"], "--rain: nan is not a number."),
         (["--seed", "-1"], "--seed: -1 is negative. Give 0 or more."),
         (["--sensor", "mars"], "mars: no such sensor. Give a YAML file or one of front_128,"),
         (["--picture"], "--picture: has a meaning only with --on. Leave it out."),
