@@ -6,7 +6,6 @@ import struct
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, suppress
-from dataclasses import replace
 from functools import cache, partial
 from io import BytesIO
 from pathlib import Path
@@ -22,7 +21,6 @@ from mcap.data_stream import RecordBuilder
 from benchmarks.fuzzing.false_indexes import (
     MCAP_MAGIC,
     chunks_times,
-    renamed,
     ros1_with_index,
     stating,
     with_summary,
@@ -39,9 +37,6 @@ from benchmarks.recorded_bags import (
     drive,
     table_of,
     write_bag,
-)
-from benchmarks.recorded_bags import (
-    POINTS as POINTS_TOPIC,
 )
 from derain.bags.bag_copy import BagCopy
 from derain.evaluation.hard_cases import scene
@@ -202,12 +197,6 @@ def _with(recorded: Recorded, message: bytes) -> Recorded:
     return Recorded(recorded.topic, recorded.type, recorded.time, message)
 
 
-def _with_nul(storage: Storage) -> bytes:
-    """A bag with a NUL in the name of a topic."""
-    messages = _messages(storage)
-    return _written(storage, [replace(each, topic=f"{each.topic}\0") for each in messages])
-
-
 def _lying(storage: Storage, lie: tuple[int, int, int, int]) -> bytes:
     """A bag with a cloud that says what is not so."""
     messages = _messages(storage)
@@ -226,7 +215,6 @@ def _hostile_ros1() -> list[Callable[[], bytes]]:
         lambda: _ros1_packed("bz2", lambda _: _bz2_bomb()),
         lambda: _ros1_packed("lz4", lambda _: _lz4_bomb()),
         lambda: _ros1_packed("lz4", lambda _: b""),
-        lambda: _with_nul("ros1"),
         lambda: ros1_with_index(_ros1()[0], topics=TOPICS),
         lambda: ros1_with_index(_ros1()[0], chunk_times=TOPICS),
     ]
@@ -247,7 +235,6 @@ def _hostile_sqlite3() -> list[Callable[[], bytes]]:
             "CREATE VIEW messages AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM"
             " n) SELECT i AS id, 1 AS topic_id, i AS timestamp, zeroblob(100) AS data FROM n"
         ),
-        lambda: _with_nul("sqlite3"),
         _database_of_many_topics,
         lambda: _database(
             "CREATE TABLE messages(id INTEGER, topic_id, timestamp, data)",
@@ -290,7 +277,6 @@ def _database_of_many_topics() -> bytes:
 def _hostile_mcap() -> list[Callable[[], bytes]]:
     content = partial(lambda: _chunk_of(_mcap()[1]))
     return [
-        *_lies("mcap"),
         lambda: _of_chunks([_chunk(content(), _zstd_bomb(), "zstd")]),
         lambda: _of_chunks([_chunk(content(), _zstd_bomb(), "zstd", BOMB * 10**6)]),
         lambda: _of_chunks([_chunk(content(), _lz4_bomb(), "lz4")]),
@@ -298,11 +284,9 @@ def _hostile_mcap() -> list[Callable[[], bytes]]:
         lambda: _of_chunks([_heavy_chunk()] * 12),
         lambda: _of_chunks([struct.pack("<BQ", 5, 2**62)]),
         lambda: _of_chunks([struct.pack("<BQ", 6, 2**62)]),
-        lambda: _with_nul("mcap"),
         lambda: _of_chunks([_empty_messages()]),
         lambda: with_summary(_mcap()[1], stating(10**15)),
         lambda: with_summary(_mcap()[1], chunks_times(10_000)),
-        lambda: with_summary(_mcap()[1], renamed(POINTS_TOPIC, "/other")),
         lambda: with_summary(_mcap()[1], _with_channels),
     ]
 
