@@ -35,7 +35,9 @@ def in_millimetres() -> NDArray[np.float32]:
 
 
 @pytest.mark.parametrize(
-    "make", [Derainer, lambda: FilterDerainer(DROR()), PersistenceDerainer], ids=str
+    "make",
+    [Derainer, lambda: FilterDerainer(DROR()), PersistenceDerainer],
+    ids=["model", "filter", "persistence"],
 )
 def test_every_kind_of_method_warns_of_another_unit_once(make: Callable[[], Method]) -> None:
     method, points = make(), in_millimetres()
