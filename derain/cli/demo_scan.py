@@ -11,7 +11,7 @@ from derain.cli.narration import Narrator
 from derain.cli.outputs import say
 from derain.cli.results import last_line
 from derain.default import DEFAULT
-from derain.files.labels import read_labels, semantic
+from derain.files.labels import LABEL, read_labels, semantic
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 
@@ -38,20 +38,25 @@ def clean_own_scans(narrator: Narrator, scans: Path, columns: Sequence[str], out
     narrator.step(
         *("run", DEFAULT, str(scans), "--out", str(out), "--columns", ",".join(columns)),
         result=last_line,
+        leaves=out,  # a scan that cannot be cleaned is reported, and the others are shown
     )
     for warning in narrator.warned[told:]:
         say(f"  {warning}")
     counted = np.zeros((len(BANDS), 2), np.int64)
-    for number, frame in enumerate(named_frames([scans], columns)):
+    picture = out / "before_after.png"
+    for frame in named_frames([scans], columns):
+        labels = out / f"{frame.key}{LABEL}"
+        if not labels.exists():
+            continue
         scan = frame.read()
-        rain = semantic(read_labels(out / f"{frame.key}.label", len(scan))) == 1
-        counted += taken_by_range(scan, rain)
-        if number == 0:
-            picture = out / "before_after.png"
+        rain = semantic(read_labels(labels, len(scan))) == 1
+        if not counted.any():
             heading = f"{frame.key}, cleaned by the model that comes with derain"
             save(before_after_figure(scan, rain, heading), picture)
-    say(f"  taken by range: {_shares(counted)}")
-    say(f"  before and after: {picture}")
+        counted += taken_by_range(scan, rain)
+    if counted.any():
+        say(f"  taken by range: {_shares(counted)}")
+        say(f"  before and after: {picture}")
 
 
 def taken_by_range(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:

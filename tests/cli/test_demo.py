@@ -96,12 +96,12 @@ def test_the_model_that_comes_with_derain_cleans_scans_of_the_users_own(
     clean_own_scans(Narrator(main, tmp_path / "log.txt"), mine, DEFAULT_COLUMNS, out)
     command, result, *warnings, by_range, picture = capsys.readouterr().out.splitlines()
     assert command == f"$ derain run default {mine} --out {out} --columns x,y,z,intensity"
-    assert "3 scans: 1,060 points" in result
-    assert any("far.bin" in warning for warning in warnings)
-    assert re.fullmatch(r"  taken by range: 0-10 m [\d.]+%, .*, 80\+ m [\d.]+%", by_range)
+    assert "2 scans: 1,000 points" in result
+    assert any("far.bin: left whole" in warning for warning in warnings)
+    assert re.fullmatch(r"  taken by range: 0-10 m [\d.]+%, .*, 40-80 m [\d.]+%", by_range)
     assert picture == f"  before and after: {out / 'before_after.png'}"
     assert imread(out / "before_after.png")[..., :3].std() > 0
-    assert {path.name for path in out.glob("*.label")} == {"0.label", "1.label", "far.label"}
+    assert {path.name for path in out.glob("*.label")} == {"0.label", "1.label"}
 
 
 def test_what_is_taken_is_counted_by_range() -> None:

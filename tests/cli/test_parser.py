@@ -59,7 +59,7 @@ def test_a_value_that_an_option_cannot_have_is_refused_in_words(
         ("run defaul . --out o", ("defaul: ", "Did you mean default?")),
         ("bench --data . --card kiti --methods all --out o", ("kiti: ", "Did you mean kitti?")),
         ("simulate --out o --sensor spining_64", ("Did you mean spinning_64?",)),
-        ("import-weights outdt w.pt --stats wads --out o", ("Did you mean outdet?",)),
+        ("import-weights outdt w.pt --stats wads --out o.ckpt", ("Did you mean outdet?",)),
         ("run default . --out o --runtime openvin", ("openvin: ", "Did you mean openvino?")),
         ("run dsor . --out o --set neighbour=3", ("neighbour. Did you mean neighbours?",)),
     ],

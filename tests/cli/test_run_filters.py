@@ -101,7 +101,7 @@ def test_the_intensity_scale_reaches_the_filter(run_derain, scan: Path, tmp_path
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["drorr"], "derain: drorr: no such file. Give a model written by `derain export`, or one"),
+        (["drorr"], "derain: drorr: no such file. Did you mean dror?"),
         (["ror", "--set", "radios=1"], "derain: ror: it has no parameter radios."),
         (["ror", "--set", "radius=wide"], "derain: ror: radius is 'wide'."),
         (["ror", "--set", "radius"], "--set: radius is not NAME=VALUE"),

@@ -261,6 +261,4 @@ def test_what_is_no_method_is_told_what_methods_there_are(
 ) -> None:
     outcome = run_derain("tune", "dzor", *data, "--out", tmp_path / "no.yaml")
     assert outcome.code == 2
-    assert "dzor: no such file. Give a model written by `derain export`, or one of default" in (
-        outcome.err
-    )
+    assert "dzor: no such file. Did you mean dsor?" in outcome.err

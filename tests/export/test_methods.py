@@ -89,7 +89,8 @@ def test_a_model_in_a_folder_that_may_not_be_searched_is_one_line(
         "export": [closed / "a.ckpt"],
         "import-weights": ["outdet", closed / "a.pt", "--stats", "wads"],
     }
-    outcome = run_derain(command, *options[command], "--out", tmp_path / "out.onnx")
+    out = tmp_path / ("out.ckpt" if command == "import-weights" else "out.onnx")
+    outcome = run_derain(command, *options[command], "--out", out)
     assert (outcome.code, outcome.out) == (2, "")
     (line,) = outcome.err.splitlines()
     assert line.startswith(f"derain: {closed}/a.")

@@ -134,7 +134,7 @@ def test_names_in_upper_case_and_names_as_text_are_understood(tmp_path: Path) ->
     assert len(find_scans([str(tmp_path)])) == 4
 
 
-@pytest.mark.parametrize("use", [read_scan, lambda path: write_scan(path, None)])
+@pytest.mark.parametrize("use", [read_scan, lambda path: write_scan(path, Scan(np.zeros((1, 3))))])
 def test_an_unknown_suffix_is_refused_with_the_known_ones(
     tmp_path: Path, use: Callable[[Path], object]
 ) -> None:

@@ -190,6 +190,6 @@ def test_lisnownet_is_trained_without_a_label_in_the_whole_data_set(
     # It cannot be measured, but it can be used.
     refusal = run_derain("test", *data, "--ckpt_path", best)
     assert refusal.code == 2
-    assert "Add them or leave the scan out." in refusal.err.splitlines()[-1]
+    assert "labels: FOLDER" in refusal.err.splitlines()[-1]
     assert run_derain("predict", *data, "--ckpt_path", best).code == 0
     assert len(list(Path("predictions").glob("*.label"))) == 2
