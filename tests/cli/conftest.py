@@ -28,7 +28,10 @@ def write_labelled() -> WriteScan:
 
 @pytest.fixture
 def wads(tmp_path: Path, write_labelled: WriteScan) -> list[str]:
-    """Options for a data set in the layout of WADS, of three sequences of one scan each."""
+    """Options for a data set in the layout of WADS, of three sequences of one scan each.
+
+    Nothing is drawn of a training.
+    """
     root = tmp_path / "WADS"
     for sequence in ("00", "01", "02"):
         folder = root / "sequences" / sequence
@@ -37,4 +40,5 @@ def wads(tmp_path: Path, write_labelled: WriteScan) -> list[str]:
     return [
         *("--config", "outdet_wads.yaml", "--data.root", str(root), "--data.split", split),
         *("--data.loading.workers", "0", "--trainer.enable_progress_bar", "false"),
+        *("--panels.scans", "0", "--errors.pictures", "0"),
     ]

@@ -38,12 +38,11 @@ def test_a_scan_gets_its_labels_and_loses_its_rain(
     assert list(item["milliseconds"]) == ["read", "view", "network", "back", "weather", "write"]
 
 
-@pytest.mark.parametrize("name", FILTERS)
-def test_hard_scans_keep_every_row_that_is_not_rain(run_derain, tmp_path: Path, name: str) -> None:
+def test_hard_scans_keep_every_row_that_is_not_rain(run_derain, tmp_path: Path) -> None:
     for number, case in enumerate(case for _, case in hard_cases(largest=3000)):
         suffix = ".bin" if case.intensity is not None else ".pcd"
         write_scan(tmp_path / "scans" / f"{number:02d}{suffix}", case)
-    outcome = run_derain("run", name, tmp_path / "scans", "--out", tmp_path / "out")
+    outcome = run_derain("run", "dror", tmp_path / "scans", "--out", tmp_path / "out")
     assert outcome.code == 0, outcome.err
     for path in (tmp_path / "scans").iterdir():
         before = read_scan(path)

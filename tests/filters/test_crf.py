@@ -201,10 +201,11 @@ def test_only_the_published_bound_has_a_unit() -> None:
     assert odd.kind == "intensity of a smaller unit"
 
 
+@pytest.mark.parametrize("variant", ["fitted", "published"])
 @pytest.mark.parametrize(("name", "scan"), list(hard_cases(5000)))
-def test_the_published_variant_survives_hard_scans(name: str, scan: Scan) -> None:
+def test_both_variants_survive_hard_scans(name: str, scan: Scan, variant: str) -> None:
     with np.errstate(all="raise", under="ignore"):
-        rain = FilterDerainer(CRF(variant="published"))(scan)
+        rain = FilterDerainer(CRF(variant=variant))(scan)
     assert rain.shape == (len(scan),)
     assert not rain[~scan.valid].any()
 

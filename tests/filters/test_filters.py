@@ -39,11 +39,10 @@ MIXED = {
 }
 
 
-@every_filter
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
-def test_a_hard_scan_gets_an_answer_for_every_row(name: str, scan: Scan) -> None:
+def test_a_hard_scan_gets_an_answer_for_every_row(scan: Scan) -> None:
     with np.errstate(all="raise", under="ignore"):
-        rain = FilterDerainer(filter_from(name, {}), threads=2)(scan)
+        rain = FilterDerainer(DSOR(), threads=2)(scan)
     assert rain.dtype == bool
     assert rain.shape == (len(scan),)
     assert not rain[~scan.valid].any()
@@ -81,8 +80,6 @@ def test_candidates_are_judged_as_without_bounds_and_nothing_else_is_rain(name: 
     among = candidates.among(scan)
     np.testing.assert_array_equal(of_candidates, rain & among)
     assert 0 < of_candidates.sum() < rain.sum()
-    for hard in HARD_CASES.values():
-        assert not FilterDerainer(filter_, 0, candidates)(hard)[~candidates.among(hard)].any()
 
 
 @every_filter

@@ -30,15 +30,6 @@ def randomise(network: nn.Module, seed: int) -> None:
                 tensor.normal_(0, fan_in**-0.5, generator=generator)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def one_thread() -> Iterator[None]:
-    """Threads that wait for each other come to a crawl where other programs want the cores."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
-
-
 @pytest.fixture
 def outdet() -> Callable[..., OutDet]:
     """Makes a 3D-OutDet in evaluation mode, of random weights, statistics and normalisation."""

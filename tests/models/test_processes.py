@@ -1,7 +1,6 @@
 """Several processes measure and predict every scan once: what one process finds, to the bit."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -36,7 +35,6 @@ def test_two_processes_find_what_one_finds(folder: Path) -> None:
         capture_output=True,
         text=True,
         timeout=300,
-        env={**os.environ, "OMP_NUM_THREADS": "1"},
         start_new_session=True,
     )
     assert finished.returncode == 0, finished.stderr

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import onnx
@@ -129,43 +130,39 @@ def optimised(path: Path, folder: Path) -> Counter[str]:
     return operators(folder / "optimised.onnx")
 
 
-@pytest.fixture(scope="module")
-def exported(
-    random_salsanext_lite: SalsaNextLite, tmp_path_factory: pytest.TempPathFactory
-) -> Callable[[bool], Path]:
-    """Exports the network in float32 or in eight bits, proved on one scene."""
-    folder = tmp_path_factory.mktemp("salsanext_lite")
+@pytest.fixture
+def exported(random_salsanext_lite: SalsaNextLite, made_once: Callable[..., Path]) -> Path:
+    """The network in float32, as an ONNX file."""
+    return made_once("salsanext_lite.onnx", partial(export, random_salsanext_lite))
 
-    def make(integer: bool) -> Path:
-        path = folder / f"{integer}.onnx"
-        if not path.exists():
-            scenes = [Scan.of(scene(3000, seed), f"scene {seed}") for seed in range(2)]
-            with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(onnx_file, "hard_cases", lambda: [("a scene", scenes[0])])
-                assert export(random_salsanext_lite, path, scenes if integer else ()).holds
-        return path
 
-    return make
+def convolutions(model: SalsaNextLite) -> int:
+    return sum(isinstance(layer, nn.Conv2d) for layer in model.network.modules())
 
 
 def test_the_exported_graph_has_its_convolutions_and_no_batch_norm(
-    random_salsanext_lite: SalsaNextLite, exported: Callable[[bool], Path], tmp_path: Path
+    random_salsanext_lite: SalsaNextLite, exported: Path, tmp_path: Path
 ) -> None:
-    found = operators(exported(False))
-    layers = random_salsanext_lite.network.modules()
-    assert found["Conv"] == sum(isinstance(layer, nn.Conv2d) for layer in layers)
+    found = operators(exported)
+    assert found["Conv"] == convolutions(random_salsanext_lite)
     assert not found.keys() & {"BatchNormalization", "DepthToSpace"}
     # Every ReLU is part of the convolution before it, or of the sum that it ends in.
-    run = optimised(exported(False), tmp_path)
+    run = optimised(exported, tmp_path)
     assert run["Conv"] + run["FusedConv"] == found["Conv"]
     assert run["Relu"] <= found["Add"]
 
 
 def test_in_eight_bits_nothing_leaves_the_integers_between_image_and_scores(
-    random_salsanext_lite: SalsaNextLite, exported: Callable[[bool], Path], tmp_path: Path
+    random_salsanext_lite: SalsaNextLite,
+    exported: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    run = optimised(exported(True), tmp_path)
-    layers = random_salsanext_lite.network.modules()
-    assert run["QLinearConv"] == sum(isinstance(layer, nn.Conv2d) for layer in layers)
+    scenes = [Scan.of(scene(3000, seed), f"scene {seed}") for seed in range(2)]
+    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(exported))
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("a scene", scenes[0])])
+    assert export(random_salsanext_lite, tmp_path / "int8.onnx", scenes).holds
+    run = optimised(tmp_path / "int8.onnx", tmp_path)
+    assert run["QLinearConv"] == convolutions(random_salsanext_lite)
     assert run["QuantizeLinear"] == run["DequantizeLinear"] == 1
     assert not run.keys() & {"Conv", "FusedConv", "Relu", "Add", "Concat"}

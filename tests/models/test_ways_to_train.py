@@ -211,6 +211,21 @@ def test_measuring_on_scans_without_rain_is_warned_of_once(
         assert warning not in capsys.readouterr().err
 
 
+def test_intensities_of_another_unit_are_warned_of_in_what_is_measured(
+    make_trainer: MakeTrainer, memory: InMemory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = OutDet()
+    make_trainer(epochs=1).fit(model, memory)
+    for measure, measured in {"validate": "validation", "test": "test"}.items():
+        scans = {part: memory.source(part) for part in ("train", "validation", "test")}
+        frames = scans[measured]
+        scans[measured] = [memory.read(frame).with_intensity_times(1 / 256) for frame in frames]
+        data = InMemory(*scans.values(), card="wads", loading=LOADING)
+        trainer = make_trainer(1, callbacks=[ScanCheck()])
+        getattr(trainer, measure)(model, data, verbose=False)
+        assert "mean intensity 0." in capsys.readouterr().err
+
+
 def test_callbacks_go_without_a_data_module(
     make_trainer: MakeTrainer,
     memory: InMemory,

@@ -48,13 +48,18 @@ def street(directions: Points, x: float = 0.0) -> Points:
         down = directions[:, 2] < 0
         range_[down] = np.minimum(range_[down], -HEIGHT / directions[down, 2])
     horizontal = np.linalg.norm(directions[:, :2], axis=1)
-    ahead = directions[:, :2] / horizontal[:, None]
+    azimuth = np.arctan2(directions[:, 1], directions[:, 0]).round(9)
+    azimuths, of_azimuth = np.unique(azimuth, return_inverse=True)
+    ahead = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
+    nearest = np.full(len(ahead), 1000.0)
     for pole in poles.T:
         along, aside = ahead @ pole, ahead @ (pole[1], -pole[0])
         met = (np.abs(aside) < 0.3) & (along > 0)
-        near = (along[met] - np.sqrt(0.09 - aside[met] ** 2)) / horizontal[met]
-        low = near * directions[met, 2] < 5 - HEIGHT
-        range_[met] = np.where(low, np.minimum(range_[met], near), range_[met])
+        near = along[met] - np.sqrt(0.09 - aside[met] ** 2)
+        nearest[met] = np.minimum(nearest[met], near)
+    to_pole = nearest[of_azimuth] / horizontal
+    low = to_pole * directions[:, 2] < 5 - HEIGHT
+    range_ = np.where(low, np.minimum(range_, to_pole), range_)
     return directions * range_[:, None]
 
 
@@ -182,7 +187,8 @@ def test_four_beams_are_no_single_one() -> None:
 def test_scans_merged_into_a_map_are_seen_from_several_places(scans: int, step: float) -> None:
     merged = drive(scans, step)
     assert kinds(merged) == ["points of several viewpoints"]
-    voxels = np.unique(np.floor(merged / 0.2).astype(int), axis=0, return_index=True)[1]
+    cells = np.floor(merged / 0.2).astype(int) @ (1, 10_000, 10_000**2)
+    voxels = np.unique(cells, return_index=True)[1]
     assert kinds(merged[voxels]) == ["points of several viewpoints"]
 
 

@@ -8,7 +8,7 @@ import yaml
 
 resource = pytest.importorskip("resource", reason="the system has no limits on files")
 
-SHORT = ("--trainer.max_epochs", "1", "--panels.scans", "0", "--errors.pictures", "0")
+SHORT = ("--trainer.max_epochs", "1")
 
 
 @pytest.fixture(autouse=True)
