@@ -67,8 +67,9 @@ class ScanCheck(lightning.Callback):
 
 def _warn_without_rain(trainer: lightning.Trainer, model: Any) -> None:
     # Every process counts, for the counts of all are gathered.
-    labelled, counts = bool(model.metrics.per_scan()), model.metrics.pooled()
-    if trainer.is_global_zero and labelled:
+    measured = model.metrics.counts()
+    counts = measured.pooled()
+    if trainer.is_global_zero and measured.per_scan:
         warn_without_rain(bool(counts.true_positive + counts.false_negative), model.card)
 
 
