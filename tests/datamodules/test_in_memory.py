@@ -61,7 +61,7 @@ def test_a_source_is_taken_as_it_is(tmp_path: Path) -> None:
     data = InMemory(test=files, card="wads")
     assert data.source("test") is files
     assert [frame.key for frame in data.frames("predict")] == ["a"]
-    with pytest.raises(InputError, match=r"a\.bin: no labels\. Add them or leave the scan out"):
+    with pytest.raises(InputError, match=r"a\.bin: .*no labels"):
         data.frames("test")
     memory = Frames.of_scans([labelled(0)], "drive")
     assert InMemory(test=memory, card="wads").frames("test")[0].sequence == "drive"
