@@ -31,7 +31,7 @@ from derain.models.supervised import SupervisedModule
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.system.cores import usable_cores
-from derain.teaching.labels import CLASSES, TAUGHT_NOT_RAIN, TAUGHT_RAIN, TAUGHT_UNKNOWN
+from derain.teaching.labels import TAUGHT_CARD, TAUGHT_NOT_RAIN, TAUGHT_RAIN, TAUGHT_UNKNOWN
 
 # Shares of the rain that is missed, of what is called rain and is not, and of what is not known;
 # about those of persistence on a drive in snow (precision .8, recall .87).
@@ -46,7 +46,7 @@ TRAINING, CHOOSING = 10, 2
 SIMULATED = load_card("simulated")
 CARD = DataCard(
     "taught",
-    CLASSES,
+    TAUGHT_CARD.classes,
     rain=(TAUGHT_RAIN,),
     unknown=(TAUGHT_UNKNOWN,),
     intensity_unit=SIMULATED.intensity_unit,

@@ -1,4 +1,4 @@
-"""What training changes about a scan before the network sees it."""
+"""Random changes of training scans."""
 
 import math
 from dataclasses import dataclass, replace
@@ -18,19 +18,19 @@ class Augmentation:
     on WADS, and leaves the neighbours' distances those of the still cloud. Here the jitter is in
     metres and comes before the view, so that coordinates and distances agree.
 
-    What a network sees stays where the network looks: only one that sees all around has its scans
-    turned, and where it sees less, they are mirrored about the middle of what it sees.
+    Scans stay in the network's field of view: they are turned only for a network that sees all
+    around, and mirrored about the middle of a smaller field of view.
 
     Attributes:
         rotation_probability: Share of scans that are turned by an angle of 0 to 360 degrees, where
             the network sees all around.
         jitter_probability: Share of scans whose coordinates are jittered.
         jitter: Standard deviation of the jitter in metres, about a LiDAR's range noise.
-        mirror_probability: Share of scans whose left and right change places.
+        mirror_probability: Share of scans whose left and right are swapped.
         dropping_probability: Share of scans that lose points.
         dropping: The largest share of its points that such a scan loses.
-        sector_probability: Share of scans of which no more than a sector is kept, so that a batch
-            of as many points holds more scans; drawn where the sensor looks.
+        sector_probability: Share of scans of which only a sector is kept, so that a batch of as
+            many points holds more scans.
         sector: Width of the sector, degrees.
 
     Source: sporsho/3D_OutDet, dataset/_point_cloud_dataset.py, for rotation, jitter and their 0.5;
@@ -60,16 +60,17 @@ class Augmentation:
     def __call__(
         self, scan: Scan, generator: np.random.Generator, azimuth: tuple[float, float] = ALL_AROUND
     ) -> Scan:
-        """Returns a changed copy; labels and intensities stay with their points, in their order.
+        """Returns a changed copy; points keep their order, labels and intensities.
 
         Args:
             scan: The scan.
-            generator: Draws what is changed.
-            azimuth: What the network sees: right and left bound, degrees counter-clockwise from x.
+            generator: Draws the changes.
+            azimuth: The network's field of view: right and left bound, degrees counter-clockwise
+                from x.
         """
         right, left = azimuth
         sees_all_around = left - right == FULL_CIRCLE
-        valid = scan.valid  # no return is no return, wherever it is turned
+        valid = scan.valid  # rows without a return stay as they are
         moved = scan.xyz[valid]
         if generator.random() < self.rotation_probability and sees_all_around:
             moved = moved @ _turn(generator.uniform(0, 2 * np.pi))
@@ -89,7 +90,7 @@ class Augmentation:
 
 
 def _sector(scan: Scan, width: float, generator: np.random.Generator) -> Scan:
-    """A sector of a scan around one of its points, so that there is something in it.
+    """A sector of a scan around one of its points, so that it is never empty.
 
     Args:
         scan: The scan.

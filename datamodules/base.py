@@ -6,11 +6,10 @@ import lightning
 from torch.utils.data import DataLoader
 
 from derain.cards.card import DataCard
-from derain.datamodules.draws import Draws
 from derain.datamodules.loader import scan_loader
 from derain.datamodules.loading import Loading, Part
-from derain.datamodules.needed_labels import with_needed_labels
-from derain.datamodules.scan_data import ScanData
+from derain.datamodules.order import Draws
+from derain.datamodules.scan_data import ScanData, with_needed_labels
 from derain.datamodules.statistics import measured
 from derain.errors import InputError
 from derain.learning.batch import Sample
@@ -19,7 +18,6 @@ from derain.scan import Scan
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.sources.spread import evenly_spaced
-from derain.sources.training_record import by_fingerprint
 
 __all__ = ["Loading", "Part", "ScanDataModule"]
 
@@ -30,14 +28,14 @@ MOST_MEASURED = 200
 class ScanDataModule(ScanData, lightning.LightningDataModule):
     """Batches of views of scans, for training, validation, test and prediction.
 
-    A data set says where its scans come from; all else is the same for every one.
+    A data set returns its scans by part; all else is the same for every data set.
 
     Args:
         card: Data card of the scans; statistics it lacks are taken from the training scans.
         loading: How the scans are read and batched.
 
     Attributes:
-        task: What was agreed with the model, which says how scans are seen; None before that.
+        task: What model and data agreed on before training; None before that.
     """
 
     def __init__(self, card: DataCard, loading: Loading) -> None:
@@ -46,7 +44,7 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         self.task: Task | None = None
 
     def shown(self, part: Part) -> Source:
-        """The scans that a loader of a part goes through once: by default, each of them once.
+        """The scans that a loader of a part passes through: by default, each of them once.
 
         Raises:
             InputError: Missing folders or scans.
@@ -54,7 +52,7 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         return self.source(part)
 
     def draws(self) -> Draws | None:
-        """How many of which training scans an epoch draws: by default all of them once, None.
+        """Which training scans an epoch draws; None, the default, draws each once.
 
         Raises:
             InputError: Missing folders or scans.
@@ -62,11 +60,11 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         return None
 
     def complete_card(self, columns: Sequence[str] = (), labelled: bool = True) -> None:
-        """Takes from the training scans the statistics that the data card lacks.
+        """Measures the statistics that the data card lacks, on the training scans.
 
         Args:
-            columns: Columns that the card is to have statistics of, besides the usual ones.
-            labelled: Whether labels are read, which the share of rain is measured on.
+            columns: Columns besides the usual ones that need statistics.
+            labelled: Whether labels are read, from which the share of rain is measured.
 
         Raises:
             InputError: A scan that cannot be read, or a column that none of them has.
@@ -79,10 +77,10 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
     def training_scans(
         self, most: int, columns: Sequence[str] | None = None, labelled: bool = True
     ) -> Iterator[Scan]:
-        """Reads some of the training scans, spread over all of them, as they are in their files.
+        """Reads some of the training scans, spread evenly, as they are in their files.
 
         Args:
-            most: How many, where there are so many.
+            most: How many at most.
             columns: Which columns to keep besides the usual ones; None keeps all.
             labelled: Whether their labels are read.
 
@@ -93,12 +91,8 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         reader = FrameReader(self.card, self.loading.intensity_scale, columns)
         return map(reader.read, evenly_spaced(frames, most))
 
-    def training_record(self) -> dict[str, tuple[str, ...]]:
-        """Which scans it trains on, for the Spec of what is trained on them."""
-        return by_fingerprint(self.source("train"))
-
     def train_dataloader(self) -> DataLoader[Sample | InputError]:
-        """Training scans, in another order and augmented anew every epoch."""
+        """Training scans, in a new order and newly augmented every epoch."""
         return self._loader("train")
 
     def val_dataloader(self) -> DataLoader[Sample | InputError]:
@@ -110,7 +104,7 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         return self._loader("test")
 
     def predict_dataloader(self) -> DataLoader[Sample | InputError]:
-        """Test scans, whether or not they have labels, every row of them."""
+        """All rows of the test scans, with or without labels."""
         return self._loader("predict")
 
     def _loader(self, part: Part) -> DataLoader[Sample | InputError]:

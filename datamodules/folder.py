@@ -1,4 +1,4 @@
-"""Any scans and labels, wherever they lie."""
+"""Scans and labels picked by patterns."""
 
 from glob import glob
 from pathlib import Path
@@ -22,10 +22,10 @@ class Folder(ScanDataModule):
     Args:
         root: Folder that the patterns start from.
         card: Name of a packaged data card, or a YAML file: it maps label ids to class names and
-            says which are rain.
+            names those of rain.
         train: Patterns of the training scans, such as ``velodyne/*.bin`` or ``**/*.pcd``.
         validation: Patterns of the validation scans.
-        test: Patterns of the scans that are tested and predicted.
+        test: Patterns of the scans for test and prediction.
         loading: How the scans are read and batched.
     """
 
@@ -43,10 +43,10 @@ class Folder(ScanDataModule):
         self.patterns = {"train": train, "validation": validation, "test": test, "predict": test}
 
     def source(self, part: Part) -> Source:
-        """The scans that a part's patterns find, each pattern's in sorted order.
+        """The scans that match a part's patterns, sorted within each pattern.
 
         Raises:
-            InputError: A pattern that finds nothing.
+            InputError: A pattern without a match.
         """
         patterns = self.patterns[part]
         if not patterns:

@@ -1,4 +1,4 @@
-"""Scans that are in memory already."""
+"""Scans in memory, as a data module."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ Scans = Scan | Sequence[Scan] | Source
 
 
 class InMemory(ScanDataModule):
-    """Scans in memory, or of any source, to be trained on, measured and predicted.
+    """Scans in memory, or of any source, for training, validation, test and prediction.
 
     Example:
         >>> import numpy as np
@@ -33,14 +33,14 @@ class InMemory(ScanDataModule):
         (100,)
 
     Args:
-        train: The training scan or scans, in time order, with the labels that they have.
+        train: The training scan or scans, in time order, with any labels they have.
         validation: The validation scans.
-        test: The scans that are tested and predicted.
+        test: The scans for test and prediction.
         card: Their data card: itself, the name of a packaged one, or a YAML file.
         loading: How the scans are batched.
 
     Raises:
-        InputError: No such data card, or something else than scans.
+        InputError: No such data card, or anything but scans.
     """
 
     def __init__(

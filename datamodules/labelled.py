@@ -11,56 +11,28 @@ from pathlib import Path
 from derain.cards.card import DataCard, load_card, packaged_cards
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
-from derain.datamodules.loading import Loading, Part
-from derain.datamodules.scan_data import ScanData
-from derain.datamodules.sequence_data import SequenceData
-from derain.datamodules.taught_data import TaughtData
+from derain.datamodules.loading import Loading
+from derain.datamodules.scan_data import NamedScans, ScanData, SequenceData, TaughtData
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.simulation.manifest import RAIN_RATE, manifest_of, rates_of_sequences, read_manifest
-from derain.sources.folders import find_layout, named_frames
-from derain.sources.source import Source
+from derain.sources.folders import find_layout
 from derain.teaching.manifest import CARD, is_taught
-
-
-class NamedScans(ScanData):
-    """Scans named one by one or by their folders, the same ones for every part.
-
-    A scan's labels are ``<stem>.label`` beside it or in the sibling folder of labels.
-
-    Args:
-        paths: Scans, folders with scans directly in them, and sequences.
-        card: Data card of the scans, by whose layout sequences and labels are found before others.
-        loading: How the scans are read.
-    """
-
-    def __init__(self, paths: Sequence[Path], card: DataCard, loading: Loading) -> None:
-        super().__init__(card, loading)
-        self.paths = paths
-
-    def source(self, part: Part) -> Source:
-        """The scans, in the order they are named, those of a folder sorted by name.
-
-        Raises:
-            InputError: A path that does not exist, or a folder without scans.
-        """
-        layouts = layouts_for(self.card)
-        return named_frames(self.paths, self.loading.columns, labelled=True, layouts=layouts)
 
 
 def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> ScanData:
     """The scans that a command's ``--data`` names.
 
     Args:
-        paths: Scans and folders of scans; or the root of one data set, which has a folder
-            ``sequences`` and the split of its manifest, if it was simulated, else of its card; or
-            one that ``derain teach`` wrote, by whose labels it is measured then.
+        paths: Scans and folders of scans; or the root of one data set, with a folder
+            ``sequences`` and the split of its manifest if it is simulated, else of its card; or a
+            folder that ``derain teach`` wrote, whose labels are used.
         card: Data card of the scans.
         loading: How the scans are read.
 
     Raises:
-        InputError: A root beside other paths, or whose sequences hold no folder of scans that is
-            known.
+        InputError: A root beside other paths, or one whose sequences hold no known folder of
+            scans.
     """
     taught = [path for path in paths if is_taught(path)]
     roots = taught or [path for path in paths if os.path.isdir(path / card.layout.sequences)]
@@ -84,12 +56,12 @@ def card_of(paths: Sequence[Path], name: str | None) -> DataCard:
 
     Args:
         paths: Scans and folders of scans, or the root of one data set.
-        name: A packaged card or a YAML file; None asks the manifest of the simulated data set that
-            the first of them is or lies in, or takes what a teacher's labels are called, and else
-            knows REHEARSE-3D by its folders.
+        name: A packaged card or a YAML file; None takes that of simulated data where the first
+            path is in a simulated data set, that of a teacher's labels in a taught folder, and else
+            recognises REHEARSE-3D by its folders.
 
     Raises:
-        InputError: No such card, or data that do not say whose they are.
+        InputError: No such card, or data that are not recognised.
     """
     if name is not None:
         return load_card(name)
@@ -109,14 +81,14 @@ def card_of(paths: Sequence[Path], name: str | None) -> DataCard:
 
 
 def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
-    """Rain rate of each sequence in mm/h, by its name, as far as it is known.
+    """Rain rate of each sequence in mm/h, by its name, where it is known.
 
     Args:
         paths: What ``--data`` names.
         file: YAML file of ``"<sequence>": <mm/h>``; None takes a simulated data set's manifest.
 
     Raises:
-        InputError: A file that is not of this kind.
+        InputError: A file of another kind.
     """
     if file is None:
         return dict(manifest_of(paths[0]).get(RAIN_RATE, {}))
@@ -124,7 +96,7 @@ def rain_rates(paths: Sequence[Path], file: Path | None) -> Mapping[str, float]:
 
 
 def _layout_of(root: Path, card: DataCard) -> Layout:
-    """What the folders of a data set's sequences are called: as its card says, or as others do."""
+    """Names of the folders in a data set's sequences: those of its card or of another."""
     sequences, layouts = root / card.layout.sequences, layouts_for(card)
     layout = find_layout(sequences, layouts)
     if layout is None:
@@ -132,7 +104,7 @@ def _layout_of(root: Path, card: DataCard) -> Layout:
         raise InputError(
             sequences,
             f"no sequence has a folder {' or '.join(folders)}",
-            "Name the folders of scans themselves, or say in --card what they are called.",
+            "Name the folders of scans themselves, or give their names in --card.",
         )
-    # Others may call the folder of sequences otherwise, and this one was found by its card's name.
+    # The folder of sequences has the name in this card, whatever another layout calls it.
     return replace(layout, sequences=card.layout.sequences)

@@ -1,19 +1,22 @@
-"""Loaders of batches, with or without a data module around them."""
+"""Loaders of batches, with or without a data module."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 from torch.utils.data import DataLoader, Sampler
 
-from derain.datamodules.draws import DrawnOrder, Draws
-from derain.datamodules.kept import MEGABYTE
 from derain.datamodules.loading import Loading, Part
-from derain.datamodules.needed_labels import with_needed_labels
-from derain.datamodules.order import MeasuringOrder, Pick, TrainingOrder
-from derain.datamodules.scan_dataset import LateLoader, ScanDataset, packed
+from derain.datamodules.order import Draws, MeasuringOrder, Pick, TrainingOrder
+from derain.datamodules.scan_data import with_needed_labels
+from derain.datamodules.scan_dataset import MEGABYTE, ScanDataset
 from derain.errors import InputError
-from derain.learning.batch import Sample
+from derain.learning.batch import VIEW, Batch, Sample, added_up
 from derain.learning.seeds import run_seed
 from derain.learning.task import Task
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
+from derain.system.stopwatch import Stopwatch
 
 
 def scan_loader(
@@ -25,7 +28,7 @@ def scan_loader(
     process: int = 0,
     draws: Draws | None = None,
 ) -> DataLoader[Sample | InputError]:
-    """A loader of :class:`~derain.learning.batch.Batch`, as a trainer or a plain loop takes it.
+    """A loader of :class:`~derain.learning.batch.Batch`, for a trainer or a plain loop.
 
     Example:
         >>> import numpy as np
@@ -43,18 +46,18 @@ def scan_loader(
 
     Args:
         source: The scans, with their labels where they have any.
-        part: What they are read for. Training has an order and an augmentation of its own for
-            every epoch, which the sampler is told by ``set_epoch``; a trainer does. Everything
-            else comes in order and as it is; for prediction without labels, and every row of it.
-        task: What was agreed with the model.
-        loading: How the scans are read and batched. Of files, the source knows the columns.
+        part: What they are read for. Training has a new order and augmentation every epoch: call
+            the sampler's ``set_epoch``, as a trainer does. The other parts are read in order and
+            unchanged; for prediction without labels and with all rows.
+        task: What model and data agreed on.
+        loading: How the scans are read and batched. The source itself knows the columns of files.
         processes: How many processes share the scans.
         process: Which of them this is.
-        draws: How many of which scans are drawn for an epoch of training; None draws each once.
+        draws: Which scans an epoch of training draws; None draws each once.
 
     Raises:
-        InputError: Labels missing where they are needed; or a network that sees several scans, of
-            which the augmentation would change one.
+        InputError: Labels missing where they are needed; or a network that sees several scans,
+            with an augmentation that moves one of them alone.
     """
     view = task.make_view(threads=1 if loading.workers else 0)
     if part == "train" and loading.augmentation.moves_the_sensor and not view.window.is_one_scan:
@@ -69,10 +72,10 @@ def scan_loader(
     # Tests and predictions ask for each scan once.
     room = loading.kept_megabytes * MEGABYTE if part in ("train", "validation") else 0
     dataset = ScanDataset(
-        # Of frames to predict, whoever writes beside them has to know where their labels are.
+        # Frames to predict keep the path of their labels: predictions must not overwrite them.
         source if part == "predict" else with_needed_labels(source, part, task.reads_labels),
         {
-            # Jitter would pull equal points apart, which the view takes for one in deployment.
+            # Jitter would separate points at one position, which the view merges in deployment.
             "train": reader.read_distinct,
             "predict": reader.read_unlabelled,
         }.get(part, reader.read_distinct if once else reader.read),
@@ -102,6 +105,29 @@ def _order(
 ) -> Sampler[Pick]:
     if part != "train":
         return MeasuringOrder(dataset, batch_size, processes, process)
-    if draws is not None:
-        return DrawnOrder(draws, dataset.seed, processes, process)
-    return TrainingOrder(dataset, dataset.seed, processes, process)
+    return TrainingOrder(dataset, dataset.seed, processes, process, draws)
+
+
+class LateLoader(DataLoader[Sample | InputError]):
+    """Starts to read when the first batch is asked for, and raises the errors of workers.
+
+    When a run resumes from a checkpoint, Lightning makes the iterators before it sets the epoch,
+    and workers read ahead as soon as there is an iterator.
+    """
+
+    def __iter__(self) -> Any:
+        for batch in super().__iter__():
+            if isinstance(batch, InputError):
+                raise batch
+            yield batch
+
+
+def packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:
+    """A batch of samples, or the first error among them."""
+    for error in samples:
+        if isinstance(error, InputError):
+            return error
+    stopwatch = Stopwatch()
+    with stopwatch.stage(VIEW):
+        batch = Batch.of([sample for sample in samples if isinstance(sample, Sample)])
+    return replace(batch, milliseconds=added_up([batch.milliseconds, stopwatch.milliseconds]))

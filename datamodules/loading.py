@@ -19,12 +19,12 @@ class Loading:
         batch_size: Scans in a batch.
         workers: Processes that read and view scans; 0 does it in the training process.
         columns: Names of the columns of files that do not name them.
-        intensity_scale: What takes the scans' intensities to the unit of the data card, e.g. 255.
-        deduplicate: Whether points at one position are measured once; None does as the data card
-            says. Predictions are for every row in any case.
-        augmentation: What training changes about its scans.
-        kept_megabytes: Memory for what no epoch changes of the training scans, and as much for the
-            validation scans, so that it is not read and viewed again. Workers share it out.
+        intensity_scale: Factor from the scans' intensities to the unit of the data card, e.g. 255.
+        deduplicate: Whether points at one position are measured once; None follows the data card.
+            Predictions cover every row in any case.
+        augmentation: How training changes its scans.
+        kept_megabytes: Memory in which training scans are kept from epoch to epoch, so that they
+            are not read again, and as much for validation scans. Workers divide it among them.
 
     Raises:
         InputError: Fewer scans, processes or megabytes than there can be.

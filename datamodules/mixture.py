@@ -10,7 +10,7 @@ from torch.utils.data import DataLoader
 from derain.cards.card import DataCard
 from derain.cards.mixed import LabelMap, label_maps, mixed_card, with_pooled_statistics
 from derain.datamodules.base import Loading, Part, ScanDataModule
-from derain.datamodules.draws import Draws, shared_out
+from derain.datamodules.order import Draws, shared_out
 from derain.errors import InputError
 from derain.learning.batch import Sample
 from derain.scan import Scan
@@ -26,13 +26,13 @@ _NAME = re.compile(r"\w[\w-]*")
 class Mixture(ScanDataModule):
     """Several data sets as one: each epoch draws from all of them by weight.
 
-    Each part keeps its own data card: what is rain to one may be none to another. The classes of
-    all stand side by side, as ``part: class``, so that every score can be told by part, and is.
-    What a model is normalised by are the parts' statistics, pooled by weight.
+    Each part keeps its own data card: a class of rain in one may be none in another. The mixture
+    has the classes of all parts, named ``part: class``, so that scores are also logged by part.
+    Inputs are normalised by the parts' statistics, pooled by weight.
 
-    How single files are read is said by each part's own ``loading`` (columns, unit of intensity);
+    Each part's own ``loading`` determines how its files are read (columns, unit of intensity);
     batches, workers and augmentation are the mixture's. Points at one position are measured once
-    where any part's card says so.
+    if any part's card asks for it.
 
     Example:
         >>> from derain.datamodules.folder import Folder
@@ -46,16 +46,17 @@ class Mixture(ScanDataModule):
 
     Args:
         parts: Data modules, by a name for each.
-        weights: By the same names, in what proportion training draws scans from the parts; 1 where
-            nothing is said.
+        weights: In what proportion training draws scans from the parts, by their names; 1 by
+            default.
         scans_per_epoch: Scans that an epoch of training draws; by default as many as all parts have
-            together. Of a part with fewer than its share, scans are drawn again.
+            together. A part with fewer scans than its share repeats them.
         measured: Names of the parts that are validated, tested and predicted; by default all.
         loading: How the scans are batched.
 
     Raises:
-        InputError: No parts, or none with rain; a weight that is not greater than 0; a name that no
-            part has or that is none; a part that is a mixture itself; a scale of intensity for all.
+        InputError: No parts, or none with rain; a weight that is not greater than 0; the name of no
+            part, or one with other characters than letters, digits, _ and -; a part that is a
+            mixture itself; a scale of intensity for all parts.
     """
 
     def __init__(
@@ -86,7 +87,7 @@ class Mixture(ScanDataModule):
         return [weight / sum(self.weights.values()) for weight in self.weights.values()]
 
     def prepare_data(self) -> None:
-        """Has each part make what it has to make, such as simulated scans."""
+        """Prepares each part, such as by simulating its scans."""
         for part in self.parts.values():
             part.prepare_data()
 
@@ -114,7 +115,7 @@ class Mixture(ScanDataModule):
         return Draws.by_weight(scans, self.weights, self.scans_per_epoch)
 
     def complete_card(self, columns: Sequence[str] = (), labelled: bool = True) -> None:
-        """Takes from each part's training scans what its card lacks, and pools the statistics.
+        """Measures what each part's card lacks on its training scans, and pools the statistics.
 
         Raises:
             InputError: A scan that cannot be read, or a part without one of the columns.
@@ -128,7 +129,7 @@ class Mixture(ScanDataModule):
     def training_scans(
         self, most: int, columns: Sequence[str] | None = None, labelled: bool = True
     ) -> Iterator[Scan]:
-        """Reads some of the training scans, of each part by its weight, but of each at least one.
+        """Reads some of the training scans, shared by weight, at least one of each part.
 
         Raises:
             InputError: A scan or labels that cannot be read.
@@ -140,11 +141,11 @@ class Mixture(ScanDataModule):
                 yield scan if label is None else scan.with_label(maps[name](label, scan.name))
 
     def training_record(self) -> dict[str, tuple[str, ...]]:
-        """Which scans of which parts it trains on."""
+        """The training scans, by the name of each part's data card."""
         return by_parts((part.card.name, part.training_record()) for part in self.parts.values())
 
     def train_dataloader(self) -> DataLoader[Sample | InputError]:
-        """Training scans, drawn by weight, in another order and augmented anew every epoch.
+        """Training scans, drawn by weight, in a new order and newly augmented every epoch.
 
         Raises:
             InputError: Intensities that the model sees, in units that differ or missing in a part.
@@ -155,7 +156,7 @@ class Mixture(ScanDataModule):
         return super().train_dataloader()
 
     def _refuse_missing(self, channels: Sequence[str]) -> None:
-        """Refuses channels that the first training scan of some part does not have."""
+        """Refuses channels that are missing in the first training scan of some part."""
         for name, part in self.parts.items() if channels else ():
             scan = next(part.training_scans(1, channels, labelled=False))
             for channel in channels:
@@ -167,7 +168,7 @@ class Mixture(ScanDataModule):
                     )
 
     def _refuse_units(self) -> None:
-        """Refuses intensities of which two parts' cards say different units."""
+        """Refuses intensities of different units, by the parts' cards."""
         units = {
             name: part.card.intensity_unit
             for name, part in self.parts.items()
@@ -177,8 +178,8 @@ class Mixture(ScanDataModule):
             raise InputError(
                 "intensity",
                 ", ".join(f"'{name}' has it in {unit}" for name, unit in units.items()),
-                "Leave it out of --model.channels, or state cards of one unit and what takes the "
-                "scans there: loading.intensity_scale.",
+                "Leave it out of --model.channels, or convert them to one unit, by the cards and "
+                "loading.intensity_scale of the parts.",
             )
 
 

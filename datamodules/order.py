@@ -1,11 +1,15 @@
-"""Which scan a process reads, and when."""
+"""Which scans an epoch draws, and in which order a process reads them."""
 
-from collections.abc import Iterator, Sequence, Sized
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence, Sized
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from torch.utils.data import DistributedSampler
 
+from derain.errors import InputError
 from derain.learning.seeds import Draw, generator_of
 
 if TYPE_CHECKING:
@@ -18,7 +22,7 @@ class Pick(NamedTuple):
     Attributes:
         number: Its number among the scans of its part.
         epoch: The epoch that it is read in.
-        measured: Whether what a network says of it is counted or written.
+        measured: Whether the network's answer is counted or written.
         again: How often it was drawn before in that epoch.
     """
 
@@ -28,30 +32,110 @@ class Pick(NamedTuple):
     again: int = 0
 
 
+@dataclass(frozen=True)
+class Draws:
+    """How many scans an epoch of training draws from each of several data sets, and which.
+
+    The scans of all data sets are numbered consecutively. Each data set is passed through again and
+    again, in a new order every time, and an epoch continues where the last one ended, so that all
+    scans of a data set are drawn equally often. Where an epoch starts follows from its number:
+    nothing has to be stored.
+
+    Attributes:
+        scans: Number of scans of each data set, in order.
+        drawn: How many of them an epoch draws, in the same order.
+    """
+
+    scans: tuple[int, ...]
+    drawn: tuple[int, ...]
+
+    @classmethod
+    def by_weight(
+        cls, scans: Mapping[str, int], weights: Mapping[str, float], total: int | None = None
+    ) -> "Draws":
+        """Divides an epoch among the data sets by weight, rounded to whole scans.
+
+        Example:
+            >>> Draws.by_weight({"snow": 4, "streets": 40}, {"snow": 1, "streets": 2}, 10).drawn
+            (3, 7)
+
+        Args:
+            scans: Number of scans of each data set, by its name.
+            weights: Weight of each, greater than 0.
+            total: Scans of an epoch; by default as many as all data sets have together.
+
+        Raises:
+            InputError: An epoch in which a data set has not one scan.
+        """
+        total = sum(scans.values()) if total is None else total
+        drawn = shared_out(total, [weights[name] for name in scans])
+        for name, number in zip(scans, drawn, strict=True):
+            if not number:
+                raise InputError(
+                    f"part '{name}'",
+                    f"its weight gives it none of the {total} scans of an epoch",
+                    "Give it more weight, or an epoch more scans: --data.scans_per_epoch.",
+                )
+        return cls(tuple(scans.values()), drawn)
+
+    def picks(self, seed: int, epoch: int) -> list[Pick]:
+        """The scans that are drawn for an epoch, one data set after the other."""
+        numbers = [
+            offset + number
+            for place, offset in enumerate(np.cumsum((0, *self.scans[:-1])).tolist())
+            for number in self._of_one(place, seed, epoch).tolist()
+        ]
+        before: Counter[int] = Counter()
+        picks = []
+        for number in numbers:
+            picks.append(Pick(number, epoch, measured=False, again=before[number]))
+            before[number] += 1
+        return picks
+
+    def _of_one(self, place: int, seed: int, epoch: int) -> NDArray[np.int64]:
+        """Numbers of the scans of one data set that an epoch draws."""
+        scans, drawn = self.scans[place], self.drawn[place]
+        first, skipped = divmod(epoch * drawn, scans)
+        passes = range(first, first + -(-(skipped + drawn) // scans))
+        orders = [generator_of(Draw.MIXTURE, seed, one, place).permutation(scans) for one in passes]
+        return np.concatenate(orders)[skipped : skipped + drawn]
+
+
 class TrainingOrder(DistributedSampler[Pick]):
-    """Every scan once an epoch, in an order that is a function of the run's seed and the epoch.
+    """Training scans in a random order, which is a function of the run's seed and the epoch.
 
     Processes take the scans in turn: at each step they see together what one process would see in a
     batch as many times as large. So that all take as many steps, the first of the order may come
     twice.
 
-    Lightning tells the epoch to every sampler, and leaves those of this kind alone on several
-    processes.
+    Lightning sets the epoch of every sampler, and does not replace a ``DistributedSampler``.
 
     Args:
         scans: The scans.
         seed: Seed of the run.
         processes: How many processes share the scans.
         process: Which of them this is.
+        draws: Which of the scans an epoch draws; None draws each once.
     """
 
-    def __init__(self, scans: Sized, seed: int, processes: int, process: int) -> None:
-        # Of what it is given, the sampler asks no more than how many there are.
-        super().__init__(cast("ScanDataset", scans), processes, process, seed=seed)
+    def __init__(
+        self,
+        scans: Sized,
+        seed: int,
+        processes: int,
+        process: int,
+        draws: Draws | None = None,
+    ) -> None:
+        drawn = len(scans) if draws is None else sum(draws.drawn)
+        # The base class only asks for the number of scans.
+        super().__init__(cast("ScanDataset", range(drawn)), processes, process, seed=seed)
         self.scans = len(scans)
+        self.draws = draws
 
     def picks(self) -> Sequence[Pick]:
-        """What all processes together read in this epoch, before it is put in order."""
+        """The scans that all processes together read in this epoch, not yet in random order."""
+        if self.draws is not None:
+            return self.draws.picks(self.seed, self.epoch)
         return [Pick(number, self.epoch, measured=False) for number in range(self.scans)]
 
     def __iter__(self) -> Iterator[Pick]:
@@ -63,10 +147,10 @@ class TrainingOrder(DistributedSampler[Pick]):
 
 
 class MeasuringOrder(DistributedSampler[Pick]):
-    """Every scan once, in order, whole batches going to the processes in turn.
+    """Every scan once, in order; the processes take whole batches in turn.
 
-    So a batch is the same however many processes there are. Where one has a batch less, it reads a
-    scan again that is not measured: processes wait for each other at every step.
+    So batches do not depend on the number of processes. A process with a batch less reads one scan
+    again, unmeasured, because processes wait for each other at every step.
 
     Args:
         scans: The scans.
@@ -91,3 +175,18 @@ class MeasuringOrder(DistributedSampler[Pick]):
 
     def __iter__(self) -> Iterator[Pick]:
         return iter(self.picks)
+
+
+def shared_out(total: int, weights: Sequence[float]) -> tuple[int, ...]:
+    """Whole numbers in proportion to weights, by the method of the largest remainder.
+
+    Args:
+        total: Their sum.
+        weights: Greater than 0.
+    """
+    exact = total * np.array(weights) / sum(weights)
+    whole = np.floor(exact).astype(int)
+    # Sorted in a way that leaves equals in their order, so that everybody shares out alike.
+    largest = np.argsort(whole - exact, kind="stable")[: total - int(whole.sum())]
+    whole[largest] += 1
+    return tuple(whole.tolist())

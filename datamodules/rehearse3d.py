@@ -9,7 +9,7 @@ from derain.datamodules.sequences import SequenceDataModule
 class Rehearse3D(SequenceDataModule):
     """REHEARSE-3D as published: merged LiDAR and radar clouds, and the official split.
 
-    The merged files hold x, y, z and intensity; which points are the radar's they do not say.
+    The merged files hold x, y, z and intensity, without a mark on the radar's points.
 
     Example:
         >>> data = Rehearse3D("REHEARSE3D_PUBLIC")

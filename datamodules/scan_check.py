@@ -1,4 +1,4 @@
-"""Says before a run which of its scans do not suit the model."""
+"""Warns of scans that do not suit the model."""
 
 from dataclasses import replace
 from typing import Any
@@ -13,12 +13,12 @@ from derain.system.notices import Notices
 
 
 class ScanCheck(lightning.Callback):
-    """Warns where scans lack what the model judges by, or have intensities of another unit.
+    """Warns where scans lack a channel of the model, or have intensities of another unit.
 
-    It looks before the first batch, since hours of training on a wrong unit are lost.
+    It checks before the first batch: hours of training on a wrong unit would be lost.
 
     Args:
-        scans: How many of a part's scans are looked at, spread over all of them.
+        scans: How many scans of a part are checked, spread evenly.
     """
 
     def __init__(self, scans: int = 10) -> None:
@@ -26,13 +26,13 @@ class ScanCheck(lightning.Callback):
         self._validated = False
 
     def on_fit_start(self, trainer: lightning.Trainer, model: Any) -> None:
-        """Looks at training scans."""
-        self._look(trainer, model, "train")
+        """Checks training scans."""
+        self._check(trainer, model, "train")
 
     def on_validation_start(self, trainer: lightning.Trainer, model: Any) -> None:
-        """Looks at validation scans, where nothing is trained."""
+        """Checks validation scans, unless they belong to a training."""
         if trainer.state.fn == TrainerFn.VALIDATING:
-            self._look(trainer, model, "validation")
+            self._check(trainer, model, "validation")
 
     def on_validation_end(self, trainer: lightning.Trainer, model: Any) -> None:
         """Warns once where the scans had labels and no rain."""
@@ -45,18 +45,18 @@ class ScanCheck(lightning.Callback):
         _warn_without_rain(trainer, model)
 
     def on_test_start(self, trainer: lightning.Trainer, model: Any) -> None:
-        """Looks at test scans."""
-        self._look(trainer, model, "test")
+        """Checks test scans."""
+        self._check(trainer, model, "test")
 
     def on_predict_start(self, trainer: lightning.Trainer, model: Any) -> None:
-        """Looks at scans to be judged."""
-        self._look(trainer, model, "predict")
+        """Checks the scans to predict."""
+        self._check(trainer, model, "predict")
 
-    def _look(self, trainer: lightning.Trainer, model: Any, part: Part) -> None:
+    def _check(self, trainer: lightning.Trainer, model: Any, part: Part) -> None:
         if not trainer.is_global_zero:
             return
         data = trainer.datamodule  # type: ignore[attr-defined]
-        if not isinstance(data, ScanDataModule):  # whoever makes loaders looks at their scans
+        if not isinstance(data, ScanDataModule):  # a user's own loaders are not checked
             return
         notices = Notices()
         for frame in evenly_spaced(data.frames(part), self.scans):
@@ -67,11 +67,12 @@ class ScanCheck(lightning.Callback):
 
 def _warn_without_rain(trainer: lightning.Trainer, model: Any) -> None:
     # Every process counts, for the counts of all are gathered.
-    labelled, counts = bool(model.metrics.per_scan()), model.metrics.pooled()
-    if trainer.is_global_zero and labelled:
+    measured = model.metrics.counts()
+    counts = measured.pooled()
+    if trainer.is_global_zero and measured.per_scan:
         warn_without_rain(bool(counts.true_positive + counts.false_negative), model.card)
 
 
 def _here(detail: str) -> str:
-    """The same, with the option as it is called here."""
+    """The same, with the name that the option has in training."""
     return detail.replace("--intensity-scale", "--data.loading.intensity_scale")

@@ -1,21 +1,29 @@
-"""Scans of a data set by part, and how they are read: what measuring needs, and training too.
+"""Labelled scans by part, and how they are read: what measuring needs, and training too.
 
 Nothing here loads torch.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
-from derain.cards.card import DataCard
+from derain.cards.card import DataCard, load_card
+from derain.cards.known import layouts_for
+from derain.cards.layout import Layout
 from derain.datamodules.loading import Loading, Part
-from derain.datamodules.needed_labels import with_needed_labels
+from derain.errors import InputError
 from derain.scan import Scan
+from derain.sources.folders import named_frames, sequence_frames
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
+from derain.sources.training_record import by_fingerprint, by_name
+from derain.teaching.held_out import FEWEST_SCANS
+from derain.teaching.manifest import CARD, HELD_OUT_PART, TRAINING_PART, Manifest
 
 
 class ScanData(ABC):
-    """Labelled scans of which some are to train on, others to validate and to test.
+    """Labelled scans for training, validation and test.
 
     Args:
         card: Data card of the scans.
@@ -56,12 +64,16 @@ class ScanData(ABC):
         return self._reader.read(frame)
 
     def read_measured(self, frame: Frame) -> Scan:
-        """Reads what is measured of a scan, with its labels.
+        """Reads the points of a scan that are measured, with their labels.
 
         Raises:
             InputError: A file that cannot be read, or labels that are not in the data card.
         """
         return (self._reader.read_distinct if self.distinct else self._reader.read)(frame)
+
+    def training_record(self) -> dict[str, tuple[str, ...]]:
+        """The training scans, as the Spec of a model that is trained on them records them."""
+        return by_fingerprint(self.source("train"))
 
     @property
     def _reads_labels(self) -> bool:
@@ -71,3 +83,145 @@ class ScanData(ABC):
     @property
     def _reader(self) -> FrameReader:
         return FrameReader(self.card, self.loading.intensity_scale)
+
+
+class NamedScans(ScanData):
+    """Scans named one by one or by their folders, the same ones for every part.
+
+    A scan's labels are ``<stem>.label`` beside it or in the sibling folder of labels.
+
+    Args:
+        paths: Scans, folders with scans directly in them, and sequences.
+        card: Data card of the scans. Its layout is the first to be searched for sequences and
+            labels.
+        loading: How the scans are read.
+    """
+
+    def __init__(self, paths: Sequence[Path], card: DataCard, loading: Loading) -> None:
+        super().__init__(card, loading)
+        self.paths = paths
+
+    def source(self, part: Part) -> Source:
+        """The scans, in the order of their names on the command line; a folder's sorted by name.
+
+        Raises:
+            InputError: A path that does not exist, or a folder without scans.
+        """
+        layouts = layouts_for(self.card)
+        return named_frames(self.paths, self.loading.columns, labelled=True, layouts=layouts)
+
+
+class SequenceData(ScanData):
+    """Scans and labels in sequences, which a split assigns to train, validation and test.
+
+    Args:
+        root: Folder of the data set.
+        card: Data card of the scans.
+        layout: Names of its folders.
+        split: Sequences of ``train``, ``validation`` and ``test``; by default the data card's.
+        loading: How the scans are read and batched.
+    """
+
+    def __init__(
+        self,
+        root: str,
+        card: DataCard,
+        layout: Layout,
+        split: Mapping[str, Sequence[str]] | None,
+        loading: Loading,
+    ) -> None:
+        super().__init__(card, loading)
+        self.root = Path(root)
+        self.layout = layout
+        self.split = split or card.split
+
+    def source(self, part: Part) -> Source:
+        """The scans of a part's sequences, in order; for prediction those of the test part.
+
+        Raises:
+            InputError: A missing sequence or scan folder.
+        """
+        sequences = self.split.get("test" if part == "predict" else part, ())
+        if not sequences:
+            raise InputError(self.root, f"no sequences are named for {part}", "Give a split.")
+        return sequence_frames(
+            [self._folder(name) for name in sequences], self.layout, self.loading.columns
+        )
+
+    def training_record(self) -> dict[str, tuple[str, ...]]:
+        """The training scans, recorded by the names of their sequences.
+
+        Simulated sequences have the same names in every data set: their scans are recorded instead.
+        """
+        if self.card.simulated:
+            return super().training_record()
+        return by_name(self.split.get("train", ()))
+
+    def _folder(self, name: str) -> Path:
+        folder = self.root / self.layout.sequences / name
+        if not (folder / self.layout.scans).is_dir():
+            raise InputError(
+                folder / self.layout.scans,
+                f"no such folder, though the split names sequence {name}",
+                "Check the root. If only some sequences are there, give `derain fit` a "
+                "--data.split, and other commands the folders of scans.",
+            )
+        return folder
+
+
+class TaughtData(ScanData):
+    """Recordings that ``derain teach`` labelled; the held-out scans are the validation part.
+
+    Args:
+        root: The folder that ``derain teach`` wrote.
+        loading: How the scans are read; their columns and the unit of their intensities are those
+            that the teacher read.
+
+    Raises:
+        InputError: No such folder, or one that is damaged or not complete.
+    """
+
+    def __init__(self, root: str, loading: Loading = Loading()) -> None:
+        self.root = Path(root)
+        self.manifest = Manifest.read(self.root)
+        super().__init__(load_card(self.root / CARD), loading)
+
+    def source(self, part: Part) -> Source:
+        """The scans of a part, in order: the held-out ones for every part but ``train``.
+
+        Raises:
+            InputError: No scan was held out.
+        """
+        wanted = TRAINING_PART if part == "train" else HELD_OUT_PART
+        frames = self.manifest.frames(self.root, wanted)
+        if not len(frames):
+            raise InputError(
+                self.root,
+                f"none of its labelled scans is for {part}",
+                f"Of a sequence with {FEWEST_SCANS} or more labelled scans the last ones are held "
+                "out: see what `derain teach` warned of.",
+            )
+        return frames
+
+
+def with_needed_labels(source: Source, part: Part, reads_labels: bool) -> Source:
+    """The frames of a part, each with the labels that are read there.
+
+    Prediction reads none, nor does the training of a model that does not learn from labels. The
+    validation of such a model reads the labels it finds: they measure and choose nothing.
+
+    Args:
+        source: The frames, with the labels they have.
+        part: The part.
+        reads_labels: Whether the model learns from labels.
+
+    Raises:
+        InputError: Labels missing where they are needed.
+    """
+    if part == "predict" or (part == "train" and not reads_labels):
+        return source.map(lambda frame: frame.without_labels())
+    if part == "validation" and not reads_labels:
+        return source.map(lambda frame: frame if frame.has_labels else frame.without_labels())
+    for frame in source:
+        frame.require_labels()
+    return source

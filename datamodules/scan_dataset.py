@@ -1,41 +1,46 @@
-"""Scans of a data set one by one: read, augmented and viewed."""
+"""Reads, augments and views the scans of a data set one by one, and keeps what stays the same."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Generic, TypeVar
 
-from torch.utils.data import DataLoader, Dataset
+import numpy as np
+import torch
+from torch.utils.data import Dataset
 
 from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
-from derain.datamodules.kept import Kept
 from derain.datamodules.order import Pick
-from derain.datamodules.windows import seen
 from derain.errors import InputError
-from derain.learning.batch import READ, VIEW, Batch, Sample, added_up
+from derain.learning.batch import READ, VIEW, Sample
 from derain.learning.seeds import Draw, generator_of
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.spread import evenly_spaced
 from derain.system.stopwatch import Stopwatch
-from derain.views.view import View
+from derain.views.view import SeenScan, View
+from derain.views.window import PlacedScan, Window, WindowOfScans
+
+Item = TypeVar("Item", Scan, Sample)
+
+MEGABYTE = 2**20
 
 
 class ScanDataset(Dataset[Sample | InputError]):
     """Reads the scans of frames and views them.
 
-    What no epoch changes is kept from one to the next: of scans that are augmented what was read,
-    of others their views, too. A file that changes meanwhile is not read again.
+    What stays the same is kept from epoch to epoch: the read scan where it is augmented, else its
+    view. A file that changes meanwhile is not read again.
 
     Args:
         frames: The frames.
-        read: Reads the scan of one of them, as the network is to see it.
+        read: Reads the scan of a frame, as the network sees it.
         view: What the network sees.
-        reader: Reads scans as they are, and has the data card that says which labels are rain.
-        augmentation: Changes each scan anew every epoch; None leaves them as they are.
-        seed: Seed of the run; with the epoch and the scan it says how that scan is changed.
-        room: Bytes that may be kept; each worker, which has a copy of the data set, keeps as many.
+        reader: Reads scans as they are in their files; its data card names the labels of rain.
+        augmentation: Changes each scan newly every epoch; None changes nothing.
+        seed: Seed of the run; with epoch and scan it determines the augmentation.
+        room: Bytes that may be kept; each worker has a copy of the data set and keeps as many.
     """
 
     def __init__(
@@ -59,7 +64,7 @@ class ScanDataset(Dataset[Sample | InputError]):
 
     @property
     def card(self) -> DataCard:
-        """Says which labels are rain."""
+        """The data card, which names the labels of rain."""
         return self.reader.card
 
     def __len__(self) -> int:
@@ -75,10 +80,10 @@ class ScanDataset(Dataset[Sample | InputError]):
             return error
 
     def scans(self, most: int) -> Iterator[Scan]:
-        """Reads some of the scans, spread over all of them, as they are in their files.
+        """Reads some of the scans, spread evenly, as they are in their files.
 
         Args:
-            most: How many, where there are so many.
+            most: How many at most.
 
         Raises:
             InputError: A scan that cannot be read.
@@ -97,12 +102,12 @@ class ScanDataset(Dataset[Sample | InputError]):
                 made = self._samples.get(number, lambda: self._viewed(read(), number, stopwatch))
             else:
                 scan = self._scans.get(number, read)
-                # The first time is drawn as where there is no second one.
+                # A scan that is drawn once is augmented the same, whether or not others repeat.
                 drawn = (number, pick.again) if pick.again else (number,)
                 generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, *drawn)
                 scan = self.augmentation(scan, generator, self.view.azimuth)
                 made = self._viewed(scan, number, stopwatch)
-        # Of a sample that was kept, what this epoch took, which is next to nothing.
+        # A kept sample took next to no time in this epoch.
         return replace(made, measured=pick.measured, milliseconds=stopwatch.milliseconds)
 
     def _viewed(self, scan: Scan, number: int, stopwatch: Stopwatch) -> Sample:
@@ -114,26 +119,87 @@ class ScanDataset(Dataset[Sample | InputError]):
         return Sample.of(scan, view, self.card, key=self.frames[number].key)
 
 
-class LateLoader(DataLoader[Sample | InputError]):
-    """Starts to read when the first batch is asked for, and raises what went wrong in a worker.
+class Kept(Generic[Item]):
+    """Items by number, as many as there is room for.
 
-    Lightning makes the iterators of a run that goes on from a checkpoint before it tells the epoch,
-    and workers read ahead as soon as there is an iterator.
+    The first items stay. Every epoch asks for each item once: a cache that evicted the oldest would
+    have evicted each item by the time it is asked for again.
+
+    Args:
+        room: Bytes that the arrays of all items together may fill.
     """
 
-    def __iter__(self) -> Any:
-        for batch in super().__iter__():
-            if isinstance(batch, InputError):
-                raise batch
-            yield batch
+    def __init__(self, room: int) -> None:
+        self._left = room
+        self._items: dict[int, Item] = {}
+
+    def get(self, number: int, make: Callable[[], Item]) -> Item:
+        """The item of a number, made where it is not kept."""
+        kept = self._items.get(number)
+        if kept is not None:
+            return kept
+        made = make()
+        size = bytes_of(made)
+        if size <= self._left:
+            self._left -= size
+            self._items[number] = made
+        return made
 
 
-def packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:
-    """One batch of samples, or the first error among them."""
-    for error in samples:
-        if isinstance(error, InputError):
-            return error
-    stopwatch = Stopwatch()
-    with stopwatch.stage(VIEW):
-        batch = Batch.of([sample for sample in samples if isinstance(sample, Sample)])
-    return replace(batch, milliseconds=added_up([batch.milliseconds, stopwatch.milliseconds]))
+def bytes_of(item: object) -> int:
+    """Bytes of the arrays of a scan or a sample; shared memory is counted twice."""
+    match item:
+        case np.ndarray() | torch.Tensor():
+            return int(item.nbytes)
+        case dict():
+            return sum(map(bytes_of, item.values()))
+        case list() | tuple():
+            return sum(map(bytes_of, item))
+        case _ if hasattr(item, "__dict__") and not callable(item):
+            return bytes_of(vars(item))
+    return 0
+
+
+def seen(
+    view: View,
+    scan: Scan,
+    frames: Sequence[Frame],
+    number: int,
+    read: Callable[[Frame], Scan],
+) -> SeenScan:
+    """What a network sees of a scan, with the scans around it where its view needs them.
+
+    Args:
+        view: The view.
+        scan: The scan to be judged, as read and perhaps augmented.
+        frames: All frames, in time order, one sequence after the other.
+        number: Number of the scan's frame.
+        read: Reads the scans around it.
+
+    Raises:
+        InputError: A scan around it, or its time or pose, that cannot be read.
+    """
+    window = view.window
+    if window.is_one_scan:
+        return view(scan)
+
+    def placed(place: int) -> PlacedScan:
+        frame = frames[place]
+        return PlacedScan(scan if place == number else read(frame), frame.time, frame.pose)
+
+    first, last = _reach(frames, number, window)
+    before, after = range(first, number), range(number + 1, last + 1)
+    return view.of_window(
+        WindowOfScans(placed(number), [*map(placed, before)], [*map(placed, after)])
+    )
+
+
+def _reach(frames: Sequence[Frame], number: int, window: Window) -> tuple[int, int]:
+    """The first and the last frame of a window, which ends at gaps in a sequence."""
+    first = last = number
+    while first > max(number - window.before, 0) and frames[first].follows(frames[first - 1]):
+        first -= 1
+    end = min(number + window.after, len(frames) - 1)
+    while last < end and frames[last + 1].follows(frames[last]):
+        last += 1
+    return first, last

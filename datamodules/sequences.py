@@ -1,9 +1,8 @@
-"""The data modules of sequences: what any data set of that layout is trained on by."""
+"""Data modules of scans in sequences."""
 
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading, ScanDataModule
-from derain.datamodules.sequence_data import SequenceData
-from derain.sources.training_record import by_name
+from derain.datamodules.scan_data import SequenceData
 
 
 class SequenceDataModule(SequenceData, ScanDataModule):
@@ -17,21 +16,12 @@ class SequenceDataModule(SequenceData, ScanDataModule):
         loading: How the scans are read and batched.
     """
 
-    def training_record(self) -> dict[str, tuple[str, ...]]:
-        """Which scans it trains on: those of whole sequences.
-
-        Simulated sequences are called the same in every data set, so that their names say nothing.
-        """
-        if self.card.simulated:
-            return super().training_record()
-        return by_name(self.split.get("train", ()))
-
 
 class Sequences(SequenceDataModule):
-    """Any data set of sequences, of which its data card says everything.
+    """Any data set of sequences, described by its data card alone.
 
-    A data set that derain does not know needs no code, but a card: what its folders are called, its
-    split, its classes, and whether points at one position count once.
+    A new data set needs no code, only a card with the names of its folders, its split, its classes,
+    and whether points at one position count once.
 
     Example:
         >>> data = Sequences("KITTI", card="kitti")

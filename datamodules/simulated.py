@@ -19,13 +19,13 @@ class SimulatedDataModule(SequenceDataModule):
 
     Args:
         root: Folder of the data set.
-        campaign: What is simulated where the folder does not hold it already.
-        make: Whether it is; else what lies there is taken, whatever the campaign.
+        campaign: The simulation, run where the folder does not hold its result.
+        make: Whether to run it; False takes any simulated data set in the folder.
         loading: How the scans are read and batched.
         workers: Processes that simulate; 0 takes one per core.
 
     Raises:
-        InputError: Nothing is to be made, and there is no simulated data set in the folder.
+        InputError: No simulated data set in the folder, where none is made.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class SimulatedDataModule(SequenceDataModule):
 class Simulated(SimulatedDataModule):
     """A simulated data set in the layout of REHEARSE-3D: by default a small one, made at first use.
 
-    Simulated rain is easy: a score on it says nothing about real rain.
+    Simulated rain is easy to find: scores on it are no evidence of quality on real rain.
 
     Example:
         >>> data = Simulated("rain")  # nothing is simulated before training asks for it
@@ -79,13 +79,12 @@ class Simulated(SimulatedDataModule):
 
     Args:
         root: Folder of the data set.
-        campaign: What is simulated where the folder does not hold it already.
-        make: Whether it is simulated there; else what ``derain simulate`` wrote to the folder is
-            taken, whatever the campaign.
+        campaign: The simulation, run where the folder does not hold its result.
+        make: Whether to run it; False takes any data set that ``derain simulate`` wrote there.
         loading: How the scans are read and batched.
 
     Raises:
-        InputError: Nothing is to be made, and there is no simulated data set in the folder.
+        InputError: No simulated data set in the folder, where none is made.
     """
 
     def __init__(

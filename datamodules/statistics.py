@@ -1,4 +1,4 @@
-"""Statistics of training scans: what a network's input is normalised by."""
+"""Statistics of training scans, by which a network's input is normalised."""
 
 from collections.abc import Iterable, Sequence
 
@@ -18,9 +18,8 @@ def measured(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -
     """Completes a data card with the statistics that it lacks.
 
     Mean and standard deviation of x, y, z and range in metres, of intensity and of extra channels,
-    over what the valid points of all scans hold of them; 0 and 1 where they hold nothing. The share
-    of rain is that of the points whose class says whether they are; it is not measured where a scan
-    has no labels.
+    over the valid points of all scans; 0 and 1 for a channel without values. The share of rain is
+    that among the points of known class; it is not measured where a scan has no labels.
 
     Args:
         card: A data card.
@@ -28,7 +27,7 @@ def measured(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -
         extra: Names of further channels.
 
     Raises:
-        InputError: An extra channel of which no scan holds anything.
+        InputError: An extra channel without any value.
     """
     channels = (*USUAL_CHANNELS, *extra)
     count, total, squares = np.zeros((3, len(channels)))
@@ -43,10 +42,10 @@ def measured(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -
         if labelled:
             rain += int(card.rain_of(scan)[rows].sum())
             judged += int((~card.unknown_of(scan)[rows]).sum())
-    _refuse_unheard_of(extra, count[len(USUAL_CHANNELS) :])
+    _refuse_missing(extra, count[len(USUAL_CHANNELS) :])
     mean = total / np.maximum(count, 1)
     variance = squares / np.maximum(count, 1) - mean**2
-    # A channel that never changes says nothing, and is not to be divided by 0.
+    # A constant channel is not divided by 0.
     std = np.sqrt(np.where(variance > ROUNDING * mean**2, variance, 1.0))
     statistics = dict(zip(channels, zip(mean.tolist(), std.tolist(), strict=True), strict=True))
     return card.completed(
@@ -58,7 +57,7 @@ def measured(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -
     )
 
 
-def _refuse_unheard_of(channels: Sequence[str], count: NDArray[np.float64]) -> None:
+def _refuse_missing(channels: Sequence[str], count: NDArray[np.float64]) -> None:
     for name, known in zip(channels, count, strict=True):
         if not known:
             raise InputError(

@@ -1,19 +1,18 @@
-"""The data module of recordings that a teacher has labelled."""
+"""The data module of recordings that a teacher labelled."""
 
 from derain.datamodules.base import Part, ScanDataModule
-from derain.datamodules.taught_data import TaughtData
+from derain.datamodules.scan_data import TaughtData
 from derain.sources.source import Frames, Source
 
-# Scans of an epoch of training: as many steps as the rates of learning are chosen for.
+# Scans of a training epoch, at least: the learning rates are chosen for so many steps.
 FEWEST_SHOWN = 16
 
 
 class Taught(TaughtData, ScanDataModule):
-    """Scans with the labels of a teacher, and those that were held out as the validation part.
+    """Scans with a teacher's labels; the held-out scans are the validation part.
 
-    Points of which the teacher is not sure are left out, of training and of measuring. So scores
-    are agreement with the teacher, which says little of the truth. The held-out scans are those
-    that are tested and predicted, too.
+    Points of which the teacher is not sure are left out, in training and in measuring. Scores are
+    agreement with the teacher, not with the truth. Test and prediction use the held-out scans, too.
 
     Example:
         >>> from pathlib import Path
@@ -28,18 +27,18 @@ class Taught(TaughtData, ScanDataModule):
 
     Args:
         root: The folder that ``derain teach`` wrote.
-        loading: How the scans are read and batched; their columns are those that the teacher read,
-            and intensities are in the unit that it saw.
+        loading: How the scans are read and batched; their columns and the unit of their
+            intensities are those that the teacher read.
 
     Raises:
         InputError: No such folder, or one that is damaged or not complete.
     """
 
     def shown(self, part: Part) -> Source:
-        """The scans of a part; to train on, each of a short recording several times an epoch.
+        """The scans of a part; those of a short training recording several times an epoch.
 
-        Augmentation changes it in another way each time. An epoch of a few scans would be too short
-        to choose by.
+        Augmentation changes each differently every time. Epochs of a few scans would be too short
+        to select checkpoints by.
 
         Raises:
             InputError: No scan was held out.

@@ -9,8 +9,8 @@ from derain.datamodules.sequences import SequenceDataModule
 class Wads(SequenceDataModule):
     """WADS as published, with the split of 3D-OutDet.
 
-    Its raw scans hold about 40 % of their points twice. They are measured on distinct points, as
-    the published results are and as its data card says; predictions are for every row of the file.
+    About 40 % of the points in its raw scans are duplicates. Scores count distinct points, as its
+    data card states and the published results do; predictions cover every row of the file.
 
     Example:
         >>> data = Wads("WADS")

@@ -1,4 +1,4 @@
-"""Scans of many simulated worlds, made on the user's machine."""
+"""Scans of many simulated worlds."""
 
 from derain.datamodules.base import Loading
 from derain.datamodules.simulated import SimulatedDataModule
@@ -6,9 +6,9 @@ from derain.simulation.world_campaign import WorldCampaign
 
 
 class Worlds(SimulatedDataModule):
-    """Scans of which each is of another place, sensor and weather, made at first use.
+    """Scans each of another place, sensor and weather, made at first use.
 
-    What learns from them is to work on sensors and in places that nobody has shown it.
+    They train models for sensors and places that are not in any training data.
 
     Example:
         >>> data = Worlds("worlds")  # nothing is simulated before training asks for it
@@ -17,9 +17,8 @@ class Worlds(SimulatedDataModule):
 
     Args:
         root: Folder of the data set.
-        campaign: What is simulated where the folder does not hold it already.
-        make: Whether it is simulated there; else what ``derain simulate --world`` wrote to the
-            folder is taken, whatever the campaign.
+        campaign: The simulation, run where the folder does not hold its result.
+        make: Whether to run it; False takes what ``derain simulate --world`` wrote there.
         workers: Processes that simulate; 0 takes one per core.
         loading: How the scans are read and batched.
 

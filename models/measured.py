@@ -155,20 +155,21 @@ class MeasuredModule(lightning.LightningModule, ABC):
         for measured, probability in zip(batch.measured, probabilities, strict=True):
             scan = measured.scan
             if scan.label is not None:
-                self.metrics.update_scan(scan, probability > self.spec.threshold)
+                self.metrics.update(scan, probability > self.spec.threshold)
                 known = ~self.card.unknown_of(scan)
                 rain = self.card.rain_of(scan)
                 self.threshold_counts.update(probability[known], rain[known])
         return probabilities
 
     def _log_scores(self, part: str) -> None:
-        if not self.metrics.per_scan():  # scans without labels measure nothing
+        counts = self.metrics.counts()
+        if not counts.per_scan:  # scans without labels measure nothing
             return
         scores = self.metrics.compute() | self.threshold_counts.compute()
         self._log_alike({f"{part}/{name}": score for name, score in scores.items()})
         self._log_alike({f"{part}_iou": scores["iou"]}, prog_bar=True, logger=False)
         for name, ids in self.card.parts.items():
-            self._log_of_one(f"{part}/{name}", self.metrics.pooled_over(ids))
+            self._log_of_one(f"{part}/{name}", counts.pooled_over(ids))
         if part == "val":
             self._log_alike({"hp_metric": scores["iou"]})
 
@@ -176,7 +177,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
         """What the best checkpoint is chosen by, given the loss of the validation scans."""
         if not self.LEARNS_FROM_LABELS:
             return -loss
-        counts = self.metrics.pooled()
+        counts = self.metrics.counts().pooled()
         if counts.true_positive + counts.false_negative:
             return torch.tensor(counts.iou, dtype=torch.float32, device=loss.device)
         # Without rain the IoU is undefined, or 0 because of a single point.

@@ -75,9 +75,7 @@ class SupervisedModule(DerainingModule):
         inside = self.hparams.get("candidates")
         if inside is None or not scans:
             return None
-        known = [scan.take(~card.unknown_of(scan)) for scan in scans]
-        labelled = ((scan, card.rain_of(scan)) for scan in known)
-        return fit_candidates(labelled, self.channels, inside)
+        return fit_candidates(map(card.known_points, scans), self.channels, inside)
 
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
         """Loss with its parts, and logits."""

@@ -132,6 +132,18 @@ class DataCard:
         """
         return self._of_classes(scan, self.unknown)
 
+    def known_points(self, scan: Scan) -> tuple[Scan, NDArray[np.bool_]]:
+        """The points of a labelled scan of which it is known whether they are rain.
+
+        Returns:
+            The scan of those M points, and which of them are rain, bool (M,).
+
+        Raises:
+            InputError: A scan without labels.
+        """
+        known = scan.take(~self.unknown_of(scan))
+        return known, self.rain_of(known)
+
     def normalised_as(self, other: "DataCard") -> "DataCard":
         """The same card with the input's statistics of another one, and the unit they are in."""
         return replace(

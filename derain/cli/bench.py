@@ -158,8 +158,7 @@ def _labelled_frames(
 
 def _learn_from(arguments: argparse.Namespace, data: "ScanData") -> "LearnFrom | None":
     """What gives the training scans; None where none are named."""
-    from derain.datamodules.sequence_data import SequenceData
-    from derain.datamodules.taught_data import TaughtData
+    from derain.datamodules.scan_data import SequenceData, TaughtData
 
     if arguments.train is None and not isinstance(data, SequenceData | TaughtData):
         return None
@@ -170,7 +169,7 @@ def _learn_from(arguments: argparse.Namespace, data: "ScanData") -> "LearnFrom |
 
 
 def _require_split(arguments: argparse.Namespace, data: "ScanData") -> None:
-    from derain.datamodules.sequence_data import SequenceData
+    from derain.datamodules.scan_data import SequenceData
 
     if not isinstance(data, SequenceData):
         raise InputError(

@@ -17,12 +17,14 @@ from derain.cli.runtime_options import add_runtime
 from derain.cli.scan_by_scan import ScanByScan
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError, printable
+from derain.evaluation.answers import Answers
 from derain.evaluation.counts import or_none
 from derain.evaluation.text_tables import number_text
 from derain.sources.folders import named_frames
 from derain.sources.recordings import irregularities
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
+from derain.teaching.labels import TAUGHT_CARD
 from derain.views.oddities import much_removed
 
 if TYPE_CHECKING:
@@ -140,13 +142,11 @@ class _Telling:
     def __init__(
         self, method: "Method", source: "Source", card: DataCard | None, as_json: bool
     ) -> None:
-        from derain.teaching.shares import TaughtShares
-
         self.method = method
         self.frames = {frame.key: frame for frame in source}
         self.judged = 0
         self.as_json = as_json
-        self.shares = TaughtShares()
+        self.answers = Answers.none()
         self.notices = Notices()
         self.record = None
         if card is not None and any(frame.has_labels for frame in source):
@@ -160,10 +160,12 @@ class _Telling:
         self.judged += 1
         odd = [*self.method.oddities(judgement), *much_removed(judgement.share_of_rain)]
         self.notices.tell(frame.name, odd)
-        not_rain, rain, unknown = map(or_none, self.shares.add(judgement.scan, labels).tolist())
-        points = int(judgement.scan.valid.sum())
+        answers = Answers.of(judgement.scan.with_label(labels), TAUGHT_CARD)
+        self.answers += answers
+        not_rain, rain, unknown = map(or_none, answers.shares.tolist())
         times = dict(stopwatch.milliseconds)
-        tell(TaughtFacts(frame.name, points, rain, not_rain, unknown, times), self.as_json)
+        facts = TaughtFacts(frame.name, answers.points, rain, not_rain, unknown, times)
+        tell(facts, self.as_json)
         if self.record is not None:
             try:
                 self.record.add(self.frames[frame.key], judgement)
@@ -176,7 +178,7 @@ class _Telling:
 
         stream = sys.stderr if self.as_json else sys.stdout
         self.notices.tell_how_many_more()
-        say(f"{self.judged:,} scans\n{self.shares}", stream)
+        say(f"{self.judged:,} scans\n{self.answers}", stream)
         if self.record is not None and self.record.scans:
             say(
                 f"for the record only, beside {self.record.card.title}'s own labels of "
@@ -185,7 +187,7 @@ class _Telling:
             )
         if nothing := self.judged - len(manifest.scans):
             warn(f"{nothing:,} of {self.judged:,} scans are left out: of them nothing is known")
-        if not self.shares.rain:
+        if not self.answers.rain:
             warn("no rain was found: a network would learn that nothing is rain")
         if not any(scan.part == HELD_OUT_PART for scan in manifest.scans):
             warn("no scan is held out, for that a sequence needs three: all are for training")

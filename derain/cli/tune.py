@@ -149,9 +149,7 @@ def _candidates(
 
     def known() -> Iterator[tuple[Any, Any]]:
         for frame in tqdm(frames, desc="bounding rain", unit="scan", disable=None):
-            scan = data.read_measured(frame)
-            scan = scan.take(~data.card.unknown_of(scan))
-            yield scan, data.card.rain_of(scan)
+            yield data.card.known_points(data.read_measured(frame))
 
     candidates = fit_candidates(known(), ("intensity",), arguments.candidates)
     say(f"candidates: {candidates or 'every point, for no bounds tell rain from the rest'}")

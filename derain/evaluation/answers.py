@@ -1,27 +1,29 @@
-"""What a teacher says of points, and what its student makes of them, counted by range."""
+"""A teacher's answers, and its student's beside them, counted by range."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.evaluation.counts import Counts, ratio
+from derain.evaluation.range_bands import RANGE_EDGES, band_names, band_of
+from derain.evaluation.text_tables import number_text, plain_table
 from derain.scan import Scan
 
-# What a teacher says of a point, as a number of its column in a table of answers.
+# A teacher's answer for a point, as the number of its column in a table of answers.
 NOT_RAIN, RAIN, NOT_KNOWN = range(3)
 TEACHERS_ANSWERS = {NOT_RAIN: "not rain", RAIN: "rain", NOT_KNOWN: "not known"}
 
-# Where the bands of range start that answers are counted in, metres; the last one is open.
+# Where the narrow bands start in which answers are counted, metres; the last is open.
 FINE_EDGES = tuple(range(0, 85, 5))
-COARSE_EDGES = (0, 10, 20, 40, 80)
+
+_SHAPE = (len(FINE_EDGES), len(TEACHERS_ANSWERS), 2)
 
 
 def answer_of(scan: Scan, card: DataCard) -> NDArray[np.int64]:
-    """What a teacher says of each point, as a number of ``TEACHERS_ANSWERS``, int64 (N,).
+    """The teacher's answer for each point, as a number of ``TEACHERS_ANSWERS``, int64 (N,).
 
     Args:
         scan: A scan with the teacher's labels.
@@ -36,12 +38,11 @@ def answer_of(scan: Scan, card: DataCard) -> NDArray[np.int64]:
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """Points by their range, by what the teacher says of them, and by what the student does.
+    """Points by range, by the teacher's answer and by the student's.
 
     Attributes:
         table: Points, int64 (bands of ``FINE_EDGES``, answers of the teacher, 2); of the last axis
-            the second is what the student calls rain. Where no student was asked, all are in the
-            first.
+            the second counts what the student calls rain. Without a student, all are in the first.
     """
 
     table: NDArray[np.int64]
@@ -50,12 +51,12 @@ class Answers:
     def of(
         cls, scan: Scan, card: DataCard, called_rain: NDArray[np.bool_] | None = None
     ) -> "Answers":
-        """Counts the points of one scan that can be judged.
+        """Counts the valid points of one scan.
 
         Args:
             scan: A scan with the teacher's labels.
             card: Data card of these labels.
-            called_rain: What the student calls rain, bool (N,); None where it was not asked.
+            called_rain: What the student calls rain, bool (N,); None without a student.
 
         Raises:
             InputError: A scan without labels.
@@ -63,30 +64,34 @@ class Answers:
         answer = answer_of(scan, card)
         student = np.zeros(len(scan), np.int64) if called_rain is None else called_rain
         valid = scan.valid
-        band = np.searchsorted(FINE_EDGES, scan.range[valid], side="right") - 1
-        shape = (len(FINE_EDGES), len(TEACHERS_ANSWERS), 2)
-        cell = np.ravel_multi_index((band, answer[valid], student[valid].astype(int)), shape)
-        return cls(np.bincount(cell, minlength=int(np.prod(shape))).reshape(shape))
+        band = band_of(scan.range[valid], FINE_EDGES)
+        cell = np.ravel_multi_index((band, answer[valid], student[valid].astype(int)), _SHAPE)
+        return cls(np.bincount(cell, minlength=int(np.prod(_SHAPE))).reshape(_SHAPE))
 
     @classmethod
     def none(cls) -> "Answers":
-        """Of no points."""
-        return cls(np.zeros((len(FINE_EDGES), len(TEACHERS_ANSWERS), 2), np.int64))
+        """Counts of no points."""
+        return cls(np.zeros(_SHAPE, np.int64))
 
     def __add__(self, other: "Answers") -> "Answers":
-        """Of the points of both."""
+        """Counts of the points of both."""
         return Answers(self.table + other.table)
 
     def between(self, nearest: float, farthest: float) -> "Answers":
-        """Of the points in the bands that start from one range and before another, metres."""
+        """Counts of the bands that start from one range and before another, metres."""
         start = np.array(FINE_EDGES)
         inside = (start >= nearest) & (start < farthest)
         return Answers(np.where(inside[:, None, None], self.table, 0))
 
     @property
     def points(self) -> int:
-        """How many there are."""
+        """Number of points."""
         return int(self.table.sum())
+
+    @property
+    def rain(self) -> int:
+        """Points that the teacher calls rain."""
+        return int(self.table[:, RAIN].sum())
 
     @property
     def shares(self) -> NDArray[np.float64]:
@@ -106,7 +111,7 @@ class Answers:
 
     @property
     def agreement(self) -> Counts:
-        """The student beside the teacher, where that is sure, as if it were the truth."""
+        """Counts of the student's answers, with the teacher's sure answers as the truth."""
         kept, called = self.table.sum(axis=0).T
         return Counts(
             true_positive=int(called[RAIN]),
@@ -115,14 +120,22 @@ class Answers:
             true_negative=int(kept[NOT_RAIN]),
         )
 
+    def __str__(self) -> str:
+        """Points and the shares of the teacher's answers, by range, as a table."""
+        rows = [["range", "points", *TEACHERS_ANSWERS.values()]]
+        for name, band in {**coarse_bands(self), "all": self}.items():
+            shares = (number_text(share, ".1%") for share in band.shares)
+            rows.append([name, f"{band.points:,}", *shares])
+        return plain_table(rows)
+
 
 @dataclass(frozen=True)
 class AnswersOfScan:
     """The answers of one scan.
 
     Attributes:
-        key: What the scan is called.
-        held_out: Whether the student did not learn from it, but was chosen and asked by it.
+        key: Key of the scan.
+        held_out: Whether the student did not learn from it, but is chosen and measured by it.
         answers: The answers.
     """
 
@@ -131,12 +144,13 @@ class AnswersOfScan:
     answers: Answers
 
 
-def total(answers: "list[Answers]") -> Answers:
-    """Of the points of all."""
-    return reduce(Answers.__add__, answers, Answers.none())
+def total(answers: Sequence[Answers]) -> Answers:
+    """Counts of the points of all."""
+    return sum(answers, Answers.none())
 
 
 def coarse_bands(answers: Answers) -> dict[str, Answers]:
-    """The answers of each wide band of range, by names such as ``0-10 m`` and ``80+ m``."""
-    bands = {f"{a}-{b} m": answers.between(a, b) for a, b in pairwise(COARSE_EDGES)}
-    return {**bands, f"{COARSE_EDGES[-1]}+ m": answers.between(COARSE_EDGES[-1], np.inf)}
+    """The answers in each band of ``RANGE_EDGES``, by its name."""
+    ends = (*RANGE_EDGES[1:], np.inf)
+    bands = zip(band_names(), RANGE_EDGES, ends, strict=True)
+    return {name: answers.between(start, end) for name, start, end in bands}

@@ -12,7 +12,6 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import intersection_over_union
 from derain.scan import Scan
@@ -29,20 +28,6 @@ def all_points(scan: Scan) -> NDArray[np.bool_]:
 def no_points(scan: Scan) -> NDArray[np.bool_]:
     """Calls no point rain, bool (N,)."""
     return np.zeros(len(scan), bool)
-
-
-def known_truth(scan: Scan, card: DataCard) -> tuple[Scan, NDArray[np.bool_]]:
-    """The points of a labelled scan of which it is known whether they are rain.
-
-    Args:
-        scan: A scan with labels.
-        card: Its data card.
-
-    Returns:
-        The scan of those M points, and which of them are rain, bool (M,).
-    """
-    known = ~card.unknown_of(scan)
-    return scan.take(known), card.rain_of(scan)[known]
 
 
 @dataclass(frozen=True, eq=False)

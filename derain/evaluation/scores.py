@@ -99,7 +99,7 @@ class _Scoring:
 
     def scores(self, rain_rates: Sequence[float | None] | None) -> Scores:
         """The counts so far, given the rain rate of each scan in mm/h."""
-        per_scan = self.counts.per_scan()
+        per_scan = self.counts.per_scan
         rain_rates = [None] * len(per_scan) if rain_rates is None else rain_rates
         by_rate: dict[float, list[Counts]] = {}
         for rate, counts in zip(rain_rates, per_scan, strict=True):

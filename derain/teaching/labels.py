@@ -1,4 +1,4 @@
-"""The labels that a teacher gives, and the data card that says what they mean."""
+"""The labels that a teacher gives, and the data card that describes them."""
 
 from pathlib import Path
 from typing import Any
@@ -8,19 +8,26 @@ import yaml
 from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
+from derain.evaluation.answers import TEACHERS_ANSWERS
 from derain.files.atomic import replacing
 from derain.sources.judgement import Judgement
 
-# Class ids of what a teacher says of a point.
+# Class ids of a teacher's answers.
 TAUGHT_NOT_RAIN, TAUGHT_RAIN, TAUGHT_UNKNOWN = 0, 1, 255
 
-CLASSES = {TAUGHT_NOT_RAIN: "not rain", TAUGHT_RAIN: "rain", TAUGHT_UNKNOWN: "not known"}
+_IDS = (TAUGHT_NOT_RAIN, TAUGHT_RAIN, TAUGHT_UNKNOWN)
+TAUGHT_CARD = DataCard(
+    "taught",
+    classes=dict(zip(_IDS, TEACHERS_ANSWERS.values(), strict=True)),
+    rain=(TAUGHT_RAIN,),
+    unknown=(TAUGHT_UNKNOWN,),
+)
 
 
 def labels_of(judgement: Judgement) -> NDArray[np.uint32]:
-    """What a teacher says of each row of a scan, uint32 (N,), as it is written.
+    """The labels of each row of a judged scan, uint32 (N,), as they are written.
 
-    Not known is what it is not sure of, and every row that cannot be judged or that it did not see.
+    Rows of which the method is not sure, which it did not see or which hold no return are unknown.
     """
     labels = np.where(judgement.rain, np.uint32(TAUGHT_RAIN), np.uint32(TAUGHT_NOT_RAIN))
     labels[~(judgement.answered & judgement.scan.valid)] = TAUGHT_UNKNOWN
@@ -28,23 +35,23 @@ def labels_of(judgement: Judgement) -> NDArray[np.uint32]:
 
 
 def write_card(path: Path, teacher: str, scans: DataCard | None) -> None:
-    """Writes the data card of labels that a teacher gave; its statistics are measured in training.
+    """Writes the data card of a teacher's labels; training measures its statistics.
 
     Args:
         path: The file.
-        teacher: Its name.
-        scans: Data card of the scans, which has their licence, their unit, and whether their points
-            count once; None where there is none.
+        teacher: Name of the teacher.
+        scans: Data card of the scans, which gives their licence, their unit, and whether points at
+            one position count once; None where there is none.
 
     Raises:
         InputError: It cannot be written.
     """
     card: dict[str, Any] = {
         "name": f"{'scans' if scans is None else scans.name} taught by {teacher}",
-        "classes": CLASSES,
-        "rain": [TAUGHT_RAIN],
-        "unknown": [TAUGHT_UNKNOWN],
-        "licence": f"derived from scans whose licence is {_licence(scans)}",
+        "classes": dict(TAUGHT_CARD.classes),
+        "rain": [*TAUGHT_CARD.rain],
+        "unknown": [*TAUGHT_CARD.unknown],
+        "licence": f"derived from scans whose licence is {(scans or TAUGHT_CARD).licence}",
     }
     if scans is not None:
         card |= {
@@ -54,7 +61,3 @@ def write_card(path: Path, teacher: str, scans: DataCard | None) -> None:
         }
     with replacing(path) as temporary:
         temporary.write_text(yaml.safe_dump(card, sort_keys=False, allow_unicode=True), "utf-8")
-
-
-def _licence(scans: DataCard | None) -> str:
-    return "not stated" if scans is None else scans.licence

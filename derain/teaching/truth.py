@@ -1,23 +1,25 @@
-"""How far a teacher is from the truth, for the record: nothing that it says depends on this."""
+"""Scores of a teacher by the scans' own labels, for the record: they change nothing it teaches."""
+
+from dataclasses import astuple
 
 from derain.cards.card import DataCard
-from derain.errors import InputError
 from derain.evaluation.counts import Counts
 from derain.evaluation.rain_counts import RainCounts
 from derain.evaluation.text_tables import number_text, plain_table
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
+from derain.sources.reader import FrameReader
 from derain.views.morton import first_rows
 
 
 class TruthRecord:
-    """Measures what a teacher said of scans beside their own labels, where they have any.
+    """Measures a teacher's answers by the scans' own labels, where there are any.
 
     Args:
-        card: Data card of the scans, which says what of them is rain.
+        card: Data card of the scans.
 
     Attributes:
-        scans: How many scans had labels.
+        scans: Number of scans with labels.
     """
 
     def __init__(self, card: DataCard) -> None:
@@ -28,35 +30,28 @@ class TruthRecord:
         )
 
     def add(self, frame: Frame, judgement: Judgement) -> None:
-        """Measures one scan; where it has no labels, nothing is done.
+        """Measures one scan; one without labels is skipped.
 
         Args:
             frame: The scan's frame, with its own labels.
-            judgement: What the teacher said of it.
+            judgement: What the teacher returned for it.
 
         Raises:
-            InputError: Labels that cannot be read, or that the data card does not know.
+            InputError: Labels that cannot be read, or that the data card does not name.
         """
         if not frame.has_labels:
             return
-        scan = judgement.scan
-        label = frame.read_label(len(scan))
-        if strange := sorted({*label.tolist()} - self.card.classes.keys()):
-            raise InputError(
-                frame.label_path or frame.name,
-                f"ids {strange[:5]} are no classes of {self.card.name}",
-                "Name them in the data card.",
-            )
+        scan = FrameReader(self.card).with_labels(judgement.scan, frame)
         rows = first_rows(scan) if self.card.deduplicate else scan.valid.nonzero()[0]
-        self._all.add(scan.with_label(label).take(rows), judgement.rain[rows])
+        self._all.add(scan.take(rows), judgement.rain[rows])
         sure = rows[judgement.answered[rows]]
-        self._sure.add(scan.with_label(label).take(sure), judgement.rain[sure])
+        self._sure.add(scan.take(sure), judgement.rain[sure])
         self.scans += 1
 
     def __str__(self) -> str:
         scores = [["", "points", "precision", "recall", "IoU"]]
-        for name, metrics in (("all points", self._all), ("points it is sure of", self._sure)):
-            scores.append([name, *_scores(metrics.pooled())])
+        for name, measured in (("all points", self._all), ("points it is sure of", self._sure)):
+            scores.append([name, *_scores(measured.pooled())])
         classes = [["class", "points", "called rain", "of those it is sure of"]]
         sure = self._sure.by_class()
         for name, counts in self._all.by_class().items():
@@ -68,6 +63,5 @@ class TruthRecord:
 
 
 def _scores(counts: Counts) -> list[str]:
-    points = sum((counts.true_positive, counts.false_positive, counts.false_negative))
-    points += counts.true_negative
+    points = sum(astuple(counts))
     return [f"{points:,}", *map(number_text, (counts.precision, counts.recall, counts.iou))]

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.evaluation.baselines import known_truth
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
@@ -65,7 +64,7 @@ class LabelledFrames:
         """
         read = self._reader.read_distinct if self.distinct else self._reader.read
         for frame in evenly_spaced(self.frames, MOST_TRAINING_SCANS):
-            yield known_truth(read(frame), self.card)
+            yield self.card.known_points(read(frame))
 
     @property
     def _reader(self) -> FrameReader:

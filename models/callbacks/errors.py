@@ -7,9 +7,9 @@ import numpy as np
 from lightning.pytorch.loggers import TensorBoardLogger
 from numpy.typing import NDArray
 
-from derain.evaluation.metrics import RainMetrics
 from derain.evaluation.operating_points import CURVE_THRESHOLDS, OperatingPoints
-from derain.evaluation.rain_counts import band_names
+from derain.evaluation.rain_counts import RainCounts
+from derain.evaluation.range_bands import band_names
 from derain.models.base import DerainingModule
 from derain.models.callbacks.drawn_epochs import DrawnEpochs
 from derain.pictures.error_pictures import errors_figure, operating_points_figure
@@ -42,9 +42,9 @@ class ErrorPanels(lightning.Callback):
 
     def on_validation_epoch_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
         """Logs the errors of a validation."""
-        if trainer.sanity_checking or not model.metrics.per_scan():
+        if trainer.sanity_checking or not model.metrics.counts().per_scan:
             return
-        values = errors_by_name(model.metrics)  # of all processes
+        values = errors_by_name(model.metrics.counts())  # of all processes
         for logger in trainer.loggers:
             logger.log_metrics(values, trainer.global_step)
         if self.draws:
@@ -59,21 +59,21 @@ class ErrorPanels(lightning.Callback):
 
     def on_test_epoch_end(self, trainer: lightning.Trainer, model: DerainingModule) -> None:
         """Draws the errors of a test."""
-        if self.epochs.pictures and model.metrics.per_scan():
+        if self.epochs.pictures and model.metrics.counts().per_scan:
             self._draw(trainer, model, "test", model.trained_steps or trainer.global_step)
 
     def _draw(
         self, trainer: lightning.Trainer, model: DerainingModule, part: str, step: int
     ) -> None:
         # All processes put the counts together, the first one draws.
-        metrics, points = model.metrics, model.threshold_counts.points()
-        table = metrics.by_class_and_range()
+        points = model.threshold_counts.points()
+        table = model.metrics.counts().by_class_and_range()
         title = f"{part} on {model.card.name}, step {step:,}"
         for logger in trainer.loggers:
             if not isinstance(logger, TensorBoardLogger) or not trainer.is_global_zero:
                 continue
             writer = logger.experiment
-            figure = errors_figure(table, band_names(metrics.range_edges), title)
+            figure = errors_figure(table, band_names(), title)
             writer.add_figure(f"{part}: errors by class and range", figure, step)
             if points.rain:
                 figure = operating_points_figure(points, model.spec.threshold, title)
@@ -83,10 +83,10 @@ class ErrorPanels(lightning.Callback):
                 )
 
 
-def errors_by_name(metrics: RainMetrics) -> dict[str, float]:
+def errors_by_name(measured: RainCounts) -> dict[str, float]:
     """Shares that are judged wrongly, by the names of their scalars; where there are points."""
-    classes = metrics.by_class().items()
-    bands = metrics.by_range().items()
+    classes = measured.by_class().items()
+    bands = measured.by_range().items()
     return (
         {f"{BY_CLASS}/{name}": counts.share_wrong for name, counts in classes if counts.points}
         | {

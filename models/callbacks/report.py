@@ -48,33 +48,35 @@ def _tested(trainer: lightning.Trainer) -> str | None:
 
 def as_dict(metrics: RainMetrics) -> dict[str, object]:
     """Scores and counts as JSON-able primitives; a score that is undefined is None."""
+    measured = metrics.counts()
     return {
         "scores": {name: or_none(float(score)) for name, score in metrics.compute().items()},
-        "scans": len(metrics.per_scan()),
+        "scans": len(measured.per_scan),
         "classes": {
             name: {"points": counts.points, "called_rain": counts.called_rain, "rain": counts.rain}
-            for name, counts in metrics.by_class().items()
+            for name, counts in measured.by_class().items()
         },
         "ranges": {
             name: {score: or_none(getattr(counts, score)) for score in SCORES}
-            for name, counts in metrics.by_range().items()
+            for name, counts in measured.by_range().items()
         },
     }
 
 
 def as_text(metrics: RainMetrics, data: str) -> str:
     """Scores and counts as three small tables; ``-`` is a score that is undefined."""
+    measured = metrics.counts()
     scores = {name: float(score) for name, score in metrics.compute().items()}
     lines = [
-        f"{data}, {len(metrics.per_scan())} scans      precision  recall      F1     IoU",
+        f"{data}, {len(measured.per_scan)} scans      precision  recall      F1     IoU",
     ]
     width = lines[0].index("precision")
     for average, suffix in (("pooled over points", ""), ("mean over scans", "_per_scan")):
         lines.append(average.ljust(width) + _row([scores[score + suffix] for score in SCORES]))
-    for band, counts in metrics.by_range().items():
+    for band, counts in measured.by_range().items():
         lines.append(band.ljust(width) + _row([getattr(counts, score) for score in SCORES]))
     lines += ["", "class".ljust(width) + "   points  called rain   share"]
-    for name, of_class in metrics.by_class().items():
+    for name, of_class in measured.by_class().items():
         if of_class.points:
             name += " (rain)" if of_class.rain else ""
             lines.append(

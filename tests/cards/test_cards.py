@@ -247,3 +247,11 @@ def test_a_card_takes_the_normalisation_of_another_and_stays_itself() -> None:
     for channel in ("x", "y", "z", "intensity", "range"):
         assert both.statistics(channel) == wads.statistics(channel)
     assert replace(both, mean=None, std=None, range=None) == rehearse
+
+
+def test_known_points_are_those_that_are_rain_or_not() -> None:
+    card = DataCard("ours", {0: "ground", 3: "rain", 9: "haze"}, rain=(3,), unknown=(9,))
+    scan = Scan(np.arange(12, dtype=np.float32).reshape(4, 3)).with_label(np.array([3, 9, 0, 9]))
+    known, rain = card.known_points(scan)
+    np.testing.assert_array_equal(known.xyz, scan.xyz[[0, 2]])
+    assert rain.tolist() == [True, False]

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from derain.cli.main import main
-from derain.evaluation.metrics import RainMetrics
+from derain.evaluation.counts import Counts
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import read_labels, semantic
@@ -37,15 +37,7 @@ def test_the_scores_are_the_published_ones(folder: Path, shared: Path) -> None:
     points = 115_881
     truth = semantic(read_labels(shared / "data/wads/sample.label", points))
     found = read_labels(folder / "cleaned/sample.label", points)
-    metrics = RainMetrics({0: "other", FALLING_SNOW: "falling snow"}, {FALLING_SNOW})
-    metrics.update(
-        predicted=torch.from_numpy(found == 1),
-        label=torch.from_numpy(np.where(truth == FALLING_SNOW, truth, 0)),
-        range=torch.zeros(points),
-        scan=torch.zeros(points, dtype=torch.int64),
-        scans=1,
-    )
-    scores = metrics.pooled()
+    scores = Counts.of(found == 1, truth == FALLING_SNOW)
     assert scores.precision == pytest.approx(0.8950, abs=5e-4)
     assert scores.recall == pytest.approx(0.9243, abs=5e-4)
     assert scores.iou == pytest.approx(0.8339, abs=5e-4)

@@ -7,21 +7,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from derain.datamodules.draws import DrawnOrder, Draws, shared_out
-from derain.datamodules.order import Pick
+from derain.datamodules.order import Draws, Pick, TrainingOrder, shared_out
 from derain.errors import InputError
 
 WEIGHTS = st.lists(st.floats(0.1, 10), min_size=1, max_size=5)
 SIZES = st.lists(st.integers(1, 12), min_size=1, max_size=4)
 
 
+def sampler(draws: Draws, seed: int, processes: int, process: int) -> TrainingOrder:
+    return TrainingOrder(range(sum(draws.scans)), seed, processes, process, draws)
+
+
 def order(draws: Draws, processes: int, epoch: int, seed: int = 0) -> list[list[Pick]]:
     """What each process reads in an epoch."""
-    samplers = [DrawnOrder(draws, seed, processes, own) for own in range(processes)]
-    for sampler in samplers:
-        sampler.set_epoch(epoch)
-        assert len(sampler) == len(list(sampler))
-    return [list(sampler) for sampler in samplers]
+    samplers = [sampler(draws, seed, processes, own) for own in range(processes)]
+    for one in samplers:
+        one.set_epoch(epoch)
+        assert len(one) == len(list(one))
+    return [list(one) for one in samplers]
 
 
 @given(st.integers(0, 500), WEIGHTS)
@@ -68,7 +71,7 @@ def test_draws_differ_by_seed_and_epoch_and_are_known_without_the_earlier_ones()
     epochs = [order(draws, 1, epoch, seed)[0] for seed in range(3) for epoch in range(5)]
     numbers = {tuple(pick.number for pick in picks) for picks in epochs}
     assert len(numbers) == len(epochs)
-    again = DrawnOrder(draws, 2, 1, 0)
+    again = sampler(draws, 2, 1, 0)
     again.set_epoch(4)
     assert list(again) == epochs[-1]
 

@@ -11,9 +11,9 @@ import torch
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
-from derain.datamodules.kept import Kept, bytes_of
 from derain.datamodules.loader import scan_loader
 from derain.datamodules.loading import Part
+from derain.datamodules.scan_dataset import Kept, bytes_of
 from derain.evaluation.hard_cases import scene
 from derain.learning.batch import Batch
 from derain.scan import Scan

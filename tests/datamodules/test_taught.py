@@ -9,8 +9,8 @@ from window_method import Between
 
 from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.labelled import card_of, labelled_scans
+from derain.datamodules.scan_data import TaughtData
 from derain.datamodules.taught import Taught
-from derain.datamodules.taught_data import TaughtData
 from derain.errors import InputError
 from derain.evaluation.baselines import no_points
 from derain.evaluation.hard_cases import scene

@@ -11,7 +11,7 @@ from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
 from derain.datamodules.in_memory import InMemory
 from derain.datamodules.loader import scan_loader
-from derain.datamodules.windows import seen
+from derain.datamodules.scan_dataset import seen
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.learning.task import agree

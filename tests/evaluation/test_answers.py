@@ -5,7 +5,6 @@ import pytest
 
 from derain.cards.card import DataCard
 from derain.evaluation.answers import (
-    COARSE_EDGES,
     FINE_EDGES,
     NOT_KNOWN,
     NOT_RAIN,
@@ -17,6 +16,7 @@ from derain.evaluation.answers import (
 )
 from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import hard_cases, scene
+from derain.evaluation.range_bands import RANGE_EDGES
 from derain.scan import Scan
 
 HARD_CASES = dict(hard_cases(largest=2000))
@@ -68,7 +68,7 @@ def test_wide_bands_hold_all_points_by_their_range(
     assert list(bands) == ["0-10 m", "10-20 m", "20-40 m", "40-80 m", "80+ m"]
     ranges = scan.range[scan.valid]
     for band, (start, end) in zip(
-        bands.values(), zip(COARSE_EDGES, (*COARSE_EDGES[1:], np.inf), strict=True), strict=True
+        bands.values(), zip(RANGE_EDGES, (*RANGE_EDGES[1:], np.inf), strict=True), strict=True
     ):
         assert band.points == ((ranges >= start) & (ranges < end)).sum()
 
@@ -93,3 +93,15 @@ def test_of_no_points_no_share_is_defined(card: DataCard) -> None:
 def test_hard_scans_are_counted_too(name: str, scan: Scan, card: DataCard) -> None:
     labelled = scan.with_label(np.resize([0, 3, 9], len(scan)))
     assert Answers.of(labelled, card).points == scan.valid.sum()
+
+
+def test_the_table_has_a_row_for_each_band_and_one_for_all() -> None:
+    points = np.zeros((7, 4))
+    points[:, 0] = [1, 9.5, 10, 39, 40, 80, np.nan]
+    card = DataCard("taught", {0: "a", 1: "b", 2: "c"}, rain=(1,), unknown=(2,))
+    answers = Answers.of(Scan.of(points).with_label(np.array([0, 1, 1, 2, 0, 2, 2])), card)
+    rows = [line.split() for line in str(answers + answers).splitlines()]
+    assert rows[1] == ["0-10", "m", "4", "50.0%", "50.0%", "0.0%"]
+    assert rows[-1] == ["all", "12", "33.3%", "33.3%", "33.3%"]
+    assert (answers + answers).rain == 4
+    assert str(Answers.none()).splitlines()[-1].split() == ["all", "0", "-", "-", "-"]

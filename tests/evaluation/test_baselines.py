@@ -9,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.evaluation.baselines import PositionPrior, all_points, known_truth, no_points
+from derain.evaluation.baselines import PositionPrior, all_points, no_points
 from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.scan import Scan
@@ -116,15 +115,6 @@ def test_hard_scans_get_an_answer_and_points_that_cannot_be_judged_teach_nothing
         assert not predicted[~scan.valid].any()
     whole = PositionPrior.learn([(scan.take(scan.valid), rain[scan.valid])])
     np.testing.assert_array_equal(prior.rain, whole.rain)
-
-
-@given(st.lists(st.sampled_from([0, 3, 9]), max_size=30))
-def test_a_labelled_scan_teaches_what_is_known_of_it(labels: list[int]) -> None:
-    card = DataCard("ours", {0: "ground", 3: "rain", 9: "haze"}, rain=(3,), unknown=(9,))
-    scan = Scan.of(scene(30)[: len(labels)]).with_label(np.array(labels, np.int64))
-    seen, rain = known_truth(scan, card)
-    assert rain.tolist() == [label == 3 for label in labels if label != 9]
-    np.testing.assert_array_equal(seen.xyz, scan.xyz[[label != 9 for label in labels]])
 
 
 def test_everything_and_nothing_are_what_they_say() -> None:

@@ -12,8 +12,8 @@ from torch import Tensor
 
 from derain.cards.card import load_card
 from derain.errors import InputError
+from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import scene
-from derain.evaluation.metrics import Counts
 from derain.learning.batch import Batch, Sample
 from derain.models.outdet import PUBLISHED_KEYS, OutDet, OutDetNetwork
 from derain.models.published import read_state_dict

@@ -107,7 +107,7 @@ def test_the_scores_of_a_test_are_those_of_its_predictions(run: Run) -> None:
     predicted = run.probabilities[0] > run.model.spec.threshold
     assert run.scores["test/iou"] == pytest.approx(iou(predicted, rain))
     assert run.scores["test/recall"] == pytest.approx((predicted & rain).sum() / rain.sum())
-    by_class = run.model.metrics.by_class()
+    by_class = run.model.metrics.counts().by_class()
     assert by_class["rain"].called_rain == (predicted & rain).sum()
     assert sum(counts.points for counts in by_class.values()) == len(rain)
 
@@ -370,8 +370,9 @@ def test_a_run_goes_through_scans_of_no_point_and_of_one(
     assert trainer.global_step == 4
     assert all(tensor.isfinite().all() for tensor in model.state_dict().values())
     trainer.test(model, data, verbose=False)
-    assert len(model.metrics.per_scan()) == 6
-    assert sum(counts.points for counts in model.metrics.by_class().values()) == 4 * 300 + 1
+    measured = model.metrics.counts()
+    assert len(measured.per_scan) == 6
+    assert sum(counts.points for counts in measured.by_class().values()) == 4 * 300 + 1
 
 
 def test_a_scan_that_cannot_be_read_stops_a_run_with_its_name(

@@ -70,12 +70,13 @@ def test_the_numbers_are_those_of_the_counts(train: Callable[..., Any]) -> None:
         if tag.startswith(("errors_by_class", "rain_left", "lost_by"))
     }
     assert all(len(events.Scalars(tag)) == 2 for tag in last)
-    pooled, classes = model.metrics.pooled(), model.metrics.by_class()
+    measured = model.metrics.counts()
+    pooled, classes = measured.pooled(), measured.by_class()
     assert {tag for tag in last if tag.startswith("errors_by_class")} == {
         f"errors_by_class/{name}" for name, counts in classes.items() if counts.points
     }
     assert last["errors_by_class/falling-snow"] == pytest.approx(1 - pooled.recall)
-    for band, counts in model.metrics.by_range().items():
+    for band, counts in measured.by_range().items():
         left, lost = f"rain_left_by_range/{band}", f"lost_by_range/{band}"
         rain = counts.true_positive + counts.false_negative
         others = counts.false_positive + counts.true_negative
@@ -89,11 +90,11 @@ def test_the_numbers_are_those_of_the_counts(train: Callable[..., Any]) -> None:
 def test_the_curve_goes_through_the_counts_at_the_threshold(train: Callable[..., Any]) -> None:
     _, model, events = train(1, ErrorPanels())
     points = model.threshold_counts.points()
-    assert points.counts(points.at(model.spec.threshold)) == model.metrics.pooled()
+    assert points.counts(points.at(model.spec.threshold)) == model.metrics.counts().pooled()
     (event,) = events.Tensors("validation: rain")
     curve = tensor_util.make_ndarray(event.tensor_proto)
     assert curve.shape == (6, len(CURVE_THRESHOLDS))
-    counts = model.metrics.pooled()
+    counts = model.metrics.counts().pooled()
     expected = [
         *(counts.true_positive, counts.false_positive),
         *(counts.true_negative, counts.false_negative),

@@ -18,7 +18,7 @@ def test_a_score_that_is_undefined_is_a_dash_in_text_and_null_in_json() -> None:
     card = load_card("wads")
     metrics = RainMetrics(card.classes, card.rain)
     near = Scan.of(np.tile([3.0, 0, 0], (4, 1))).with_label(np.array([0, 0, 0, 110]))
-    metrics.update_scan(near, np.zeros(4, bool))  # rain that is left
+    metrics.update(near, np.zeros(4, bool))  # rain that is left
     lines = as_text(metrics, "WADS").splitlines()
     assert lines[1].split()[-4:] == ["-", "0.0000", "0.0000", "0.0000"]
     assert [line.split()[-4:] for line in lines if line.startswith("10-20 m")] == [["-"] * 4]
@@ -34,7 +34,7 @@ def test_the_folder_is_printed_with_escapes(
     folder.mkdir()
     metrics = RainMetrics(card.classes, card.rain)
     rain = np.arange(100) < 50
-    metrics.update_scan(Scan.of(scene(100)).with_label(np.where(rain, 110, 0)), rain)
+    metrics.update(Scan.of(scene(100)).with_label(np.where(rain, 110, 0)), rain)
     trainer = SimpleNamespace(
         log_dir=str(folder), is_global_zero=True, loggers=[], ckpt_path="runs/last.ckpt"
     )
