@@ -242,6 +242,14 @@ def image_onnx(image_model: "DerainingModule", made_once: Callable[..., Path]) -
     return made_once(f"{image_model.NAME}.onnx", partial(export, image_model))
 
 
+@pytest.fixture(scope="session")
+def salsanext_onnx(random_salsanext: "SalsaNextModule", made_once: Callable[..., Path]) -> Path:
+    """One of them, for what does not depend on the network."""
+    from derain.export.onnx_file import export
+
+    return made_once("salsanext.onnx", partial(export, random_salsanext))
+
+
 @pytest.fixture
 def one_block(monkeypatch: pytest.MonkeyPatch) -> None:
     """Exports 3D-OutDet in one block: the same network, traced several times as quickly."""

@@ -138,15 +138,15 @@ def scans(tmp_path: Path) -> Path:
 
 def test_a_model_in_eight_bits_is_scaled_by_scans_like_those_it_will_see(
     run_derain,
-    image_model: DerainingModule,
-    image_onnx: Path,
+    random_salsanext: DerainingModule,
+    salsanext_onnx: Path,
     scans: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(image_onnx))
+    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(salsanext_onnx))
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
-    save_model(image_model, tmp_path / "model.ckpt")
+    save_model(random_salsanext, tmp_path / "model.ckpt")
     outcome = run_derain(
         *("export", tmp_path / "model.ckpt", "--out", tmp_path / "int8.onnx"),
         *("--int8", "--calibration", scans, "--scan", scans / "00.bin", "--repeats", "1"),

@@ -109,7 +109,7 @@ def test_a_share_that_is_none_is_refused(
 
 
 def test_a_scan_is_projected_once_and_in_the_time_that_is_told(
-    run_derain, image_onnx: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, salsanext_onnx: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     points = scene(400)
     points[:100, 2] = 80.0  # above the grid
@@ -121,10 +121,10 @@ def test_a_scan_is_projected_once_and_in_the_time_that_is_told(
         return pixel(grid, xyz)
 
     monkeypatch.setattr(SphericalGrid, "pixel", counting)
-    outcome = run_derain("run", image_onnx, tmp_path / "scan.bin", "--out", tmp_path / "out")
+    outcome = run_derain("run", salsanext_onnx, tmp_path / "scan.bin", "--out", tmp_path / "out")
     assert outcome.code == 0
     assert [points for points in projected if points] == [400]  # of none when a model is opened
-    grid = Derainer(image_onnx).view.grid
+    grid = Derainer(salsanext_onnx).view.grid
     outside = (grid.pixel(points[:, :3]) < 0).mean()
     assert outside > 0.2
     assert outcome.said == [

@@ -105,15 +105,15 @@ def test_the_threshold_of_a_model_is_tuned(
 
 
 def test_points_outside_the_grid_of_a_model_are_warned_of(
-    run_derain, data: list[str | Path], tmp_path: Path, image_onnx: Path
+    run_derain, data: list[str | Path], tmp_path: Path, salsanext_onnx: Path
 ) -> None:
     outsides = []
     for path in sorted((tmp_path / "velodyne").iterdir()):
         points = np.fromfile(path, np.float32).reshape(-1, 4)
         points[:100, 2] = 80.0
         points.tofile(path)
-        outsides.append((Derainer(image_onnx).view.grid.pixel(points[:, :3]) < 0).mean())
-    outcome = run_derain("tune", image_onnx, *data, "--out", tmp_path / "best.yaml")
+        outsides.append((Derainer(salsanext_onnx).view.grid.pixel(points[:, :3]) < 0).mean())
+    outcome = run_derain("tune", salsanext_onnx, *data, "--out", tmp_path / "best.yaml")
     assert outcome.said == [
         f"derain: warning: {tmp_path / 'velodyne/0.bin'}: {outsides[0]:.0%} of the points lie "
         "outside the grid of WADS, and stay",

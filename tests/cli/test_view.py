@@ -84,19 +84,19 @@ def test_intensities_of_another_unit_are_warned_of_and_scaled(
 
 
 def test_points_outside_the_grid_of_a_model_are_warned_of(
-    run_derain, tmp_path: Path, image_onnx: Path, saved: list[Figure]
+    run_derain, tmp_path: Path, salsanext_onnx: Path, saved: list[Figure]
 ) -> None:
     scan, points = tmp_path / "high.bin", scene(400)
     points[:100, 2] = 80.0
     points.tofile(scan)
-    outside = (Derainer(image_onnx).view.grid.pixel(points[:, :3]) < 0).mean()
-    methods = ["--methods", f"net={image_onnx}", "dror"]
+    outside = (Derainer(salsanext_onnx).view.grid.pixel(points[:, :3]) < 0).mean()
+    methods = ["--methods", f"net={salsanext_onnx}", "dror"]
     outcome = run_derain("view", scan, *methods, "--out", tmp_path / "out.png")
     assert outcome.said == [
         f"derain: warning: {scan}: net: {outside:.0%} of the points lie outside the grid of WADS, "
         "and stay"
     ]
-    called = Derainer(image_onnx)(read_scan(scan)).sum()
+    called = Derainer(salsanext_onnx)(read_scan(scan)).sum()
     assert f"net: {called} points removed" in panels(saved[0])
 
 

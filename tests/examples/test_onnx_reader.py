@@ -80,14 +80,14 @@ def test_of_images_it_makes_what_derain_makes(
 @pytest.mark.parametrize("bounded", [False, True], ids=["all", "candidates"])
 def test_it_carries_scores_of_pixels_back_in_every_way(
     reader: ModuleType,
-    image_onnx: Path,
+    salsanext_onnx: Path,
     tmp_path: Path,
     way_back: str,
     azimuth: tuple[float, float],
     bounded: bool,
     candidates: Candidates,
 ) -> None:
-    proto, spec = onnx.load(image_onnx), Derainer(image_onnx).spec
+    proto, spec = onnx.load(salsanext_onnx), Derainer(salsanext_onnx).spec
     grid = {**spec.view["grid"], "azimuth": azimuth}
     view = {"kind": "range", "grid": grid, "way_back": way_back}
     changed = replace(spec, view=view, candidates=candidates if bounded else None)

@@ -49,6 +49,13 @@ def test_a_hard_scan_gets_an_answer_for_every_row(scan: Scan) -> None:
 
 
 @every_filter
+@pytest.mark.parametrize("points", [0, 1, 4])
+def test_few_points_are_judged_without_a_warning(name: str, points: int) -> None:
+    with np.errstate(all="raise", under="ignore"):
+        assert FilterDerainer(filter_from(name, {}))(scene()[:points]).shape == (points,)
+
+
+@every_filter
 def test_the_order_of_the_rows_does_not_matter(name: str) -> None:
     derainer = FilterDerainer(filter_from(name, MIXED[name]))
     scan = Scan.of(scene())
