@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm, many_evenly_in_logarithm
+from derain.simulation.drawing import log_uniform, log_uniforms
 from derain.simulation.shapes import Triangles
 
 
@@ -40,7 +40,7 @@ def asphalt(
     x: tuple[float, float], y: tuple[float, float], generator: np.random.Generator
 ) -> Surface:
     """A patch of road, from dry asphalt to a film of water that mirrors most of the light away."""
-    reflectivity = evenly_in_logarithm((0.01, 0.2), generator)
+    reflectivity = log_uniform((0.01, 0.2), generator)
     return Surface(shapes.rectangle(x, y, 0), TrackClass.ROAD, reflectivity)
 
 
@@ -147,5 +147,5 @@ def foliage(
     return Surface(
         shapes.raised(leaves, height),
         TrackClass.BACKGROUND,
-        many_evenly_in_logarithm((0.003, 0.4), count, generator),
+        log_uniforms((0.003, 0.4), count, generator),
     )

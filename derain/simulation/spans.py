@@ -9,7 +9,7 @@ import numpy as np
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
-from derain.simulation.drawing import Span, evenly_in_logarithm
+from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.sensor import MOST_BEAMS, ReturnMode
 
 # Whatever holds spans.
@@ -194,7 +194,7 @@ def draw(spans: Any, name: str, generator: np.random.Generator) -> float:
     """
     span: Span = getattr(spans, name)
     if name in LOGARITHMIC_SPANS:
-        return evenly_in_logarithm(span, generator)
+        return log_uniform(span, generator)
     return float(generator.uniform(*span))
 
 

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.simulation import objects
+from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, people, plants, relief, threads, vehicles, walls
 from derain.simulation.places.crowd import mixed, ragged_things, users
 from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.spacing import along
 from derain.simulation.places.standing import (
     assembled,
     free_places,

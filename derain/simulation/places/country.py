@@ -7,11 +7,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, plants, relief, threads
 from derain.simulation.places.crowd import ragged_things, users
 from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.spacing import along
 from derain.simulation.places.standing import Line, assembled, lined_up, put
 from derain.simulation.track import Track
 

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from derain.simulation import shapes
-from derain.simulation.drawing import evenly_in_logarithm
+from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
 from derain.simulation.places.relief import Relief, ground_mesh
@@ -93,7 +93,7 @@ def _under_the_ceiling(hall: Hall, generator: np.random.Generator) -> Iterator[S
     """Pipes, trays, lamps, and loose cables that hang down."""
     top = hall.height - 0.05
     for _ in range(generator.integers(3, 12)):
-        radius, drop = evenly_in_logarithm((0.008, 0.12), generator), generator.uniform(0.06, 0.35)
+        radius, drop = log_uniform((0.008, 0.12), generator), generator.uniform(0.06, 0.35)
         if generator.random() < 0.5:
             y = generator.uniform(*hall.y)
             ends = [((hall.x[0], y, top - drop), (hall.x[1], y, top - drop))]

@@ -7,7 +7,7 @@ behind, as it does through real glass; where it meets one it returns weakly, by 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.simulation.drawing import evenly_in_logarithm
+from derain.simulation.drawing import log_uniform
 from derain.simulation.shapes import Triangles
 
 GLASS_CELL = 0.04
@@ -27,7 +27,7 @@ def pane(corners: NDArray[np.float64], generator: np.random.Generator) -> Triang
     sides = np.linalg.norm(corners[[1, 3]] - corners[0], axis=1)
     cell = max(GLASS_CELL, float(np.sqrt(sides.prod() / MOST_CELLS)))
     wide, high = (1 + int(side / cell) for side in sides)
-    share = evenly_in_logarithm(RETURNING, generator)
+    share = log_uniform(RETURNING, generator)
     # A pane is never nothing at all.
     there = generator.permutation(wide * high)[: 1 + generator.binomial(wide * high - 1, share)]
     column, row = there % wide, there // wide

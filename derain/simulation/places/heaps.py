@@ -4,7 +4,7 @@ import numpy as np
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm, many_evenly_in_logarithm
+from derain.simulation.drawing import log_uniform, log_uniforms
 from derain.simulation.objects import Surface
 
 # Of snow, and of earth and stone.
@@ -19,7 +19,7 @@ def bank(length: float, generator: np.random.Generator, *, snow: bool = False) -
         generator: Random generator.
         snow: Whether it is of snow that a plough has left.
     """
-    width, height = generator.uniform(0.8, 4), evenly_in_logarithm((0.2, 2.0), generator)
+    width, height = generator.uniform(0.8, 4), log_uniform((0.2, 2.0), generator)
     cell = np.sqrt(length * width / 1500)
     x = np.linspace(0, length, 3 + int(length / cell))
     y = np.linspace(-width / 2, width / 2, 3 + int(width / cell))
@@ -41,7 +41,7 @@ def rubble(radius: float, generator: np.random.Generator) -> Surface:
         generator: Random generator.
     """
     count = int(generator.integers(100, 900))
-    size = many_evenly_in_logarithm((0.015, 0.15), count, generator)
+    size = log_uniforms((0.015, 0.15), count, generator)
     place = generator.normal(0, 0.45 * radius, (count, 2))
     height = 0.5 * radius * np.exp(-2 * (place / radius) ** 2).prod(axis=1)
     middle = np.column_stack([place, height * generator.uniform(0.7, 1, count)])
@@ -71,6 +71,6 @@ def _matter(
     triangles: shapes.Triangles, span: tuple[float, float], generator: np.random.Generator
 ) -> Surface:
     """Uneven in reflectivity from spot to spot."""
-    usual = evenly_in_logarithm(span, generator)
+    usual = log_uniform(span, generator)
     spots = usual * np.exp(generator.normal(0, 0.25, len(triangles)))
     return Surface(triangles, TrackClass.BACKGROUND, np.clip(spots, 0.003, 1))

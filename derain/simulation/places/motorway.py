@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.simulation import objects, shapes
+from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
 from derain.simulation.places.crowd import ragged_things
 from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.spacing import along
 from derain.simulation.places.standing import (
     Make,
     assembled,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm
+from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places import furniture, people, plants, threads
 from derain.simulation.places.frames import bars, made, railing
@@ -68,7 +68,7 @@ def _polished(surface: Surface, generator: np.random.Generator) -> Iterator[Surf
     if generator.random() > POLISHED or surface.label != TrackClass.BACKGROUND:
         yield surface
         return
-    count = round(evenly_in_logarithm(SPECKS_OF_A_THING, generator))
+    count = round(log_uniform(SPECKS_OF_A_THING, generator))
     yield from mirrored(surface, np.array([0, 0, np.mean(MOUNTING_HEIGHTS)]), count, generator)
 
 
@@ -95,7 +95,7 @@ def _below_the_ceiling(room: Walls, generator: np.random.Generator) -> Iterator[
         yield made([lamp, bars(wires, 0.004)], generator)
     for _ in range(generator.integers(0, 4)):
         y, z = generator.uniform(*room.y), room.height - generator.uniform(0.08, 0.5)
-        radius = evenly_in_logarithm((0.01, 0.15), generator)
+        radius = log_uniform((0.01, 0.15), generator)
         yield made([bars([((room.x[0], y, z), (room.x[1], y, z))], radius, 6)], generator)
     for _ in range(generator.integers(0, 5)):
         start = np.array([generator.uniform(*room.x), generator.uniform(*room.y), room.height])
@@ -118,7 +118,7 @@ def _furniture(room: Walls, generator: np.random.Generator) -> Iterator[Surface]
         (_twigs, 1.5),
     ]
     area = (room.x[1] - room.x[0]) * (room.y[1] - room.y[0])
-    count = int(np.clip(area * evenly_in_logarithm((0.08, 0.6), generator), 3, 40))
+    count = int(np.clip(area * log_uniform((0.08, 0.6), generator), 3, 40))
     makes = shared(options, count, generator)
     places = free_places(count, (0.7, 15.0), 0.6, generator, room.holds)
     yield from strewn(makes, places, generator)

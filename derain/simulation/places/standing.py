@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.simulation import shapes
-from derain.simulation.drawing import Span, evenly_in_logarithm
+from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places.relief import Relief
 from derain.simulation.track import Track
@@ -57,7 +57,7 @@ def free_places(
     taken: list[tuple[float, float]] = []
     for number in range(count):
         for _ in range(PLACING_TRIES):
-            distance = evenly_in_logarithm(distances, generator)
+            distance = log_uniform(distances, generator)
             limit = AHEAD if number % 2 else 180.0
             azimuth = np.radians(generator.uniform(-limit, limit))
             x, y = float(distance * np.cos(azimuth)), float(distance * np.sin(azimuth))

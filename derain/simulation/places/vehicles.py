@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm
+from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places.frames import bars
 from derain.simulation.places.glass import pane
@@ -121,7 +121,7 @@ def _tarpaulin(length: float, y: float, top: float, generator: np.random.Generat
 def _part(
     triangles: Triangles, reflectivity: tuple[float, float], generator: np.random.Generator
 ) -> Surface:
-    return Surface(triangles, TrackClass.CAR, evenly_in_logarithm(reflectivity, generator))
+    return Surface(triangles, TrackClass.CAR, log_uniform(reflectivity, generator))
 
 
 def joined(surfaces: Iterator[Surface]) -> Surface:

@@ -6,7 +6,7 @@ import numpy as np
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm
+from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places.frames import bars, railing
 from derain.simulation.places.glass import pane
@@ -30,9 +30,9 @@ def rough_wall(
     x = np.linspace(0, length, 2 + int(length / cell))
     z = np.linspace(0, height, 2 + int(height / cell))
     corners = np.stack(np.meshgrid(x, 0.0, z, indexing="ij"), axis=-1)[:, 0]
-    bumps = evenly_in_logarithm((0.001, 0.05), generator)
+    bumps = log_uniform((0.001, 0.05), generator)
     corners[..., 1] += bumps * generator.normal(size=corners.shape[:2])
-    stones = evenly_in_logarithm(STONE, generator)
+    stones = log_uniform(STONE, generator)
     triangles = shapes.sheet(corners)
     reflectivity = stones * np.exp(generator.normal(0, 0.15, len(triangles)))
     return Surface(triangles, TrackClass.BACKGROUND, np.clip(reflectivity, 0.003, 1))
@@ -65,9 +65,7 @@ def facade(length: float, generator: np.random.Generator) -> Iterator[Surface]:
         panes.append(pane(np.array(square), generator))
         frames += list(zip(square, square[1:] + square[:1], strict=True))
         frames += [((x, recess, z), (x, recess, top)), ((left, -0.05, z), (right, -0.05, z))]
-    yield Surface(
-        np.concatenate(panes), TrackClass.BACKGROUND, evenly_in_logarithm(GLASS, generator)
-    )
+    yield Surface(np.concatenate(panes), TrackClass.BACKGROUND, log_uniform(GLASS, generator))
     yield _thing([bars(frames, 0.03)], generator)
     yield from _on_the_wall(length, height, storey, generator)
 
@@ -106,6 +104,4 @@ def _box(
 
 
 def _thing(parts: list[shapes.Triangles], generator: np.random.Generator) -> Surface:
-    return Surface(
-        np.concatenate(parts), TrackClass.BACKGROUND, evenly_in_logarithm(STONE, generator)
-    )
+    return Surface(np.concatenate(parts), TrackClass.BACKGROUND, log_uniform(STONE, generator))
