@@ -1,4 +1,4 @@
-"""What carries the sensor and is seen by it: a car, a lorry, a robot, a tripod with its operator.
+"""The carrier that a sensor sees under itself: a car, a lorry, a robot, a tripod, a mast.
 
 Its parts are seen from .15 to 3 m, most of them at grazing angles or of paint that mirrors the
 light away, so that much of a carrier returns in a few scattered points, or not at all, and hides
@@ -17,7 +17,6 @@ from derain.simulation.objects import Surface
 from derain.simulation.places.frames import Point, bars
 from derain.simulation.places.specks import PAINT, mirrored
 from derain.simulation.shapes import Triangles
-from derain.simulation.track import Track
 
 # Of how many specks a part is seen that returns nothing else.
 SPECKS_OF_A_CARRIER = (1.0, 100.0)
@@ -60,20 +59,6 @@ def lay_out_carrier(generator: np.random.Generator, mounting_height: float) -> I
         yield from _finished(
             shapes.raised(turned, mounting_height), mounting_height, painted, generator
         )
-
-
-def with_surfaces(track: Track, surfaces: Iterator[Surface]) -> Track:
-    """A track to which surfaces are added, for example those of a carrier or of a horizon."""
-    added = list(surfaces)
-    if not added:
-        return track
-    tracks = [track, Track.of(added)]
-    return Track(
-        *(
-            np.concatenate([getattr(part, name) for part in tracks])
-            for name in ("triangles", "reflectivity", "label")
-        )
-    )
 
 
 def _finished(

@@ -5,9 +5,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from derain.simulation import shapes
-from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Surface, of_material
 from derain.simulation.shapes import Triangles
 
 FRAME_REFLECTIVITY = (0.03, 0.7)
@@ -127,8 +126,4 @@ def bollard(generator: np.random.Generator) -> Surface:
 
 def made(parts: list[Triangles], generator: np.random.Generator) -> Surface:
     """Parts of one material as a surface."""
-    return Surface(
-        np.concatenate(parts),
-        TrackClass.BACKGROUND,
-        log_uniform(FRAME_REFLECTIVITY, generator),
-    )
+    return of_material(parts, FRAME_REFLECTIVITY, generator)

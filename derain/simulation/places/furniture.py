@@ -13,7 +13,7 @@ from derain.simulation.shapes import Triangles
 
 
 def table(generator: np.random.Generator) -> Iterator[Surface]:
-    """A table on four legs or a trestle, strewn with papers, screens, cups and cables."""
+    """A table on four legs or a trestle, scatter with papers, screens, cups and cables."""
     length, width = generator.uniform(0.6, 2.2), generator.uniform(0.5, 1.0)
     top = generator.uniform(0.65, 1.05)
     yield made([shapes.box(length, width, top - 0.03, top)], generator)

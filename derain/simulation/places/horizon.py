@@ -1,4 +1,4 @@
-"""What is seen from 50 to 280 m away by a few beams: rows of trees, hills, corners, pylons."""
+"""Things 50 to 280 m away, which few beams reach: rows of trees, hills, corners, pylons."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -8,7 +8,7 @@ import numpy as np
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform, log_uniforms
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Surface, of_material
 from derain.simulation.places import frames, threads
 from derain.simulation.shapes import Triangles
 
@@ -135,14 +135,14 @@ def _building(away: float, generator: np.random.Generator) -> Iterator[Surface]:
         block = shapes.box(length, width, -DEPTH, top)
         x, y = generator.uniform(0, 12) + 16, generator.uniform(-15, 15)
         heading = generator.uniform(-np.pi, np.pi)
-        yield _matter(shapes.placed(block, x, y, heading), generator)
+        yield of_material([shapes.placed(block, x, y, heading)], HORIZON_REFLECTIVITY, generator)
         rods = [
             ((a, b, top), (a, b, top + generator.uniform(0.5, 4)))
             for a, b in generator.uniform(-3, 3, (generator.integers(0, 5), 2))
         ]
         if rods:
             thin = frames.bars(rods, log_uniform((0.01, 0.3), generator))
-            yield _matter(shapes.placed(thin, x, y, heading), generator)
+            yield of_material([shapes.placed(thin, x, y, heading)], HORIZON_REFLECTIVITY, generator)
 
 
 def _poles(away: float, generator: np.random.Generator) -> Iterator[Surface]:
@@ -154,7 +154,7 @@ def _poles(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     x = np.maximum(ahead * y, HORIZON[0] - away)
     rods = [((a, b, -DEPTH), (a, b, height)) for a, b in zip(x, y, strict=True)]
     rods += [((a, b, height), (a, b + 1.5, height + 0.2)) for a, b in zip(x, y, strict=True)]
-    yield _matter(frames.bars(rods, radius, 6), generator)
+    yield of_material([frames.bars(rods, radius, 6)], HORIZON_REFLECTIVITY, generator)
     if generator.random() < 0.5:
         heads = np.column_stack([x, y, np.full(count, height)])
         for start, end in itertools.pairwise(heads):
@@ -168,7 +168,7 @@ def _pylons(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     for y in (-apart / 2, apart / 2):
         yield frames.lattice((0, y, -DEPTH), (0, y, height), generator.uniform(0.6, 2), generator)
         arm = [((-4.0, y, height - 3), (4.0, y, height - 3))]
-        yield _matter(frames.bars(arm, 0.15), generator)
+        yield of_material([frames.bars(arm, 0.15)], HORIZON_REFLECTIVITY, generator)
         heads.append([(x, y, height - 3) for x in (-4.0, 0.0, 4.0)])
     for start, end in zip(*np.array(heads), strict=True):
         yield threads.cable(start, end, 0.03 * apart, (0.015, 0.08), generator)
@@ -181,7 +181,7 @@ def _sign(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     turned = shapes.placed(plate, 0, 0, generator.normal(0, 0.6))
     yield Surface(turned, TrackClass.BACKGROUND, generator.uniform(*RETROREFLECTIVE))
     post = frames.bars([((0.05, 0, -DEPTH), (0.05, 0, top))], 0.04)
-    yield _matter(post, generator)
+    yield of_material([post], HORIZON_REFLECTIVITY, generator)
 
 
 def _glint(away: float, generator: np.random.Generator) -> Iterator[Surface]:
@@ -196,11 +196,8 @@ def _vehicle(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     length, width, height = [(4.4, 1.8, 1.5), (10.0, 2.5, 3.6)][int(generator.random() < 0.3)]
     body = shapes.box(length, width, -1.0, height)
     heading = generator.uniform(-np.pi, np.pi)
-    yield Surface(
-        shapes.placed(body, 0, 0, heading),
-        TrackClass.CAR,
-        log_uniform((0.02, 0.6), generator),
-    )
+    turned = shapes.placed(body, 0, 0, heading)
+    yield of_material([turned], (0.02, 0.6), generator, TrackClass.CAR)
 
 
 def _plant(triangles: Triangles, generator: np.random.Generator) -> Surface:
@@ -208,8 +205,3 @@ def _plant(triangles: Triangles, generator: np.random.Generator) -> Surface:
     usual = log_uniform((0.1, 0.7), generator)
     spread = log_uniforms((0.3, 1.4), len(triangles), generator)
     return Surface(triangles, TrackClass.BACKGROUND, np.minimum(usual * spread, 1))
-
-
-def _matter(triangles: Triangles, generator: np.random.Generator) -> Surface:
-    reflectivity = log_uniform(HORIZON_REFLECTIVITY, generator)
-    return Surface(triangles, TrackClass.BACKGROUND, reflectivity)

@@ -53,6 +53,11 @@ def bare_tree(generator: np.random.Generator) -> Surface:
     return _plant(_boughs(log_uniform((2.0, 10.0), generator), 6, generator), generator)
 
 
+def tree(winter: bool, generator: np.random.Generator) -> Surface | Iterator[Surface]:
+    """A bare tree in winter, else one in leaf."""
+    return bare_tree(generator) if winter else crowned_tree(generator)
+
+
 def brushwood(radius: float, generator: np.random.Generator) -> Surface:
     """Bare rods and brambles that rise from one spot, as far as a radius in metres."""
     count = int(generator.integers(15, 80))

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,8 +12,8 @@ from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places import threads, walls
 from derain.simulation.places.frames import Point, bars, made
-from derain.simulation.places.glass import pane
-from derain.simulation.places.standing import put
+from derain.simulation.places.standing import place
+from derain.simulation.places.walls import pane
 
 FLOOR = (0.03, 0.6)
 
@@ -31,11 +32,13 @@ class Walls:
         x: From wall to wall along x, metres.
         y: From wall to wall along y, metres.
         height: Of the ceiling, metres.
+        MARGIN: Least distance of the middle of a thing from the walls, metres.
     """
 
     x: Span
     y: Span
     height: float
+    MARGIN: ClassVar[float] = 0.35
 
     @classmethod
     def draw(cls, shortest: Span, longest: Span, generator: np.random.Generator) -> "Walls":
@@ -58,9 +61,9 @@ class Walls:
         return [(behind, right), (ahead, right), (ahead, left), (behind, left)]
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether a thing as large as a chair may stand there."""
-        inside = self.x[0] + 0.35 < x < self.x[1] - 0.35
-        return inside and self.y[0] + 0.35 < y < self.y[1] - 0.35
+        """Whether there is room for a thing between the walls."""
+        inside = self.x[0] + self.MARGIN < x < self.x[1] - self.MARGIN
+        return inside and self.y[0] + self.MARGIN < y < self.y[1] - self.MARGIN
 
 
 def shell(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
@@ -79,10 +82,8 @@ def _floor_and_ceiling(room: Walls, generator: np.random.Generator) -> Iterator[
     for height, bumps in ((0.0, SMOOTH), (room.height, -SMOOTH)):
         rough = walls.rough_wall(length + 2 * OVERLAP, width + 2 * OVERLAP, generator, cell=0.5)
         rough = moved(rough, -OVERLAP, 0, -OVERLAP)
-        x, bump, z = np.moveaxis(rough.triangles, -1, 0)
-        lying = np.stack([x + room.x[0], z + room.y[0], height + bumps * bump], axis=-1)
-        shine = log_uniform(FLOOR, generator)
-        yield replace(rough, triangles=lying, reflectivity=shine)
+        lying = walls.laid_flat(rough, (room.x[0], room.y[0]), height, bumps)
+        yield replace(lying, reflectivity=log_uniform(FLOOR, generator))
 
 
 def _walls(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
@@ -102,7 +103,7 @@ def _walls(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
             behind = walls.rough_wall(length + 8, room.height + 2, generator, cell=0.8)
             wall.append(moved(behind, -4, -_beyond(generator), -1))
         wall += [*_on_the_wall(length, room.height, generator)]
-        yield from put(wall, *start, number * np.pi / 2)
+        yield from place(wall, *start, number * np.pi / 2)
 
 
 def _beyond(generator: np.random.Generator) -> float:

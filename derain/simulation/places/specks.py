@@ -1,4 +1,4 @@
-"""What little of a surface returns when the rest mirrors the light away: dust, edges, scratches."""
+"""Specks on a surface that mirrors the light away: dust, edges, scratches."""
 
 from collections.abc import Iterator
 from dataclasses import replace

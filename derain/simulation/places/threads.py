@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.simulation import shapes
-from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import Span, log_uniform
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Surface, of_material
 from derain.simulation.shapes import Triangles
 
 THREAD_REFLECTIVITY = (0.03, 0.6)
@@ -101,9 +100,8 @@ def _ribbons(starts: NDArray[np.float64], ends: NDArray[np.float64], width: floa
     along = ends - starts
     aside = np.cross(along, (0.0, 1.0, 0.0))
     aside *= width / 2 / np.maximum(np.linalg.norm(aside, axis=1, keepdims=True), 1e-9)
-    corners = starts - aside, starts + aside, ends + aside, ends - aside
-    return np.stack([corners[i] for i in (0, 1, 2, 0, 2, 3)], axis=1).reshape(-1, 3, 3)
+    return shapes.quads(starts - aside, starts + aside, ends + aside, ends - aside)
 
 
 def _strung(triangles: Triangles, generator: np.random.Generator) -> Surface:
-    return Surface(triangles, TrackClass.BACKGROUND, log_uniform(THREAD_REFLECTIVITY, generator))
+    return of_material([triangles], THREAD_REFLECTIVITY, generator)
