@@ -1,10 +1,10 @@
-"""What a simulated data set is made from."""
+"""The description of a simulated data set."""
 
 import json
 from dataclasses import asdict, dataclass, field, replace
-from itertools import cycle
+from itertools import cycle, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from derain.errors import InputError
 from derain.files.documents import shown
 from derain.simulation.drive import Drive
 from derain.simulation.layouts import LAYOUTS
-from derain.simulation.manifest import MAKER, RAIN_RATE
+from derain.simulation.manifest import MAKER, RAIN_RATE, SPLIT_PARTS
 from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.sensor import SELDOM_STATED, Sensor
@@ -35,9 +35,56 @@ MOST = 100_000
 HELD_OUT = 0.2
 
 
+class SplitSequences:
+    """Sequences that are drawn by their numbers and split into three parts.
+
+    Attributes:
+        train: How many to train on, at least one.
+        validation: How many to choose a model with.
+        test: How many to judge it on.
+        seed: Seed of everything drawn.
+        DIGITS: Of the name of a sequence.
+    """
+
+    train: int
+    validation: int
+    test: int
+    seed: int
+    DIGITS: ClassVar[int]
+
+    def _check_counts(self) -> None:
+        for part in SPLIT_PARTS:
+            _check_count(part, getattr(self, part), int(part == "train"))
+        if self.seed < 0:
+            raise InputError("seed", f"{shown(self.seed)} is negative", "Give 0 or more.")
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the sequences, in ascending order."""
+        count = self.train + self.validation + self.test
+        return [f"{number:0{self.DIGITS}d}" for number in range(count)]
+
+    @property
+    def split(self) -> dict[str, list[str]]:
+        """Names of the sequences of each part."""
+        names = iter(self.names)
+        return {part: list(islice(names, getattr(self, part))) for part in SPLIT_PARTS}
+
+    def _described(self, **content: Any) -> dict[str, Any]:
+        """A description, as reading it back from JSON gives it."""
+        content = {"made_by": MAKER, "version": __version__, **content}
+        return dict(json.loads(json.dumps(content)))
+
+
+def _check_count(name: str, count: int, least: int) -> None:
+    if not least <= count <= MOST:
+        few_or_many = "few" if count < least else "many"
+        raise InputError(name, f"{shown(count)} is too {few_or_many}", f"Give {least} to {MOST:,}.")
+
+
 @dataclass(frozen=True)
-class Campaign:
-    """What is simulated: every sequence is another track, and its scans differ in rain and noise.
+class Campaign(SplitSequences):
+    """A data set in which every sequence is of another track; its scans differ in rain and noise.
 
     Attributes:
         train: Sequences to train on, at least one.
@@ -68,17 +115,11 @@ class Campaign:
     layout: str = "street"
     radar: Radar | None = None
     drive: Drive | None = None
+    DIGITS = 3
 
     def __post_init__(self) -> None:
-        for name, least in (("train", 1), ("validation", 0), ("test", 0), ("scans", 1)):
-            count = getattr(self, name)
-            if not least <= count <= MOST:
-                few_or_many = "few" if count < least else "many"
-                raise InputError(
-                    name, f"{shown(count)} is too {few_or_many}", f"Give {least} to {MOST:,}."
-                )
-        if self.seed < 0:
-            raise InputError("seed", f"{shown(self.seed)} is negative", "Give 0 or more.")
+        self._check_counts()
+        _check_count("scans", self.scans, 1)
         if not self.rain_rates:
             raise InputError("rain rate", "none is given", "Give one or more, in mm/h.")
         for rate in self.rain_rates:
@@ -105,7 +146,7 @@ class Campaign:
         """
         return load_sensor(self.sensor) if isinstance(self.sensor, str) else self.sensor
 
-    def settled(self) -> "Campaign":
+    def resolved(self) -> "Campaign":
         """The same with its sensor read.
 
         Raises:
@@ -133,21 +174,6 @@ class Campaign:
         return np.arange(self.scans) / self.lidar.frame_rate
 
     @property
-    def names(self) -> list[str]:
-        """Names of the sequences, in ascending order."""
-        return [f"{number:03d}" for number in range(self.train + self.validation + self.test)]
-
-    @property
-    def split(self) -> dict[str, list[str]]:
-        """Names of the sequences of each part."""
-        judged = self.train + self.validation
-        return {
-            "train": self.names[: self.train],
-            "validation": self.names[self.train : judged],
-            "test": self.names[judged:],
-        }
-
-    @property
     def rain_rate(self) -> dict[str, float]:
         """Nominal rain rate of each sequence, in mm/h, by name in ascending order."""
         return dict(zip(self.names, cycle(map(float, self.rain_rates)), strict=False))
@@ -162,14 +188,7 @@ class Campaign:
         for name in SELDOM_STATED - {"row_inclinations"}:  # likewise
             if campaign["sensor"][name] == usual[name]:
                 del campaign["sensor"][name]
-        content = {
-            "made_by": MAKER,
-            "version": __version__,
-            "campaign": campaign,
-            "split": self.split,
-            RAIN_RATE: self.rain_rate,
-        }
-        return dict(json.loads(json.dumps(content)))
+        return self._described(campaign=campaign, split=self.split) | {RAIN_RATE: self.rain_rate}
 
 
 def partition(sequences: int) -> tuple[int, int, int]:

@@ -1,4 +1,4 @@
-"""What a point of the simulated track can be."""
+"""The classes of the points of a simulated track."""
 
 from enum import IntEnum
 
@@ -32,6 +32,6 @@ def packed(kind: NDArray[np.int64], thing: NDArray[np.int64]) -> NDArray[np.int6
     return kind | thing << 16
 
 
-def parted(label: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Classes and numbers, int64 (N,) each, of labels as :func:`packed` gives them."""
+def unpacked(label: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Classes and numbers, int64 (N,) each, of labels from :func:`packed`."""
     return label & 0xFFFF, label >> 16

@@ -1,4 +1,4 @@
-"""Writes a simulated data set in the layout of REHEARSE-3D, together with what it was made from.
+"""Writes a simulated data set in the layout of REHEARSE-3D, with a manifest of its origin.
 
 manifest.json       campaign, split, rain rate of each sequence, SHA-256 of each file
 sequences/000/...   see :mod:`derain.simulation.sequence`
@@ -31,7 +31,7 @@ SEQUENCES = "sequences"
 
 
 class Simulation(Protocol):
-    """What is simulated, sequence by sequence."""
+    """A data set that is simulated sequence by sequence."""
 
     @property
     def names(self) -> list[str]:
@@ -41,7 +41,7 @@ class Simulation(Protocol):
     def description(self) -> dict[str, Any]:
         """Everything that the files depend on, as reading it back from JSON gives it."""
 
-    def settled(self) -> Self:
+    def resolved(self) -> Self:
         """The same with every file that it names read.
 
         Raises:
@@ -70,7 +70,7 @@ def ensure_track(root: Path, campaign: Simulation, workers: int = 1) -> None:
     Raises:
         InputError: As :func:`simulate_track`.
     """
-    campaign = campaign.settled()  # reports a wrong file first
+    campaign = campaign.resolved()  # reports a wrong file first
     with _alone(root):
         there = read_manifest(root)
         if there and not there.get("keep") and not _describes(there, campaign):
@@ -95,7 +95,7 @@ def simulate_track(root: Path, campaign: Simulation, workers: int = 1) -> None:
         InputError: The folder holds something else or cannot be written, or Open3D cannot be
             imported. What was complete by then stays, and nothing half-written.
     """
-    campaign = campaign.settled()  # reports a wrong file first
+    campaign = campaign.resolved()  # reports a wrong file first
     with _alone(root):
         _simulate(root, campaign, workers, keep=True)
 

@@ -1,18 +1,18 @@
-"""What sensors and their drivers do to a scan besides noise: losses, copies, steps, mixed points.
+"""Defects of a scan besides noise: lost and copied returns, range steps, mixed points.
 
-Nothing here makes rain of what is none or the other way round: every return keeps its label, and a
-point between two surfaces gets that of the nearer one.
+Every return keeps its label, so that none becomes rain or ceases to be; a point between two
+surfaces gets the label of the nearer one.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import shown
-from derain.simulation.classes import TrackClass, parted
+from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.returns import Returns
 
 # Parts of a scan that are lost together: sensors send a scan in 75 (Ouster) to 180 (Velodyne)
@@ -141,10 +141,10 @@ def _single(beam: NDArray[np.int64]) -> NDArray[np.bool_]:
 def _borders(returns: Returns, columns: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows of the beams at a border, int64 (B,), and of the next beam in each one's row.
 
-    Both beams return one thing, which is not rain: what a drop shares a beam with is for the
-    simulation of rain to say.
+    Both beams return one surface each. Beams with rain are left out: the simulation of rain already
+    decides what a drop shares a beam with.
     """
-    kind, _ = parted(returns.label)
+    kind, _ = unpacked(returns.label)
     surface = returns.returned & (kind != TrackClass.RAIN) & _single(returns.beam)
     next_in_row = (np.diff(returns.beam) == 1) & (returns.beam[1:] % columns != 0)
     gap = np.abs(np.diff(returns.range)) > SMALLEST_GAP
@@ -171,14 +171,13 @@ def _with_both(
     returns: Returns, row: NDArray[np.int64], second: Returns, share: NDArray[np.float64]
 ) -> Returns:
     """Gives the beams of some rows a second return, with a share of what it would be by itself."""
-    reflectivity = np.concatenate([returns.reflectivity, share * second.reflectivity])
-    reflectivity[row] *= 1 - share
-    joined = Returns(
-        np.concatenate([returns.range, second.range]),
-        reflectivity,
-        np.concatenate([returns.label, second.label]),
-        np.concatenate([returns.beam, returns.beam[row]]),
-    )
+    first = returns.reflectivity.copy()
+    first[row] *= 1 - share
+    both = [
+        replace(returns, reflectivity=first),
+        replace(second, reflectivity=share * second.reflectivity, beam=returns.beam[row]),
+    ]
+    joined = Returns.joined(both)
     added = len(returns.beam) + np.arange(len(row))
     weaker = joined.power[added] <= joined.power[row]  # and so comes after the other
     return joined.take(np.insert(np.arange(len(returns.beam)), row + weaker, added))

@@ -1,4 +1,4 @@
-"""What a sensor reports of all that its beams meet."""
+"""Which of the things in its beams a sensor reports."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,16 +26,6 @@ def detected_surfaces(clear: Returns, transmission: NDArray[np.float64], sensor:
     )
 
 
-def joined(*parts: Returns) -> Returns:
-    """All that several calls have found, in their order."""
-    return Returns(
-        np.concatenate([part.range for part in parts]),
-        np.concatenate([part.reflectivity for part in parts]),
-        np.concatenate([part.label for part in parts]),
-        np.concatenate([part.beam for part in parts]),
-    )
-
-
 def reported(candidates: Returns, returns: ReturnMode) -> Returns:
     """What the sensor reports of all that it could detect.
 
@@ -60,7 +50,7 @@ def reported(candidates: Returns, returns: ReturnMode) -> Returns:
             last = _greatest(distance, candidates.beam)
             both = np.stack([strongest, last], axis=1)
             chosen = both[np.stack([np.ones_like(last, bool), last != strongest], axis=1)]
-    return _taken(candidates, chosen)
+    return candidates.take(chosen)
 
 
 def _greatest(value: NDArray[np.float64], beam: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -69,9 +59,3 @@ def _greatest(value: NDArray[np.float64], beam: NDArray[np.int64]) -> NDArray[np
     row = np.empty(beam.max(initial=-1) + 1, np.int64)
     row[beam[ascending]] = ascending  # of several rows the last assigned stays
     return row
-
-
-def _taken(returns: Returns, rows: NDArray[np.int64]) -> Returns:
-    return Returns(
-        returns.range[rows], returns.reflectivity[rows], returns.label[rows], returns.beam[rows]
-    )

@@ -1,21 +1,36 @@
-"""Numbers that are drawn between two others."""
+"""Random numbers between two bounds."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Lowest and highest value of what is drawn in between.
+# Least and greatest value.
 Span = tuple[float, float]
 
 
-def evenly_in_logarithm(span: Span, generator: np.random.Generator) -> float:
-    """A number between two positive ones: each doubling is as likely as any other."""
+def log_uniform(span: Span, generator: np.random.Generator) -> float:
+    """A number between two positive ones, uniform in its logarithm."""
     low, high = np.log(span)
     return float(np.exp(generator.uniform(low, high)))
 
 
-def many_evenly_in_logarithm(
-    span: Span, count: int, generator: np.random.Generator
-) -> NDArray[np.float64]:
-    """As :func:`evenly_in_logarithm`, so many numbers, float64 (count,)."""
+def log_uniforms(span: Span, count: int, generator: np.random.Generator) -> NDArray[np.float64]:
+    """Several numbers as of :func:`log_uniform`, float64 (count,)."""
     low, high = np.log(span)
     return np.asarray(np.exp(generator.uniform(low, high, count)))
+
+
+def along(begin: float, end: float, spacing: Span, generator: np.random.Generator) -> list[float]:
+    """Places along a line, uneven steps apart.
+
+    Args:
+        begin: The first place is at most one step after it.
+        end: The last place is before it.
+        spacing: Least and greatest step.
+        generator: Random generator.
+    """
+    places = []
+    place = begin + generator.uniform(0, spacing[1])
+    while place < end:
+        places.append(place)
+        place += generator.uniform(*spacing)
+    return places

@@ -89,8 +89,7 @@ def _verges(half_width: float, generator: np.random.Generator) -> Iterator[Surfa
         for _ in range(generator.integers(2, 7)):
             x, y = generator.uniform(5, 60), side * (half_width + generator.uniform(2, 15))
             crown = generator.uniform(1, 3)
-            yield objects.trunk(generator).placed(x, y)
-            yield objects.foliage((crown, crown, crown), 2 + crown, generator).placed(x, y)
+            yield from (part.placed(x, y) for part in objects.tree(crown, generator))
         for _ in range(generator.integers(5, 20)):
             x, y = generator.uniform(3, 50), side * (half_width + generator.uniform(0.5, 8))
             yield objects.pole(generator).placed(x, y)
@@ -99,9 +98,7 @@ def _verges(half_width: float, generator: np.random.Generator) -> Iterator[Surfa
 def _boughs(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
     for _ in range(generator.integers(5, 15)):
         x, y = generator.uniform(3, 15), generator.uniform(-half_width, half_width)
-        length, width, height = generator.uniform(0.3, 1.5, 3)
-        bough = objects.foliage((length, width, height), generator.uniform(1.5, 3), generator)
-        yield bough.placed(x, y)
+        yield objects.bough(1.5, generator).placed(x, y)
 
 
 def _buildings(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:

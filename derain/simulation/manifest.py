@@ -1,4 +1,4 @@
-"""The manifest of a simulated data set: what it was made from, and the checksum of every file.
+"""The manifest of a simulated data set: its description, and the checksum of every file.
 
 It is written twice: without ``files`` when the work begins, so that a run that is taken up again
 recognises the folder, and with ``files`` when every sequence is there.
@@ -17,7 +17,7 @@ from derain.simulation.rain_field import HARDEST_RAIN
 
 MANIFEST = "manifest.json"
 
-# What stands under ``made_by``: by this a manifest of derain is told from any other JSON file.
+# The value of ``made_by``, which distinguishes a manifest of derain from any other JSON file.
 MAKER = "derain.simulation"
 
 # Parts of its split.

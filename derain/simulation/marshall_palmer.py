@@ -1,4 +1,4 @@
-"""How many rain drops of which size fall at a rain rate, and the light that they take away.
+"""Number, sizes and extinction of the rain drops at a rain rate.
 
 Rates are in mm/h, 0 being clear air, and may be arrays of any shape; results have that shape.
 """

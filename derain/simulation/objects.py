@@ -4,6 +4,7 @@ Reflectivities are modelling choices for a near-infrared LiDAR, drawn per object
 everyday objects.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm, many_evenly_in_logarithm
+from derain.simulation.drawing import Span, log_uniform, log_uniforms
 from derain.simulation.shapes import Triangles
 
 
@@ -36,11 +37,37 @@ class Surface:
         return replace(self, triangles=shapes.placed(self.triangles, x, y, heading))
 
 
+def of_material(
+    parts: Sequence[Triangles],
+    reflectivity: Span,
+    generator: np.random.Generator,
+    label: TrackClass = TrackClass.BACKGROUND,
+) -> Surface:
+    """Parts as one surface, its reflectivity log-uniform between two values."""
+    return Surface(np.concatenate(parts), label, log_uniform(reflectivity, generator))
+
+
+def spotted(
+    triangles: Triangles, reflectivity: Span, spread: float, generator: np.random.Generator
+) -> Surface:
+    """A surface of the background whose reflectivity differs from triangle to triangle.
+
+    Args:
+        triangles: The surface.
+        reflectivity: Of the whole, log-uniform between two values.
+        spread: Standard deviation of its logarithm.
+        generator: Random generator.
+    """
+    usual = log_uniform(reflectivity, generator)
+    spots = usual * np.exp(generator.normal(0, spread, len(triangles)))
+    return Surface(triangles, TrackClass.BACKGROUND, np.clip(spots, 0.003, 1))
+
+
 def asphalt(
     x: tuple[float, float], y: tuple[float, float], generator: np.random.Generator
 ) -> Surface:
     """A patch of road, from dry asphalt to a film of water that mirrors most of the light away."""
-    reflectivity = evenly_in_logarithm((0.01, 0.2), generator)
+    reflectivity = log_uniform((0.01, 0.2), generator)
     return Surface(shapes.rectangle(x, y, 0), TrackClass.ROAD, reflectivity)
 
 
@@ -121,6 +148,23 @@ def trunk(generator: np.random.Generator) -> Surface:
     return Surface(stem, TrackClass.BACKGROUND, generator.uniform(0.05, 0.3))
 
 
+def tree(crown: float, generator: np.random.Generator) -> Iterator[Surface]:
+    """A tree with a round crown of a radius in metres."""
+    yield trunk(generator)
+    yield foliage((crown, crown, crown), 2 + crown, generator)
+
+
+def bough(largest: float, generator: np.random.Generator) -> Surface:
+    """Foliage overhead with half-axes of 0.3 m or more.
+
+    Args:
+        largest: Upper limit of a half-axis, metres.
+        generator: Random generator.
+    """
+    length, width, height = generator.uniform(0.3, largest, 3)
+    return foliage((length, width, height), generator.uniform(1.5, 3), generator)
+
+
 def building(generator: np.random.Generator) -> Surface:
     """A flat-roofed building."""
     length, width = generator.uniform(5, 15), generator.uniform(10, 40)
@@ -147,5 +191,5 @@ def foliage(
     return Surface(
         shapes.raised(leaves, height),
         TrackClass.BACKGROUND,
-        many_evenly_in_logarithm((0.003, 0.4), count, generator),
+        log_uniforms((0.003, 0.4), count, generator),
     )

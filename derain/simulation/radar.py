@@ -1,4 +1,4 @@
-"""A 4D radar: what it detects of a track in the rain.
+"""A 4D radar, and its detections of a track in the rain.
 
 The radar sorts its echoes into cells of inclination, azimuth and range. The mean echo of a cell is
 that of the surfaces and the rain in it, and of noise. Every frame draws the echo of each cell anew,

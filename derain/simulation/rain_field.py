@@ -1,4 +1,4 @@
-"""How hard it rains where: evenly, or as under the sprinklers of a rain facility."""
+"""Rain rates over the ground: uniform, or under the sprinklers of a rain facility."""
 
 import math
 from dataclasses import dataclass

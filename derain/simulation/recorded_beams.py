@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import Scan
-from derain.simulation.footprint import in_hull
+from derain.simulation.scan_pattern import unit_vectors
 from derain.views.directions import directions
 from derain.views.grid_fit import GridFit, fit_grid
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
@@ -15,7 +15,7 @@ from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 # Rounds of the median polish: enough for sensors whose lasers point to a few distinct azimuths.
 ROUNDS = 3
 
-# Row and column of an organised scan are taken to tell where a beam points if at least half of the
+# Row and column of an organised scan give the direction of its beams if at least half of the
 # returns are no farther than this from the direction of their cell, degrees. Those of spinning
 # sensors are within a tenth of it.
 FARTHEST_STRAY = 1.0
@@ -90,7 +90,7 @@ def _cell_directions(scan: Scan, valid: NDArray[np.bool_]) -> NDArray[np.float64
     first = np.argmax(np.isfinite(azimuth), axis=0)
     reference = azimuth[first, np.arange(azimuth.shape[1])]
     azimuth = reference + (azimuth - reference + 180) % 360 - 180
-    return _unit_vectors(_polished(azimuth).ravel(), _polished(inclination.T).T.ravel())
+    return unit_vectors(_polished(azimuth).ravel(), _polished(inclination.T).T.ravel())
 
 
 def _polished(angle: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -127,7 +127,7 @@ def _unreturned(
     chosen = np.sort(generator.choice(empty, count, replace=False))
     by_pixel = np.argsort(pixel, kind="stable")
     before = np.searchsorted(pixel[by_pixel], chosen) - 1
-    return seen[by_pixel[np.maximum(before, 0)]], _unit_vectors(*_pixel_angles(fit, chosen))
+    return seen[by_pixel[np.maximum(before, 0)]], unit_vectors(*_pixel_angles(fit, chosen))
 
 
 def _looked_at(
@@ -153,9 +153,45 @@ def _pixel_angles(
     return azimuth, inclination[row]
 
 
-def _unit_vectors(
-    azimuth: NDArray[np.float64], inclination: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    azimuth, inclination = np.radians(azimuth), np.radians(inclination)
-    level = np.cos(inclination)
-    return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(inclination)], axis=1)
+def in_hull(
+    points: tuple[NDArray[np.float64], NDArray[np.float64]],
+    places: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> NDArray[np.bool_]:
+    """Whether places lie in the convex hull of points, or on its edge.
+
+    The hull of the returns never reaches beyond a field of view that is convex, be it a rectangle
+    or a circle. It falls short of it where nothing returned near the edge, for example from the
+    sky.
+
+    Args:
+        points: Azimuth and inclination of the returns, float64 (N,) each, N > 0, degrees, the
+            azimuth without a jump inside the field of view.
+        places: Azimuth and inclination of the places, float64 (M,) each, likewise.
+
+    Returns:
+        True for the places inside, bool (M,).
+    """
+    (azimuth, inclination), (across, up) = points, places
+    inside: NDArray[np.bool_] = (across >= azimuth.min()) & (across <= azimuth.max())
+    inside &= up <= np.interp(across, *_upper_hull(azimuth, inclination))
+    inside &= -up <= np.interp(across, *_upper_hull(azimuth, -inclination))
+    return inside
+
+
+def _upper_hull(
+    x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners of the upper side of the convex hull, from left to right."""
+    order = np.lexsort((y, x))
+    x, y = x[order], y[order]
+    highest = np.append(x[1:] > x[:-1], True)  # of the points at one x only the highest
+    x, y = x[highest], y[highest]
+    while True:
+        run, rise = np.diff(x), np.diff(y)
+        # A point on or below the line between its two neighbours is no corner of the hull. That
+        # stays true when a neighbour is dropped in the same round, for the hull lies higher still.
+        corner = np.ones(len(x), bool)
+        corner[1:-1] = rise[1:] * run[:-1] < rise[:-1] * run[1:]
+        if corner.all():
+            return x, y
+        x, y = x[corner], y[corner]

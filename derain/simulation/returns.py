@@ -1,13 +1,15 @@
-"""What comes back to a sensor along its beams."""
+"""The returns of the beams of a sensor."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.simulation.columns import Columns
+
 
 @dataclass(frozen=True, eq=False)
-class Returns:
+class Returns(Columns):
     """What comes back to the sensor, ordered by beam.
 
     Every beam has a row, also one that nothing returned; a sensor of dual returns may give it two,
@@ -38,7 +40,3 @@ class Returns:
     def power(self) -> NDArray[np.float64]:
         """Received power, float64 (N,), m⁻²: that of reflectivity 1 at 1 m is 1."""
         return self.reflectivity / self.range**2
-
-    def take(self, rows: NDArray[np.int64]) -> "Returns":
-        """Some of the rows, by their numbers, int64 (M,)."""
-        return Returns(self.range[rows], self.reflectivity[rows], self.label[rows], self.beam[rows])

@@ -1,4 +1,4 @@
-"""What a rough surface returns towards where the light came from."""
+"""The light that a rough surface returns to its source."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""What a sequence is recorded of, and what a sensor sees of it scan after scan."""
+"""The scene of a sequence, and what a sensor sees of it in each scan."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import packed
-from derain.simulation.course import Course
-from derain.simulation.drive import Drive
+from derain.simulation.drive import Course, Drive
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.objects import Surface
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
@@ -126,10 +125,6 @@ def _drawn(
 
 def _nearer(first: Returns, second: Returns) -> Returns:
     """Of two returns of every beam the nearer."""
+    rows = np.arange(len(first.beam))
     nearer = second.range < first.range
-    return Returns(
-        np.where(nearer, second.range, first.range),
-        np.where(nearer, second.reflectivity, first.reflectivity),
-        np.where(nearer, second.label, first.label),
-        first.beam,
-    )
+    return Returns.joined([first, second]).take(rows + len(rows) * nearer)

@@ -75,7 +75,7 @@ class Sensor:
         range_noise: Standard deviation of a measured distance, metres.
         range_noise_growth: Another that grows with distance, metres per metre.
         weak_range_noise: Another for returns at the detection threshold, metres; it falls with the
-            square root of power, as where counted photons tell the distance.
+            square root of power, as where a distance is measured from counted photons.
         encoder_noise: Standard deviation of the azimuth that is measured of a column, degrees.
         intensity_noise: Standard deviation of a measured intensity, relative to it.
         mounting_height: Height above the road, metres.
@@ -232,7 +232,7 @@ class Sensor:
     def _measured_directions(
         self, beam: NDArray[np.int64], generator: np.random.Generator
     ) -> NDArray[np.float64]:
-        """Unit vectors in the sensor's own frame, float64 (N, 3), as the encoder tells them."""
+        """Unit vectors in the sensor's own frame, float64 (N, 3), as the encoder measures them."""
         azimuth, inclination = self._angles()
         if self.encoder_noise:
             azimuth = azimuth + generator.normal(0, self.encoder_noise, self.columns)

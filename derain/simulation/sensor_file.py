@@ -1,14 +1,19 @@
 """Sensors as YAML files: those that come with derain, and a user's own."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, TypeVar, get_type_hints
 
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.files.packaged import packaged, packaged_or_own
 from derain.simulation.defects import Defects
 from derain.simulation.sensor import MOST_BEAMS, Pattern, ReturnMode, Sensor
+
+# What reads a value of a document.
+Parser = Callable[[Entry], Any]
+
+Made = TypeVar("Made")
 
 
 def packaged_sensors() -> dict[str, Path]:
@@ -27,7 +32,7 @@ def load_sensor(name: str | Path) -> Sensor:
         InputError: No such sensor, or a file that does not describe one.
     """
     path = packaged_or_own(name, packaged_sensors(), "sensor")
-    values = Entry.of_yaml(path).record(_PARSERS)
+    values = Entry.of_yaml(path).record(_SENSOR)
     try:
         return Sensor(**values)
     except InputError as error:
@@ -36,30 +41,36 @@ def load_sensor(name: str | Path) -> Sensor:
         ) from error
 
 
-def _span(entry: Entry) -> tuple[float, ...]:
-    return entry.numbers(2)
+def read_fields(make: Callable[..., Made], entry: Entry, parsers: Mapping[str, Parser]) -> Made:
+    """Makes something of what a document states; the rest has its defaults.
 
+    Args:
+        make: Takes the values by name.
+        entry: A record of them.
+        parsers: What reads each of them.
 
-def _beams(entry: Entry) -> int:
-    return entry.whole(1, MOST_BEAMS)
-
-
-def _defects(entry: Entry) -> Defects:
-    values = entry.record(dict.fromkeys(get_type_hints(Defects), Entry.number))
+    Raises:
+        InputError: Another key, or a value of another kind or that ``make`` refuses.
+    """
+    values = entry.record(parsers)
     try:
-        return Defects(**values)
+        return make(**values)
     except InputError as error:
         raise entry.fault(f"{error.subject}: {error.reason}", error.remedy) from error
 
 
-# What reads the attributes of a sensor, by their type.
-_PARSERS_BY_TYPE: dict[Any, Callable[[Entry], Any]] = {
-    tuple[float, float]: _span,
+def _defects(entry: Entry) -> Defects:
+    return read_fields(Defects, entry, dict.fromkeys(get_type_hints(Defects), Entry.number))
+
+
+# What reads a value, by its type.
+PARSERS: dict[Any, Parser] = {
+    tuple[float, float]: lambda entry: entry.numbers(2),
     tuple[float, ...]: Entry.numbers,
-    int: _beams,
+    int: lambda entry: entry.whole(1, MOST_BEAMS),
     float: Entry.number,
     ReturnMode: Entry.text,
     Pattern: Entry.text,
     Defects: _defects,
 }
-_PARSERS = {name: _PARSERS_BY_TYPE[kind] for name, kind in get_type_hints(Sensor).items()}
+_SENSOR = {name: PARSERS[kind] for name, kind in get_type_hints(Sensor).items()}

@@ -13,8 +13,7 @@ files are missing, and lidar_radar_pcd holds the LiDAR's scans alone.
 
 Of a drive, both folders of scans hold poses.txt: a line a scan, the upper three rows of the motion
 that takes its points to the frame of the first scan, both as the scans begin. The upper 16 bits of
-a label then tell what moves: 1, 2, ... for each moving car or pedestrian, 0 for what stands and for
-rain.
+a label are then the number of a moving car or pedestrian, from 1 on; 0 is what stands, and rain.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,7 +34,7 @@ from derain.fusion.extrinsics import POSE, Extrinsics
 from derain.fusion.fuse import NO_DETECTIONS, fuse, nearest_in_time
 from derain.scan import Scan, to_float32
 from derain.simulation.campaign import Campaign
-from derain.simulation.classes import parted
+from derain.simulation.classes import unpacked
 from derain.simulation.radar import Radar, detect, mean_echoes
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.scene import SimulatedScene
@@ -75,7 +74,7 @@ def write_sequence(folder: Path, campaign: Campaign, name: str) -> None:
         assert joined.label is not None  # as both of its parts are labelled
         write_scan(folder / FOLDERS.lidar / f"{stem}.bin", scan)
         write_scan(folder / FOLDERS.scans / f"{stem}.bin", joined)
-        write_labels(folder / FOLDERS.labels / f"{stem}.label", *parted(joined.label))
+        write_labels(folder / FOLDERS.labels / f"{stem}.label", *unpacked(joined.label))
         _write_table(folder / "weather" / f"{stem}.csv", asdict(scene.weather))
     for kind in (FOLDERS.lidar, FOLDERS.scans, FOLDERS.labels, "weather"):
         _write_times(folder / kind, times)

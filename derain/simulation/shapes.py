@@ -106,9 +106,17 @@ def sheet(corners: NDArray[np.float64]) -> Triangles:
     Args:
         corners: Float64 (M, N, 3), metres.
     """
-    first, second = corners[:-1, :-1], corners[1:, :-1]
-    third, fourth = corners[1:, 1:], corners[:-1, 1:]
-    halves = np.stack([first, second, third, first, third, fourth], axis=2)
+    return quads(corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:])
+
+
+def quads(
+    first: NDArray[np.float64],
+    second: NDArray[np.float64],
+    third: NDArray[np.float64],
+    fourth: NDArray[np.float64],
+) -> Triangles:
+    """Quadrangles by their corners in order, float64 (..., 3) each: two triangles for each."""
+    halves = np.stack([first, second, third, first, third, fourth], axis=-2)
     return halves.reshape(-1, 3, 3)
 
 
@@ -134,9 +142,7 @@ def rods(
     ring *= np.broadcast_to(radius, len(starts))[:, None, None]
     lower, upper = starts[:, None] + ring, ends[:, None] + taper * ring
     following = (np.arange(sides) + 1) % sides
-    next_lower, next_upper = lower[:, following], upper[:, following]
-    halves = np.stack([lower, next_lower, next_upper, lower, next_upper, upper], axis=2)
-    return halves.reshape(-1, 3, 3)
+    return quads(lower, lower[:, following], upper[:, following], upper)
 
 
 def blades(

@@ -1,19 +1,17 @@
-"""What drawn sensors are drawn from: a span or a choice with weights for each property."""
+"""What sensors are drawn from: a span, or choices with weights, for each property."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self, TypeVar, get_args, get_type_hints
+from typing import Any, Self, get_args, get_type_hints
 
 import numpy as np
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
-from derain.simulation.drawing import Span, evenly_in_logarithm
-from derain.simulation.sensor import MOST_BEAMS, ReturnMode
-
-# Whatever holds spans.
-Spans = TypeVar("Spans")
+from derain.simulation.drawing import Span, log_uniform
+from derain.simulation.sensor import ReturnMode
+from derain.simulation.sensor_file import PARSERS, read_fields
 
 # Sensors of today have at most 256.
 MOST_ROWS = 4096
@@ -22,8 +20,22 @@ MOST_ROWS = 4096
 SENSOR_KINDS = ("spinning", "front", "rosette")
 
 
+class ReadableSpans:
+    """Spans that can be read from a document."""
+
+    @classmethod
+    def of(cls, entry: Entry) -> Self:
+        """Reads what a document states; the rest is as by default.
+
+        Raises:
+            InputError: Another key, or a value of another kind or that is impossible.
+        """
+        hints = get_type_hints(cls)
+        return read_fields(cls, entry, {name: _PARSERS[hint] for name, hint in hints.items()})
+
+
 @dataclass(frozen=True)
-class DefectSpans:
+class DefectSpans(ReadableSpans):
     """What the defects of sensors are drawn from; shares are drawn evenly.
 
     Attributes:
@@ -54,22 +66,13 @@ class DefectSpans:
             if not 0 <= getattr(self, name) <= 1:
                 raise _impossible("defect spans", self, name, "Give a share of 0 to 1.")
 
-    @classmethod
-    def of(cls, entry: Entry) -> Self:
-        """Reads what a document states; the rest is as by default.
-
-        Raises:
-            InputError: Another key, or a value of another kind or that is impossible.
-        """
-        return _read(cls, entry)
-
 
 @dataclass(frozen=True)
-class SensorSpans:
+class SensorSpans(ReadableSpans):
     """What sensors are drawn from. The defaults span the sensors of today.
 
-    Angles are in degrees, distances in metres. What spans a decade or more is drawn evenly in its
-    logarithm, which ``Span of a logarithm`` marks.
+    Angles are in degrees, distances in metres. Spans of a decade or more are
+    log-uniform where stated, the others uniform.
 
     Attributes:
         kinds: Weight of each kind: ``spinning`` sees a full circle in rows, ``front`` looks one way
@@ -77,7 +80,7 @@ class SensorSpans:
         spinning_rows: Rows of a spinning sensor, each as probable.
         spinning_field: Angle between its lowest and highest row; the narrower of two draws.
         spinning_centre: Inclination of the middle between them.
-        azimuth_step: Between its columns. Span of a logarithm.
+        azimuth_step: Between its columns. Log-uniform.
         uneven: Share of spinning sensors whose rows are closer together at the horizon.
         row_azimuth: Most that its rows are turned.
         front_rows: Rows of a sensor that looks one way, each as probable.
@@ -85,11 +88,11 @@ class SensorSpans:
         front_height: Likewise, from bottom to top.
         front_step: Between its columns.
         rosette_width: Diameter of a rosette.
-        rosette_beams: Shots of a rosette. Span of a logarithm.
-        prism_turns: Turns of the faster prism in a scan. Span of a logarithm.
+        rosette_beams: Shots of a rosette. Log-uniform.
+        prism_turns: Turns of the faster prism in a scan. Log-uniform.
         most_beams: Where a sensor would have more, its columns are farther apart.
         returns: Weight of what is reported of a beam that several things return.
-        range_noise: Span of a logarithm.
+        range_noise: Log-uniform.
         range_noise_growth: Metres per metre.
         weak_range_noise: Metres.
         encoder_noise: Degrees.
@@ -98,11 +101,11 @@ class SensorSpans:
         tilt: Roll and pitch, either way.
         head_down: Share of the sensors that are mounted head down besides.
         head_down_pitch: By so much.
-        minimum_range: Span of a logarithm.
-        maximum_range: Span of a logarithm.
-        detection_threshold: Span of a logarithm, m⁻².
+        minimum_range: Log-uniform.
+        maximum_range: Log-uniform.
+        detection_threshold: Log-uniform, m⁻².
         aperture: Metres.
-        beam_divergence: Span of a logarithm, radians.
+        beam_divergence: Log-uniform, radians.
         frame_rate: Hz.
         defects: What is wrong with them.
 
@@ -165,17 +168,8 @@ class SensorSpans:
             if not positive or not weights.keys() <= set(known):
                 raise _impossible(subject, self, name, f"Give weights of {', '.join(known)}.")
 
-    @classmethod
-    def of(cls, entry: Entry) -> Self:
-        """Reads what a document states; the rest is as by default.
 
-        Raises:
-            InputError: Another key, or a value of another kind or that is impossible.
-        """
-        return _read(cls, entry)
-
-
-# Spans that are drawn evenly in their logarithm.
+# Spans that are log-uniform.
 LOGARITHMIC_SPANS = frozenset(
     {
         *("azimuth_step", "front_step", "rosette_beams", "prism_turns", "range_noise"),
@@ -194,7 +188,7 @@ def draw(spans: Any, name: str, generator: np.random.Generator) -> float:
     """
     span: Span = getattr(spans, name)
     if name in LOGARITHMIC_SPANS:
-        return evenly_in_logarithm(span, generator)
+        return log_uniform(span, generator)
     return float(generator.uniform(*span))
 
 
@@ -216,19 +210,6 @@ def _impossible(subject: str, spans: Any, name: str, remedy: str) -> InputError:
     return InputError(f"{subject}: {name}", f"{shown(getattr(spans, name))} is impossible", remedy)
 
 
-def _read(kind: type[Spans], entry: Entry) -> Spans:
-    hints = get_type_hints(kind)
-    values = entry.record({name: _PARSERS[hint] for name, hint in hints.items()})
-    try:
-        return kind(**values)
-    except InputError as error:
-        raise entry.fault(f"{error.subject}: {error.reason}", error.remedy) from error
-
-
-def _span(entry: Entry) -> tuple[float, ...]:
-    return entry.numbers(2)
-
-
 def _rows(entry: Entry) -> tuple[int, ...]:
     return tuple(item.whole(2, MOST_ROWS) for item in entry.items())
 
@@ -237,16 +218,9 @@ def _weights(entry: Entry) -> dict[str, float]:
     return {name: member.number() for name, member in entry.members().items()}
 
 
-def _beams(entry: Entry) -> int:
-    return entry.whole(1, MOST_BEAMS)
-
-
 # What reads a property, by its type.
-_PARSERS: dict[Any, Callable[[Entry], Any]] = {
-    Span: _span,
+_PARSERS = PARSERS | {
     tuple[int, ...]: _rows,
     Mapping[str, float]: _weights,
-    int: _beams,
-    float: Entry.number,
     DefectSpans: DefectSpans.of,
 }

@@ -133,8 +133,7 @@ def _pavement(street: Street, side: int, generator: np.random.Generator) -> Iter
     for x in _scattered(street, 0.1, generator):
         yield from _tree(x, kerb, generator)
     for x in _scattered(street, 0.2, generator):
-        length, width, height = generator.uniform(0.3, 1.2, 3)
-        bough = objects.foliage((length, width, height), generator.uniform(1.5, 3), generator)
+        bough = objects.bough(1.2, generator)
         yield bough.placed(x, street.beside(side, generator.uniform(1.3, PAVEMENT)))
     for x in _scattered(street, 0.03, generator):
         y = street.beside(side, PAVEMENT + generator.uniform(0, 0.5))
@@ -165,8 +164,7 @@ def _houses(street: Street, side: int, generator: np.random.Generator) -> Iterat
 
 def _tree(x: float, y: float, generator: np.random.Generator) -> Iterator[Surface]:
     crown = generator.uniform(1, 2.5)
-    yield objects.trunk(generator).placed(x, y)
-    yield objects.foliage((crown, crown, crown), 2 + crown, generator).placed(x, y)
+    yield from (part.placed(x, y) for part in objects.tree(crown, generator))
 
 
 def _scattered(street: Street, per_metre: float, generator: np.random.Generator) -> Iterator[float]:

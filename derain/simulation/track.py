@@ -1,4 +1,4 @@
-"""A test track as triangles, and what a sensor sees of it through clear air."""
+"""A test track of triangles, and its returns through clear air."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -55,6 +55,17 @@ class Track:
             np.concatenate(roughness),
         )
 
+    @classmethod
+    def joined(cls, tracks: Iterable["Track"]) -> "Track":
+        """Tracks as one, of which every surface is smooth."""
+        parts = [(track.triangles, track.reflectivity, track.label) for track in tracks]
+        return cls(*map(np.concatenate, zip(*parts, strict=True)))
+
+    def with_surfaces(self, surfaces: Iterable[Surface]) -> "Track":
+        """The track with surfaces added; every surface is then smooth."""
+        added = list(surfaces)
+        return Track.joined([self, Track.of(added)]) if added else self
+
     def cast(self, sensor: Sensor, pose: NDArray[np.float64] | None = None) -> Returns:
         """What every beam of a sensor would return through clear air to a perfect detector.
 
@@ -89,7 +100,7 @@ class Track:
         return Returns(distance, reflectivity, label, np.arange(len(beams)))
 
     def _hits(self, rays: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
-        """What Open3D says of the first triangle on each ray, float32 (N, 6): origin, direction."""
+        """The first triangle on each ray as Open3D finds it; float32 (N, 6): origin, direction."""
         tensor = import_open3d().core.Tensor
         return {name: hit.numpy() for name, hit in self._scene.cast_rays(tensor(rays)).items()}
 

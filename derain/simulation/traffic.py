@@ -58,7 +58,7 @@ def draw_traffic(
     times: NDArray[np.float64],
     generator: np.random.Generator,
 ) -> list[MovingThing]:
-    """Draws who moves in a street.
+    """Draws the cars and pedestrians that move in a street.
 
     In turn: a car in the sensor's lane, an oncoming one, somebody who walks along a pavement, a car
     that crosses at a junction, somebody who crosses there on foot. Each is near the sensor at some

@@ -30,7 +30,7 @@ def draw_wind(generator: np.random.Generator) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Weather:
-    """What a weather station and a disdrometer would say; units are in the names.
+    """What a weather station and a disdrometer would measure; units are in the names.
 
     The drop spectrum N(D) = intercept · exp(−slope · D), the median diameter by volume and the
     visibility are those of the nominal rate. Clear air has an infinite slope, drops of no diameter,

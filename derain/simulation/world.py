@@ -1,4 +1,4 @@
-"""The training world: where, with which sensor and in what weather a scan is taken, by spans."""
+"""The training world: what places, sensors and precipitation of a scan are drawn from."""
 
 import math
 from collections.abc import Mapping
@@ -14,18 +14,19 @@ from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawn_sensor import draw_sensor
+from derain.simulation.flying.kinds import PrecipitationSpans, draw_precipitation
 from derain.simulation.flying.meeting import meet
 from derain.simulation.flying.precipitation import Precipitation
-from derain.simulation.flying.spans import PrecipitationSpans, draw_precipitation
 from derain.simulation.layouts import INDOORS, LAYOUTS
-from derain.simulation.places.carrier import lay_out_carrier, with_surfaces
+from derain.simulation.places.carrier import lay_out_carrier
 from derain.simulation.places.horizon import lay_out_horizon
 from derain.simulation.sensor import Sensor
+from derain.simulation.sensor_file import read_fields
 from derain.simulation.spans import SensorSpans, draw_kind
 from derain.simulation.track import Track
 
-# A scan with fewer points teaches nothing, and one of more rain than this is none of weather that a
-# sensor is used in: both are drawn anew, and after so many times it is said that the spans are bad.
+# A scan with fewer points teaches nothing, and one with a greater share of rain shows weather that
+# no sensor is used in: both are drawn again, at most so many times before the world is refused.
 SMALLEST_SCAN = 1000
 LARGEST_SHARE_OF_RAIN = 0.4
 MOST_TRIES = 100
@@ -33,7 +34,7 @@ MOST_TRIES = 100
 
 @dataclass(frozen=True)
 class World:
-    """What scans are drawn from.
+    """The distributions that scans are drawn from.
 
     Attributes:
         places: Weight of each layout, by its name in ``LAYOUTS``; the default is all of them alike.
@@ -43,7 +44,7 @@ class World:
         precipitation: What precipitation is drawn from.
 
     Raises:
-        InputError: Weights that say nothing, or a share that is none.
+        InputError: Weights of which none is above 0, or a share outside 0 to 1.
     """
 
     places: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(LAYOUTS, 1.0))
@@ -72,19 +73,14 @@ class World:
         Raises:
             InputError: Another key, or a value of another kind or that is impossible.
         """
-        values = entry.record(
-            {
-                "places": _weights_of_places,
-                "horizon": lambda part: part.within(0, 1),
-                "carrier": lambda part: part.within(0, 1),
-                "sensors": SensorSpans.of,
-                "precipitation": PrecipitationSpans.of,
-            }
-        )
-        try:
-            return cls(**values)
-        except InputError as error:
-            raise entry.fault(f"{error.subject}: {error.reason}", error.remedy) from error
+        parsers = {
+            "places": _weights_of_places,
+            "horizon": lambda part: part.within(0, 1),
+            "carrier": lambda part: part.within(0, 1),
+            "sensors": SensorSpans.of,
+            "precipitation": PrecipitationSpans.of,
+        }
+        return read_fields(cls, entry, parsers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,9 +155,9 @@ def _drawn(world: World, generator: np.random.Generator) -> DrawnScan:
 def _laid_out(place: str, world: World, sensor: Sensor, generator: np.random.Generator) -> Track:
     track = LAYOUTS[place](generator)
     if place not in INDOORS and generator.random() < world.horizon:
-        track = with_surfaces(track, lay_out_horizon(generator))
+        track = track.with_surfaces(lay_out_horizon(generator))
     if generator.random() < world.carrier:
-        track = with_surfaces(track, lay_out_carrier(generator, sensor.mounting_height))
+        track = track.with_surfaces(lay_out_carrier(generator, sensor.mounting_height))
     return track
 
 

@@ -1,4 +1,4 @@
-"""A data set of scans that are drawn one by one, and how one of them is written."""
+"""A data set of single scans, each drawn from a world, and the writer of one."""
 
 import json
 from dataclasses import asdict, dataclass, field, replace
@@ -8,16 +8,12 @@ from typing import Any
 import numpy as np
 import yaml
 
-from derain import __version__
 from derain.cards.card import load_card
-from derain.errors import InputError
 from derain.files import write_scan
 from derain.files.atomic import replacing
-from derain.files.documents import shown
 from derain.files.labels import write_labels
-from derain.simulation.campaign import MOST
-from derain.simulation.classes import parted
-from derain.simulation.manifest import MAKER, SPLIT_PARTS
+from derain.simulation.campaign import SplitSequences
+from derain.simulation.classes import unpacked
 from derain.simulation.world import World, draw_scan, load_world
 
 # What the folders of a sequence are called.
@@ -29,8 +25,8 @@ DRAWN_WORLDS = "drawn.yaml"
 
 
 @dataclass(frozen=True)
-class WorldCampaign:
-    """What is simulated: every sequence is one scan, of another place, sensor and weather.
+class WorldCampaign(SplitSequences):
+    """A data set in which every sequence is one scan, of another place, sensor and weather.
 
     Attributes:
         train: Scans to train on, at least one.
@@ -48,16 +44,12 @@ class WorldCampaign:
     test: int = 0
     seed: int = 0
     world: World | str = field(default_factory=World)
+    DIGITS = 5
 
     def __post_init__(self) -> None:
-        for part in SPLIT_PARTS:
-            count, least = getattr(self, part), int(part == "train")
-            if not least <= count <= MOST:
-                raise InputError(part, f"{shown(count)} scans", f"Give {least} to {MOST:,}.")
-        if self.seed < 0:
-            raise InputError("seed", f"{shown(self.seed)} is negative", "Give 0 or more.")
+        self._check_counts()
 
-    def settled(self) -> "WorldCampaign":
+    def resolved(self) -> "WorldCampaign":
         """The same with its world read.
 
         Raises:
@@ -67,27 +59,9 @@ class WorldCampaign:
         return replace(self, world=world)
 
     @property
-    def names(self) -> list[str]:
-        """Names of the sequences, in ascending order."""
-        return [f"{number:05d}" for number in range(self.train + self.validation + self.test)]
-
-    @property
-    def split(self) -> dict[str, list[str]]:
-        """Names of the sequences of each part."""
-        ends = np.cumsum([self.train, self.validation, self.test])
-        parts = zip(SPLIT_PARTS, [0, *ends[:-1]], ends, strict=True)
-        return {part: self.names[begin:end] for part, begin, end in parts}
-
-    @property
     def description(self) -> dict[str, Any]:
         """Everything that the files depend on, as reading it back from JSON gives it."""
-        content = {
-            "made_by": MAKER,
-            "version": __version__,
-            "worlds": asdict(self),
-            "split": self.split,
-        }
-        return dict(json.loads(json.dumps(content)))
+        return self._described(worlds=asdict(self), split=self.split)
 
     def write(self, folder: Path, name: str) -> None:
         """Simulates a sequence: one scan, its labels, and what it was drawn as.
@@ -99,12 +73,12 @@ class WorldCampaign:
         Raises:
             InputError: A file cannot be written, or Open3D cannot be imported.
         """
-        assert isinstance(self.world, World)  # it is settled
+        assert isinstance(self.world, World)  # after resolved()
         seed = np.random.SeedSequence(self.seed, spawn_key=(int(name),))
         drawn = draw_scan(self.world, np.random.default_rng(seed))
         assert drawn.scan.label is not None
         write_scan(folder / FOLDERS.scans / f"{STEM}.bin", drawn.scan)
-        write_labels(folder / FOLDERS.labels / f"{STEM}.label", *parted(drawn.scan.label))
+        write_labels(folder / FOLDERS.labels / f"{STEM}.label", *unpacked(drawn.scan.label))
         with replacing(folder / DRAWN_WORLDS) as temporary:
             described = json.loads(json.dumps(drawn.description))
             temporary.write_text(yaml.safe_dump(described, sort_keys=False), "utf-8")

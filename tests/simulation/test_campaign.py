@@ -30,7 +30,7 @@ def test_a_sensor_is_given_by_its_name_or_as_it_is() -> None:
     assert Campaign(sensor=Sensor(rows=7)).lidar == Sensor(rows=7)
 
 
-def test_the_description_tells_campaigns_apart_and_is_json() -> None:
+def test_the_description_differs_between_campaigns_and_is_json() -> None:
     plain = Campaign().description
     assert json.loads(json.dumps(plain)) == plain
     changes = [
@@ -42,7 +42,7 @@ def test_the_description_tells_campaigns_apart_and_is_json() -> None:
     ]
     for change in changes:
         assert replace(Campaign(), **change).description != plain
-    # A sensor file may change under its name: what it said counts.
+    # A sensor file may change under its name: its content counts.
     assert replace(Campaign(), sensor="mems_64").description == plain
 
 
@@ -78,18 +78,18 @@ def test_two_of_five_sequences_are_clean() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"train": 0}, "train: 0 is too few"),
-        ({"validation": -1}, "validation: -1 is too few"),
-        ({"scans": 0}, "scans: 0 is too few"),
-        ({"scans": 10**9}, "scans: 1000000000 is too many"),
-        ({"test": 16**5000}, "test: a number of very many digits is too many"),
-        ({"seed": -1}, "seed: -1 is negative"),
-        ({"rain_rates": ()}, "rain rate: none is given"),
-        ({"rain_rates": (-5.0,)}, "rain rate: -5.0 mm/h is no rain rate"),
-        ({"drive": Drive(13), "layout": "facility"}, "drive: a facility has none"),
-        ({"drive": Drive(13), "radar": Radar()}, "drive: has no radar"),
-        ({"drive": Drive(13), "scans": 2000}, "drive: 200 s at 13 m/s are 2,599 m of street"),
-        ({"rain_rates": (float("nan"),)}, "rain rate: nan mm/h is no rain rate"),
+        ({"train": 0}, "train: 0 "),
+        ({"validation": -1}, "validation: -1 "),
+        ({"scans": 0}, "scans: 0 "),
+        ({"scans": 10**9}, "scans: 1000000000 "),
+        ({"test": 16**5000}, "test: "),
+        ({"seed": -1}, "seed: -1 "),
+        ({"rain_rates": ()}, "rain rate: "),
+        ({"rain_rates": (-5.0,)}, "rain rate: -5.0 "),
+        ({"drive": Drive(13), "layout": "facility"}, "drive: .*facility"),
+        ({"drive": Drive(13), "radar": Radar()}, "drive: .*radar"),
+        ({"drive": Drive(13), "scans": 2000}, "drive: .*2,599 m"),
+        ({"rain_rates": (float("nan"),)}, "rain rate: nan "),
     ],
 )
 def test_an_impossible_campaign_is_refused(wrong: dict[str, Any], message: str) -> None:

@@ -7,20 +7,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.simulation.drops import (
+from derain.simulation.marshall_palmer import (
+    LARGEST_DROP,
+    SMALLEST_DROP,
+    drops_per_cubic_metre,
+    slope,
+)
+from derain.simulation.rain import (
     DROP_REFLECTIVITY,
     Drops,
     draw_drops,
     drop_reflectivity,
     farthest_visible_drop,
     thin_out,
-)
-from derain.simulation.marshall_palmer import (
-    INTERCEPT,
-    LARGEST_DROP,
-    SMALLEST_DROP,
-    drops_per_cubic_metre,
-    slope,
 )
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.sensor import Sensor
@@ -137,10 +136,3 @@ def test_the_largest_drop_is_at_the_threshold_where_visibility_ends(sensor: Sens
     horizon = farthest_visible_drop(sensor)
     power = drop_reflectivity(drop_at(horizon, LARGEST_DROP), sensor)[0] / horizon**2
     assert power == pytest.approx(sensor.detection_threshold)
-
-
-def test_the_density_of_drops_is_an_integral_over_their_diameters() -> None:
-    diameter = np.linspace(SMALLEST_DROP, LARGEST_DROP, 100_001)
-    for rate in RATES:
-        density = np.trapezoid(INTERCEPT * np.exp(-slope(rate) * diameter), diameter)
-        assert drops_per_cubic_metre(rate) == pytest.approx(density, rel=1e-6)

@@ -1,4 +1,4 @@
-"""The manifest of a simulated data set is known, and what is wrong with it is said."""
+"""The manifest of a simulated data set: recognised, and refused where it is damaged."""
 
 from pathlib import Path
 from typing import Any

@@ -84,7 +84,7 @@ def backscatter_efficiency(size: float, index: complex) -> float:
 
 
 @pytest.mark.parametrize("rate", [10, 25, 50])
-def test_rain_scatters_back_what_mies_theory_says(rate: float) -> None:
+def test_rain_scatters_back_as_by_mies_theory(rate: float) -> None:
     wavelength, water = 299.79 / 77, 3.67 + 2.16j  # mm; at 20 degrees, Liebe et al. 1991
     diameter = np.linspace(0.02, 8, 400)
     number = 8000 * np.exp(-4.1 * rate**-0.21 * diameter)  # Marshall and Palmer 1948
@@ -142,7 +142,7 @@ def test_the_rain_fills_every_cell_up_to_what_blocks_the_view() -> None:
 
 
 @pytest.mark.parametrize("rain", [DRY, HEAVY], ids=["dry", "heavy rain"])
-def test_false_alarms_are_as_rare_as_said_whether_or_not_it_rains(rain: RainField) -> None:
+def test_false_alarms_are_as_rare_as_stated_whether_or_not_it_rains(rain: RainField) -> None:
     radar = replace(NARROW, false_alarm_rate=2e-3)
     scans = frames(OPEN, radar, 60, rain)
     cells = math.prod(radar.shape)
@@ -156,7 +156,7 @@ def test_false_alarms_are_as_rare_as_said_whether_or_not_it_rains(rain: RainFiel
 
 
 @pytest.mark.parametrize("reach", [90, 120, 200])
-def test_a_target_is_detected_as_often_as_the_closed_form_says(reach: float) -> None:
+def test_a_target_is_detected_as_often_as_by_the_closed_form(reach: float) -> None:
     # An isolated Swerling 1 target of a signal S times the noise, by cell-averaging CFAR over N
     # cells: (1 + T / (1 + S))^-N where T = P^(-1/N) - 1 for a false alarm rate of P.
     # Source: Finn and Johnson 1968.

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from derain.simulation import rain as rain_module
 from derain.simulation.classes import TrackClass
-from derain.simulation.drops import DROP_REFLECTIVITY, Drops, draw_drops, drop_reflectivity
 from derain.simulation.marshall_palmer import (
     INTERCEPT,
     LARGEST_DROP,
@@ -19,7 +19,14 @@ from derain.simulation.marshall_palmer import (
     extinction,
     slope,
 )
-from derain.simulation.rain import rain_on_beams
+from derain.simulation.rain import (
+    DROP_REFLECTIVITY,
+    Drops,
+    Transmission,
+    draw_drops,
+    drop_reflectivity,
+    rain_on_beams,
+)
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
 from derain.simulation.sensor import Returns, Sensor
 
@@ -208,7 +215,7 @@ def test_more_rain_loses_more_of_the_surfaces_that_clear_air_shows() -> None:
     assert (np.diff(lost) > 200).all(), lost
 
 
-def test_it_rains_where_the_field_says_so() -> None:
+def test_it_rains_where_the_field_rains() -> None:
     beams = Sensor(azimuth=(-180, 180), inclination=(-1, 1), rows=20, columns=2000).beams()
     clear = open_air(len(beams))
     detected = rain_on_beams(clear, beams, SprinkledRain(50), SENSOR, np.random.default_rng(12))
@@ -219,14 +226,40 @@ def test_it_rains_where_the_field_says_so() -> None:
     assert np.count_nonzero(x > 8) > 50
 
 
-def test_a_seed_gives_the_same_rain_again() -> None:
-    clear = random_surfaces(2000, np.random.default_rng(11))
-    first, again, other = (rained(clear, UniformRain(25), seed) for seed in (1, 1, 2))
-    assert (first.range == again.range).all()
-    assert (first.reflectivity == again.reflectivity).all()
-    assert (first.range != other.range).any()
-
-
 def test_a_scan_without_beams_stays_empty() -> None:
     for sensor in (SENSOR, LAST, DUAL):
         assert len(rained(open_air(0), UniformRain(25), 0, sensor).range) == 0
+
+
+def random_beams(count: int, generator: np.random.Generator) -> NDArray[np.float64]:
+    beams = generator.normal(size=(count, 3))
+    return beams / np.linalg.norm(beams, axis=1, keepdims=True)
+
+
+def integrated(rain: RainField, beam: NDArray[np.float64], distance: float) -> float:
+    way = np.linspace(0, distance, 2001)
+    depth = np.trapezoid(extinction(rain.rate(way * beam[0], way * beam[1])), way)
+    return float(np.exp(-2 * depth))
+
+
+def test_even_rain_takes_light_exponentially_in_every_direction() -> None:
+    generator = np.random.default_rng(0)
+    beams = np.concatenate([random_beams(1000, generator), [[0, 0, 1], [0, 0, -1], [-1, 0, 0]]])
+    distance = generator.uniform(0, 300, len(beams))  # also farther than the field is sampled
+    share = Transmission(UniformRain(50), 120)(beams, distance)
+    assert np.allclose(share, np.exp(-2 * extinction(50) * distance), rtol=1e-12)
+
+
+@pytest.mark.parametrize("nominal", [10.0, 25.0, 50.0])
+def test_uneven_rain_takes_light_by_the_integral_along_each_beam(nominal: float) -> None:
+    rain, generator = SprinkledRain(nominal), np.random.default_rng(2)
+    beams = random_beams(300, generator)
+    beams[::2, :2] = [1, 0]  # half of them down the track, at all inclinations
+    beams /= np.linalg.norm(beams, axis=1, keepdims=True)
+    distance = generator.uniform(0.5, 110, len(beams))
+    share = Transmission(rain, 120)(beams, distance)
+    expected = [
+        integrated(rain, beam, float(end)) for beam, end in zip(beams, distance, strict=True)
+    ]
+    assert np.abs(share - expected).max() < 0.01
+    assert np.ptp(expected) > 0.1

@@ -4,12 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
 from derain.scan import Scan
-from derain.simulation.recorded_beams import RecordedBeams, find_beams
+from derain.simulation.recorded_beams import RecordedBeams, find_beams, in_hull
 from derain.simulation.sensor import Sensor
 
 # Half a step off, so that beams lie in the middle of the columns of a grid from -180 to 180.
@@ -180,3 +182,24 @@ def test_directions_of_real_returns_are_found_when_they_are_hidden(name: str, sh
     error = degrees_between(found, truth)
     assert np.median(error) < 0.1
     assert np.percentile(error, 95) < 0.4
+
+
+# On a lattice, so that corners coincide, lie one above the other and three in a line.
+lattice = st.tuples(st.integers(-4, 4), st.integers(-4, 4))
+polygons = st.lists(lattice, min_size=1, max_size=12)
+
+
+def as_columns(points: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
+    x, y = np.array(points, float).T
+    return x, y
+
+
+@given(polygons, lattice)
+def test_a_place_is_outside_if_a_line_parts_it_from_every_point(
+    points: list[tuple[int, int]], place: tuple[int, int]
+) -> None:
+    away = np.array(points) - place
+    # Hulls of such points have edges in these directions only; so do the lines that part.
+    steps = [(a, b) for a in range(-8, 9) for b in range(-8, 9) if (a, b) != (0, 0)]
+    parted = any((away @ np.array(normal) > 0).all() for normal in steps)
+    assert in_hull(as_columns(points), as_columns([place])).all() == (not parted)

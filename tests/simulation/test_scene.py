@@ -8,9 +8,8 @@ import pytest
 
 from derain.simulation import shapes
 from derain.simulation.campaign import Campaign
-from derain.simulation.classes import TrackClass, parted
-from derain.simulation.course import Course
-from derain.simulation.drive import Drive
+from derain.simulation.classes import TrackClass, unpacked
+from derain.simulation.drive import Course, Drive
 from derain.simulation.objects import Surface
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.scene import SimulatedScene
@@ -77,9 +76,9 @@ def test_what_moves_is_seen_as_if_it_were_built_into_the_street(open3d: ModuleTy
         expected = whole.cast(SENSOR, drive.course.pose(time, SENSOR))
         assert np.allclose(returns.range, expected.range, rtol=1e-5)
         assert np.allclose(returns.reflectivity, expected.reflectivity, atol=1e-5)
-        assert np.array_equal(parted(returns.label)[0], expected.label)
+        assert np.array_equal(unpacked(returns.label)[0], expected.label)
         assert np.array_equal(returns.beam, expected.beam)
-    assert any(parted(returns.label)[1].any() for returns in seen)
+    assert any(unpacked(returns.label)[1].any() for returns in seen)
 
 
 def test_the_numbers_of_what_moves_are_on_it_and_on_nothing_else(open3d: ModuleType) -> None:
@@ -87,7 +86,7 @@ def test_the_numbers_of_what_moves_are_on_it_and_on_nothing_else(open3d: ModuleT
     assert drive.course is not None
     for time, returns in zip(TIMES, drive.cast(SENSOR, TIMES), strict=True):
         ends = points(returns, drive.course.pose(time, SENSOR))
-        kind, number = parted(returns.label)
+        kind, number = unpacked(returns.label)
         assert number.max() <= len(drive.traffic)
         for row, thing in enumerate(drive.traffic, 1):
             corners = moved(thing, time).reshape(-1, 3)
@@ -105,7 +104,7 @@ def test_a_thing_moves_on_by_its_speed_while_the_street_stands(open3d: ModuleTyp
     seen = of_surfaces(wall, course=course, traffic=(away,)).cast(SENSOR, TIMES)
     for time, returns in zip(TIMES, seen, strict=True):
         ends = points(returns, course.pose(time, SENSOR))
-        kind, number = parted(returns.label)
+        kind, number = unpacked(returns.label)
         assert ends[number == 1, 0].min() == pytest.approx(14.5 + 5 * time, abs=2e-3)
         standing = returns.returned & (kind == TrackClass.BACKGROUND)
         assert ends[standing, 0].min() == pytest.approx(39.5, abs=2e-3)

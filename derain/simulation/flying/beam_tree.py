@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.simulation.columns import Columns
 from derain.system.waiting import sleeping_threads
 
 with sleeping_threads():
@@ -19,7 +20,7 @@ PAIRS_AT_ONCE = 2**22
 
 
 @dataclass(frozen=True, eq=False)
-class Meetings:
+class Meetings(Columns):
     """Which particle is met by which beam; a particle and a beam may each be in several.
 
     Attributes:
@@ -31,10 +32,6 @@ class Meetings:
     particle: NDArray[np.int64]
     beam: NDArray[np.int64]
     offset: NDArray[np.float64]
-
-    def take(self, rows: NDArray[np.bool_]) -> "Meetings":
-        """Those of a mask, bool (M,)."""
-        return Meetings(self.particle[rows], self.beam[rows], self.offset[rows])
 
 
 class BeamTree:
@@ -73,7 +70,7 @@ class BeamTree:
                 found.append(Meetings(part[row], beam[row, column], offset[row, column]))
                 more.append(part[~whole])
             rows, count = np.concatenate(more), GROWTH * count
-        return _joined(found)
+        return _by_particle(found)
 
     def nearest(self, place: NDArray[np.float64]) -> NDArray[np.int64]:
         """The beam whose axis passes each place nearest, int64 (P,)."""
@@ -117,13 +114,7 @@ def covered_share(
     return np.asarray(np.clip(lens / (np.pi * (beam / 2) ** 2), 0, 1))
 
 
-def _joined(parts: list[Meetings]) -> Meetings:
-    if not parts:
-        return Meetings(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
-    particle = np.concatenate([part.particle for part in parts])
-    order = np.argsort(particle, kind="stable")
-    return Meetings(
-        particle[order],
-        np.concatenate([part.beam for part in parts])[order],
-        np.concatenate([part.offset for part in parts])[order],
-    )
+def _by_particle(parts: list[Meetings]) -> Meetings:
+    none = Meetings(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
+    meetings = Meetings.joined([none, *parts])
+    return meetings.take(np.argsort(meetings.particle, kind="stable"))

@@ -1,4 +1,4 @@
-"""What a sensor can see of particles."""
+"""How a sensor detects particles."""
 
 import math
 from dataclasses import dataclass

@@ -6,10 +6,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.simulation.columns import Columns
 from derain.simulation.flying.beam_tree import BeamTree, Meetings
 from derain.simulation.flying.optics import Optics
-from derain.simulation.flying.sizes import Sizes
-from derain.simulation.flying.slices import Slices
+from derain.simulation.flying.sizes import Sizes, Slices
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class OpenBeams:
 
 
 @dataclass(frozen=True, eq=False)
-class Particles:
+class Particles(Columns):
     """Particles near beams.
 
     Attributes:
@@ -61,10 +61,6 @@ class Particles:
     def range(self) -> NDArray[np.float64]:
         """Distance from the sensor, float64 (P,), metres."""
         return np.asarray(np.linalg.norm(self.place, axis=1))
-
-    def take(self, rows: NDArray[np.bool_]) -> "Particles":
-        """Those of a mask, bool (P,)."""
-        return Particles(self.place[rows], self.diameter[rows])
 
 
 def draw_particles(
@@ -108,7 +104,7 @@ def _by_nearest(
     # Where the nearest of all could not draw it, such as behind a surface, another one counts.
     ended = (distance < stretch.near[nearest]) | (distance > stretch.far[nearest])
     unsettled = np.flatnonzero(ended & ~kept)
-    rest = Particles(drawn.place[unsettled], drawn.diameter[unsettled])
+    rest = drawn.take(unsettled)
     meetings = _meetings(rest, beams)
     meetings = meetings.take(_inside(stretch, meetings, rest.range))
     # From the farthest to the nearest: of several beams the last assigned stays.

@@ -1,4 +1,4 @@
-"""What falls in a scan, in numbers."""
+"""The parameters of the precipitation in a scan."""
 
 import math
 from dataclasses import dataclass, fields

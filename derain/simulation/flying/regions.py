@@ -1,4 +1,4 @@
-"""Where particles fly: in all the air, or low over the ground."""
+"""Where particles fly: in all the air, low over the ground, or behind cars."""
 
 import math
 from dataclasses import dataclass
@@ -7,8 +7,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.flying.gusts import Gusts
 from derain.simulation.flying.particles import Stretch
+from derain.simulation.sensor import Returns
 
 # Multiples of its height where the density of a layer has fallen to almost nothing.
 LAYER_TOP = 4.0
@@ -77,3 +79,87 @@ class GroundLayer:
         above = place[:, 2] - self.ground
         fallen = np.exp(-np.maximum(above, 0) / self.height)
         return np.where(above >= 0, fallen, 0) * self.gusts(place)
+
+
+# A plume of spray, modelling choices after photographs: it is as wide as a car where it begins and
+# gets wider, and as high as a car's tail.
+PLUME_HALF_WIDTH = 0.9
+PLUME_OPENING = 0.15
+PLUME_HEIGHT = 0.8
+
+# A car's points are looked for this far around one of them, metres.
+CAR_LENGTH = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Plume:
+    """Spray behind a car: a wedge on the ground, densest at the car's tail.
+
+    Attributes:
+        start: Middle of the tail, on the ground, float64 (3,), metres, sensor frame.
+        heading: Where the plume goes from there, float64 (3,), a level unit vector.
+        length: Metres.
+    """
+
+    start: NDArray[np.float64]
+    heading: NDArray[np.float64]
+    length: float
+
+    def stretch(self, beams: NDArray[np.float64], stretch: Stretch) -> Stretch:
+        """Where beams are in the sphere around it."""
+        centre = self.start + self.heading * self.length / 2
+        radius = math.hypot(self.length / 2, self._half_width(self.length), 2 * PLUME_HEIGHT)
+        along = beams @ centre
+        half = np.sqrt(np.maximum(radius**2 - (centre @ centre - along**2), 0))
+        return Stretch(
+            np.maximum(stretch.near, along - half), np.minimum(stretch.far, along + half)
+        )
+
+    def density(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Falls to 1/e halfway along it, and over a third of its height."""
+        off = place - self.start
+        along, up = off @ self.heading, off[:, 2]
+        across = np.abs(off[:, 1] * self.heading[0] - off[:, 0] * self.heading[1])
+        inside = (along >= 0) & (along <= self.length) & (across <= self._half_width(along))
+        inside &= (up >= 0) & (up <= 2 * PLUME_HEIGHT)
+        fallen = np.exp(-2 * along / self.length - 3 * up / PLUME_HEIGHT)
+        return np.where(inside, np.minimum(fallen, 1), 0)
+
+    def _half_width(self, along: NDArray[np.float64] | float) -> NDArray[np.float64]:
+        return np.asarray(PLUME_HALF_WIDTH + PLUME_OPENING * along)
+
+
+def draw_plumes(
+    clear: Returns,
+    beams: NDArray[np.float64],
+    ground: float,
+    count: int,
+    length: float,
+    generator: np.random.Generator,
+) -> list[Plume]:
+    """Plumes behind cars that the beams see.
+
+    Cars drive along x, as on derain's streets, one way or the other.
+
+    Args:
+        clear: What each beam would return through clear air.
+        beams: Unit vectors along them, float64 (N, 3), sensor frame.
+        ground: Height of the ground in the sensor frame, metres.
+        count: How many; fewer only where no car is seen.
+        length: Metres.
+        generator: Random generator.
+    """
+    kind, _ = unpacked(clear.label)
+    seen = (kind == TrackClass.CAR) & clear.returned
+    points = beams[clear.beam[seen]] * clear.range[seen, None]
+    plumes = []
+    for _ in range(count if len(points) else 0):
+        point = points[generator.integers(len(points))]
+        direction = generator.choice([-1.0, 1.0])
+        near = np.linalg.norm(points[:, :2] - point[:2], axis=1) < CAR_LENGTH
+        tail = direction * (direction * points[near, 0]).max()
+        middle = (points[near, 1].min() + points[near, 1].max()) / 2
+        plumes.append(
+            Plume(np.array([tail, middle, ground]), np.array([direction, 0.0, 0.0]), length)
+        )
+    return plumes

@@ -1,1 +1,1 @@
-"""Places that a sensor stands in, and the ragged things that they are full of."""
+"""Places around a sensor, and the irregular things in them."""

@@ -8,17 +8,18 @@ from numpy.typing import NDArray
 from derain.simulation import objects
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
-from derain.simulation.places.crowd import mixed, ragged_things
+from derain.simulation.places.crowd import ragged_things
 from derain.simulation.places.relief import Relief, ground_mesh
 from derain.simulation.places.standing import (
     Piece,
-    assembled,
+    assemble,
+    choose,
     free_places,
-    lined_up,
-    put,
-    shared,
+    line_up,
+    place,
+    scatter,
+    shuffled,
     straight,
-    strewn,
 )
 from derain.simulation.shapes import placed
 from derain.simulation.track import Track
@@ -49,7 +50,7 @@ def lay_out_car_park(generator: np.random.Generator) -> Track:
         ),
     ]
     uneven = Relief.draw(generator.uniform(0.01, 0.12), generator)
-    return assembled(_ground(winter, generator), standing, uneven, generator)
+    return assemble(_ground(winter, generator), standing, uneven, generator)
 
 
 def _ground(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
@@ -75,7 +76,7 @@ def _rows(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
                 make = vehicles.glazed_car if near else objects.car
                 heading = np.pi / 2 * generator.choice([-1, 1]) + generator.normal(0, 0.04)
                 nudged = x + generator.normal(0, 0.12), y + generator.normal(0, 0.25)
-                yield from put(make(generator), *nudged, heading)
+                yield from place(make(generator), *nudged, heading)
 
 
 def _people(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
@@ -87,14 +88,14 @@ def _people(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
         return max(abs(x), abs(y)) < HALF_SIZE and across < LANE / 2 + 0.8
 
     for count, distances in ((generator.integers(6, 16), (2.2, 35)), (6, (15, 50))):
-        makes = shared([(people.person, 8), (people.cyclist, 1)], int(count), generator)
+        makes = choose([(people.person, 8), (people.cyclist, 1)], int(count), generator)
         places = free_places(len(makes), distances, 0.9, generator, in_a_lane)
-        yield from strewn(makes, places, generator)
+        yield from scatter(makes, places, generator)
 
 
 def _between(aside: float, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
     """What stands along the lane and where lots meet."""
-    small = shared(
+    small = choose(
         [(frames.trolley, 2), (frames.bollard, 2), (frames.thin_pole, 2), (_sapling, 1)],
         int(generator.integers(8, 25)),
         generator,
@@ -103,14 +104,14 @@ def _between(aside: float, winter: bool, generator: np.random.Generator) -> Iter
     def at_its_edge(x: float, y: float) -> bool:
         return abs(x) < HALF_SIZE and abs(abs(y - aside) - LANE / 2 - 0.3) < 0.5
 
-    yield from strewn(
-        mixed(small, generator),
+    yield from scatter(
+        shuffled(small, generator),
         free_places(len(small), (2.2, 35), 0.5, generator, at_its_edge),
         generator,
     )
     for x in np.arange(-HALF_SIZE, HALF_SIZE, generator.uniform(10, 20)):
         y = aside + LANE / 2 + LOT_LENGTH + 0.15
-        yield from put(_young_tree(winter, generator), float(x), y)
+        yield from place(plants.tree(winter, generator), float(x), y)
     if winter:
         bank = heaps.bank(generator.uniform(4, 12), generator, snow=True)
         yield bank.placed(generator.uniform(3, 20), aside - LANE / 2 - 1)
@@ -123,7 +124,7 @@ def _edge(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
     for quarter in range(4):
         make = makes[generator.integers(len(makes))]
         piece = 19.0 if make is walls.facade else 9.5
-        for surface in lined_up(
+        for surface in line_up(
             make, straight(HALF_SIZE), (-HALF_SIZE, HALF_SIZE), piece, generator, 0.15
         ):
             yield surface.placed(0, 0, quarter * np.pi / 2)
@@ -135,7 +136,7 @@ def _nets(length: float, generator: np.random.Generator) -> Surface:
 
 def _brushes(length: float, generator: np.random.Generator) -> Iterator[Surface]:
     for x in np.arange(0, length, 1.0):
-        yield from put(plants.brushwood(generator.uniform(0.8, 2), generator), float(x), 0)
+        yield from place(plants.brushwood(generator.uniform(0.8, 2), generator), float(x), 0)
 
 
 def _sapling(generator: np.random.Generator) -> Iterable[Surface]:
@@ -145,7 +146,3 @@ def _sapling(generator: np.random.Generator) -> Iterable[Surface]:
     leaves = plants.bush((crown[0], crown[1], crown[2]), generator)
     shift = placed(leaves.triangles, 0.1, 0) + np.array([0, 0, generator.uniform(0.8, 1.8)])
     yield Surface(shift, leaves.label, leaves.reflectivity)
-
-
-def _young_tree(winter: bool, generator: np.random.Generator) -> Iterable[Surface]:
-    return [plants.bare_tree(generator)] if winter else plants.crowned_tree(generator)

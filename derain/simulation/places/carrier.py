@@ -1,4 +1,4 @@
-"""What carries the sensor and is seen by it: a car, a lorry, a robot, a tripod with its operator.
+"""The carrier that a sensor sees under itself: a car, a lorry, a robot, a tripod, a mast.
 
 Its parts are seen from .15 to 3 m, most of them at grazing angles or of paint that mirrors the
 light away, so that much of a carrier returns in a few scattered points, or not at all, and hides
@@ -12,12 +12,11 @@ import numpy as np
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import Span, evenly_in_logarithm
+from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places.frames import Point, bars
 from derain.simulation.places.specks import PAINT, mirrored
 from derain.simulation.shapes import Triangles
-from derain.simulation.track import Track
 
 # Of how many specks a part is seen that returns nothing else.
 SPECKS_OF_A_CARRIER = (1.0, 100.0)
@@ -62,29 +61,15 @@ def lay_out_carrier(generator: np.random.Generator, mounting_height: float) -> I
         )
 
 
-def with_surfaces(track: Track, surfaces: Iterator[Surface]) -> Track:
-    """A track to which surfaces are added, for example those of a carrier or of a horizon."""
-    added = list(surfaces)
-    if not added:
-        return track
-    tracks = [track, Track.of(added)]
-    return Track(
-        *(
-            np.concatenate([getattr(part, name) for part in tracks])
-            for name in ("triangles", "reflectivity", "label")
-        )
-    )
-
-
 def _finished(
     part: Triangles, mounting_height: float, painted: float, generator: np.random.Generator
 ) -> Iterator[Surface]:
     """A part as paint that returns, or as a mirror with specks on it, or as the specks alone."""
-    surface = Surface(part, TrackClass.BACKGROUND, evenly_in_logarithm(PAINT, generator))
+    surface = Surface(part, TrackClass.BACKGROUND, log_uniform(PAINT, generator))
     if generator.random() < painted:
         yield surface
         return
-    count = round(evenly_in_logarithm(SPECKS_OF_A_CARRIER, generator))
+    count = round(log_uniform(SPECKS_OF_A_CARRIER, generator))
     shining = mirrored(surface, np.array([0, 0, mounting_height]), count, generator)
     hides = generator.random() < 0.7
     yield from shining if hides else islice(shining, 1, None)
@@ -92,7 +77,7 @@ def _finished(
 
 def _car(generator: np.random.Generator, mounting_height: float) -> Parts:
     """A roof with rack and antenna under the sensor, windscreen, bonnet, boot and mirrors."""
-    drop = evenly_in_logarithm((0.2, min(0.9, mounting_height - 1.0)), generator)
+    drop = log_uniform((0.2, min(0.9, mounting_height - 1.0)), generator)
     half = generator.uniform(0.5, 0.75)
     rear, front = -generator.uniform(0.3, 2.0), generator.uniform(0.3, 1.4)
     yield _vaulted((rear, front), half, -drop, generator)
@@ -111,7 +96,7 @@ def _car(generator: np.random.Generator, mounting_height: float) -> Parts:
 
 def _lorry(generator: np.random.Generator, mounting_height: float) -> Parts:
     """A cab's roof with a deflector, mirrors on arms, lamps, and the front of a box behind."""
-    drop = evenly_in_logarithm((0.2, 1.2), generator)
+    drop = log_uniform((0.2, 1.2), generator)
     rear, front, half = -generator.uniform(0.5, 1.5), generator.uniform(0.2, 0.8), 1.2
     yield _vaulted((rear, front), half, -drop, generator)
     top = generator.uniform(-0.1, 0.9)
@@ -129,7 +114,7 @@ def _lorry(generator: np.random.Generator, mounting_height: float) -> Parts:
 
 def _robot(generator: np.random.Generator, mounting_height: float) -> Parts:
     """A flat deck with posts at its corners, plates over them, cables, an arm, wheels."""
-    drop = evenly_in_logarithm((0.18, max(0.2, 0.8 * mounting_height)), generator)
+    drop = log_uniform((0.18, max(0.2, 0.8 * mounting_height)), generator)
     drop = max(min(drop, mounting_height - 0.02), 0.17)
     half_length, half_width = generator.uniform(0.25, 0.7), generator.uniform(0.2, 0.45)
     yield shapes.box(2 * half_length, 2 * half_width, -drop - 0.03, -drop)
@@ -200,7 +185,7 @@ def _antenna(x: float, roof: float, generator: np.random.Generator) -> Parts:
         x = x if abs(x) > 0.3 else -0.35
         y, length = generator.uniform(-0.3, 0.3), generator.uniform(0.08, 0.9)
         tip = x - np.copysign(generator.uniform(0, 0.5), -x) * length, y, roof + length
-        yield bars([((x, y, roof), tip)], evenly_in_logarithm((0.002, 0.015), generator), 6)
+        yield bars([((x, y, roof), tip)], log_uniform((0.002, 0.015), generator), 6)
 
 
 def _equipment(distance: Span, floor: float, generator: np.random.Generator) -> Parts:
@@ -212,7 +197,7 @@ def _equipment(distance: Span, floor: float, generator: np.random.Generator) -> 
         generator: Random generator.
     """
     for _ in range(generator.poisson(2.5)):
-        angle, away = generator.uniform(-np.pi, np.pi), evenly_in_logarithm(distance, generator)
+        angle, away = generator.uniform(-np.pi, np.pi), log_uniform(distance, generator)
         size = generator.uniform(0.02, 0.3) * min(1.0, away)
         top = max(floor + 0.03, generator.uniform(floor, 0.3 * away))
         shape = generator.integers(3)
@@ -237,14 +222,14 @@ def _loop(distance: Span, floor: float, generator: np.random.Generator) -> Trian
     away = np.linspace(near, far, 13)
     height = floor + 0.02 + 0.15 * generator.random() * np.sin(np.linspace(0, np.pi, 13)) ** 2
     knots = np.column_stack([away * np.cos(angle), away * np.sin(angle), height])
-    return shapes.rods(knots[:-1], knots[1:], evenly_in_logarithm((0.002, 0.012), generator))
+    return shapes.rods(knots[:-1], knots[1:], log_uniform((0.002, 0.012), generator))
 
 
 def _rim(generator: np.random.Generator) -> Triangles:
     """A sector of a ring about the sensor: the frame of a window or the edge of a hood."""
     begin, sector = generator.uniform(-np.pi, np.pi), generator.uniform(0.3, 2.5)
     angle = begin + np.linspace(0, sector, 25)
-    away, tilt = evenly_in_logarithm((0.2, 0.9), generator), generator.uniform(-0.25, 0.3)
+    away, tilt = log_uniform((0.2, 0.9), generator), generator.uniform(-0.25, 0.3)
     wave = generator.uniform(0, 0.1) * np.sin(3 * angle + begin)
     rows = []
     for up in (0.0, generator.uniform(0.01, 0.15)):

@@ -1,25 +1,25 @@
 """A city street: windows, parked cars and bicycles, people, trees, scaffolds, cables."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.simulation import objects
+from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, people, plants, relief, threads, vehicles, walls
-from derain.simulation.places.crowd import mixed, ragged_things, users
+from derain.simulation.places.crowd import ragged_things, users
 from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.spacing import along
 from derain.simulation.places.standing import (
-    assembled,
+    assemble,
+    choose,
     free_places,
-    lined_up,
-    put,
-    shared,
+    line_up,
+    place,
+    scatter,
+    shuffled,
     straight,
-    strewn,
 )
 from derain.simulation.track import Track
 
@@ -75,27 +75,26 @@ def lay_out_city(generator: np.random.Generator) -> Track:
     ]
     uneven = Relief.draw(generator.uniform(0.01, 0.1), generator)
     ground = _ground(section, generator)
-    return assembled(ground, standing, uneven, generator, _cables(section, generator))
+    return assemble(ground, standing, uneven, generator, _cables(section, generator))
 
 
 def _ground(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
     surface = relief.COBBLES if generator.random() < 0.25 else relief.ASPHALT
-
-    def kind_at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
-        return np.where((y > section.kerbs[0]) & (y < section.kerbs[1]), 0, 1)
-
-    yield from ground_mesh([surface, relief.PAVING], kind_at, generator)
+    right, left = section.kerbs
+    return ground_mesh(
+        [surface, relief.PAVING], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
+    )
 
 
 def _houses(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
-    make: Callable[[float, np.random.Generator], Iterable[Surface]] = walls.facade
     for side, front in zip((-1, 1), section.fronts, strict=True):
         gaps, piece = generator.uniform(0, 0.3), generator.uniform(9, 18)
-        for house in lined_up(make, straight(abs(front)), CITY_SIGHT, piece, generator, gaps):
+        line = straight(abs(front))
+        for house in line_up(walls.facade, line, CITY_SIGHT, piece, generator, gaps):
             # Houses are seen from the street: those on the right are those on the left, turned.
             yield house if side > 0 else house.placed(CITY_SIGHT[0] + CITY_SIGHT[1], 0, np.pi)
     far = walls.facade(30, generator)
-    yield from put(far, CITY_SIGHT[1], 15, -np.pi / 2)
+    yield from place(far, CITY_SIGHT[1], 15, -np.pi / 2)
 
 
 def _parked(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
@@ -106,27 +105,27 @@ def _parked(section: Section, generator: np.random.Generator) -> Iterator[Surfac
             if generator.random() < full and np.hypot(x, y) > 3.9:
                 make = vehicles.glazed_car if abs(x) < 30 else objects.car
                 heading = generator.normal(0, 0.03) + np.pi * generator.integers(2)
-                yield from put(make(generator), x, y, heading)
+                yield from place(make(generator), x, y, heading)
 
 
 def _people(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
-    makes = shared([(people.person, 8), (people.cyclist, 2)], 18, generator)
+    makes = choose([(people.person, 8), (people.cyclist, 2)], 18, generator)
     count = int(generator.integers(4, 18))
     places = free_places(count, (2.5, 55), 0.8, generator, section.on_a_pavement)
-    yield from strewn(makes, places, generator)
+    yield from scatter(makes, places, generator)
 
 
 def _furniture(section: Section, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
     """Trees, lamps, signs, bollards and railings along the kerbs; bushes in tubs."""
     for kerb, side in zip(section.kerbs, (-1, 1), strict=True):
         for x in along(*CITY_SIGHT, (6, 30), generator):
-            tree = [plants.bare_tree(generator)] if winter else plants.crowned_tree(generator)
-            yield from put(tree, x, kerb + side * generator.uniform(0.5, 1))
-        makes = shared([(frames.thin_pole, 3), (frames.bollard, 2)], 40, generator)
+            tree = plants.tree(winter, generator)
+            yield from place(tree, x, kerb + side * generator.uniform(0.5, 1))
+        makes = choose([(frames.thin_pole, 3), (frames.bollard, 2)], 40, generator)
         for make, x in zip(
-            mixed(makes, generator), along(*CITY_SIGHT, (1, 7), generator), strict=False
+            shuffled(makes, generator), along(*CITY_SIGHT, (1, 7), generator), strict=False
         ):
-            yield from put(make(generator), x, kerb + side * 0.35)
+            yield from place(make(generator), x, kerb + side * 0.35)
         if generator.random() < 0.4:
             begin = generator.uniform(2, 20)
             rail = frames.railing(generator.uniform(3, 12), generator)
@@ -139,7 +138,7 @@ def _works(section: Section, generator: np.random.Generator) -> Iterator[Surface
         side = int(generator.integers(2))
         length, x = generator.uniform(6, 15), generator.uniform(-5, 25)
         y = section.fronts[side] - (1.4 if side else -0.2)
-        yield from put(frames.scaffold(length, generator), x, y)
+        yield from place(frames.scaffold(length, generator), x, y)
         if generator.random() < 0.7:
             veil = threads.net(length, generator.uniform(3, 6), generator)
             yield veil.placed(x, y - 0.15 if side else y + 1.3)

@@ -7,12 +7,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, plants, relief, threads
 from derain.simulation.places.crowd import ragged_things, users
 from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.spacing import along
-from derain.simulation.places.standing import Line, assembled, lined_up, put
+from derain.simulation.places.standing import Line, assemble, line_up, place
 from derain.simulation.track import Track
 
 # How far what is beside the road goes on behind the sensor and ahead of it, metres.
@@ -66,7 +66,7 @@ def lay_out_country(generator: np.random.Generator) -> Track:
         *ragged_things(generator, lambda x, y: bool(road.outside(x, y) > 0.5), leafy=not winter),
     ]
     uneven = Relief.draw(generator.uniform(0.05, 0.5), generator)
-    return assembled(_ground(road, snowy, generator), standing, uneven, generator)
+    return assemble(_ground(road, snowy, generator), standing, uneven, generator)
 
 
 def _ground(road: Road, snowy: bool, generator: np.random.Generator) -> Iterator[Surface]:
@@ -109,13 +109,13 @@ def _boundary(
         "gate": frames.railing,
     }
     make = makes[generator.choice(list(makes), p=[0.35, 0.2, 0.15, 0.15, 0.05, 0.1])]
-    return lined_up(make, line, COUNTRY_SIGHT, generator.uniform(4, 9), generator, gaps)
+    return line_up(make, line, COUNTRY_SIGHT, generator.uniform(4, 9), generator, gaps)
 
 
 def _bare_hedge(length: float, generator: np.random.Generator) -> Iterator[Surface]:
     height = generator.uniform(0.8, 2.5)
     for x in np.arange(0, length, 0.6):
-        yield from put(plants.brushwood(height, generator), float(x), 0)
+        yield from place(plants.brushwood(height, generator), float(x), 0)
 
 
 def _trees(road: Road, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
@@ -123,8 +123,7 @@ def _trees(road: Road, winter: bool, generator: np.random.Generator) -> Iterator
         line, spacing = road.beside(side, generator.uniform(1.5, 10)), generator.uniform(6, 25)
         for x in along(*COUNTRY_SIGHT, (0.5 * spacing, spacing), generator):
             y = float(line(np.array(x))) + side * generator.uniform(0, 3)
-            tree = plants.bare_tree if winter else plants.crowned_tree
-            yield from put(tree(generator), x, y, generator.uniform(0, 6))
+            yield from place(plants.tree(winter, generator), x, y, generator.uniform(0, 6))
 
 
 def _cables(road: Road, generator: np.random.Generator) -> Iterator[Surface]:

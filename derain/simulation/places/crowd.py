@@ -1,13 +1,21 @@
-"""Who and what is everywhere: people and vehicles near the sensor and far, ragged things."""
+"""People, vehicles and irregular things at all distances from the sensor."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
 from derain.simulation import objects
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, threads, vehicles
-from derain.simulation.places.standing import Allowed, Make, anywhere, free_places, shared, strewn
+from derain.simulation.places.standing import (
+    Allowed,
+    anywhere,
+    choose,
+    free_places,
+    of_size,
+    scatter,
+    shuffled,
+)
 
 # Fewest, and one more than the most.
 Counts = tuple[int, int]
@@ -33,17 +41,17 @@ def users(
         cyclists: The same of cyclists.
         cars: The same of vehicles, of which few are lorries.
     """
-    wheeled = shared(
+    wheeled = choose(
         [(vehicles.glazed_car, 8), (objects.car, 2), (vehicles.lorry, 1)],
         int(generator.integers(*cars)),
         generator,
     )
-    on_foot = shared(
+    on_foot = choose(
         [(people.person, 9), (objects.pedestrian, 1)],
         int(generator.integers(*walkers)),
         generator,
     )
-    bikes = shared(
+    bikes = choose(
         [(people.cyclist, 9), (objects.bike, 1)], int(generator.integers(*cyclists)), generator
     )
     far, near = NEAR_AND_FAR[1], NEAR_AND_FAR[0]
@@ -53,8 +61,8 @@ def users(
         return allowed(x, y) and all(np.hypot(x - a, y - b) > 3.2 for a, b in parked)
 
     others = free_places(len(on_foot) + len(bikes), (near, far), 1.0, generator, beside_them)
-    yield from strewn(wheeled, parked, generator)
-    yield from strewn(mixed([*on_foot, *bikes], generator), others, generator)
+    yield from scatter(wheeled, parked, generator)
+    yield from scatter(shuffled([*on_foot, *bikes], generator), others, generator)
 
 
 def ragged_things(
@@ -72,16 +80,17 @@ def ragged_things(
         count: Fewest, and one more than the most.
         leafy: Whether plants have leaves.
     """
-    makes = shared(
+    brushwood = of_size(plants.brushwood, (0.4, 2.5))
+    makes = choose(
         [
-            (_bush if leafy else _brushwood, 4),
-            (_brushwood, 4),
-            (_net, 1.5),
-            (_chain_link, 1),
-            (_railing, 1),
+            (_bush if leafy else brushwood, 4),
+            (brushwood, 4),
+            (of_size(threads.net, (1.5, 8), (1, 3.5)), 1.5),
+            (of_size(threads.chain_link, (2, 10)), 1),
+            (of_size(frames.railing, (1, 5)), 1),
             (frames.thin_pole, 4),
             (_tufts, 3),
-            (_rubble, 1),
+            (of_size(heaps.rubble, (0.4, 2)), 1),
             (plants.crowned_tree if leafy else plants.bare_tree, 1.5),
             (plants.bare_tree, 1),
         ],
@@ -89,13 +98,7 @@ def ragged_things(
         generator,
     )
     places = free_places(len(makes), (2.5, 60.0), 0.6, generator, allowed)
-    yield from strewn(makes, places, generator)
-
-
-def mixed(makes: Iterable[Make], generator: np.random.Generator) -> list[Make]:
-    """Makers of things in another order."""
-    ordered = list(makes)
-    return [ordered[which] for which in generator.permutation(len(ordered))]
+    yield from scatter(makes, places, generator)
 
 
 def _bush(generator: np.random.Generator) -> Surface:
@@ -103,26 +106,6 @@ def _bush(generator: np.random.Generator) -> Surface:
     return plants.bush((length, width, height), generator)
 
 
-def _brushwood(generator: np.random.Generator) -> Surface:
-    return plants.brushwood(generator.uniform(0.4, 2.5), generator)
-
-
-def _net(generator: np.random.Generator) -> Surface:
-    return threads.net(generator.uniform(1.5, 8), generator.uniform(1, 3.5), generator)
-
-
-def _chain_link(generator: np.random.Generator) -> Iterable[Surface]:
-    return threads.chain_link(generator.uniform(2, 10), generator)
-
-
-def _railing(generator: np.random.Generator) -> Surface:
-    return frames.railing(generator.uniform(1, 5), generator)
-
-
 def _tufts(generator: np.random.Generator) -> Surface:
     spread = generator.uniform(0.3, 2.5)
     return plants.grass(generator.normal(0, spread, (generator.integers(5, 60), 2)), generator)
-
-
-def _rubble(generator: np.random.Generator) -> Surface:
-    return heaps.rubble(generator.uniform(0.4, 2), generator)

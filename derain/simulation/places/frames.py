@@ -5,9 +5,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from derain.simulation import shapes
-from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm
-from derain.simulation.objects import Surface
+from derain.simulation.drawing import log_uniform
+from derain.simulation.objects import Surface, of_material
 from derain.simulation.shapes import Triangles
 
 FRAME_REFLECTIVITY = (0.03, 0.7)
@@ -23,7 +22,7 @@ def bars(ends: Iterable[tuple[Point, Point]], radius: float, sides: int = 4) -> 
 
 def thin_pole(generator: np.random.Generator) -> Surface:
     """A pole of 5 mm to 6 cm, leaning or not, some with a sign or a lamp on it."""
-    height, radius = generator.uniform(0.6, 6), evenly_in_logarithm((0.005, 0.06), generator)
+    height, radius = generator.uniform(0.6, 6), log_uniform((0.005, 0.06), generator)
     foot, lean = (0.0, 0.0, 0.0), generator.normal(0, 0.03, 2) * height
     parts = [bars([(foot, (lean[0], lean[1], height))], radius, sides=6)]
     if generator.random() < 0.3:
@@ -36,7 +35,7 @@ def thin_pole(generator: np.random.Generator) -> Surface:
 def railing(length: float, generator: np.random.Generator) -> Surface:
     """A railing or gate of bars along x, from x = 0 on."""
     height, bottom = generator.uniform(0.8, 2.2), generator.uniform(0.05, 0.25)
-    radius = evenly_in_logarithm((0.006, 0.03), generator)
+    radius = log_uniform((0.006, 0.03), generator)
     x = np.arange(0, length, generator.uniform(0.08, 0.25))
     upright = [((at, 0, bottom), (at, 0, height)) for at in x]
     level = [((0, 0, z), (length, 0, z)) for z in (bottom, height)]
@@ -106,7 +105,7 @@ def guard_rail(length: float, generator: np.random.Generator) -> Iterator[Surfac
 def trolley(generator: np.random.Generator) -> Surface:
     """A shopping trolley: a basket of wire, a handle, wheels."""
     length, width, low, high = 0.9, 0.55, 0.4, 0.95
-    radius, half = evenly_in_logarithm((0.003, 0.01), generator), width / 2
+    radius, half = log_uniform((0.003, 0.01), generator), width / 2
     wires = [((x, y, low), (x, y, high)) for x in np.arange(0, length, 0.12) for y in (-half, half)]
     wires += [((x, -half, low), (x, half, low)) for x in np.arange(0, length, 0.12)]
     wires += [
@@ -127,8 +126,4 @@ def bollard(generator: np.random.Generator) -> Surface:
 
 def made(parts: list[Triangles], generator: np.random.Generator) -> Surface:
     """Parts of one material as a surface."""
-    return Surface(
-        np.concatenate(parts),
-        TrackClass.BACKGROUND,
-        evenly_in_logarithm(FRAME_REFLECTIVITY, generator),
-    )
+    return of_material(parts, FRAME_REFLECTIVITY, generator)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from derain.simulation import shapes
-from derain.simulation.drawing import evenly_in_logarithm
+from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places import plants, threads
 from derain.simulation.places.frames import Point, bars, made
@@ -13,7 +13,7 @@ from derain.simulation.shapes import Triangles
 
 
 def table(generator: np.random.Generator) -> Iterator[Surface]:
-    """A table on four legs or a trestle, strewn with papers, screens, cups and cables."""
+    """A table on four legs or a trestle, scatter with papers, screens, cups and cables."""
     length, width = generator.uniform(0.6, 2.2), generator.uniform(0.5, 1.0)
     top = generator.uniform(0.65, 1.05)
     yield made([shapes.box(length, width, top - 0.03, top)], generator)
@@ -22,7 +22,7 @@ def table(generator: np.random.Generator) -> Iterator[Surface]:
     rods: list[tuple[Point, Point]] = [((a, b, 0), (a, b, top)) for a, b in feet]
     if generator.random() < 0.5:
         rods += [((-x, -y, 0.3), (-x, y, 0.3)), ((x, -y, 0.3), (x, y, 0.3))]
-    yield made([bars(rods, evenly_in_logarithm((0.01, 0.04), generator))], generator)
+    yield made([bars(rods, log_uniform((0.01, 0.04), generator))], generator)
     for _ in range(generator.integers(0, 9)):
         at_x, at_y = generator.uniform((-x, -y), (x, y))
         thing = _small_thing(top, generator)
@@ -35,7 +35,7 @@ def table(generator: np.random.Generator) -> Iterator[Surface]:
 def chair(generator: np.random.Generator) -> Surface:
     """A chair with legs of tube or on a star of castors, its back closed or of bars."""
     seat, half = generator.uniform(0.4, 0.6), generator.uniform(0.17, 0.25)
-    back, radius = seat + generator.uniform(0.3, 0.6), evenly_in_logarithm((0.007, 0.02), generator)
+    back, radius = seat + generator.uniform(0.3, 0.6), log_uniform((0.007, 0.02), generator)
     parts = [shapes.box(2 * half, 2 * half, seat - 0.04, seat)]
     if generator.random() < 0.5:
         corners = [(i * half, j * half) for i in (-1, 1) for j in (-1, 1)]
@@ -67,7 +67,7 @@ def shelf(generator: np.random.Generator) -> Iterator[Surface]:
         x = -half
         while x < half - 0.05:
             width, height = (
-                evenly_in_logarithm((0.02, 0.4), generator),
+                log_uniform((0.02, 0.4), generator),
                 generator.uniform(0.05, 0.27),
             )
             deep = generator.uniform(0.3, 1) * depth
@@ -93,7 +93,7 @@ def pot_plant(generator: np.random.Generator) -> Iterator[Surface]:
 
 def standing_lamp(generator: np.random.Generator) -> Surface:
     """A lamp, a coat stand, a microphone or a flag on a thin pole."""
-    height, radius = generator.uniform(1.0, 2.0), evenly_in_logarithm((0.006, 0.03), generator)
+    height, radius = generator.uniform(1.0, 2.0), log_uniform((0.006, 0.03), generator)
     parts = [bars([((0, 0, 0), (0, 0, height))], radius, 6), shapes.cylinder(0.15, 0, 0.03)]
     if generator.random() < 0.6:
         parts.append(shapes.cylinder(generator.uniform(0.08, 0.25), height, height + 0.2))

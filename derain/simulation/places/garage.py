@@ -1,25 +1,29 @@
 """A parking garage: a low ceiling with pipes and lamps, pillars, mesh, things near on all sides."""
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from derain.simulation import shapes
-from derain.simulation.drawing import evenly_in_logarithm
+from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
 from derain.simulation.places.relief import Relief, ground_mesh
+from derain.simulation.places.shell import Walls
 from derain.simulation.places.standing import (
     Make,
-    assembled,
+    Piece,
+    assemble,
+    choose,
     free_places,
-    lined_up,
-    put,
-    shared,
+    line_up,
+    of_size,
+    place,
+    scatter,
+    shuffled,
     straight,
-    strewn,
 )
 from derain.simulation.track import Track
 
@@ -28,35 +32,15 @@ LOWEST_CEILING = 2.9
 
 
 @dataclass(frozen=True)
-class Hall:
+class Hall(Walls):
     """The hall of a garage, with the sensor somewhere in it.
 
     Attributes:
-        x: From wall to wall along x, metres.
-        y: From wall to wall along y, metres.
-        height: Of its ceiling, metres.
         bay: Between pillars, metres.
     """
 
-    x: tuple[float, float]
-    y: tuple[float, float]
-    height: float
     bay: float
-
-    @classmethod
-    def draw(cls, generator: np.random.Generator) -> "Hall":
-        """Draws a hall, from a private garage's yard to a whole storey."""
-        return cls(
-            (-generator.uniform(4, 25), generator.uniform(10, 45)),
-            (-generator.uniform(4, 20), generator.uniform(4, 20)),
-            generator.uniform(LOWEST_CEILING, 4.5),
-            generator.uniform(4.5, 8),
-        )
-
-    def holds(self, x: float, y: float) -> bool:
-        """Whether a thing as large as a person may stand there."""
-        inside = self.x[0] + 0.7 < x < self.x[1] - 0.7
-        return inside and self.y[0] + 0.7 < y < self.y[1] - 0.7
+    MARGIN = 0.7
 
 
 def lay_out_garage(generator: np.random.Generator) -> Track:
@@ -66,7 +50,7 @@ def lay_out_garage(generator: np.random.Generator) -> Track:
     cars with windows, people, bicycles, cages of mesh, railings, trolleys and dust sheets near on
     all sides, from 2 m on. A wall may be open to the outside, with a railing.
     """
-    hall = Hall.draw(generator)
+    hall = _hall(generator)
     standing = [
         *_pillars(hall, generator),
         *_walls(hall, generator),
@@ -77,23 +61,30 @@ def lay_out_garage(generator: np.random.Generator) -> Track:
     ]
     floor = ground_mesh([relief.CONCRETE], lambda x, y: np.zeros(np.shape(x), np.int64), generator)
     uneven = Relief.draw(generator.uniform(0.003, 0.03), generator)
-    return assembled(floor, standing, uneven, generator, [_ceiling(hall, generator)])
+    return assemble(floor, standing, uneven, generator, [_ceiling(hall, generator)])
+
+
+def _hall(generator: np.random.Generator) -> Hall:
+    """Draws a hall, from a private garage's yard to a whole storey."""
+    return Hall(
+        (-generator.uniform(4, 25), generator.uniform(10, 45)),
+        (-generator.uniform(4, 20), generator.uniform(4, 20)),
+        generator.uniform(LOWEST_CEILING, 4.5),
+        generator.uniform(4.5, 8),
+    )
 
 
 def _ceiling(hall: Hall, generator: np.random.Generator) -> Surface:
     length, width = hall.x[1] - hall.x[0], hall.y[1] - hall.y[0]
     rough = walls.rough_wall(length, width, generator, cell=0.6)
-    # A wall's x and z become the ceiling's x and y, its bumps hang down.
-    x, bump, z = np.moveaxis(rough.triangles, -1, 0)
-    lying = np.stack([x + hall.x[0], z + hall.y[0], hall.height + bump], axis=-1)
-    return replace(rough, triangles=lying)
+    return walls.laid_flat(rough, (hall.x[0], hall.y[0]), hall.height)
 
 
 def _under_the_ceiling(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
     """Pipes, trays, lamps, and loose cables that hang down."""
     top = hall.height - 0.05
     for _ in range(generator.integers(3, 12)):
-        radius, drop = evenly_in_logarithm((0.008, 0.12), generator), generator.uniform(0.06, 0.35)
+        radius, drop = log_uniform((0.008, 0.12), generator), generator.uniform(0.06, 0.35)
         if generator.random() < 0.5:
             y = generator.uniform(*hall.y)
             ends = [((hall.x[0], y, top - drop), (hall.x[1], y, top - drop))]
@@ -127,8 +118,7 @@ def _pillars(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
 
 def _walls(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
     (behind, ahead), (right, left) = hall.x, hall.y
-    corners = [(behind, right), (ahead, right), (ahead, left), (behind, left)]
-    for number, (x, y) in enumerate(corners):
+    for number, (x, y) in enumerate(hall.corners):
         length = (ahead - behind) if number % 2 == 0 else (left - right)
         is_open = generator.random() < 0.25
         sill = generator.uniform(0.3, 1.1) if is_open else hall.height
@@ -137,7 +127,7 @@ def _walls(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
             wall.append(frames.railing(length, generator))
             outside = plants.bush((0.5 * length, 1.5, 2.0), generator)
             wall.append(outside.placed(length / 2, -generator.uniform(3, 8)))
-        yield from put(wall, x, y, number * np.pi / 2)
+        yield from place(wall, x, y, number * np.pi / 2)
 
 
 def _parked(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
@@ -146,7 +136,7 @@ def _parked(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
         for x in np.arange(hall.x[0] + 2, hall.x[1] - 2, 2.7):
             if generator.random() < full and np.hypot(x, y) > 4.3:
                 heading = nose * np.pi / 2 + generator.normal(0, 0.04)
-                yield from put(vehicles.glazed_car(generator), float(x), float(y), heading)
+                yield from place(vehicles.glazed_car(generator), float(x), float(y), heading)
 
 
 def _about(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
@@ -157,19 +147,18 @@ def _about(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
         (frames.trolley, 2),
         (frames.bollard, 1),
         (frames.thin_pole, 3),
-        (_dry_plants, 1),
+        (of_size(plants.brushwood, (0.3, 1.2)), 1),
         (heaps.logs, 0.4),
-        (_rubble, 1),
+        (of_size(heaps.rubble, (0.3, 1)), 1),
     ]
-    makes += shared(small, int(generator.integers(5, 20)), generator)
+    makes += choose(small, int(generator.integers(5, 20)), generator)
     places = free_places(len(makes), (2.2, 30), 0.9, generator, hall.holds)
-    ordered = [makes[which] for which in generator.permutation(len(makes))]
-    yield from strewn(ordered, places, generator)
+    yield from scatter(shuffled(makes, generator), places, generator)
 
 
 def _cages(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
     """Walls of mesh, nets and railings that part the hall."""
-    kinds: list[Callable[[float, np.random.Generator], Surface | Iterable[Surface]]] = [
+    kinds: list[Piece] = [
         threads.chain_link,
         frames.railing,
         lambda length, drawn: threads.net(length, hall.height - 0.1, drawn),
@@ -178,13 +167,5 @@ def _cages(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
     for x, y in free_places(int(generator.integers(2, 6)), (2.5, 20), 2.5, generator, hall.holds):
         make = kinds[generator.integers(len(kinds))]
         reach = min(generator.uniform(1.5, 7), hall.x[1] - x)
-        pieces = lined_up(make, straight(0), (0, reach + 0.1), reach, generator)
-        yield from put(pieces, x, y)
-
-
-def _dry_plants(generator: np.random.Generator) -> Surface:
-    return plants.brushwood(generator.uniform(0.3, 1.2), generator)
-
-
-def _rubble(generator: np.random.Generator) -> Surface:
-    return heaps.rubble(generator.uniform(0.3, 1), generator)
+        pieces = line_up(make, straight(0), (0, reach + 0.1), reach, generator)
+        yield from place(pieces, x, y)

@@ -3,12 +3,14 @@
 import numpy as np
 
 from derain.simulation import shapes
-from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm, many_evenly_in_logarithm
-from derain.simulation.objects import Surface
+from derain.simulation.drawing import log_uniform, log_uniforms
+from derain.simulation.objects import Surface, spotted
 
 # Of snow, and of earth and stone.
 BRIGHT, DULL = (0.3, 0.95), (0.05, 0.4)
+
+# Standard deviation of the logarithm of reflectivity from spot to spot.
+SPREAD = 0.25
 
 
 def bank(length: float, generator: np.random.Generator, *, snow: bool = False) -> Surface:
@@ -19,7 +21,7 @@ def bank(length: float, generator: np.random.Generator, *, snow: bool = False) -
         generator: Random generator.
         snow: Whether it is of snow that a plough has left.
     """
-    width, height = generator.uniform(0.8, 4), evenly_in_logarithm((0.2, 2.0), generator)
+    width, height = generator.uniform(0.8, 4), log_uniform((0.2, 2.0), generator)
     cell = np.sqrt(length * width / 1500)
     x = np.linspace(0, length, 3 + int(length / cell))
     y = np.linspace(-width / 2, width / 2, 3 + int(width / cell))
@@ -30,7 +32,7 @@ def bank(length: float, generator: np.random.Generator, *, snow: bool = False) -
     waves = 1 + 0.3 * np.sin(generator.uniform(0.3, 1.5) * over + generator.uniform(0, 6))
     up = height * ridge * waves + lumps * (ridge > 0.05) - 0.03
     triangles = shapes.sheet(np.stack([over, beside, up], axis=-1))
-    return _matter(triangles, BRIGHT if snow else DULL, generator)
+    return spotted(triangles, BRIGHT if snow else DULL, SPREAD, generator)
 
 
 def rubble(radius: float, generator: np.random.Generator) -> Surface:
@@ -41,14 +43,14 @@ def rubble(radius: float, generator: np.random.Generator) -> Surface:
         generator: Random generator.
     """
     count = int(generator.integers(100, 900))
-    size = many_evenly_in_logarithm((0.015, 0.15), count, generator)
+    size = log_uniforms((0.015, 0.15), count, generator)
     place = generator.normal(0, 0.45 * radius, (count, 2))
     height = 0.5 * radius * np.exp(-2 * (place / radius) ** 2).prod(axis=1)
     middle = np.column_stack([place, height * generator.uniform(0.7, 1, count)])
     # Each is a crooked tetrahedron.
     corners = middle[:, None] + size[:, None, None] * generator.normal(0, 1, (count, 4, 3))
     faces = corners[:, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]]
-    return _matter(faces.reshape(-1, 3, 3), DULL, generator)
+    return spotted(faces.reshape(-1, 3, 3), DULL, SPREAD, generator)
 
 
 def logs(generator: np.random.Generator) -> Surface:
@@ -64,13 +66,4 @@ def logs(generator: np.random.Generator) -> Surface:
         np.array([[x, y, z] for y, z in places]) + generator.normal(0, 0.05, (len(places), 3))
         for x in (0, length)
     ]
-    return _matter(shapes.rods(ends[0], ends[1], radius, sides=8), DULL, generator)
-
-
-def _matter(
-    triangles: shapes.Triangles, span: tuple[float, float], generator: np.random.Generator
-) -> Surface:
-    """Uneven in reflectivity from spot to spot."""
-    usual = evenly_in_logarithm(span, generator)
-    spots = usual * np.exp(generator.normal(0, 0.25, len(triangles)))
-    return Surface(triangles, TrackClass.BACKGROUND, np.clip(spots, 0.003, 1))
+    return spotted(shapes.rods(ends[0], ends[1], radius, sides=8), DULL, SPREAD, generator)

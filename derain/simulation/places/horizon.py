@@ -1,4 +1,4 @@
-"""What is seen from 50 to 280 m away by a few beams: rows of trees, hills, corners, pylons."""
+"""Things 50 to 280 m away, which few beams reach: rows of trees, hills, corners, pylons."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -7,8 +7,8 @@ import numpy as np
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm, many_evenly_in_logarithm
-from derain.simulation.objects import Surface
+from derain.simulation.drawing import log_uniform, log_uniforms
+from derain.simulation.objects import Surface, of_material
 from derain.simulation.places import frames, threads
 from derain.simulation.shapes import Triangles
 
@@ -52,7 +52,7 @@ def lay_out_horizon(generator: np.random.Generator) -> Iterator[Surface]:
     ]
     for make, most in kinds:
         for _ in range(generator.integers(0, most + 1)):
-            away = evenly_in_logarithm(HORIZON, generator)
+            away = log_uniform(HORIZON, generator)
             azimuth = generator.uniform(-np.pi, np.pi)
             for surface in make(away, generator):
                 yield surface.placed(
@@ -69,12 +69,12 @@ def _hills(generator: np.random.Generator) -> Surface:
     for waves in generator.integers(1, 24, 8):
         turned = waves * angle + generator.uniform(0, 2 * np.pi) + generator.normal(0, 3) * share
         height += generator.uniform(0, 8) / waves**0.7 * share * np.sin(turned)
-    height += evenly_in_logarithm((0.02, 0.6), generator) * generator.normal(size=height.shape)
+    height += log_uniform((0.02, 0.6), generator) * generator.normal(size=height.shape)
     height[:, -1] = height[:, 0]
     ring = np.stack([away * np.cos(angle), away * np.sin(angle), height - 1.5], axis=-1)
     triangles = shapes.sheet(ring)
-    usual = evenly_in_logarithm((0.01, 0.3), generator)
-    spread = many_evenly_in_logarithm((0.2, 3), len(triangles), generator)
+    usual = log_uniform((0.01, 0.3), generator)
+    spread = log_uniforms((0.2, 3), len(triangles), generator)
     return Surface(triangles, TrackClass.BACKGROUND, usual * spread)
 
 
@@ -100,12 +100,12 @@ def _tree(away: float, generator: np.random.Generator) -> Iterator[Surface]:
 
 def _scrub(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     """Bushes and stalks by the dozen, each seen by a beam or none."""
-    count = int(evenly_in_logarithm((10, 300), generator))
+    count = int(log_uniform((10, 300), generator))
     spread = generator.uniform((1, 3), (4, 20)) / 2
     places = np.column_stack(
         [generator.normal(0, spread, (count, 2)), generator.uniform(-2, 2.5, count)]
     )
-    size = evenly_in_logarithm((0.03, 0.3), generator)
+    size = log_uniform((0.03, 0.3), generator)
     yield _plant(
         shapes.leaves(np.clip(places, -40, 40) + np.array([45, 0, 0]), size, generator), generator
     )
@@ -113,14 +113,14 @@ def _scrub(away: float, generator: np.random.Generator) -> Iterator[Surface]:
 
 def _crown(most: int, generator: np.random.Generator) -> Triangles:
     """Leaves about boughs, some clumped, over a stem."""
-    height = evenly_in_logarithm((4, 22), generator)
+    height = log_uniform((4, 22), generator)
     radii = height * generator.uniform(0.12, 0.3, 3)
-    count = int(evenly_in_logarithm((15, most), generator))
+    count = int(log_uniform((15, most), generator))
     centres = shapes.inside_ellipsoid(count, (radii[0], radii[1], radii[2]), generator)
     clumps = centres[generator.integers(count, size=max(2, count // 12))]
     own = clumps[generator.integers(len(clumps), size=count)]
     centres += generator.choice([0.0, 0.4, 0.8]) * (own - centres)
-    leaves = shapes.leaves(centres, evenly_in_logarithm(FAR_LEAF, generator), generator)
+    leaves = shapes.leaves(centres, log_uniform(FAR_LEAF, generator), generator)
     stem = shapes.rods(
         np.array([[0.0, 0.0, -DEPTH]]), np.array([[0.0, 0.0, height - radii[2]]]), 0.02 * height
     )
@@ -131,30 +131,30 @@ def _building(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     """A building of one to three blocks with eaves, chimneys and aerials, its corner ahead."""
     for _ in range(generator.integers(1, 4)):
         length, width = generator.uniform(6, 25, 2)
-        top = evenly_in_logarithm((3, 25), generator)
+        top = log_uniform((3, 25), generator)
         block = shapes.box(length, width, -DEPTH, top)
         x, y = generator.uniform(0, 12) + 16, generator.uniform(-15, 15)
         heading = generator.uniform(-np.pi, np.pi)
-        yield _matter(shapes.placed(block, x, y, heading), generator)
+        yield of_material([shapes.placed(block, x, y, heading)], HORIZON_REFLECTIVITY, generator)
         rods = [
             ((a, b, top), (a, b, top + generator.uniform(0.5, 4)))
             for a, b in generator.uniform(-3, 3, (generator.integers(0, 5), 2))
         ]
         if rods:
-            thin = frames.bars(rods, evenly_in_logarithm((0.01, 0.3), generator))
-            yield _matter(shapes.placed(thin, x, y, heading), generator)
+            thin = frames.bars(rods, log_uniform((0.01, 0.3), generator))
+            yield of_material([shapes.placed(thin, x, y, heading)], HORIZON_REFLECTIVITY, generator)
 
 
 def _poles(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     """Lamps or poles in a line across, with arms; perhaps a cable from each to the next."""
     count, step = int(generator.integers(1, 8)), generator.uniform(8, 30)
-    height, radius = generator.uniform(3, 12), evenly_in_logarithm((0.02, 0.2), generator)
+    height, radius = generator.uniform(3, 12), log_uniform((0.02, 0.2), generator)
     ahead = generator.uniform(-0.3, 1.0)
     y = step * (np.arange(count) - (count - 1) / 2)
     x = np.maximum(ahead * y, HORIZON[0] - away)
     rods = [((a, b, -DEPTH), (a, b, height)) for a, b in zip(x, y, strict=True)]
     rods += [((a, b, height), (a, b + 1.5, height + 0.2)) for a, b in zip(x, y, strict=True)]
-    yield _matter(frames.bars(rods, radius, 6), generator)
+    yield of_material([frames.bars(rods, radius, 6)], HORIZON_REFLECTIVITY, generator)
     if generator.random() < 0.5:
         heads = np.column_stack([x, y, np.full(count, height)])
         for start, end in itertools.pairwise(heads):
@@ -168,7 +168,7 @@ def _pylons(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     for y in (-apart / 2, apart / 2):
         yield frames.lattice((0, y, -DEPTH), (0, y, height), generator.uniform(0.6, 2), generator)
         arm = [((-4.0, y, height - 3), (4.0, y, height - 3))]
-        yield _matter(frames.bars(arm, 0.15), generator)
+        yield of_material([frames.bars(arm, 0.15)], HORIZON_REFLECTIVITY, generator)
         heads.append([(x, y, height - 3) for x in (-4.0, 0.0, 4.0)])
     for start, end in zip(*np.array(heads), strict=True):
         yield threads.cable(start, end, 0.03 * apart, (0.015, 0.08), generator)
@@ -176,17 +176,17 @@ def _pylons(away: float, generator: np.random.Generator) -> Iterator[Surface]:
 
 def _sign(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     """A retroreflecting sign, plate or marker post, towards the sensor or turned from it."""
-    side, top = evenly_in_logarithm((0.08, 3), generator), evenly_in_logarithm((0.6, 7), generator)
+    side, top = log_uniform((0.08, 3), generator), log_uniform((0.6, 7), generator)
     plate = shapes.box(0.03, side, top - side, top)
     turned = shapes.placed(plate, 0, 0, generator.normal(0, 0.6))
     yield Surface(turned, TrackClass.BACKGROUND, generator.uniform(*RETROREFLECTIVE))
     post = frames.bars([((0.05, 0, -DEPTH), (0.05, 0, top))], 0.04)
-    yield _matter(post, generator)
+    yield of_material([post], HORIZON_REFLECTIVITY, generator)
 
 
 def _glint(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     """A lamp, a marker or a scrap of metal that returns light from afar, to one beam or two."""
-    size, height = evenly_in_logarithm((0.05, 0.5), generator), generator.uniform(-1, 8)
+    size, height = log_uniform((0.05, 0.5), generator), generator.uniform(-1, 8)
     glint = shapes.raised(shapes.leaves(np.zeros((1, 3)), size, generator), height)
     yield Surface(glint, TrackClass.BACKGROUND, generator.uniform(*RETROREFLECTIVE))
 
@@ -196,20 +196,12 @@ def _vehicle(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     length, width, height = [(4.4, 1.8, 1.5), (10.0, 2.5, 3.6)][int(generator.random() < 0.3)]
     body = shapes.box(length, width, -1.0, height)
     heading = generator.uniform(-np.pi, np.pi)
-    yield Surface(
-        shapes.placed(body, 0, 0, heading),
-        TrackClass.CAR,
-        evenly_in_logarithm((0.02, 0.6), generator),
-    )
+    turned = shapes.placed(body, 0, 0, heading)
+    yield of_material([turned], (0.02, 0.6), generator, TrackClass.CAR)
 
 
 def _plant(triangles: Triangles, generator: np.random.Generator) -> Surface:
     """Leaves that return from nearly nothing to nearly all of the light."""
-    usual = evenly_in_logarithm((0.1, 0.7), generator)
-    spread = many_evenly_in_logarithm((0.3, 1.4), len(triangles), generator)
+    usual = log_uniform((0.1, 0.7), generator)
+    spread = log_uniforms((0.3, 1.4), len(triangles), generator)
     return Surface(triangles, TrackClass.BACKGROUND, np.minimum(usual * spread, 1))
-
-
-def _matter(triangles: Triangles, generator: np.random.Generator) -> Surface:
-    reflectivity = evenly_in_logarithm(HORIZON_REFLECTIVITY, generator)
-    return Surface(triangles, TrackClass.BACKGROUND, reflectivity)

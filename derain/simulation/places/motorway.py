@@ -1,24 +1,24 @@
 """A motorway: guard rails, gantries, noise walls, lorries, thin poles, embankments with scrub."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.simulation import objects, shapes
+from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
 from derain.simulation.places.crowd import ragged_things
 from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.spacing import along
 from derain.simulation.places.standing import (
     Make,
-    assembled,
+    Piece,
+    assemble,
     free_places,
-    lined_up,
-    put,
+    line_up,
+    place,
+    scatter,
     straight,
-    strewn,
 )
 from derain.simulation.track import Track
 
@@ -48,28 +48,20 @@ def lay_out_motorway(generator: np.random.Generator) -> Track:
     ]
     uneven = Relief.draw(generator.uniform(0.02, 0.15), generator)
     over = _gantries((right - 1, other + 1), generator)
-    return assembled(_ground(right, other, generator), standing, uneven, generator, over)
+    return assemble(_ground(right, other, generator), standing, uneven, generator, over)
 
 
 def _ground(right: float, left: float, generator: np.random.Generator) -> Iterator[Surface]:
     verge = [relief.MEADOW, relief.GRAVEL, relief.SNOW][generator.choice(3, p=[0.6, 0.25, 0.15])]
-
-    def kind_at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
-        return np.where((y > right) & (y < left), 0, 1)
-
-    yield from ground_mesh([relief.ASPHALT, verge], kind_at, generator)
+    return ground_mesh(
+        [relief.ASPHALT, verge], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
+    )
 
 
 def _rails(lines: tuple[float, ...], generator: np.random.Generator) -> Iterator[Surface]:
     for y in lines:
-        make: Callable[[float, np.random.Generator], Iterable[Surface]] = (
-            frames.guard_rail if generator.random() < 0.7 else _cable_barrier
-        )
-        yield from lined_up(make, straight(y), MOTORWAY_SIGHT, 16, generator, gaps=0.05)
-
-
-def _cable_barrier(length: float, generator: np.random.Generator) -> Iterable[Surface]:
-    return threads.wire_fence(length, generator)
+        make = frames.guard_rail if generator.random() < 0.7 else threads.wire_fence
+        yield from line_up(make, straight(y), MOTORWAY_SIGHT, 16, generator, gaps=0.05)
 
 
 def _driving(
@@ -85,7 +77,7 @@ def _driving(
             slow = lane in (0, 2 * lanes - 1)
             make: Make = vehicles.lorry if generator.random() < 0.15 + 0.45 * slow else _car(x)
             heading = 0 if own_carriageway else np.pi
-            yield from put(make(generator), x, y + generator.normal(0, 0.2), heading)
+            yield from place(make(generator), x, y + generator.normal(0, 0.2), heading)
 
 
 def _car(x: float) -> Make:
@@ -100,7 +92,7 @@ def _breakdown(right: float, generator: np.random.Generator) -> Iterator[Surface
 
     makes = [people.person] * generator.integers(2, 8) + [frames.bollard] * generator.integers(0, 8)
     places = free_places(len(makes), (2.3, 60), 1.2, generator, on_the_shoulder)
-    yield from strewn(makes, places, generator)
+    yield from scatter(makes, places, generator)
 
 
 def _beside(edges: tuple[float, float], generator: np.random.Generator) -> Iterator[Surface]:
@@ -111,9 +103,9 @@ def _beside(edges: tuple[float, float], generator: np.random.Generator) -> Itera
         yield plants.grass(np.column_stack([ahead, y + side * (out - 1)]), generator)
         for x in along(-30, 50, (5, 40), generator):
             litter = heaps.rubble(generator.uniform(0.3, 1), generator)
-            yield from put(litter, x, y + side * generator.uniform(-1.5, 0.5))
+            yield from place(litter, x, y + side * generator.uniform(-1.5, 0.5))
         for x in along(*MOTORWAY_SIGHT, (4, 25), generator):
-            yield from put(frames.thin_pole(generator), x, y + side * generator.uniform(0.8, 3))
+            yield from place(frames.thin_pole(generator), x, y + side * generator.uniform(0.8, 3))
 
 
 def _gantries(edges: tuple[float, float], generator: np.random.Generator) -> Iterator[Surface]:
@@ -139,26 +131,19 @@ def _embankments(edges: tuple[float, float], generator: np.random.Generator) -> 
     for y, side in zip(edges, (-1, 1), strict=True):
         kind = generator.choice(["wall", "fence", "bank"])
         away = y + side * generator.uniform(0.5, 4)
-        if kind == "wall":
-            yield from lined_up(
-                _noise_wall, straight(away), MOTORWAY_SIGHT, 13, generator, gaps=0.05
-            )
-        elif kind == "fence":
-            yield from lined_up(
-                threads.chain_link, straight(away), MOTORWAY_SIGHT, 13, generator, 0.1
-            )
-        else:
-            yield from lined_up(
-                heaps.bank, straight(away + 2 * side), MOTORWAY_SIGHT, 10, generator
-            )
+        kinds: dict[str, tuple[Piece, float, float, float]] = {
+            "wall": (_noise_wall, away, 13, 0.05),
+            "fence": (threads.chain_link, away, 13, 0.1),
+            "bank": (heaps.bank, away + 2 * side, 10, 0.0),
+        }
+        make, line, piece, gaps = kinds[kind]
+        yield from line_up(make, straight(line), MOTORWAY_SIGHT, piece, generator, gaps)
         for x in along(*MOTORWAY_SIGHT, (5, 18), generator):
-            place = x, away + side * generator.uniform(1, 12)
-            bare = generator.random() < 0.4
-            tree = [plants.bare_tree(generator)] if bare else plants.crowned_tree(generator)
-            yield from put(tree, *place)
+            y = away + side * generator.uniform(1, 12)
+            yield from place(plants.tree(generator.random() < 0.4, generator), x, y)
         for x in along(*MOTORWAY_SIGHT, (2, 12), generator):
             scrub = plants.brushwood(generator.uniform(0.5, 2.5), generator)
-            yield from put(scrub, x, away + side * generator.uniform(0.5, 6))
+            yield from place(scrub, x, away + side * generator.uniform(0.5, 6))
 
 
 def _noise_wall(length: float, generator: np.random.Generator) -> Iterator[Surface]:

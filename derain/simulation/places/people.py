@@ -6,7 +6,7 @@ import numpy as np
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm
+from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.shapes import Triangles
 
@@ -128,7 +128,7 @@ def _wheel(x: float, generator: np.random.Generator) -> Triangles:
     angle = np.linspace(0, 2 * np.pi, 17)
     rim = np.column_stack([x + 0.34 * np.cos(angle), 0 * angle, 0.34 + 0.34 * np.sin(angle)])
     hub = np.broadcast_to((x, 0.0, 0.34), (len(angle), 3))
-    width = evenly_in_logarithm((0.002, 0.006), generator)
+    width = log_uniform((0.002, 0.006), generator)
     return np.concatenate(
         [shapes.rods(rim[:-1], rim[1:], 0.02), shapes.rods(hub[:-1], rim[:-1], width)]
     )
@@ -142,6 +142,6 @@ def _limbs(ends: Sequence[tuple[tuple[float, ...], tuple[float, ...]]], radius: 
 def _clothed(parts: list[Triangles], label: TrackClass, generator: np.random.Generator) -> Surface:
     """Every part of a reflectivity of its own."""
     reflectivity = [
-        np.full(len(part), evenly_in_logarithm(PERSON_REFLECTIVITY, generator)) for part in parts
+        np.full(len(part), log_uniform(PERSON_REFLECTIVITY, generator)) for part in parts
     ]
     return Surface(np.concatenate(parts), label, np.concatenate(reflectivity))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm, many_evenly_in_logarithm
+from derain.simulation.drawing import log_uniform, log_uniforms
 from derain.simulation.objects import Surface
 from derain.simulation.shapes import Triangles
 
@@ -41,7 +41,7 @@ def bush(radii: tuple[float, float, float], generator: np.random.Generator) -> S
 
 def crowned_tree(generator: np.random.Generator) -> Iterator[Surface]:
     """A tree in leaf, from a sapling to one of 12 m."""
-    height = evenly_in_logarithm((2.0, 12.0), generator)
+    height = log_uniform((2.0, 12.0), generator)
     radii = height * generator.uniform(0.12, 0.35, 3)
     crown = shapes.raised(_leaves(tuple(radii), generator), height - radii[2])
     yield _plant(crown, generator)
@@ -50,7 +50,12 @@ def crowned_tree(generator: np.random.Generator) -> Iterator[Surface]:
 
 def bare_tree(generator: np.random.Generator) -> Surface:
     """A tree in winter: a trunk, boughs, and twigs down to a finger's width."""
-    return _plant(_boughs(evenly_in_logarithm((2.0, 10.0), generator), 6, generator), generator)
+    return _plant(_boughs(log_uniform((2.0, 10.0), generator), 6, generator), generator)
+
+
+def tree(winter: bool, generator: np.random.Generator) -> Surface | Iterator[Surface]:
+    """A bare tree in winter, else one in leaf."""
+    return bare_tree(generator) if winter else crowned_tree(generator)
 
 
 def brushwood(radius: float, generator: np.random.Generator) -> Surface:
@@ -59,7 +64,7 @@ def brushwood(radius: float, generator: np.random.Generator) -> Surface:
     starts = np.column_stack([generator.normal(0, 0.15 * radius, (count, 2)), np.zeros(count)])
     ends = starts + radius * generator.normal((0, 0, 0.9), (0.45, 0.45, 0.3), (count, 3))
     ends[:, 2] = np.abs(ends[:, 2]) + 0.05
-    width = evenly_in_logarithm((0.004, 0.03), generator)
+    width = log_uniform((0.004, 0.03), generator)
     stems = shapes.blades(starts, ends, 1.5 * width, generator)
     where = generator.random((count * 4, 1))
     starts = (starts + where.reshape(4, count, 1) * (ends - starts)).reshape(-1, 3)
@@ -76,8 +81,8 @@ def hedge(length: float, generator: np.random.Generator) -> Surface:
         generator: Random generator.
     """
     height, depth = generator.uniform(0.6, 2.5), generator.uniform(0.4, 1.5)
-    size = evenly_in_logarithm(LEAF, generator)
-    cover = evenly_in_logarithm((0.5, 3.0), generator)
+    size = log_uniform(LEAF, generator)
+    cover = log_uniform((0.5, 3.0), generator)
     count = min(int(cover * length * height / _area(size)), int(600 * length))
     x, u, v = generator.random((3, count))
     # Most leaves are at the outside, where there is light.
@@ -99,25 +104,25 @@ def grass(places: NDArray[np.float64], generator: np.random.Generator) -> Surfac
     blades = generator.integers(3, 14)
     centres = np.repeat(places, blades, axis=0)
     feet = centres + generator.normal(0, tuft, centres.shape)
-    usual = evenly_in_logarithm((0.08, 0.9), generator)
+    usual = log_uniform((0.08, 0.9), generator)
     height = usual * generator.uniform(0.4, 1.3, len(feet))
     lean = height[:, None] * generator.normal(0, 0.35, feet.shape)
     starts = np.column_stack([feet, np.zeros(len(feet))])
     ends = np.column_stack([feet + lean, height])
-    width = evenly_in_logarithm((0.006, 0.03), generator)
+    width = log_uniform((0.006, 0.03), generator)
     return _plant(shapes.blades(starts, ends, width, generator), generator)
 
 
 def _plant(triangles: Triangles, generator: np.random.Generator) -> Surface:
-    reflectivity = many_evenly_in_logarithm(PLANT_REFLECTIVITY, len(triangles), generator)
+    reflectivity = log_uniforms(PLANT_REFLECTIVITY, len(triangles), generator)
     return Surface(triangles, TrackClass.BACKGROUND, reflectivity)
 
 
 def _leaves(radii: tuple[float, float, float], generator: np.random.Generator) -> Triangles:
     """Leaves in an ellipsoid about the origin, sparse or dense, some of them in clumps."""
-    size = evenly_in_logarithm(LEAF, generator)
+    size = log_uniform(LEAF, generator)
     shadow = np.pi * np.sqrt(radii[0] * radii[1]) * radii[2]
-    cover = evenly_in_logarithm(COVER, generator)
+    cover = log_uniform(COVER, generator)
     count = int(np.clip(cover * shadow / _area(size), 20, MOST_LEAVES))
     centres = shapes.inside_ellipsoid(count, radii, generator)
     clumps = int(generator.integers(2, 1 + max(3, count // 15)))
@@ -135,7 +140,7 @@ def _boughs(height: float, generations: int, generator: np.random.Generator) -> 
     """A trunk as high as half of the tree, and what branches from it, generation by generation."""
     starts = np.zeros((1, 3))
     ends = np.array([[*generator.normal(0, 0.05 * height, 2), 0.5 * height]])
-    radius = evenly_in_logarithm((0.012, 0.03), generator) * height
+    radius = log_uniform((0.012, 0.03), generator) * height
     wood = [shapes.rods(starts, ends, radius, taper=0.6, sides=8)]
     for generation in range(1, generations):
         length = np.linalg.norm(ends - starts, axis=1)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import Span, evenly_in_logarithm, many_evenly_in_logarithm
+from derain.simulation.drawing import Span, log_uniform, log_uniforms
 from derain.simulation.objects import Surface
 
 RELIEF_WAVES = 12
@@ -45,7 +45,7 @@ class Relief:
             height: Standard deviation of the height, metres. Long waves are higher than short ones.
             generator: Random generator.
         """
-        length = many_evenly_in_logarithm(WAVELENGTHS, RELIEF_WAVES, generator)
+        length = log_uniforms(WAVELENGTHS, RELIEF_WAVES, generator)
         direction = generator.uniform(0, 2 * np.pi, RELIEF_WAVES)
         waves = 2 * np.pi / length * np.stack([np.cos(direction), np.sin(direction)])
         amplitudes = height * np.sqrt(2) * length / np.linalg.norm(length)
@@ -105,7 +105,7 @@ def ground_mesh(
     """
     corners = _rings()
     kind = kind_at(corners[..., 0], corners[..., 1])
-    bumps = np.array([evenly_in_logarithm(each.bumps, generator) for each in kinds])
+    bumps = np.array([log_uniform(each.bumps, generator) for each in kinds])
     furrow = np.array([each.furrow * generator.uniform(0.3, 1) for each in kinds])
     corners[..., 2] = bumps[kind] * generator.normal(size=kind.shape)
     corners[..., 2] += furrow[kind] * _furrows(corners, generator)
@@ -126,7 +126,7 @@ def _patch(
     generator: np.random.Generator,
 ) -> Surface:
     """All ground of a kind: uneven in reflectivity from spot to spot, dark where it is wet."""
-    usual = evenly_in_logarithm(kind.reflectivity, generator)
+    usual = log_uniform(kind.reflectivity, generator)
     spots = usual * np.exp(generator.normal(0, 0.2, len(triangles)))
     spots[wetness > np.quantile(wetness, 1 - kind.wet)] *= WET
     return Surface(triangles, kind.label, np.clip(spots, 0.003, 1))

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm
+from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places import furniture, people, plants, threads
 from derain.simulation.places.frames import bars, made, railing
 from derain.simulation.places.shell import Walls, moved, shell
 from derain.simulation.places.specks import mirrored
-from derain.simulation.places.standing import Make, free_places, put, shared, strewn
+from derain.simulation.places.standing import Make, choose, free_places, of_size, place, scatter
 from derain.simulation.track import Track
 
 # Sensors that stand in a room are so high above its floor, metres.
@@ -68,7 +68,7 @@ def _polished(surface: Surface, generator: np.random.Generator) -> Iterator[Surf
     if generator.random() > POLISHED or surface.label != TrackClass.BACKGROUND:
         yield surface
         return
-    count = round(evenly_in_logarithm(SPECKS_OF_A_THING, generator))
+    count = round(log_uniform(SPECKS_OF_A_THING, generator))
     yield from mirrored(surface, np.array([0, 0, np.mean(MOUNTING_HEIGHTS)]), count, generator)
 
 
@@ -95,7 +95,7 @@ def _below_the_ceiling(room: Walls, generator: np.random.Generator) -> Iterator[
         yield made([lamp, bars(wires, 0.004)], generator)
     for _ in range(generator.integers(0, 4)):
         y, z = generator.uniform(*room.y), room.height - generator.uniform(0.08, 0.5)
-        radius = evenly_in_logarithm((0.01, 0.15), generator)
+        radius = log_uniform((0.01, 0.15), generator)
         yield made([bars([((room.x[0], y, z), (room.x[1], y, z))], radius, 6)], generator)
     for _ in range(generator.integers(0, 5)):
         start = np.array([generator.uniform(*room.x), generator.uniform(*room.y), room.height])
@@ -114,26 +114,21 @@ def _furniture(room: Walls, generator: np.random.Generator) -> Iterator[Surface]
         (furniture.standing_lamp, 1.5),
         (furniture.machine, 2),
         (furniture.rubbish, 2),
-        (_hung_net, 0.7),
+        (of_size(threads.net, (0.5, 2.5), (1.5, 2.3)), 0.7),
         (_twigs, 1.5),
     ]
     area = (room.x[1] - room.x[0]) * (room.y[1] - room.y[0])
-    count = int(np.clip(area * evenly_in_logarithm((0.08, 0.6), generator), 3, 40))
-    makes = shared(options, count, generator)
+    count = int(np.clip(area * log_uniform((0.08, 0.6), generator), 3, 40))
+    makes = choose(options, count, generator)
     places = free_places(count, (0.7, 15.0), 0.6, generator, room.holds)
-    yield from strewn(makes, places, generator)
+    yield from scatter(makes, places, generator)
 
 
 def _people(room: Walls, most: int, generator: np.random.Generator) -> Iterator[Surface]:
     """Somebody at an arm's length or at the other end of the room."""
     count = int(generator.integers(0, most))
     places = free_places(count, (0.6, 8.0), 0.5, generator, room.holds)
-    yield from strewn([people.person] * count, places, generator)
-
-
-def _hung_net(generator: np.random.Generator) -> Surface:
-    """A curtain, a net or a drape."""
-    return threads.net(generator.uniform(0.5, 2.5), generator.uniform(1.5, 2.3), generator)
+    yield from scatter([people.person] * count, places, generator)
 
 
 def _twigs(generator: np.random.Generator) -> Surface:
@@ -152,11 +147,11 @@ def _along_a_corridor(room: Walls, generator: np.random.Generator) -> Iterator[S
         door = shapes.placed(shapes.box(0.9, 0.04, 0.01, 2.0), 0.45, 0, ajar)
         handle = shapes.placed(shapes.box(0.12, 0.03, 1.0, 1.03), 0.8, 0.06)
         x, y, heading = (at, side, 0.0) if lengthwise else (side, at, np.pi / 2)
-        yield from put(made([door, handle], generator), float(x), float(y), heading)
+        yield from place(made([door, handle], generator), float(x), float(y), heading)
     makes: list[Make] = [furniture.chair, furniture.rubbish, furniture.pot_plant, furniture.shelf]
     count = int(generator.integers(0, 8))
-    chosen = shared([(make, 1) for make in makes], count, generator)
-    yield from strewn(chosen, free_places(count, (0.8, 20), 1, generator, room.holds), generator)
+    chosen = choose([(make, 1) for make in makes], count, generator)
+    yield from scatter(chosen, free_places(count, (0.8, 20), 1, generator, room.holds), generator)
 
 
 def _stairs(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
@@ -164,32 +159,15 @@ def _stairs(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
     rise, tread, width = generator.uniform(0.15, 0.2), generator.uniform(0.25, 0.32), 1.2
     closed = generator.random() < 0.5
     for level, heading in ((0.0, 0.0), (12 * rise, np.pi)):
-        steps = [
-            shapes.placed(
-                shapes.box(
-                    tread,
-                    width,
-                    level + (n + 1) * rise - (rise if closed else 0.05),
-                    level + (n + 1) * rise,
-                ),
-                tread * n,
-                0,
-            )
-            for n in range(12)
-        ]
+        steps = []
+        for number in range(12):
+            top = level + (number + 1) * rise
+            step = shapes.box(tread, width, top - (rise if closed else 0.05), top)
+            steps.append(shapes.placed(step, tread * number, 0))
         rail = railing(12 * tread, generator)
-        parts = [
-            made(steps, generator),
-            *(
-                replace(
-                    rail,
-                    triangles=shapes.raised(
-                        shapes.sloped(moved(rail, 0, y, 0).triangles, rise / tread, 0),
-                        level + rise,
-                    ),
-                )
-                for y in (-width / 2, width / 2)
-            ),
-        ]
+        parts = [made(steps, generator)]
+        for y in (-width / 2, width / 2):
+            sloped = shapes.sloped(moved(rail, 0, y, 0).triangles, rise / tread, 0)
+            parts.append(replace(rail, triangles=shapes.raised(sloped, level + rise)))
         turned = -6 * tread if heading else 0.8
-        yield from put(parts, turned * np.cos(heading), 0.6 * np.sign(heading), heading)
+        yield from place(parts, turned * np.cos(heading), 0.6 * np.sign(heading), heading)

@@ -3,16 +3,17 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 
 from derain.simulation import shapes
-from derain.simulation.drawing import Span, evenly_in_logarithm
+from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places import threads, walls
 from derain.simulation.places.frames import Point, bars, made
-from derain.simulation.places.glass import pane
-from derain.simulation.places.standing import put
+from derain.simulation.places.standing import place
+from derain.simulation.places.walls import pane
 
 FLOOR = (0.03, 0.6)
 
@@ -31,16 +32,18 @@ class Walls:
         x: From wall to wall along x, metres.
         y: From wall to wall along y, metres.
         height: Of the ceiling, metres.
+        MARGIN: Least distance of the middle of a thing from the walls, metres.
     """
 
     x: Span
     y: Span
     height: float
+    MARGIN: ClassVar[float] = 0.35
 
     @classmethod
     def draw(cls, shortest: Span, longest: Span, generator: np.random.Generator) -> "Walls":
         """Draws walls by the spans of the length of the shorter side and of the longer one."""
-        sides = [evenly_in_logarithm(span, generator) for span in (shortest, longest)]
+        sides = [log_uniform(span, generator) for span in (shortest, longest)]
         along, across = (sides[which] for which in generator.permutation(2))
         behind, right = (
             np.clip(generator.uniform(0, side), 0.7, side - 0.7) for side in (along, across)
@@ -58,9 +61,9 @@ class Walls:
         return [(behind, right), (ahead, right), (ahead, left), (behind, left)]
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether a thing as large as a chair may stand there."""
-        inside = self.x[0] + 0.35 < x < self.x[1] - 0.35
-        return inside and self.y[0] + 0.35 < y < self.y[1] - 0.35
+        """Whether there is room for a thing between the walls."""
+        inside = self.x[0] + self.MARGIN < x < self.x[1] - self.MARGIN
+        return inside and self.y[0] + self.MARGIN < y < self.y[1] - self.MARGIN
 
 
 def shell(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
@@ -79,10 +82,8 @@ def _floor_and_ceiling(room: Walls, generator: np.random.Generator) -> Iterator[
     for height, bumps in ((0.0, SMOOTH), (room.height, -SMOOTH)):
         rough = walls.rough_wall(length + 2 * OVERLAP, width + 2 * OVERLAP, generator, cell=0.5)
         rough = moved(rough, -OVERLAP, 0, -OVERLAP)
-        x, bump, z = np.moveaxis(rough.triangles, -1, 0)
-        lying = np.stack([x + room.x[0], z + room.y[0], height + bumps * bump], axis=-1)
-        shine = evenly_in_logarithm(FLOOR, generator)
-        yield replace(rough, triangles=lying, reflectivity=shine)
+        lying = walls.laid_flat(rough, (room.x[0], room.y[0]), height, bumps)
+        yield replace(lying, reflectivity=log_uniform(FLOOR, generator))
 
 
 def _walls(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
@@ -102,12 +103,12 @@ def _walls(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
             behind = walls.rough_wall(length + 8, room.height + 2, generator, cell=0.8)
             wall.append(moved(behind, -4, -_beyond(generator), -1))
         wall += [*_on_the_wall(length, room.height, generator)]
-        yield from put(wall, *start, number * np.pi / 2)
+        yield from place(wall, *start, number * np.pi / 2)
 
 
 def _beyond(generator: np.random.Generator) -> float:
     """How far behind a window or a door the next wall is, metres."""
-    return evenly_in_logarithm((1.0, 40.0), generator)
+    return log_uniform((1.0, 40.0), generator)
 
 
 def _pierced(
@@ -121,7 +122,7 @@ def _pierced(
     left, right = (length - wide) / 2, (length + wide) / 2
     pieces = [((0.0, left), (0.0, height)), ((right, length), (0.0, height))]
     pieces += [((left, right), (high, height)), ((left, right), (0.0, low))]
-    shine = evenly_in_logarithm(walls.STONE, generator)
+    shine = log_uniform(walls.STONE, generator)
     for (begin, end), (bottom, top) in pieces:
         if top - bottom > 0.01:
             piece = walls.rough_wall(end - begin, top - bottom, generator, cell=0.5)
@@ -156,7 +157,7 @@ def _on_the_wall(length: float, height: float, generator: np.random.Generator) -
         yield made([shapes.placed(shapes.box(side, deep, z, z + 0.6 * side), x, 0.05)], generator)
     if generator.random() < 0.5:
         x = generator.uniform(0, length)
-        radius = evenly_in_logarithm((0.008, 0.06), generator)
+        radius = log_uniform((0.008, 0.06), generator)
         yield made([bars([((x, 0.12, 0), (x, 0.12, height))], radius, 6)], generator)
     if generator.random() < 0.4 and length > 1.5:
         ribs = generator.uniform(0, length - 1) + np.arange(0, 1, 0.07)

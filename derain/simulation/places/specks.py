@@ -1,4 +1,4 @@
-"""What little of a surface returns when the rest mirrors the light away: dust, edges, scratches."""
+"""Specks on a surface that mirrors the light away: dust, edges, scratches."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.simulation.drawing import evenly_in_logarithm
+from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.shapes import Triangles
 
@@ -42,7 +42,7 @@ def specks(
     clumps = places[generator.integers(len(places), size=1 + count // 25)]
     from_clumps = np.linalg.norm(places[:, None] - clumps, axis=2).min(axis=1)
     places = places[from_clumps <= np.quantile(from_clumps, share)]
-    size = evenly_in_logarithm(SIZE, generator) * np.linalg.norm(places - sensor, axis=1)
+    size = log_uniform(SIZE, generator) * np.linalg.norm(places - sensor, axis=1)
     corners = generator.normal(0, 1, (len(places), 3, 3))
     small = places[:, None] + size[:, None, None] * np.clip(corners, -2, 2)
     away = np.linalg.norm(small - sensor, axis=2).min(axis=1)
@@ -64,7 +64,7 @@ def mirrored(
     yield replace(surface, reflectivity=MIRROR)
     on_it = specks(surface.triangles, sensor, count, generator)
     if len(on_it):
-        yield Surface(on_it, surface.label, evenly_in_logarithm(PAINT, generator))
+        yield Surface(on_it, surface.label, log_uniform(PAINT, generator))
 
 
 def on_surface(

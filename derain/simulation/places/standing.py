@@ -1,13 +1,14 @@
-"""Where things stand: near the sensor and far from it, beside each other, along lines."""
+"""Sets things up around the sensor: at random, side by side, along lines."""
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.simulation import shapes
-from derain.simulation.drawing import Span, evenly_in_logarithm
+from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places.relief import Relief
 from derain.simulation.track import Track
@@ -57,7 +58,7 @@ def free_places(
     taken: list[tuple[float, float]] = []
     for number in range(count):
         for _ in range(PLACING_TRIES):
-            distance = evenly_in_logarithm(distances, generator)
+            distance = log_uniform(distances, generator)
             limit = AHEAD if number % 2 else 180.0
             azimuth = np.radians(generator.uniform(-limit, limit))
             x, y = float(distance * np.cos(azimuth)), float(distance * np.sin(azimuth))
@@ -67,7 +68,7 @@ def free_places(
     return taken
 
 
-def strewn(
+def scatter(
     makes: Iterable[Make],
     places: Iterable[tuple[float, float]],
     generator: np.random.Generator,
@@ -81,7 +82,18 @@ def strewn(
     """
     for make, (x, y) in zip(makes, places, strict=False):
         heading = generator.uniform(-np.pi, np.pi)
-        yield from put(make(generator), x, y, heading)
+        yield from place(make(generator), x, y, heading)
+
+
+def of_size(make: Callable[..., Surface | Iterable[Surface]], *sizes: Span) -> Make:
+    """Makes things whose sizes, in metres, are each uniform between two values."""
+    return lambda generator: make(*(generator.uniform(*size) for size in sizes), generator)
+
+
+def shuffled(makes: Iterable[Make], generator: np.random.Generator) -> list[Make]:
+    """Makers of things in another order."""
+    ordered = list(makes)
+    return [ordered[which] for which in generator.permutation(len(ordered))]
 
 
 def straight(y: float) -> Line:
@@ -89,7 +101,7 @@ def straight(y: float) -> Line:
     return lambda x: np.full(np.shape(x), y)
 
 
-def put(
+def place(
     things: Surface | Iterable[Surface], x: float, y: float, heading: float = 0.0
 ) -> Iterator[Surface]:
     """A thing turned by a heading in radians, then moved to (x, y)."""
@@ -97,7 +109,7 @@ def put(
         yield surface.placed(x, y, heading)
 
 
-def lined_up(
+def line_up(
     make: Piece,
     line: Line,
     x: Span,
@@ -120,19 +132,19 @@ def lined_up(
         if generator.random() >= gaps:
             length = float(np.hypot(after - before, right - left))
             heading = float(np.arctan2(right - left, after - before))
-            yield from put(make(length, generator), float(before), float(left), heading)
+            yield from place(make(length, generator), float(before), float(left), heading)
 
 
-def shared(
+def choose(
     options: Iterable[tuple[Make, float]], count: int, generator: np.random.Generator
 ) -> list[Make]:
-    """So many of several makers of things, each as often as its share of the sum says."""
+    """So many of several makers of things, each with the probability of its share in the sum."""
     makes, shares = zip(*options, strict=True)
     chosen = generator.choice(len(makes), count, p=np.array(shares) / np.sum(shares))
     return [makes[which] for which in chosen]
 
 
-def assembled(
+def assemble(
     ground: Iterable[Surface],
     standing: Iterable[Surface],
     relief: Relief,
@@ -148,16 +160,12 @@ def assembled(
         generator: Random generator.
         over: What may be right above the sensor: a ceiling, cables.
     """
-    lower, upper = Track.of(ground), _cleared(Track.of(standing))
-    tracks = [lower, upper, *(Track.of([surface]) for surface in over)]
-    triangles, reflectivity, label = (
-        np.concatenate([getattr(track, part) for track in tracks])
-        for part in ("triangles", "reflectivity", "label")
-    )
-    corners = triangles.reshape(-1, 3).astype(np.float64)
+    cleared = Track.joined([Track.of(ground), _cleared(Track.of(standing))])
+    track = cleared.with_surfaces(over)
+    corners = track.triangles.reshape(-1, 3).astype(np.float64)
     corners[:, 2] += relief(corners[:, 0], corners[:, 1])
     tilted = (corners @ _tilt(generator)).reshape(-1, 3, 3)
-    return Track(tilted.astype(np.float32), reflectivity, label)
+    return replace(track, triangles=tilted.astype(np.float32))
 
 
 def _tilt(generator: np.random.Generator) -> NDArray[np.float64]:

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.simulation import shapes
-from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import Span, evenly_in_logarithm
-from derain.simulation.objects import Surface
+from derain.simulation.drawing import Span, log_uniform
+from derain.simulation.objects import Surface, of_material
 from derain.simulation.shapes import Triangles
 
 THREAD_REFLECTIVITY = (0.03, 0.6)
@@ -26,7 +25,7 @@ def net(length: float, height: float, generator: np.random.Generator) -> Surface
         height: Metres from the ground on.
         generator: Random generator.
     """
-    mesh = max(evenly_in_logarithm((0.05, 0.4), generator), np.sqrt(length * height / 2500))
+    mesh = max(log_uniform((0.05, 0.4), generator), np.sqrt(length * height / 2500))
     x, z = np.arange(0, length, mesh), np.arange(0, height, mesh)
     knots = np.stack([*np.meshgrid(x, 0.0, z, indexing="ij")], axis=-1)[:, 0]
     billow = generator.uniform(0, 0.3) * np.sin(np.pi * knots[..., 2] / height)
@@ -35,14 +34,14 @@ def net(length: float, height: float, generator: np.random.Generator) -> Surface
     starts = np.concatenate([knots[:-1].reshape(-1, 3), knots[:, :-1].reshape(-1, 3)])
     ends = np.concatenate([knots[1:].reshape(-1, 3), knots[:, 1:].reshape(-1, 3)])
     whole = generator.random(len(starts)) > generator.choice([0, 0.02, 0.2])
-    width = evenly_in_logarithm((0.004, 0.03), generator)
+    width = log_uniform((0.004, 0.03), generator)
     return _strung(_ribbons(starts[whole], ends[whole], width), generator)
 
 
 def chain_link(length: float, generator: np.random.Generator) -> Iterator[Surface]:
     """A fence of diagonal wire along x, from x = 0 on, with its posts."""
     height, mesh = generator.uniform(1, 2.2), generator.uniform(0.05, 0.14)
-    width = evenly_in_logarithm((0.003, 0.012), generator)
+    width = log_uniform((0.003, 0.012), generator)
     offsets = np.arange(-height, length, mesh * np.sqrt(2))
     # Each wire is cut off where the fence ends.
     low, high = np.maximum(0, -offsets), np.minimum(height, length - offsets)
@@ -92,7 +91,7 @@ def cable(
     """
     share = np.linspace(0, 1, 17)[:, None]
     knots = start + share * (end - start) - 4 * sag * share * (1 - share) * np.array([0, 0, 1])
-    radius = evenly_in_logarithm(width, generator) / 2
+    radius = log_uniform(width, generator) / 2
     return _strung(shapes.rods(knots[:-1], knots[1:], radius), generator)
 
 
@@ -101,11 +100,8 @@ def _ribbons(starts: NDArray[np.float64], ends: NDArray[np.float64], width: floa
     along = ends - starts
     aside = np.cross(along, (0.0, 1.0, 0.0))
     aside *= width / 2 / np.maximum(np.linalg.norm(aside, axis=1, keepdims=True), 1e-9)
-    corners = starts - aside, starts + aside, ends + aside, ends - aside
-    return np.stack([corners[i] for i in (0, 1, 2, 0, 2, 3)], axis=1).reshape(-1, 3, 3)
+    return shapes.quads(starts - aside, starts + aside, ends + aside, ends - aside)
 
 
 def _strung(triangles: Triangles, generator: np.random.Generator) -> Surface:
-    return Surface(
-        triangles, TrackClass.BACKGROUND, evenly_in_logarithm(THREAD_REFLECTIVITY, generator)
-    )
+    return of_material([triangles], THREAD_REFLECTIVITY, generator)

@@ -1,17 +1,15 @@
 """Vehicles with windows that rays go through, and with what is behind them: seats, a driver."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Surface, of_material
 from derain.simulation.places.frames import bars
-from derain.simulation.places.glass import pane
+from derain.simulation.places.walls import pane
 from derain.simulation.shapes import Triangles
 
 BODYWORK = (0.02, 0.7)
@@ -34,11 +32,11 @@ def glazed_car(generator: np.random.Generator) -> Iterator[Surface]:
         for side in (-1, 1)
     ]
     antenna = bars([((-0.2 * length, 0, roof), (-0.3 * length, 0, roof + 0.4))], 0.005)
-    painted = np.concatenate([body, pillars, top, *mirrors, antenna])
-    yield _part(painted, BODYWORK, generator)
-    yield _part(np.concatenate(_panes(cabin, generator)), CAR_GLASS, generator)
-    yield _part(_seats(length, width, sill, generator), CLOTH, generator)
-    yield _part(_wheels(0.31 * length, width), RUBBER, generator)
+    painted = [body, pillars, top, *mirrors, antenna]
+    yield of_material(painted, BODYWORK, generator, TrackClass.CAR)
+    yield of_material(_panes(cabin, generator), CAR_GLASS, generator, TrackClass.CAR)
+    yield of_material([_seats(length, width, sill, generator)], CLOTH, generator, TrackClass.CAR)
+    yield of_material([_wheels(0.31 * length, width)], RUBBER, generator, TrackClass.CAR)
 
 
 def lorry(generator: np.random.Generator) -> Iterator[Surface]:
@@ -50,20 +48,20 @@ def lorry(generator: np.random.Generator) -> Iterator[Surface]:
     foot += (length / 2 + 1.1, 0, 0)
     head = shapes.raised(foot, 0.9)
     pillars = shapes.rods(foot, head, 0.05, sides=4)
-    yield _part(np.concatenate([cab, roof, pillars]), BODYWORK, generator)
-    yield _part(np.concatenate(_panes((foot, head), generator)), CAR_GLASS, generator)
+    yield of_material([cab, roof, pillars], BODYWORK, generator, TrackClass.CAR)
+    yield of_material(_panes((foot, head), generator), CAR_GLASS, generator, TrackClass.CAR)
     sides = [_tarpaulin(length, y, top, generator) for y in (-width / 2, width / 2)]
     ends = [
         shapes.placed(shapes.box(0.05, width, 1.1, top), x, 0) for x in (-length / 2, length / 2)
     ]
     bed = shapes.box(length, width, 1.0, 1.15)
     lid = shapes.box(length, width, top, top + 0.03)
-    yield _part(np.concatenate([*sides, *ends, bed, lid]), BODYWORK, generator)
+    yield of_material([*sides, *ends, bed, lid], BODYWORK, generator, TrackClass.CAR)
     frame = [((-length / 2, y, 0.8), (length / 2, y, 0.8)) for y in (-0.4, 0.4)]
     frame += [((-0.2 * length, y, 0.55), (0.2 * length, y, 0.55)) for y in (-1.2, 1.2)]
     frame += [((-length / 2, -1.1, 0.5), (-length / 2, 1.1, 0.5))]
-    yield _part(bars(frame, 0.06), RUBBER, generator)
-    yield _part(_wheels(0.4 * length, width, 0.5), RUBBER, generator)
+    yield of_material([bars(frame, 0.06)], RUBBER, generator, TrackClass.CAR)
+    yield of_material([_wheels(0.4 * length, width, 0.5)], RUBBER, generator, TrackClass.CAR)
 
 
 def _cabin(
@@ -116,17 +114,3 @@ def _tarpaulin(length: float, y: float, top: float, generator: np.random.Generat
     corners = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)[:, 0]
     corners[..., 1] += generator.uniform(0, 0.04) * np.sin(generator.uniform(2, 12) * x)[:, None]
     return shapes.sheet(corners)
-
-
-def _part(
-    triangles: Triangles, reflectivity: tuple[float, float], generator: np.random.Generator
-) -> Surface:
-    return Surface(triangles, TrackClass.CAR, evenly_in_logarithm(reflectivity, generator))
-
-
-def joined(surfaces: Iterator[Surface]) -> Surface:
-    """Surfaces of one class as one of them."""
-    parts = list(surfaces)
-    reflectivity = [np.broadcast_to(part.reflectivity, len(part.triangles)) for part in parts]
-    triangles = np.concatenate([part.triangles for part in parts])
-    return replace(parts[0], triangles=triangles, reflectivity=np.concatenate(reflectivity))

@@ -1,16 +1,53 @@
 """Walls as they are: rough, with windows, frames, sills, balconies, drain pipes and ivy."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from derain.simulation import shapes
-from derain.simulation.classes import TrackClass
-from derain.simulation.drawing import evenly_in_logarithm
-from derain.simulation.objects import Surface
+from derain.simulation.drawing import log_uniform
+from derain.simulation.objects import Surface, of_material, spotted
 from derain.simulation.places.frames import bars, railing
-from derain.simulation.places.glass import pane
 from derain.simulation.places.threads import cable
+from derain.simulation.shapes import Triangles
+
+GLASS_CELL = 0.04
+MOST_CELLS = 900
+
+# Share of a pane that returns a ray: of clean glass, and of a dirty or frosted pane.
+RETURNING = (0.005, 0.6)
+
+
+def pane(corners: NDArray[np.float64], generator: np.random.Generator) -> Triangles:
+    """A pane of glass.
+
+    Args:
+        corners: Its four corners in order, (4, 3), metres.
+        generator: Random generator.
+    """
+    sides = np.linalg.norm(corners[[1, 3]] - corners[0], axis=1)
+    cell = max(GLASS_CELL, float(np.sqrt(sides.prod() / MOST_CELLS)))
+    wide, high = (1 + int(side / cell) for side in sides)
+    share = log_uniform(RETURNING, generator)
+    # A pane is never nothing at all.
+    there = generator.permutation(wide * high)[: 1 + generator.binomial(wide * high - 1, share)]
+    column, row = there % wide, there // wide
+    u, v = ((edge / count)[:, None] for edge, count in ((column, wide), (row, high)))
+    ends = (0, 0), (1, 0), (1, 1), (0, 1)
+    return shapes.quads(*(_between(corners, u + i / wide, v + j / high) for i, j in ends))
+
+
+def _between(
+    corners: NDArray[np.float64], u: NDArray[np.float64], v: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Places by their shares of the way from the first corner to the second and to the fourth."""
+    first, second, third, fourth = corners
+    lower: NDArray[np.float64] = (1 - u) * first + u * second
+    upper: NDArray[np.float64] = (1 - u) * fourth + u * third
+    return (1 - v) * lower + v * upper
+
 
 STONE = (0.08, 0.7)
 GLASS = (0.01, 0.2)
@@ -30,12 +67,25 @@ def rough_wall(
     x = np.linspace(0, length, 2 + int(length / cell))
     z = np.linspace(0, height, 2 + int(height / cell))
     corners = np.stack(np.meshgrid(x, 0.0, z, indexing="ij"), axis=-1)[:, 0]
-    bumps = evenly_in_logarithm((0.001, 0.05), generator)
+    bumps = log_uniform((0.001, 0.05), generator)
     corners[..., 1] += bumps * generator.normal(size=corners.shape[:2])
-    stones = evenly_in_logarithm(STONE, generator)
-    triangles = shapes.sheet(corners)
-    reflectivity = stones * np.exp(generator.normal(0, 0.15, len(triangles)))
-    return Surface(triangles, TrackClass.BACKGROUND, np.clip(reflectivity, 0.003, 1))
+    return spotted(shapes.sheet(corners), STONE, 0.15, generator)
+
+
+def laid_flat(
+    wall: Surface, corner: tuple[float, float], height: float, bumps: float = 1.0
+) -> Surface:
+    """A rough wall laid down as a floor or as a ceiling.
+
+    Args:
+        wall: Its x and z become x and y.
+        corner: The x and y of what was at its origin, metres.
+        height: Of the floor or ceiling, metres.
+        bumps: Factor of the bumps.
+    """
+    x, bump, z = np.moveaxis(wall.triangles, -1, 0)
+    lying = np.stack([x + corner[0], z + corner[1], height + bumps * bump], axis=-1)
+    return replace(wall, triangles=lying)
 
 
 def facade(length: float, generator: np.random.Generator) -> Iterator[Surface]:
@@ -51,7 +101,8 @@ def facade(length: float, generator: np.random.Generator) -> Iterator[Surface]:
     solid = (np.abs(along) > wide / 2) | (up < 0) | (up > high)
     assert not isinstance(wall.reflectivity, float)
     yield Surface(wall.triangles[solid], wall.label, wall.reflectivity[solid])
-    yield _thing([_box((0, length), (1.5, 4), (0, height))], generator)  # the rooms' far walls
+    behind = _box((0, length), (1.5, 4), (0, height))  # the far walls of the rooms
+    yield of_material([behind], STONE, generator)
     corners = [
         (bay * (column + 0.5), storey * level + sill)
         for column in range(columns)
@@ -65,10 +116,8 @@ def facade(length: float, generator: np.random.Generator) -> Iterator[Surface]:
         panes.append(pane(np.array(square), generator))
         frames += list(zip(square, square[1:] + square[:1], strict=True))
         frames += [((x, recess, z), (x, recess, top)), ((left, -0.05, z), (right, -0.05, z))]
-    yield Surface(
-        np.concatenate(panes), TrackClass.BACKGROUND, evenly_in_logarithm(GLASS, generator)
-    )
-    yield _thing([bars(frames, 0.03)], generator)
+    yield of_material(panes, GLASS, generator)
+    yield of_material([bars(frames, 0.03)], STONE, generator)
     yield from _on_the_wall(length, height, storey, generator)
 
 
@@ -77,25 +126,25 @@ def _on_the_wall(
 ) -> Iterator[Surface]:
     """What hangs on a house: drain pipes, balconies, wires, ivy, an aerial."""
     pipes = [((x, -0.1, 0), (x, -0.1, height)) for x in generator.uniform(0, length, 2)]
-    yield _thing([bars(pipes, 0.05)], generator)
+    yield of_material([bars(pipes, 0.05)], STONE, generator)
     if height > storey + 1 and generator.random() < 0.5:
         x, out = generator.uniform(0, 0.5 * length), 1.2
         slab = _box((x, x + 3), (-out, 0), (storey - 0.15, storey))
         rail = railing(3, generator)
         lifted = shapes.raised(shapes.placed(rail.triangles, x, -out), storey)
-        yield _thing([slab, lifted], generator)
+        yield of_material([slab, lifted], STONE, generator)
     start, end = (np.array([x, -0.15, 0.8 * height]) for x in (0, length))
     yield cable(start, end, 0.1, (0.005, 0.03), generator)
     if generator.random() < 0.4:
         leaves = generator.uniform((0, -0.3, 0), (0.4 * length, 0, 0.8 * height), (2500, 3))
         ivy = shapes.leaves(leaves, generator.uniform(0.015, 0.05), generator)
-        yield _thing([ivy], generator)
+        yield of_material([ivy], STONE, generator)
     aerial = [((0.5 * length, 1, height), (0.5 * length, 1, height + 2))]
     aerial += [
         ((0.5 * length - 0.4, 1, z), (0.5 * length + 0.4, 1, z))
         for z in height + np.arange(1, 2, 0.25)
     ]
-    yield _thing([bars(aerial, 0.012)], generator)
+    yield of_material([bars(aerial, 0.012)], STONE, generator)
 
 
 def _box(
@@ -103,9 +152,3 @@ def _box(
 ) -> shapes.Triangles:
     box = shapes.box(x[1] - x[0], y[1] - y[0], *z)
     return shapes.placed(box, sum(x) / 2, sum(y) / 2)
-
-
-def _thing(parts: list[shapes.Triangles], generator: np.random.Generator) -> Surface:
-    return Surface(
-        np.concatenate(parts), TrackClass.BACKGROUND, evenly_in_logarithm(STONE, generator)
-    )

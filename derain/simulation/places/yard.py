@@ -13,12 +13,14 @@ from derain.simulation.places.standing import (
     AXIS_CLEARANCE,
     Piece,
     anywhere,
-    assembled,
+    assemble,
     free_places,
-    lined_up,
-    put,
+    line_up,
+    of_size,
+    place,
+    scatter,
+    shuffled,
     straight,
-    strewn,
 )
 from derain.simulation.track import Track
 
@@ -39,7 +41,7 @@ def lay_out_yard(generator: np.random.Generator) -> Track:
         *ragged_things(generator, anywhere, count=(25, 60), leafy=not winter),
     ]
     uneven = Relief.draw(generator.uniform(0.05, 0.4), generator)
-    return assembled(_ground(winter, generator), standing, uneven, generator, _cables(generator))
+    return assemble(_ground(winter, generator), standing, uneven, generator, _cables(generator))
 
 
 def _ground(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
@@ -59,13 +61,9 @@ def _heaps(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
             generator.uniform(2, 8), generator, snow=winter and generator.random() < 0.7
         )
 
-    def stones(generator: np.random.Generator) -> Surface:
-        return heaps.rubble(generator.uniform(0.5, 2.5), generator)
-
-    makes = [mound] * 4 + [stones] * 6 + [heaps.logs] * 3
+    makes = [mound] * 4 + [of_size(heaps.rubble, (0.5, 2.5))] * 6 + [heaps.logs] * 3
     places = free_places(int(generator.integers(4, 14)), (4, 40), 3, generator)
-    ordered = [makes[which] for which in generator.permutation(len(makes))]
-    yield from strewn(ordered, places, generator)
+    yield from scatter(shuffled(makes, generator), places, generator)
 
 
 def _lines(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
@@ -83,10 +81,10 @@ def _lines(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
         make = kinds[generator.integers(len(kinds))]
         piece = generator.uniform(4, 9)
         reach = (0.0, piece * generator.integers(1, 4) + 0.1)
-        line = lined_up(make, straight(0), reach, piece, generator, 0.1)
+        line = line_up(make, straight(0), reach, piece, generator, 0.1)
         # Across the way from the sensor to its beginning, so that it does not lead to the sensor.
         across = np.arctan2(y, x) + np.pi / 2 + generator.normal(0, 0.5)
-        yield from put(line, x, y, across)
+        yield from place(line, x, y, across)
 
 
 def _grass(generator: np.random.Generator) -> Iterator[Surface]:

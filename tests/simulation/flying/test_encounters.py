@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from derain.simulation.flying.encounters import Encounters, Population, encounter
 from derain.simulation.flying.gusts import Gusts
+from derain.simulation.flying.meeting import Encounters, Population, encounter
 from derain.simulation.flying.optics import Optics
 from derain.simulation.flying.particles import OpenBeams, Stretch
 from derain.simulation.flying.precipitation import Precipitation
@@ -40,7 +40,7 @@ def random_encounters(generator: np.random.Generator) -> Encounters:
     part = Encounters(
         beam, generator.uniform(1, 20, 200), generator.uniform(0, 1, 200), generator.random(200)
     )
-    return Encounters.joined([part])
+    return part.ordered()
 
 
 def test_each_particle_stands_in_the_shadow_of_those_before_it() -> None:
@@ -57,8 +57,8 @@ def test_each_particle_stands_in_the_shadow_of_those_before_it() -> None:
 
 
 def test_clear_air_takes_nothing() -> None:
-    assert (Encounters.joined([]).transmission(3) == 1).all()
-    assert len(Encounters.joined([]).reflectivity) == 0
+    assert (Encounters.none().transmission(3) == 1).all()
+    assert len(Encounters.none().reflectivity) == 0
 
 
 def neighbours_that_share(found: Encounters) -> float:

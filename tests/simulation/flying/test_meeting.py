@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from derain.simulation.classes import TrackClass
+from derain.simulation.flying.kinds import KINDS
 from derain.simulation.flying.meeting import meet, uncrowded
 from derain.simulation.flying.optics import Optics
 from derain.simulation.flying.precipitation import Precipitation
-from derain.simulation.flying.sizes import Sizes
-from derain.simulation.flying.slices import Slices
-from derain.simulation.flying.spans import KINDS
+from derain.simulation.flying.sizes import Sizes, Slices
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.sensor import Returns, Sensor

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from derain.simulation.flying.optics import Optics
 from derain.simulation.flying.particles import OpenBeams, Stretch, draw_particles
 from derain.simulation.flying.precipitation import Precipitation
-from derain.simulation.flying.sizes import Sizes
-from derain.simulation.flying.slices import Slices
+from derain.simulation.flying.sizes import Sizes, Slices
 from derain.simulation.sensor import Sensor
 
 # It sees everything within 12 m.

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from derain.simulation.classes import TrackClass, packed
 from derain.simulation.flying.gusts import Gusts
 from derain.simulation.flying.particles import Stretch
-from derain.simulation.flying.plumes import Plume, draw_plumes
-from derain.simulation.flying.regions import Air, GroundLayer, Region
+from derain.simulation.flying.regions import Air, GroundLayer, Plume, Region, draw_plumes
 from derain.simulation.sensor import Returns, Sensor
 
 EVEN = Gusts("even", 1, 1, 0)

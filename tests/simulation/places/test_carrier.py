@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from derain.simulation.classes import TrackClass
-from derain.simulation.places.carrier import lay_out_carrier, with_surfaces
+from derain.simulation.places.carrier import lay_out_carrier
 from derain.simulation.places.horizon import lay_out_horizon
 from derain.simulation.sensor import Returns, Sensor
 from derain.simulation.track import Track
@@ -86,8 +86,8 @@ def test_a_seed_gives_the_same_carrier_again_and_another_seed_another_one() -> N
 
 def test_surfaces_are_added_to_a_track_behind_what_it_has() -> None:
     track, added = carriers(1.8)[0], list(lay_out_horizon(np.random.default_rng(1)))
-    joined = with_surfaces(track, iter(added))
+    joined = track.with_surfaces(added)
     assert np.array_equal(joined.triangles[: len(track.label)], track.triangles)
     assert np.array_equal(joined.triangles[len(track.label) :], Track.of(added).triangles)
     assert len(joined.label) == len(joined.reflectivity) == len(joined.triangles)
-    assert with_surfaces(track, iter(())) is track
+    assert track.with_surfaces(()) is track

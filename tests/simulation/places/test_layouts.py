@@ -72,7 +72,7 @@ def test_nothing_is_at_the_place_of_the_sensor(open3d: ModuleType, place: str) -
 
 @pytest.mark.parametrize("place", PLACES)
 def test_people_cars_and_the_rest_are_near_and_all_around(open3d: ModuleType, place: str) -> None:
-    all_seen = [seen(place, seed) for seed in (0, 1, 2)]
+    all_seen = [seen(place, seed) for seed in (0, 1)]
     ends, label = (np.concatenate(parts) for parts in zip(*all_seen, strict=True))
     distance = np.linalg.norm(ends, axis=1)
     for kind in (TrackClass.PEDESTRIAN, TrackClass.CAR, TrackClass.BACKGROUND):

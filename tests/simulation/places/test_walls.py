@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from derain.simulation.places.glass import RETURNING, pane
+from derain.simulation.places.walls import RETURNING, pane
 
 
 def test_panes_lie_in_their_outline_and_return_the_stated_share_of_rays() -> None:

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from derain.errors import InputError
 from derain.files.documents import Entry
-from derain.simulation.flying.kinds import Kind
-from derain.simulation.flying.spans import KINDS, PrecipitationSpans, draw_precipitation
+from derain.simulation.flying.kinds import KINDS, Kind, PrecipitationSpans, draw_precipitation
 
 
 def read(value: object) -> PrecipitationSpans:
@@ -69,7 +68,7 @@ def test_what_a_document_leaves_out_stays_as_it_is() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "said"),
+    ("value", "named"),
     [
         ({"hail": {}}, "hail"),
         ({"snow": {"colour": [1, 2]}}, "colour"),
@@ -86,7 +85,7 @@ def test_what_a_document_leaves_out_stays_as_it_is() -> None:
         ([1], "mapping"),
     ],
 )
-def test_a_wrong_document_is_said_with_its_place(value: object, said: str) -> None:
+def test_a_wrong_document_is_refused_with_its_place(value: object, named: str) -> None:
     with pytest.raises(InputError, match=r"world\.yaml") as caught:
         read(value)
-    assert said in str(caught.value)
+    assert named in str(caught.value)
