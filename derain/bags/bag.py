@@ -5,9 +5,8 @@ raises for what they do not. Here each is one InputError.
 """
 
 import os
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,37 +16,9 @@ from derain.bags.mcap_bag import McapBag
 from derain.bags.names import ROS1_SUFFIX
 from derain.bags.ros2_metadata import FILE, MESSAGE, Ros2Metadata
 from derain.bags.rosbags_reader import MOST_TOPICS, rosbags_reader, stored_messages
-from derain.bags.unpacked_files import UnpackedBag, unpacked_bag
-from derain.bags.unpacking import unpack
-from derain.bags.vendors import decoder_of
+from derain.bags.topics import Topic, cloud_topic
+from derain.bags.unpacking import UnpackedBag, unpack, unpacked_bag
 from derain.errors import InputError, reason_of
-
-# ROS 1 calls it sensor_msgs/PointCloud2; the library gives both the longer name.
-POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
-
-
-@dataclass(frozen=True)
-class Topic:
-    """One topic of a bag.
-
-    Attributes:
-        name: Its name.
-        type: Type of its messages.
-        messages: How many there are, as the bag's index has it.
-        encoding: How they are written: ``ros1`` or ``cdr``.
-    """
-
-    name: str
-    type: str
-    messages: int
-    encoding: str
-
-    def has(self, connection: Any) -> bool:
-        """Whether a connection of the library is one of its; one may have several publishers."""
-        return bool(connection.topic == self.name and connection.msgtype == self.type)
-
-    def __str__(self) -> str:
-        return f"{self.name} ({self.type}, {self.messages:,})"
 
 
 class Message(NamedTuple):
@@ -133,23 +104,7 @@ class Bag:
         Raises:
             InputError: No such topic, one of another type, none at all, or several.
         """
-        clouds = [topic for topic in self.topics if topic.type == POINT_CLOUD]
-        if name:
-            return self._named(name, clouds)
-        filled = [topic for topic in clouds if topic.messages]
-        if len(filled) == 1:
-            return filled[0]
-        if filled:
-            raise InputError(
-                self.path,
-                f"has {len(filled)} topics of point clouds: {_listed(filled)}",
-                f"Name one with --topic, or as {self.path}{filled[0].name}.",
-            )
-        raise InputError(
-            self.path,
-            f"holds no point clouds ({POINT_CLOUD}), but {_listed(self.topics)}",
-            _remedy_without_clouds(self.topics),
-        )
+        return cloud_topic(self.path, self.topics, name)
 
     @contextmanager
     def opened(self) -> Iterator[Any]:
@@ -277,36 +232,3 @@ class Bag:
         names = os.listdir(self.path) if os.path.isdir(self.path) else [self.path.name]
         is_mcap = any(name.lower().endswith(".mcap") for name in names)
         return "mcap recover." if is_mcap else "sqlite3's .recover."
-
-    def _named(self, name: str, clouds: list[Topic]) -> Topic:
-        same = [topic for topic in self.topics if topic.name.strip("/") == name.strip("/")]
-        for topic in same:
-            if topic.type == POINT_CLOUD:
-                return topic
-        if same:
-            raise InputError(
-                self.path,
-                f"{same[0].name} is {same[0].type}, not {POINT_CLOUD}",
-                _remedy_without_clouds(same),
-            )
-        raise InputError(
-            self.path,
-            f"has no topic {name}",
-            f"Its topics of point clouds: {_listed(clouds)}.",
-        )
-
-
-def _listed(topics: Iterable[Topic]) -> str:
-    return ", ".join(map(str, topics)) or "none"
-
-
-def _remedy_without_clouds(topics: Iterable[Topic]) -> str:
-    """What to do about topics that are not point clouds."""
-    decoders = [(topic, decoder) for topic in topics if (decoder := decoder_of(topic.type))]
-    if not decoders:
-        return "Record the topic of point clouds, or name it with --topic."
-    topic, decoder = decoders[0]
-    return (
-        f"{topic.name} is what a sensor or another node sent: {decoder} makes point clouds of it. "
-        "Play the bag through that, and record what it publishes."
-    )

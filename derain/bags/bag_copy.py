@@ -5,8 +5,11 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Self
 
-from derain.bags.bag import Bag, Message, Topic
-from derain.bags.bag_writer import writer_like
+from derain.bags.bag import Bag, Message
+from derain.bags.mcap_writer import McapWriter
+from derain.bags.names import stem
+from derain.bags.rosbags_writer import RosbagsWriter
+from derain.bags.topics import Topic
 from derain.errors import InputError, reason_of
 
 
@@ -31,7 +34,12 @@ class BagCopy:
         self._stack = ExitStack()
         reader = self._stack.enter_context(bag.opened())
         with self._writing():
-            self._writer = writer_like(bag, reader, folder)
+            path = folder / written_name(bag)
+            self._writer: McapWriter | RosbagsWriter = (
+                McapWriter(reader, bag.metadata, path)
+                if bag.storage == "mcap"
+                else RosbagsWriter(bag, reader, path)
+            )
         self._messages = bag.messages_of(reader)
         self._clouds = 0
         for connection in reader.connections:  # as many, and in the same order
@@ -128,3 +136,8 @@ class BagCopy:
                 f"its copy cannot be written ({reason_of(error)})",
                 "Choose a folder that is writable and has room.",
             ) from error
+
+
+def written_name(bag: Bag) -> str:
+    """What a bag that is written like another is called: of ROS 1 a file, of ROS 2 a folder."""
+    return bag.path.name if bag.is_ros1 else stem(bag.path)

@@ -67,7 +67,7 @@ class McapWriter:
         self._first, self._last = 2**63 - 1, 0
 
     def connection(self, like: McapConnection, topic: str | None = None) -> McapConnection:
-        """What messages are written to; see :meth:`BagWriter.connection`."""
+        """What messages are written to; see :meth:`RosbagsWriter.connection`."""
         new = replace(like, topic=topic or like.topic, msgcount=0)
         if new not in self._channels:
             number = 0
@@ -82,7 +82,7 @@ class McapWriter:
         return new
 
     def write(self, connection: McapConnection, like: Any, data: bytes) -> None:
-        """Writes a message; see :meth:`BagWriter.write`."""
+        """Writes a message; see :meth:`RosbagsWriter.write`."""
         if self._compression == MESSAGE:
             data = ZSTANDARD.load(self.path).compress(data)
         self._writer.add_message(

@@ -24,7 +24,7 @@ from derain.bags import bag as bag_module
 from derain.bags import rosbags_reader
 from derain.bags.bag import Bag
 from derain.bags.bag_copy import BagCopy
-from derain.bags.vendors import PACKET_DECODERS, decoder_of
+from derain.bags.topics import PACKET_DECODERS, decoder_of
 from derain.errors import InputError
 from derain.sources.folders import named_frames
 
