@@ -5,20 +5,20 @@ raises for what they do not. Here each is one InputError.
 """
 
 import os
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from derain.bags.cloud_message import CDR, ROS1
-from derain.bags.mcap_bag import McapBag
 from derain.bags.names import ROS1_SUFFIX
 from derain.bags.ros2_metadata import FILE, MESSAGE, Ros2Metadata
 from derain.bags.rosbags_reader import MOST_TOPICS, rosbags_reader, stored_messages
 from derain.bags.topics import Topic, cloud_topic
 from derain.bags.unpacking import UnpackedBag, unpack, unpacked_bag
 from derain.errors import InputError, reason_of
+from derain.system.extras import MCAP
 
 
 class Message(NamedTuple):
@@ -178,22 +178,24 @@ class Bag:
             chosen = [c for c in reader.connections if topic is None or topic.has(c)]
             if not chosen:
                 return
-            packed = self.storage == "sqlite3" and self._packs_messages
+            compression = "zstd" if self._packs_messages else ""
             stored = None
             if topic is None and start is None:
                 stored = reader.stored_messages() if self._is_mcap else stored_messages(reader)
             number = 0
             for connection, time, data, *more in reader.messages(chosen, start=start):
-                data = unpack(data, "zstd") if packed else bytes(data)
                 number += 1
-                yield Message(connection, time, data, *more)
+                yield Message(connection, time, unpack(bytes(data), compression), *more)
             if stored is not None and number != stored:
                 raise ValueError(f"its topics have {number:,} of {stored:,} messages")
 
     def _reader(self, path: Path, metadata: Ros2Metadata | None) -> Any:
-        if self._is_mcap:
-            return McapBag(path, metadata)
-        return rosbags_reader(path, self.is_ros1)
+        if not self._is_mcap:
+            return rosbags_reader(path, self.is_ros1)
+        MCAP.load(self.path)
+        from derain.bags.mcap_reader import McapReader
+
+        return McapReader(path, [path / name for name in _names_of_files(metadata)])
 
     def _unpacked_path(self, metadata: Ros2Metadata) -> Path:
         """The folder with the unpacked files, perhaps of the process that this one works for."""
@@ -206,7 +208,7 @@ class Bag:
         for topic in topics:
             if "\0" in topic.name:
                 raise ValueError(f"the topic {topic.name} has a NUL in its name")
-        names = [""] if self.metadata is None else self.metadata.files
+        names = _names_of_files(self.metadata)
         size = sum((self.path / name).stat().st_size for name in names)
         messages = sum(topic.messages for topic in topics)
         if messages > size:
@@ -232,3 +234,8 @@ class Bag:
         names = os.listdir(self.path) if os.path.isdir(self.path) else [self.path.name]
         is_mcap = any(name.lower().endswith(".mcap") for name in names)
         return "mcap recover." if is_mcap else "sqlite3's .recover."
+
+
+def _names_of_files(metadata: Ros2Metadata | None) -> Sequence[str]:
+    """Names of the files of a bag, below its path; one that is a file has the empty name."""
+    return ("",) if metadata is None else metadata.files

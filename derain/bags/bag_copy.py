@@ -3,10 +3,9 @@
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from derain.bags.bag import Bag, Message
-from derain.bags.mcap_writer import McapWriter
 from derain.bags.names import stem
 from derain.bags.rosbags_writer import RosbagsWriter
 from derain.bags.topics import Topic
@@ -34,12 +33,7 @@ class BagCopy:
         self._stack = ExitStack()
         reader = self._stack.enter_context(bag.opened())
         with self._writing():
-            path = folder / written_name(bag)
-            self._writer: McapWriter | RosbagsWriter = (
-                McapWriter(reader, bag.metadata, path)
-                if bag.storage == "mcap"
-                else RosbagsWriter(bag, reader, path)
-            )
+            self._writer = _writer(bag, reader, folder / written_name(bag))
         self._messages = bag.messages_of(reader)
         self._clouds = 0
         for connection in reader.connections:  # as many, and in the same order
@@ -49,7 +43,8 @@ class BagCopy:
     @property
     def path(self) -> Path:
         """The copy: a file of ROS 1, a folder of ROS 2."""
-        return self._writer.path
+        path: Path = self._writer.path
+        return path
 
     def forward_to(self, number: int) -> Message:
         """Copies what comes before one of the clouds.
@@ -141,3 +136,11 @@ class BagCopy:
 def written_name(bag: Bag) -> str:
     """What a bag that is written like another is called: of ROS 1 a file, of ROS 2 a folder."""
     return bag.path.name if bag.is_ros1 else stem(bag.path)
+
+
+def _writer(bag: Bag, reader: Any, path: Path) -> Any:
+    if bag.storage != "mcap":
+        return RosbagsWriter(bag, reader, path)
+    from derain.bags.mcap_writer import McapWriter
+
+    return McapWriter(reader, bag.metadata, path)
