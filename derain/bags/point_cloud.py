@@ -268,34 +268,5 @@ def scan_of_cloud(name: Path, cloud: PointCloud) -> Scan:
     return scan_of(name, columns, shape)
 
 
-def cloud_of_columns(columns: Mapping[str, NDArray[Any]], is_bigendian: bool = False) -> PointCloud:
-    """A cloud of columns, packed one after the other.
-
-    Args:
-        columns: Name → its values, (N,) or (N, count), of types that PointCloud2 has.
-        is_bigendian: Whether its numbers are to be in big-endian byte order.
-
-    Raises:
-        ValueError: A type that PointCloud2 has not.
-    """
-    codes = {name: code for code, name in DATATYPES.items()}
-    fields: list[PointField] = []
-    offset = 0
-    for name, column in columns.items():
-        if column.dtype.str[1:] not in codes:
-            raise ValueError(f"'{name}' is {column.dtype}, which PointCloud2 has not")
-        count = column.shape[1] if column.ndim > 1 else 1
-        fields.append(PointField(name, offset, codes[column.dtype.str[1:]], count))
-        offset += fields[-1].dtype("<").itemsize
-    order = ">" if is_bigendian else "<"
-    size = len(next(iter(columns.values()), ()))
-    table = np.empty(size, [(f.name, f.dtype(order)) for f in fields])
-    for name, column in columns.items():
-        table[name] = column
-    return PointCloud(
-        1, size, tuple(fields), is_bigendian, offset, size * offset, table.tobytes(), True
-    )
-
-
 def _native(column: NDArray[Any]) -> NDArray[Any]:
     return column if column.dtype.isnative else column.astype(column.dtype.newbyteorder("="))
