@@ -33,7 +33,7 @@ LIBRARIES = {
 # What every room may import.
 LIGHT = {
     *("numpy", "yaml", "tqdm", "small_gicp", "onnxruntime"),
-    *("lzf", "flatbuffers", "libusb_package", "_typeshed"),
+    *("lzf", "flatbuffers", "libusb_package", "mcap", "_typeshed"),
 }
 
 # Modules that run on a small computer, and those that all others are made of.

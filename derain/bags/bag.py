@@ -5,49 +5,20 @@ raises for what they do not. Here each is one InputError.
 """
 
 import os
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from derain.bags.cloud_message import CDR, ROS1
-from derain.bags.mcap_bag import McapBag
 from derain.bags.names import ROS1_SUFFIX
 from derain.bags.ros2_metadata import FILE, MESSAGE, Ros2Metadata
 from derain.bags.rosbags_reader import MOST_TOPICS, rosbags_reader, stored_messages
-from derain.bags.unpacked_files import UnpackedBag, unpacked_bag
-from derain.bags.unpacking import unpack
-from derain.bags.vendors import decoder_of
+from derain.bags.topics import Topic, cloud_topic
+from derain.bags.unpacking import UnpackedBag, unpack, unpacked_bag
 from derain.errors import InputError, reason_of
-
-# ROS 1 calls it sensor_msgs/PointCloud2; the library gives both the longer name.
-POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
-
-
-@dataclass(frozen=True)
-class Topic:
-    """One topic of a bag.
-
-    Attributes:
-        name: Its name.
-        type: Type of its messages.
-        messages: How many there are, as the bag's index has it.
-        encoding: How they are written: ``ros1`` or ``cdr``.
-    """
-
-    name: str
-    type: str
-    messages: int
-    encoding: str
-
-    def has(self, connection: Any) -> bool:
-        """Whether a connection of the library is one of its; one may have several publishers."""
-        return bool(connection.topic == self.name and connection.msgtype == self.type)
-
-    def __str__(self) -> str:
-        return f"{self.name} ({self.type}, {self.messages:,})"
+from derain.system.extras import MCAP
 
 
 class Message(NamedTuple):
@@ -133,23 +104,7 @@ class Bag:
         Raises:
             InputError: No such topic, one of another type, none at all, or several.
         """
-        clouds = [topic for topic in self.topics if topic.type == POINT_CLOUD]
-        if name:
-            return self._named(name, clouds)
-        filled = [topic for topic in clouds if topic.messages]
-        if len(filled) == 1:
-            return filled[0]
-        if filled:
-            raise InputError(
-                self.path,
-                f"has {len(filled)} topics of point clouds: {_listed(filled)}",
-                f"Name one with --topic, or as {self.path}{filled[0].name}.",
-            )
-        raise InputError(
-            self.path,
-            f"holds no point clouds ({POINT_CLOUD}), but {_listed(self.topics)}",
-            _remedy_without_clouds(self.topics),
-        )
+        return cloud_topic(self.path, self.topics, name)
 
     @contextmanager
     def opened(self) -> Iterator[Any]:
@@ -223,22 +178,24 @@ class Bag:
             chosen = [c for c in reader.connections if topic is None or topic.has(c)]
             if not chosen:
                 return
-            packed = self.storage == "sqlite3" and self._packs_messages
+            compression = "zstd" if self._packs_messages else ""
             stored = None
             if topic is None and start is None:
                 stored = reader.stored_messages() if self._is_mcap else stored_messages(reader)
             number = 0
             for connection, time, data, *more in reader.messages(chosen, start=start):
-                data = unpack(data, "zstd") if packed else bytes(data)
                 number += 1
-                yield Message(connection, time, data, *more)
+                yield Message(connection, time, unpack(bytes(data), compression), *more)
             if stored is not None and number != stored:
                 raise ValueError(f"its topics have {number:,} of {stored:,} messages")
 
     def _reader(self, path: Path, metadata: Ros2Metadata | None) -> Any:
-        if self._is_mcap:
-            return McapBag(path, metadata)
-        return rosbags_reader(path, self.is_ros1)
+        if not self._is_mcap:
+            return rosbags_reader(path, self.is_ros1)
+        MCAP.load(self.path)
+        from derain.bags.mcap_reader import McapReader
+
+        return McapReader(path, [path / name for name in _names_of_files(metadata)])
 
     def _unpacked_path(self, metadata: Ros2Metadata) -> Path:
         """The folder with the unpacked files, perhaps of the process that this one works for."""
@@ -251,7 +208,7 @@ class Bag:
         for topic in topics:
             if "\0" in topic.name:
                 raise ValueError(f"the topic {topic.name} has a NUL in its name")
-        names = [""] if self.metadata is None else self.metadata.files
+        names = _names_of_files(self.metadata)
         size = sum((self.path / name).stat().st_size for name in names)
         messages = sum(topic.messages for topic in topics)
         if messages > size:
@@ -278,35 +235,7 @@ class Bag:
         is_mcap = any(name.lower().endswith(".mcap") for name in names)
         return "mcap recover." if is_mcap else "sqlite3's .recover."
 
-    def _named(self, name: str, clouds: list[Topic]) -> Topic:
-        same = [topic for topic in self.topics if topic.name.strip("/") == name.strip("/")]
-        for topic in same:
-            if topic.type == POINT_CLOUD:
-                return topic
-        if same:
-            raise InputError(
-                self.path,
-                f"{same[0].name} is {same[0].type}, not {POINT_CLOUD}",
-                _remedy_without_clouds(same),
-            )
-        raise InputError(
-            self.path,
-            f"has no topic {name}",
-            f"Its topics of point clouds: {_listed(clouds)}.",
-        )
 
-
-def _listed(topics: Iterable[Topic]) -> str:
-    return ", ".join(map(str, topics)) or "none"
-
-
-def _remedy_without_clouds(topics: Iterable[Topic]) -> str:
-    """What to do about topics that are not point clouds."""
-    decoders = [(topic, decoder) for topic in topics if (decoder := decoder_of(topic.type))]
-    if not decoders:
-        return "Record the topic of point clouds, or name it with --topic."
-    topic, decoder = decoders[0]
-    return (
-        f"{topic.name} is what a sensor or another node sent: {decoder} makes point clouds of it. "
-        "Play the bag through that, and record what it publishes."
-    )
+def _names_of_files(metadata: Ros2Metadata | None) -> Sequence[str]:
+    """Names of the files of a bag, below its path; one that is a file has the empty name."""
+    return ("",) if metadata is None else metadata.files

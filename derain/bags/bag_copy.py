@@ -3,10 +3,12 @@
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
-from derain.bags.bag import Bag, Message, Topic
-from derain.bags.bag_writer import writer_like
+from derain.bags.bag import Bag, Message
+from derain.bags.names import stem
+from derain.bags.rosbags_writer import RosbagsWriter
+from derain.bags.topics import Topic
 from derain.errors import InputError, reason_of
 
 
@@ -31,7 +33,7 @@ class BagCopy:
         self._stack = ExitStack()
         reader = self._stack.enter_context(bag.opened())
         with self._writing():
-            self._writer = writer_like(bag, reader, folder)
+            self._writer = _writer(bag, reader, folder / written_name(bag))
         self._messages = bag.messages_of(reader)
         self._clouds = 0
         for connection in reader.connections:  # as many, and in the same order
@@ -41,7 +43,8 @@ class BagCopy:
     @property
     def path(self) -> Path:
         """The copy: a file of ROS 1, a folder of ROS 2."""
-        return self._writer.path
+        path: Path = self._writer.path
+        return path
 
     def forward_to(self, number: int) -> Message:
         """Copies what comes before one of the clouds.
@@ -128,3 +131,16 @@ class BagCopy:
                 f"its copy cannot be written ({reason_of(error)})",
                 "Choose a folder that is writable and has room.",
             ) from error
+
+
+def written_name(bag: Bag) -> str:
+    """What a bag that is written like another is called: of ROS 1 a file, of ROS 2 a folder."""
+    return bag.path.name if bag.is_ros1 else stem(bag.path)
+
+
+def _writer(bag: Bag, reader: Any, path: Path) -> Any:
+    if bag.storage != "mcap":
+        return RosbagsWriter(bag, reader, path)
+    from derain.bags.mcap_writer import McapWriter
+
+    return McapWriter(reader, bag.metadata, path)

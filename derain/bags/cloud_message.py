@@ -1,8 +1,8 @@
 """The bytes of a ``sensor_msgs/PointCloud2`` message, as ROS 1 and ROS 2 write them.
 
-What stands before and after the cloud is kept as it is: a message whose cloud does not change is
-written back byte for byte. Written here and not by the library that reads bags, which makes objects
-of whole messages and needs the definitions of their types, which bags of older ROS 2 do not hold.
+The bytes before and after the cloud are kept, so a message whose cloud does not change is written
+back byte for byte. The library that reads bags is not used here: it needs the definitions of types,
+which bags of older ROS 2 do not hold.
 
 Source: of ROS 1, http://wiki.ros.org/msg ("Fields", little-endian, nothing aligned). Of ROS 2, CDR
 of DDSI-RTPS 2.5, 10.2 (encapsulation) and CORBA 3.3 part 2, 9.3 (alignment from the end of the
@@ -38,8 +38,8 @@ class CloudMessage:
         order: Byte order of the message, ``<`` or ``>``, whatever that of its points.
         head: Its bytes up to the cloud: the header with stamp and frame.
         cloud: The cloud.
-        tail: Its bytes after the cloud, which nobody reads.
-        stamp: When the cloud was taken, nanoseconds; 0 where the driver does not say.
+        tail: Its bytes after the cloud.
+        stamp: When the cloud was taken, nanoseconds; 0 where the driver writes none.
     """
 
     encoding: str
@@ -60,10 +60,10 @@ class CloudMessage:
         Raises:
             ValueError: Bytes that are no PointCloud2, or one that contradicts itself.
         """
-        order = order_of(message, encoding)
+        order = _order_of(message, encoding)
         read = _Reader(message, encoding, order)
         try:
-            read.skip(STAMP_AT[encoding] - read.position + 8)  # the stamp
+            read.take(STAMP_AT[encoding] - read.position + 8)  # the stamp
             read.string()  # the frame
             head = message[: read.position]
             height, width = read.number("I"), read.number("I")
@@ -84,11 +84,11 @@ class CloudMessage:
         return cls(encoding, order, head, cloud, tail, stamp_of(message, encoding))
 
     def with_cloud(self, cloud: PointCloud) -> Self:
-        """The same message of another cloud."""
+        """The same message with another cloud."""
         return replace(self, cloud=cloud)
 
     def to_bytes(self) -> bytes:
-        """The message as it is sent."""
+        """The bytes of the message."""
         cloud, write = self.cloud, _Writer(self.head, self.encoding, self.order)
         write.number("I", cloud.height)
         write.number("I", cloud.width)
@@ -108,34 +108,6 @@ class CloudMessage:
         return bytes(write.message)
 
 
-def header_of(stamp: int, frame: str, encoding: str) -> bytes:
-    """The bytes that a message begins with, for one that is made anew.
-
-    Args:
-        stamp: When the cloud was taken, nanoseconds.
-        frame: Name of the sensor's frame.
-        encoding: ``ros1`` or ``cdr``, which is written in little-endian order.
-    """
-    first = b"\x00\x01\x00\x00" if encoding == CDR else struct.pack("<I", 0)
-    write = _Writer(first, encoding, "<")
-    write.number("I", stamp // 10**9)
-    write.number("I", stamp % 10**9)
-    write.string(frame)
-    return bytes(write.message)
-
-
-def message_of(cloud: PointCloud, stamp: int, frame: str, encoding: str) -> CloudMessage:
-    """A message of a cloud, which came from none.
-
-    Args:
-        cloud: The cloud.
-        stamp: When it was taken, nanoseconds.
-        frame: Name of the sensor's frame.
-        encoding: ``ros1`` or ``cdr``.
-    """
-    return CloudMessage(encoding, "<", header_of(stamp, frame, encoding), cloud, b"", stamp)
-
-
 def stamp_of(message: bytes, encoding: str) -> int:
     """When the cloud of a message was taken, nanoseconds, without reading the cloud.
 
@@ -146,7 +118,7 @@ def stamp_of(message: bytes, encoding: str) -> int:
     Raises:
         ValueError: Bytes that are no such message.
     """
-    order, start = order_of(message, encoding), STAMP_AT[encoding]
+    order, start = _order_of(message, encoding), STAMP_AT[encoding]
     if len(message) < start + 8:
         raise ValueError("the message ends too early")
     # Seconds are signed in ROS 2.
@@ -156,7 +128,7 @@ def stamp_of(message: bytes, encoding: str) -> int:
     return int(seconds) * 10**9 + int(nanoseconds)
 
 
-def order_of(message: bytes, encoding: str) -> str:
+def _order_of(message: bytes, encoding: str) -> str:
     """Byte order of a message, ``<`` or ``>``.
 
     Raises:
@@ -171,21 +143,18 @@ def order_of(message: bytes, encoding: str) -> str:
 
 
 def _aligned(position: int, size: int, encoding: str) -> int:
-    """Where a number of so many bytes may stand."""
+    """The next position at which a number of `size` bytes may begin."""
     return position if encoding == ROS1 else position + (CDR_HEADER - position) % size
 
 
 class _Reader:
-    """Goes through the bytes of a message."""
+    """Reads the values of a message one after the other."""
 
     def __init__(self, message: bytes, encoding: str, order: str) -> None:
         self.message = memoryview(message)
         self.encoding = encoding
         self.order = order
         self.position = 0
-
-    def skip(self, size: int) -> None:
-        self.take(size)
 
     def number(self, kind: str) -> int:
         layout = struct.Struct(self.order + kind)
@@ -210,7 +179,7 @@ class _Reader:
 
 
 class _Writer:
-    """Puts the bytes of a message together."""
+    """Appends values to the bytes of a message."""
 
     def __init__(self, head: bytes, encoding: str, order: str) -> None:
         self.message = bytearray(head)

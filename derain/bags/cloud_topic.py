@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.bags.bag import Bag, Message, Topic
+from derain.bags.bag import Bag, Message
 from derain.bags.cloud_message import CloudMessage, stamp_of
 from derain.bags.point_cloud import PointField
+from derain.bags.topics import Topic
 from derain.errors import InputError
 from derain.system.notices import warn
 

@@ -8,22 +8,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Message, Metadata, Schema
 
-from derain.bags.mcap_records import (
-    ATTACHMENT,
-    CHANNEL,
-    CHUNK,
-    CHUNK_INDEX,
-    DATA_END,
-    MESSAGE,
-    METADATA,
-    SCHEMA,
-    STATISTICS,
-    McapMessage,
-    McapRecords,
-)
+from derain.bags.mcap_records import McapRecords
 
-# What messages of chunks that overlap in time may take together, bytes.
+# Bytes that messages of chunks that overlap in time may take together.
 MOST_HELD = 2**29
 
 
@@ -34,8 +24,8 @@ class ChunkPlace(NamedTuple):
         start: The earliest time in it, nanoseconds.
         end: The latest.
         offset: Of its record in the file.
-        channels: Those in it; None where nobody says.
-        compression: How it is packed.
+        channels: Those in it; None where the file does not list them.
+        compression: ``""``, ``lz4`` or ``zstd``.
     """
 
     start: int
@@ -48,16 +38,16 @@ class ChunkPlace(NamedTuple):
 class McapFile:
     """A file of MCAP, open.
 
-    Its summary tells where everything is; where it does not, the file is gone through once.
+    A file whose summary is missing or incomplete is read through once when it is opened.
 
     Args:
         path: The file.
 
     Attributes:
         records: Its records by their places.
-        schemas: Records of schemas, by number.
-        channels: Records of channels, by number.
-        counts: Messages by channel.
+        schemas: Its schemas by their numbers.
+        channels: Its channels by their numbers.
+        counts: Number of messages of each channel.
         start: The earliest time of a message, nanoseconds.
         end: The latest.
         chunks: Where chunks are.
@@ -69,8 +59,8 @@ class McapFile:
 
     def __init__(self, path: Path) -> None:
         self.records = McapRecords(path)
-        self.schemas: dict[int, Any] = {}
-        self.channels: dict[int, Any] = {}
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
         try:
             self._forget_messages()
             if not self._read_summary():
@@ -84,7 +74,7 @@ class McapFile:
         """Closes the file."""
         self.records.close()
 
-    def messages(self, channels: Container[int], start: int | None = None) -> Iterator[McapMessage]:
+    def messages(self, channels: Container[int], start: int | None = None) -> Iterator[Message]:
         """Messages in the order of their times; of one time, in the order of the file.
 
         Args:
@@ -94,14 +84,14 @@ class McapFile:
         Raises:
             ValueError: A damaged file, or one that has other messages than it says.
         """
-        parts = self._in_chunks(channels, start or 0), self._in_none(channels, start or 0)
+        parts = self._in_chunks(channels, start or 0), self._outside_chunks(channels, start or 0)
         count = 0
         for _, _, message in heapq.merge(*parts, key=lambda found: found[:2]):
             count += 1
             yield message
-        told = sum(n for channel, n in self.counts.items() if channel in channels)
-        if start is None and count != told:
-            raise ValueError(f"it has {count:,} messages where its index says {told:,}")
+        stated = sum(n for channel, n in self.counts.items() if channel in channels)
+        if start is None and count != stated:
+            raise ValueError(f"it has {count:,} messages where its index says {stated:,}")
 
     def check_whole(self) -> None:
         """Checks that reading all messages leaves nothing of the file unread.
@@ -111,29 +101,29 @@ class McapFile:
                 messages, channels or schemas.
         """
         chunks, messages = set(), 0
-        for place in self.records.places():
-            if place.kind == CHUNK:
-                chunks.add(place.offset)
-            elif place.kind == MESSAGE:
+        for kind, offset, _ in self.records.places():
+            if kind == Opcode.CHUNK:
+                chunks.add(offset)
+            elif kind == Opcode.MESSAGE:
                 messages += 1
-            elif place.kind in (SCHEMA, CHANNEL):
-                self._learn(place.kind, self.records.read(place.offset, place.kind))
-            elif place.kind == DATA_END:
-                self.records.check_data(place)
+            elif kind in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._define(self.records.read(offset, kind))
+            elif kind == Opcode.DATA_END:
+                self.records.check_data(offset)
         if chunks != {chunk.offset for chunk in self.chunks}:
             raise ValueError("its summary names other chunks than there are")
         if messages != len(self._times):
             raise ValueError(f"its summary lacks {messages:,} messages that are in no chunk")
 
-    def attachments_and_metadata(self) -> Iterator[tuple[int, Any]]:
-        """Kind and content of every record that is neither a message nor about messages.
+    def attachments_and_metadata(self) -> Iterator[Attachment | Metadata]:
+        """Every record that is neither a message nor about messages.
 
         Raises:
             ValueError: A damaged file.
         """
-        for place in list(self.records.places()):
-            if place.kind in (ATTACHMENT, METADATA):
-                yield place.kind, self.records.read(place.offset, place.kind)
+        for kind, offset, _ in list(self.records.places()):
+            if kind in (Opcode.ATTACHMENT, Opcode.METADATA):
+                yield self.records.read(offset, kind)
 
     def _forget_messages(self) -> None:
         self.counts: Counter[int] = Counter()
@@ -143,17 +133,16 @@ class McapFile:
         self._times, self._offsets = array("Q"), array("Q")
 
     def _read_summary(self) -> bool:
-        """Reads the summary; whether it tells where every message is."""
+        """Reads the summary, and returns whether it locates every message."""
         statistics = None
         for kind, record in self.records.in_summary():
-            if kind == CHUNK_INDEX:
-                place = record.chunk_start_offset
+            if kind == Opcode.CHUNK_INDEX:
                 channels = frozenset(record.message_index_offsets) or None
-                self._add_chunk(record, place, channels)
-            elif kind == STATISTICS:
+                self._add_chunk(record, record.chunk_start_offset, channels)
+            elif kind == Opcode.STATISTICS:
                 statistics = record
             else:
-                self._learn(kind, record)
+                self._define(record)
         if len({chunk.offset for chunk in self.chunks}) < len(self.chunks):
             raise ValueError("its summary names a chunk more than once")
         if statistics is None or len(self.chunks) != statistics.chunk_count:
@@ -165,47 +154,53 @@ class McapFile:
         return bool(self.chunks) or not statistics.message_count
 
     def _scan(self) -> None:
-        """Goes through the whole file."""
+        """Reads through the whole file."""
         for kind, offset, _ in self.records.places():
-            if kind == CHUNK:
+            if kind == Opcode.CHUNK:
                 chunk, channels = self.records.read(offset, kind), set()
                 for inner, record in self.records.in_chunk(chunk):
-                    if inner == MESSAGE:
+                    if inner == Opcode.MESSAGE:
                         self._count(record)
-                        channels.add(record.channel)
+                        channels.add(record.channel_id)
                     else:
-                        self._learn(inner, record)
+                        self._define(record)
                 self._add_chunk(chunk, offset, frozenset(channels))
-            elif kind == MESSAGE:
+            elif kind == Opcode.MESSAGE:
                 message = self.records.read(offset, kind)
                 self._count(message)
-                self._times.append(message.time)
+                self._times.append(message.log_time)
                 self._offsets.append(offset)
-            elif kind in (SCHEMA, CHANNEL):
-                self._learn(kind, self.records.read(offset, kind))
+            elif kind in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._define(self.records.read(offset, kind))
 
-    def _count(self, message: McapMessage) -> None:
-        self.counts[message.channel] += 1
-        self.start, self.end = min(self.start, message.time), max(self.end, message.time)
+    def _count(self, message: Message) -> None:
+        self.counts[message.channel_id] += 1
+        self.start, self.end = min(self.start, message.log_time), max(self.end, message.log_time)
 
-    def _learn(self, kind: int, record: Any) -> None:
-        """Takes a schema or a channel; all of one number must be the same, wherever they are."""
-        if kind in (SCHEMA, CHANNEL):
-            known = self.schemas if kind == SCHEMA else self.channels
-            if known.setdefault(record.id, record) != record:
-                name = type(record).__name__.lower()
-                raise ValueError(f"it defines {name} {record.id} in two ways")
+    def _define(self, record: Any) -> None:
+        """Notes a schema or a channel; a second one of its number must be the same."""
+        known: dict[int, Any]
+        if isinstance(record, Schema):
+            known = self.schemas
+        elif isinstance(record, Channel):
+            known = self.channels
+        else:
+            return
+        if known.setdefault(record.id, record) != record:
+            raise ValueError(f"it defines {type(record).__name__.lower()} {record.id} in two ways")
 
-    def _add_chunk(self, record: Any, offset: int, channels: frozenset[int] | None) -> None:
+    def _add_chunk(
+        self, record: Chunk | ChunkIndex, offset: int, channels: frozenset[int] | None
+    ) -> None:
         times = record.message_start_time, record.message_end_time
         self.chunks.append(ChunkPlace(*times, offset, channels, record.compression))
 
     def _in_chunks(
         self, channels: Container[int], start: int
-    ) -> Iterator[tuple[int, int, McapMessage]]:
+    ) -> Iterator[tuple[int, int, Message]]:
         """Time, chunk and message; a chunk is unpacked when its time has come."""
         whole = self._are_all(channels)
-        waiting: list[tuple[int, int, int, McapMessage | None]] = [
+        waiting: list[tuple[int, int, int, Message | None]] = [
             (chunk.start, chunk.offset, -1, None)
             for chunk in self.chunks
             if chunk.end >= start
@@ -219,41 +214,41 @@ class McapFile:
                 held -= len(message.data)
                 yield time, offset, message
                 continue
-            parts = self.records.in_chunk(self.records.read(offset, CHUNK))
+            parts = self.records.in_chunk(self.records.read(offset, Opcode.CHUNK))
             for number, (kind, record) in enumerate(parts):
-                if kind != MESSAGE:
-                    self._learn(kind, record)
-                    if whole and kind not in (SCHEMA, CHANNEL):
+                if kind != Opcode.MESSAGE:
+                    self._define(record)
+                    if whole and kind not in (Opcode.SCHEMA, Opcode.CHANNEL):
                         raise ValueError(f"a chunk holds a record that no chunk has (kind {kind})")
-                elif record.channel in channels:
-                    if record.time >= start:
+                elif record.channel_id in channels:
+                    if record.log_time >= start:
                         held += len(record.data)
-                        heapq.heappush(waiting, (record.time, offset, number, record))
+                        heapq.heappush(waiting, (record.log_time, offset, number, record))
                 elif whole:
-                    raise _stray(record)
+                    raise _undefined(record)
             if held > MOST_HELD:
                 raise ValueError(
                     f"messages of more than {MOST_HELD // 10**6} MB in chunks of one time"
                 )
 
-    def _in_none(
+    def _outside_chunks(
         self, channels: Container[int], start: int
-    ) -> Iterator[tuple[int, int, McapMessage]]:
-        """The same of messages that are in no chunk."""
+    ) -> Iterator[tuple[int, int, Message]]:
+        """Time, place and message of those that are in no chunk."""
         whole = self._are_all(channels)
-        for place in np.argsort(np.asarray(self._times), kind="stable"):
-            if self._times[place] >= start:
-                offset = self._offsets[place]
-                message = self.records.read(offset, MESSAGE)
-                if message.channel in channels:
-                    yield message.time, offset, message
+        for index in np.argsort(np.asarray(self._times), kind="stable"):
+            if self._times[index] >= start:
+                offset = self._offsets[index]
+                message = self.records.read(offset, Opcode.MESSAGE)
+                if message.channel_id in channels:
+                    yield message.log_time, offset, message
                 elif whole:
-                    raise _stray(message)
+                    raise _undefined(message)
 
     def _are_all(self, channels: Container[int]) -> bool:
-        """Whether all messages are asked for, so that none may be left out."""
+        """Whether all channels are of interest, so that no message may be left out."""
         return all(number in channels for number in self.channels)
 
 
-def _stray(message: McapMessage) -> ValueError:
-    return ValueError(f"a message is of channel {message.channel}, which nothing defines")
+def _undefined(message: Message) -> ValueError:
+    return ValueError(f"a message is of channel {message.channel_id}, which nothing defines")

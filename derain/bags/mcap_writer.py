@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
+from mcap.records import Attachment, Metadata
+from mcap.writer import CompressionType, Writer
 
-from derain.bags.mcap_bag import McapBag, McapConnection
-from derain.bags.mcap_records import ATTACHMENT
+from derain.bags.mcap_reader import McapConnection, McapReader
 from derain.bags.ros2_metadata import (
     FILE,
     MESSAGE,
@@ -19,7 +20,7 @@ from derain.bags.ros2_metadata import (
     Ros2Metadata,
     small_yaml,
 )
-from derain.system.extras import MCAP, ZSTANDARD
+from derain.system.extras import ZSTANDARD
 
 T = TypeVar("T")
 
@@ -42,20 +43,19 @@ class McapWriter:
         path: The folder, which is made.
     """
 
-    def __init__(self, bag: McapBag, metadata: Ros2Metadata | None, path: Path) -> None:
+    def __init__(self, bag: McapReader, metadata: Ros2Metadata | None, path: Path) -> None:
         self.bag = bag
         self.metadata = metadata
         self.path = path
-        self._library = library = MCAP.load(path, "writer")
         path.mkdir(parents=True)
         self._file = (path / f"{path.name}.mcap").open("xb")
         chunks = [chunk for file in bag.files for chunk in file.chunks]
-        packing = {chunk.compression for chunk in chunks}
-        self._writer: Any = library.Writer(
+        used = {chunk.compression for chunk in chunks}
+        self._writer = Writer(
             self._file,
             compression=next(
-                (kind for kind in library.CompressionType if kind.name.lower() in packing),
-                library.CompressionType.NONE,
+                (kind for kind in CompressionType if kind.name.lower() in used),
+                CompressionType.NONE,
             ),
             use_chunking=bool(chunks) or not bag.message_count,
         )
@@ -67,7 +67,7 @@ class McapWriter:
         self._first, self._last = 2**63 - 1, 0
 
     def connection(self, like: McapConnection, topic: str | None = None) -> McapConnection:
-        """What messages are written to; see :meth:`BagWriter.connection`."""
+        """What messages are written to; see :meth:`RosbagsWriter.connection`."""
         new = replace(like, topic=topic or like.topic, msgcount=0)
         if new not in self._channels:
             number = 0
@@ -82,7 +82,7 @@ class McapWriter:
         return new
 
     def write(self, connection: McapConnection, like: Any, data: bytes) -> None:
-        """Writes a message; see :meth:`BagWriter.write`."""
+        """Writes a message; see :meth:`RosbagsWriter.write`."""
         if self._compression == MESSAGE:
             data = ZSTANDARD.load(self.path).compress(data)
         self._writer.add_message(
@@ -93,8 +93,8 @@ class McapWriter:
 
     def close(self) -> None:
         """Ends the bag, which is whole then."""
-        for kind, record in self.bag.attachments_and_metadata():
-            if kind == ATTACHMENT:
+        for record in self.bag.attachments_and_metadata():
+            if isinstance(record, Attachment):
                 times = record.create_time, record.log_time
                 self._writer.add_attachment(*times, record.name, record.media_type, record.data)
             elif record.name != ROS2_RECORD:
@@ -157,11 +157,9 @@ class McapWriter:
         """What the other bag's metadata.yaml says, or its file, where that repeats it."""
         if self.metadata is not None:
             return deepcopy(self.metadata.content)
-        for kind, record in self.bag.attachments_and_metadata():
-            if kind != ATTACHMENT and record.name == ROS2_RECORD:
-                content: dict[str, Any] | None
-                content = _said(str(record.metadata.get(ROS2_NOTE, "")), dict)
-                return content or {}
+        for record in self.bag.attachments_and_metadata():
+            if isinstance(record, Metadata) and record.name == ROS2_RECORD:
+                return _from_yaml(record.metadata.get(ROS2_NOTE, ""), dict) or {}
         return {}
 
     def _version(self) -> int:
@@ -178,7 +176,7 @@ def _topic_metadata(
     notes = dict(connection.notes)
     profiles: Any = notes.get(QOS, "")
     if version >= NEWEST_VERSION:
-        profiles = _said(profiles, list) or []
+        profiles = _from_yaml(profiles, list) or []
     made: dict[str, Any] = {
         "name": connection.topic,
         "type": connection.msgtype,
@@ -189,8 +187,8 @@ def _topic_metadata(
     return made | known.get(connection.topic, {})
 
 
-def _said(note: str, kind: type[T]) -> T | None:
-    """What a note in YAML says; None where it says nothing that can be used."""
+def _from_yaml(note: str, kind: type[T]) -> T | None:
+    """The value of a note in YAML; None where it is damaged or of another kind."""
     try:
         value = small_yaml(note)
     except ValueError:

@@ -1,4 +1,4 @@
-"""The cloud of a ``sensor_msgs/PointCloud2``: bytes, and the fields that say what they mean.
+"""The cloud of a ``sensor_msgs/PointCloud2``: bytes, and the fields that describe them.
 
 Points are removed and fields are added without looking at the other bytes, so that padding, byte
 order and fields of any type stay what they are.
@@ -6,20 +6,24 @@ order and fields of any type stay what they are.
 Source: sensor_msgs/msg/PointCloud2 and PointField of ROS, the same in ROS 1 and ROS 2.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.files.columns import scan_of
 from derain.files.content import check_columns
-from derain.scan import named
+from derain.scan import Scan, named
 
 # PointField's datatypes, in NumPy's spelling.
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 FLOAT32_DATATYPE = 7
+
+AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
@@ -167,7 +171,7 @@ class PointCloud:
             return self
         data = bytearray(self.data)
         by_name = {field.name: field for field in self.fields}
-        for axis in ("x", "y", "z"):
+        for axis in AXES:
             if (field := named(by_name, axis, "the cloud")) is not None:
                 if field.datatype not in (FLOAT32_DATATYPE, 8):
                     raise ValueError(f"field '{field.name}' cannot hold what is no number")
@@ -235,37 +239,33 @@ class PointCloud:
         return np.ascontiguousarray(within).reshape(-1, self.point_step)
 
 
-def cloud_of_columns(columns: Mapping[str, NDArray[Any]], is_bigendian: bool = False) -> PointCloud:
-    """A cloud of columns, packed one after the other.
+def scan_of_cloud(name: Path, cloud: PointCloud) -> Scan:
+    """The scan of a cloud, one point per point of the cloud, row after row.
+
+    ROS has the axes that derain has: x forward, y left, z up, metres.
 
     Args:
-        columns: Name → its values, (N,) or (N, count), of types that PointCloud2 has.
-        is_bigendian: Whether its numbers are to be in big-endian byte order.
+        name: Names it in messages.
+        cloud: The cloud.
+
+    Returns:
+        The scan, every field of the cloud as a column.
 
     Raises:
-        ValueError: A type that PointCloud2 has not.
+        InputError: No x, y and z, or several columns that could be one of them.
+        ValueError: Coordinates that are not floating-point numbers of one value each, and so in no
+            known unit.
     """
-    codes = {name: code for code, name in DATATYPES.items()}
-    fields: list[PointField] = []
-    offset = 0
-    for name, column in columns.items():
-        if column.dtype.str[1:] not in codes:
-            raise ValueError(f"'{name}' is {column.dtype}, which PointCloud2 has not")
-        count = column.shape[1] if column.ndim > 1 else 1
-        fields.append(PointField(name, offset, codes[column.dtype.str[1:]], count))
-        offset += fields[-1].dtype("<").itemsize
-    order = ">" if is_bigendian else "<"
-    table = np.empty(_rows(columns.values()), [(f.name, f.dtype(order)) for f in fields])
-    for name, column in columns.items():
-        table[name] = column
-    size = len(table)
-    return PointCloud(
-        1, size, tuple(fields), is_bigendian, offset, size * offset, table.tobytes(), True
-    )
-
-
-def _rows(columns: Iterable[NDArray[Any]]) -> int:
-    return len(next(iter(columns), ()))
+    columns = cloud.columns()
+    for axis in AXES:
+        column = named(columns, axis, name)
+        if column is not None and (column.ndim > 1 or column.dtype.kind != "f"):
+            count = f" of {column.shape[1]} values" if column.ndim > 1 else ""
+            raise ValueError(
+                f"{axis} is {column.dtype}{count}, of which nobody says how many make a metre"
+            )
+    shape = (cloud.height, cloud.width) if cloud.is_organised and len(cloud) else None
+    return scan_of(name, columns, shape)
 
 
 def _native(column: NDArray[Any]) -> NDArray[Any]:

@@ -1,17 +1,29 @@
-"""Unpacks what bags hold compressed, and no more of it than a recording needs.
+"""Unpacks compressed chunks, messages and files of bags, up to a size.
 
-A few kilobytes may unpack to more than there is memory. The libraries that read bags unpack
-whatever they find; here it ends at a size.
+A few kilobytes may unpack to more than there is memory, and the libraries that read bags unpack
+whatever they find.
 """
 
 import bz2
+import shutil
+import tempfile
+import weakref
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
+from derain.bags.ros2_metadata import Ros2Metadata
+from derain.files.temporary import temporary_folder
 from derain.system.extras import LZ4, ZSTANDARD
 
 # The most that a chunk or a message may take, bytes: a cloud of eight million points of 32 bytes.
 MOST_UNPACKED = 2**28
+
+# Bytes of a file that are written at once, and that are left on the disk for others.
+PORTION, LEFT = 2**22, 2**30
 
 
 def unpack(data: bytes, compression: str) -> bytes:
@@ -44,10 +56,6 @@ def check_size(size: int) -> None:
         raise ValueError(f"a chunk or message of more than {MOST_UNPACKED // 10**6} MB")
 
 
-def _plain(data: bytes) -> bytes:
-    return data
-
-
 def _bz2(data: bytes) -> bytes:
     return _whole(bz2.BZ2Decompressor(), data)
 
@@ -71,9 +79,71 @@ def _whole(decompressor: Any, data: bytes) -> bytes:
 
 
 UNPACKERS: Mapping[str, Callable[[bytes], bytes]] = {
-    "": _plain,
-    "none": _plain,
+    "": bytes,
+    "none": bytes,
     "bz2": _bz2,
     "lz4": _lz4,
     "zstd": _zstd,
 }
+
+
+@dataclass(frozen=True, eq=False)
+class UnpackedBag:
+    """A folder with the files of a compressed bag, not compressed.
+
+    It is removed when the process that unpacked the bag ends or holds this no more. Pickled, it is
+    the path alone: another process reads the folder and leaves it.
+
+    Attributes:
+        path: The folder.
+    """
+
+    path: Path
+
+
+# What this process has unpacked and holds, by what identified the bag's files then.
+_HELD: WeakValueDictionary[tuple[object, ...], UnpackedBag] = WeakValueDictionary()
+
+
+def unpacked_bag(folder: Path, metadata: Ros2Metadata) -> UnpackedBag:
+    """The same bag with files that are not compressed; unpacked unless this process holds it.
+
+    Args:
+        folder: The bag's folder.
+        metadata: What its metadata.yaml says.
+
+    Raises:
+        ValueError: A damaged file, or one that unpacks to more than there is room for.
+        OSError: It cannot be read, or the other not written.
+    """
+    files = [(folder / name).stat() for name in metadata.files]
+    key = (*((f.st_dev, f.st_ino, f.st_size, f.st_mtime_ns) for f in files), repr(metadata))
+    held = _HELD.get(key)
+    if held is not None:
+        return held
+    with ExitStack() as stack:
+        lent = stack.enter_context(temporary_folder(Path(tempfile.gettempdir())))
+        lent.chmod(0o700)  # others may look into the folder that it is in
+        plain = metadata.unpacked()
+        for packed, file in zip(metadata.files, plain.files, strict=True):
+            _unpack_file(folder / packed, lent / file)
+        plain.write(lent)
+        made = _HELD[key] = UnpackedBag(lent)
+        weakref.finalize(made, stack.pop_all().close)
+        return made
+
+
+def _unpack_file(source: Path, target: Path) -> None:
+    zstandard = ZSTANDARD.load(source)
+    with source.open("rb") as packed, target.open("xb") as unpacked:
+        try:
+            with zstandard.ZstdDecompressor().stream_reader(packed) as reader:
+                while portion := reader.read(PORTION):
+                    if shutil.disk_usage(target.parent).free < LEFT + len(portion):
+                        raise ValueError(
+                            f"{source.name} unpacks to more than there is room for in "
+                            f"{target.parent.parent}"
+                        )
+                    unpacked.write(portion)
+        except zstandard.ZstdError as error:
+            raise ValueError(f"{source.name} is damaged: {error}") from error

@@ -4,10 +4,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from derain.bags.bag import POINT_CLOUD, Bag, Topic
+from derain.bags.bag import Bag
 from derain.bags.cloud_topic import CloudTopic
 from derain.bags.point_cloud import DATATYPES, PointField
-from derain.bags.vendors import decoder_of
+from derain.bags.topics import POINT_CLOUD, Topic, decoder_of
 from derain.errors import InputError
 
 

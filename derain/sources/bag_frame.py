@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.bags.bag import Bag
-from derain.bags.cloud_scan import scan_of_cloud
 from derain.bags.cloud_topic import CloudTopic, damaged_cloud
 from derain.bags.names import bags_at, split, stem
+from derain.bags.point_cloud import scan_of_cloud
 from derain.errors import InputError
 from derain.files.labels import LABEL
 from derain.files.reading import reading
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 
-# Beside a bag, the folder of the labels of its clouds is called so after its stem.
+# A bag `drive.mcap` has its labels beside it, in `drive.labels`.
 LABELS_SUFFIX = ".labels"
 
 NUMBER = re.compile(r"(?:(?P<topic>.*)/)?(?P<number>[0-9]{6,9})")
@@ -36,23 +36,23 @@ class BagFrame(FileFrame):
 
     @property
     def suffix(self) -> str:
-        """Nothing: there is no file that what is made of it could be like."""
+        """Empty: there is no file whose format an output could keep."""
         return ""
 
     @property
     def label_beside_bag(self) -> Path:
-        """Where labels of its own lie: ``drive.labels/000012.label`` beside the bag."""
+        """Path of its labels: ``drive.labels/000012.label`` beside the bag."""
         bag = self.clouds.bag.path
         return bag.with_name(stem(bag) + LABELS_SUFFIX) / f"{self.number:06d}{LABEL}"
 
     @property
     def time(self) -> float:
-        """When it was taken, seconds: by its header, or where that says nothing, by the bag."""
+        """When it was taken, seconds: the stamp of its header, or if that is 0, of the bag."""
         return self.clouds.seconds(self.number)
 
     @property
     def pose(self) -> NDArray[np.float64] | None:
-        """Sensor to world, float64 (4, 4), where it was told."""
+        """Sensor to world, float64 (4, 4), where it is known."""
         return self.sensor_to_world
 
     def read(self) -> Scan:
@@ -71,7 +71,7 @@ class BagFrame(FileFrame):
         return len(self.clouds.cloud(self.number).cloud)
 
     def fingerprint(self) -> str:
-        """What tells its message from others, 16 hexadecimal digits."""
+        """First 16 hexadecimal digits of the SHA-256 of its message."""
         return self._checksum()[:16]
 
     def checksums(self) -> tuple[str, str | None]:
@@ -86,12 +86,12 @@ class BagFrame(FileFrame):
 
 
 def bag_frames(path: Path, labelled: bool = False, by_name: bool = False) -> list[BagFrame]:
-    """The clouds that a path into a bag stands for, in the order in which they were recorded.
+    """The clouds that a path into a bag names, in the order in which they were recorded.
 
     Args:
         path: A bag; a topic in it, ``bag/topic``; or one of its clouds, ``bag/topic/000012`` or
             ``bag/000012``.
-        labelled: Whether labels are to be read: from ``<stem of the bag>.labels/000012.label``.
+        labelled: Whether frames have their labels: ``<stem of the bag>.labels/000012.label``.
         by_name: Whether keys begin with the stem of the bag, as where several are named.
 
     Raises:
@@ -117,7 +117,7 @@ def bag_frame(clouds: CloudTopic, number: int, key: str) -> BagFrame:
     Args:
         clouds: The clouds.
         number: Which of them, from 0.
-        key: What is made of it is named by this.
+        key: Names the outputs of the frame.
     """
     frame = BagFrame(
         key=key,

@@ -1,4 +1,4 @@
-"""Bags written anew without the rain in their clouds."""
+"""Copies of bags without the rain in their clouds."""
 
 import os
 import re
@@ -8,24 +8,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from derain.bags.bag_copy import BagCopy
-from derain.bags.bag_writer import written_name
-from derain.bags.cleaning import cleaned
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.bags.bag_copy import BagCopy, written_name
 from derain.bags.cloud_message import CloudMessage
 from derain.bags.cloud_topic import CloudTopic, damaged_cloud
 from derain.bags.names import is_bag
+from derain.bags.point_cloud import PointCloud
 from derain.errors import InputError
 from derain.files.temporary import temporary_folder
 from derain.sources.bag_frame import BagFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 
-# Names of topics in ROS 1 and ROS 2, of which each word begins with no digit.
+# Names of topics in ROS 1 and ROS 2.
 # Source: http://wiki.ros.org/Names and https://design.ros2.org/articles/topic_and_service_names.html
 ROS1_NAME = re.compile(r"/?[A-Za-z]\w*(/\w+)*", re.ASCII)
 ROS2_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
-# What the column of probabilities is called, of files and of clouds; its values are float32.
+# Name of the column of probabilities, float32, in files and in clouds.
 RAIN_PROBABILITY = "rain_probability"
 
 
@@ -34,10 +36,10 @@ class BagOptions:
     """What is written of the clouds of a bag.
 
     Attributes:
-        cleaned_topic: Name of the topic of clean clouds, beside the one that there is; None puts
-            them in its place.
-        removed_topic: Name of a topic of what was removed; None where nobody asks for it.
-        probability: Whether points have a field of their probability to be rain.
+        cleaned_topic: Name of a further topic, of clean clouds; None replaces the clouds of the
+            topic that is read.
+        removed_topic: Name of a further topic, of the points that were removed; None for none.
+        probability: Whether points get a field of their probability to be rain.
         keep_shape: Whether organised clouds stay organised.
     """
 
@@ -48,19 +50,18 @@ class BagOptions:
 
 
 class CleanedBags:
-    """Takes what was made of the clouds of whole bags, and writes each bag when it is complete.
+    """Writes copies of whole bags, each with the clean clouds that it is given.
 
-    A cloud that nothing is made of stays as it is. Of a bag that cannot be written to its end,
-    nothing is left.
+    A cloud that is not given stays as it is. A bag that cannot be written to its end is removed.
 
     Args:
         out: The folder to write to.
-        source: All frames that there will be; those of bags of which only some clouds are among
-            them are left to others.
+        source: All frames of the run. Bags of which it has only some clouds are not copied.
         options: What is written of each cloud.
 
     Raises:
-        InputError: Something is in the way of a bag.
+        InputError: A copy would replace or enter a bag that is read, or something that is no bag;
+            or a topic has a name that ROS does not allow, or that the bag has already.
     """
 
     def __init__(self, out: Path, source: Iterable[Frame], options: BagOptions) -> None:
@@ -75,15 +76,15 @@ class CleanedBags:
         self.written: list[Path] = []
 
     def takes(self, frame: Frame) -> bool:
-        """Whether a frame is of a bag that is written anew."""
+        """Whether a frame is of a bag that is copied."""
         return isinstance(frame, BagFrame) and frame.clouds in self._whole
 
     def targets(self) -> list[Path]:
-        """Where bags are written."""
+        """Paths of the copies."""
         return [self.out / written_name(clouds.bag) for clouds in self._whole]
 
     def write(self, judgement: Judgement) -> None:
-        """Takes what a method says of a cloud; clouds come in the order of their bag.
+        """Writes a cloud without its rain; clouds are given in the order of their bag.
 
         Raises:
             InputError: It cannot be written.
@@ -95,7 +96,7 @@ class CleanedBags:
             self._write(copy, frame, judgement)
         except InputError as error:
             if error.subject != frame.name:  # not this cloud alone
-                self._break(frame.clouds, error)
+                self._give_up(frame.clouds, error)
             raise
 
     def __enter__(self) -> Self:
@@ -111,24 +112,39 @@ class CleanedBags:
 
     def _write(self, copy: BagCopy, frame: BagFrame, judgement: Judgement) -> None:
         recorded = copy.forward_to(frame.number)
-        options = self.options
-        columns = {RAIN_PROBABILITY: judgement.probability} if options.probability else {}
         try:
             message = CloudMessage.parse(recorded.data, frame.clouds.topic.encoding)
-            new = cleaned(message, judgement.rain, columns, options.keep_shape)
+            clean, removed = self._divided(message, judgement)
         except ValueError as error:
             copy.write(recorded)
             raise damaged_cloud(frame.name, error) from error
-        if options.cleaned_topic:
+        if self.options.cleaned_topic:
             copy.write(recorded)
-            copy.write(recorded, new.clean, options.cleaned_topic)
+        copy.write(recorded, clean, self.options.cleaned_topic)
+        if self.options.removed_topic:
+            copy.write(recorded, removed, self.options.removed_topic)
+
+    def _divided(self, message: CloudMessage, judgement: Judgement) -> tuple[bytes, bytes]:
+        """The message without its rain, and that of its rain alone.
+
+        Raises:
+            ValueError: A field of the probabilities' name and another type, or coordinates that
+                cannot be NaN.
+        """
+        cloud, rain = message.cloud, judgement.rain
+        columns = {RAIN_PROBABILITY: judgement.probability} if self.options.probability else {}
+
+        def part(rows: NDArray[np.bool_]) -> PointCloud:
+            return cloud.take(rows).with_columns({name: columns[name][rows] for name in columns})
+
+        if self.options.keep_shape and cloud.is_organised:
+            clean = cloud.blank(rain).with_columns(columns)
         else:
-            copy.write(recorded, new.clean)
-        if options.removed_topic:
-            copy.write(recorded, new.removed, options.removed_topic)
+            clean = part(~rain)
+        return message.with_cloud(clean).to_bytes(), message.with_cloud(part(rain)).to_bytes()
 
     def _copy_of(self, clouds: CloudTopic) -> BagCopy:
-        """The copy of a bag, begun with its first cloud; that of the bag before it is ended."""
+        """The copy of a bag; for its first cloud, ends the copy before and begins a new one."""
         if clouds in self._broken:
             raise self._broken[clouds]
         if self._current is None or self._current[0] is not clouds:
@@ -142,7 +158,7 @@ class CleanedBags:
         return self._current[1]
 
     def _finish(self) -> None:
-        """Ends the copy that is being written, and puts it in its place."""
+        """Ends the copy that is being written, and moves it into place."""
         if self._current is None:
             return
         clouds, copy = self._current
@@ -150,12 +166,13 @@ class CleanedBags:
             with self._stack:
                 self._current = None
                 target = self.out / written_name(clouds.bag)
-                _put(copy.finish(), target)
+                _move(copy.finish(), target)
                 self.written.append(target)
         except InputError as error:
             self._broken[clouds] = error
 
-    def _break(self, clouds: CloudTopic, error: InputError) -> None:
+    def _give_up(self, clouds: CloudTopic, error: InputError) -> None:
+        """Removes the copy that is being written; the error is raised again for its next cloud."""
         self._broken[clouds] = error
         self._current = None
         self._stack.close()
@@ -195,11 +212,11 @@ def _whole_topics(source: Iterable[Frame]) -> list[CloudTopic]:
     return [clouds for clouds, count in numbers.items() if count == len(clouds)]
 
 
-def _put(made: Path, target: Path) -> None:
-    """Puts a bag where it belongs, in place of one that an earlier run wrote."""
+def _move(made: Path, target: Path) -> None:
+    """Moves a bag into place, over one that an earlier run wrote."""
     try:
         if target.is_dir() and not target.is_symlink():
-            old = made.with_name(f"{made.name}.old")  # goes with the folder that it lies in
+            old = made.with_name(f"{made.name}.old")  # removed with its folder
             os.replace(target, old)
         os.replace(made, target)
     except OSError as error:

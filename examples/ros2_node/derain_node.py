@@ -35,8 +35,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.bags.cloud_scan import scan_of_cloud
-from derain.bags.point_cloud import PointCloud, PointField
+from derain.bags.point_cloud import PointCloud, PointField, scan_of_cloud
 from derain.errors import InputError
 from derain.export.runtime import Derainer, Judgement
 from derain.files import read_scan

@@ -24,7 +24,6 @@ from derain.bags import bag as bag_module
 from derain.bags import rosbags_reader
 from derain.bags.bag import Bag
 from derain.bags.bag_copy import BagCopy
-from derain.bags.vendors import PACKET_DECODERS, decoder_of
 from derain.errors import InputError
 from derain.sources.folders import named_frames
 
@@ -44,74 +43,6 @@ def refusal(act: Callable[[], Any]) -> str:
     with pytest.raises(InputError) as error:
         act()
     return str(error.value)
-
-
-def test_several_topics_are_listed(tmp_path: Path, storage: Storage) -> None:
-    ros, (table,) = Ros(storage), tables(1)
-    rear = Recorded("/rear/points", CLOUD_TYPE, START + 5, ros.cloud(table, START))
-    bag = small_bag(tmp_path, storage, more=[rear])
-
-    told = refusal(lambda: named_frames([bag]))
-    assert "/rear/points" in told
-    assert "/velodyne_points" in told
-    assert "--topic" in told
-    assert len(named_frames([bag / "rear" / "points"])) == 1
-
-
-def test_a_topic_of_another_type_is_refused(tmp_path: Path, storage: Storage) -> None:
-    bag = small_bag(tmp_path, storage)
-    told = refusal(lambda: named_frames([bag / "imu" / "data"]))
-    assert "/imu/data is sensor_msgs/msg/Imu" in told
-
-
-def test_an_unknown_topic_is_refused_with_those_there_are(tmp_path: Path, storage: Storage) -> None:
-    bag = small_bag(tmp_path, storage)
-    told = refusal(lambda: named_frames([bag / "points"]))
-    assert "no topic points" in told
-    assert "/velodyne_points" in told
-
-
-def test_a_bag_without_clouds_is_refused(tmp_path: Path, storage: Storage) -> None:
-    bag = small_bag(tmp_path, storage, clouds=[], more=[
-        Recorded("/driver", TEXT_TYPE, START, Ros(storage).text("no cloud"))
-    ])  # fmt: skip
-    told = refusal(lambda: named_frames([bag]))
-    assert "no point clouds" in told
-    assert "/driver (std_msgs/msg/String, 1)" in told
-
-
-@pytest.mark.parametrize(
-    ("type_", "decoder"),
-    [
-        ("velodyne_msgs/msg/VelodyneScan", "velodyne_pointcloud"),
-        ("ouster_sensor_msgs/msg/PacketMsg", "ouster_ros"),
-        ("livox_ros_driver2/msg/CustomMsg", "livox_ros_driver2"),
-    ],
-)
-def test_packets_of_a_vendor_name_what_decodes_them(
-    tmp_path: Path, storage: Storage, type_: str, decoder: str
-) -> None:
-    path = bag_path(tmp_path, storage)
-    from rosbags import rosbag1, rosbag2
-
-    writer: Any
-    if storage == "ros1":
-        writer, details = rosbag1.Writer(path), {"md5sum": "0" * 32}
-    else:
-        plugin = rosbag2.StoragePlugin[storage.upper()]
-        writer, details = rosbag2.Writer(path, version=8, storage_plugin=plugin), {"rihs01": "x"}
-    with writer:
-        connection = writer.add_connection("/packets", type_, msgdef="uint8[] data", **details)
-        writer.write(connection, START, bytes(40))
-
-    assert decoder in refusal(lambda: named_frames([path]))
-    assert decoder in refusal(lambda: named_frames([path / "packets"]))
-
-
-def test_vendors_are_known_in_ros_1_and_ros_2() -> None:
-    for type_, decoder in PACKET_DECODERS.items():
-        assert decoder_of(type_) == decoder_of(type_.replace("/", "/msg/")) == decoder
-    assert decoder_of("sensor_msgs/msg/Imu") is None
 
 
 def test_an_empty_bag_is_refused(tmp_path: Path, storage: Storage) -> None:

@@ -15,7 +15,7 @@ import pytest
 import zstandard
 from small_bags import small_bag, storage_file
 
-from derain.bags import unpacked_files, unpacking
+from derain.bags import unpacking
 from derain.bags.unpacking import unpack
 from derain.errors import InputError
 from derain.sources.folders import named_frames
@@ -68,7 +68,7 @@ def compressed_bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_files_that_do_not_fit_on_the_disk_are_refused(
     compressed_bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(unpacked_files, "LEFT", 2**62)
+    monkeypatch.setattr(unpacking, "LEFT", 2**62)
     with pytest.raises(InputError, match="more than there is room for"):
         named_frames([compressed_bag])
     assert not list((tmp_path / "tmp").iterdir())
@@ -82,8 +82,8 @@ def test_a_bag_is_unpacked_once_for_all_who_read_it(
     again = named_frames([compressed_bag / "000001"])
     # What another process gets, which holds nothing.
     others = pickle.loads(pickle.dumps(frames))
-    monkeypatch.setattr(unpacked_files, "_HELD", {})
-    monkeypatch.setattr(unpacked_files, "_unpack", None)
+    monkeypatch.setattr(unpacking, "_HELD", {})
+    monkeypatch.setattr(unpacking, "_unpack_file", None)
     assert [len(frame.read()) for frame in (*frames, *again, *others)] == [300] * 7
     assert list((tmp_path / "tmp").iterdir()) == [folder]
 

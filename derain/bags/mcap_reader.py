@@ -1,28 +1,28 @@
-"""A bag in MCAP, read as the library reads the other storages: topics, and messages in time."""
+"""Reads bags in MCAP, with the interface of the library that reads the other storages."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Self
+
+from mcap.records import Attachment, Metadata
 
 from derain.bags.mcap_file import McapFile
-from derain.bags.ros2_metadata import MESSAGE, Ros2Metadata
-from derain.bags.unpacking import unpack
 from derain.errors import InputError, reason_of
 
 
 @dataclass(frozen=True)
 class McapConnection:
-    """A topic as one publisher has it; equal where a file says the same of them.
+    """A topic of one publisher; equal for publishers that a file describes alike.
 
     Attributes:
         topic: Name of the topic.
         msgtype: Type of its messages, such as ``sensor_msgs/msg/PointCloud2``.
         msgcount: How many messages there are, over all files.
         encoding: How they are written, such as ``cdr``.
-        notes: What else the channel says, such as quality of service; names and values.
-        schema: Name, encoding and content of what defines the type; None where nothing does.
+        notes: Names and values of the channel's metadata, such as quality of service.
+        schema: Name, encoding and content of the definition of the type; None without one.
     """
 
     topic: str
@@ -33,35 +33,17 @@ class McapConnection:
     schema: tuple[str, str, bytes] | None
 
 
-class Recorded(NamedTuple):
-    """One message, with what the other storages do not have after the rest.
-
-    Attributes:
-        connection: Its topic.
-        time: When it was recorded, nanoseconds.
-        data: Its bytes.
-        published: When it was published, nanoseconds.
-        sequence: Its number, as the publisher counts.
-    """
-
-    connection: McapConnection
-    time: int
-    data: bytes
-    published: int
-    sequence: int
-
-
-class McapBag:
-    """A file of MCAP, or a folder of ROS 2 with such files.
+class McapReader:
+    """The files of a bag in MCAP, open inside a ``with`` block.
 
     Args:
-        path: The file or folder.
-        metadata: What the folder's metadata.yaml says; None for a file.
+        path: The bag, for errors.
+        files: Its files, in the order of time.
     """
 
-    def __init__(self, path: Path, metadata: Ros2Metadata | None = None) -> None:
+    def __init__(self, path: Path, files: Sequence[Path]) -> None:
         self.path = path
-        self.metadata = metadata
+        self._paths = files
         self._files: list[McapFile] = []
 
     @property
@@ -71,7 +53,7 @@ class McapBag:
 
     @property
     def connections(self) -> list[McapConnection]:
-        """Its topics, as publishers have them, in the order in which they come."""
+        """Its connections, in the order of the files."""
         counts: dict[McapConnection, int] = {}
         for file in self._files:
             for number, connection in _connections(file).items():
@@ -96,33 +78,30 @@ class McapBag:
 
     def messages(
         self, connections: Collection[McapConnection], start: int | None = None
-    ) -> Iterator[Recorded]:
+    ) -> Iterator[tuple[McapConnection, int, bytes, int, int]]:
         """Messages in the order of time within a file, and file after file.
 
         Args:
             connections: Those of interest.
             start: The first time of interest, nanoseconds; None for the beginning.
 
+        Yields:
+            Connection, time of recording in nanoseconds, bytes, time of publication in nanoseconds,
+            and number as the publisher counts.
+
         Raises:
             ValueError: A damaged file.
         """
         wanted = {replace(each, msgcount=0): each for each in connections}
-        packed = self.metadata is not None and self.metadata.compression == MESSAGE
         for file in self._files:
             of_file = _connections(file)
             channels = {n: wanted[each] for n, each in of_file.items() if each in wanted}
-            for message in file.messages(channels, start):
-                data = unpack(message.data, "zstd") if packed else message.data
-                yield Recorded(
-                    channels[message.channel],
-                    message.time,
-                    data,
-                    message.published,
-                    message.sequence,
-                )
+            for found in file.messages(channels, start):
+                connection = channels[found.channel_id]
+                yield connection, found.log_time, found.data, found.publish_time, found.sequence
 
     def stored_messages(self) -> int:
-        """Number of messages, once nothing but them and what describes them is in the files.
+        """Number of messages in the files, after a check that each of them can be read.
 
         Raises:
             ValueError: As for McapFile.check_whole.
@@ -136,8 +115,8 @@ class McapBag:
         for file in self._files:
             yield from file.records.private()
 
-    def attachments_and_metadata(self) -> Iterator[tuple[int, Any]]:
-        """Kind and content of every record that is neither a message nor about messages.
+    def attachments_and_metadata(self) -> Iterator[Attachment | Metadata]:
+        """Every record that is neither a message nor about messages.
 
         Raises:
             InputError: One is damaged.
@@ -153,10 +132,9 @@ class McapBag:
             ) from error
 
     def __enter__(self) -> Self:
-        names = self.metadata.files if self.metadata is not None else ("",)
         with ExitStack() as stack:
-            for name in names:
-                self._files.append(McapFile(self.path / name))
+            for path in self._paths:
+                self._files.append(McapFile(path))
                 stack.callback(self._files[-1].close)
             self._stack = stack.pop_all()
         return self

@@ -1,4 +1,4 @@
-"""Writes a bag that is like another: its storage, its compression, and its topics as they were."""
+"""Writes bags of ROS 1 and SQLite by the library, each with the settings of another bag."""
 
 from pathlib import Path
 from typing import Any
@@ -6,29 +6,13 @@ from typing import Any
 import yaml
 
 from derain.bags.bag import Bag, Message
-from derain.bags.mcap_writer import McapWriter
-from derain.bags.names import stem
 from derain.bags.ros2_metadata import NEWEST_VERSION, OLDER_VERSION
 from derain.bags.rosbags_reader import compressions_of, other_tables
 from derain.system.extras import LZ4, ROSBAGS
 from derain.system.notices import warn
 
 
-def writer_like(bag: Bag, reader: Any, folder: Path) -> "BagWriter | McapWriter":
-    """What writes a bag like another.
-
-    Args:
-        bag: The other bag.
-        reader: The reader of it, open.
-        folder: Where the bag is written, named as the other: a file of ROS 1, a folder of ROS 2.
-    """
-    path = folder / written_name(bag)
-    if bag.storage == "mcap":
-        return McapWriter(reader, bag.metadata, path)
-    return BagWriter(bag, reader, path)
-
-
-class BagWriter:
+class RosbagsWriter:
     """Writes messages to a bag like another.
 
     Of ROS 1 and SQLite. Connections keep definition, hash, quality of service, caller and latching.
@@ -111,11 +95,6 @@ class BagWriter:
         writer.connections.append(new)
         writer.counts[new.id] = 0
         return new
-
-
-def written_name(bag: Bag) -> str:
-    """What a bag that is written like another is called: of ROS 1 a file, of ROS 2 a folder."""
-    return bag.path.name if bag.is_ros1 else stem(bag.path)
 
 
 def _ros1(reader: Any, path: Path) -> Any:

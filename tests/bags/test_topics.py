@@ -1,0 +1,56 @@
+"""Which topic of a bag holds the point clouds that a user means."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from derain.bags.topics import PACKET_DECODERS, POINT_CLOUD, Topic, cloud_topic, decoder_of
+from derain.errors import InputError
+
+BAG = Path("drive.mcap")
+FRONT, REAR = (Topic(f"/{name}/points", POINT_CLOUD, 3, "cdr") for name in ("front", "rear"))
+EMPTY = Topic("/empty", POINT_CLOUD, 0, "cdr")
+IMU = Topic("/imu/data", "sensor_msgs/msg/Imu", 1000, "cdr")
+PACKETS = Topic("/packets", "velodyne_msgs/msg/VelodyneScan", 3, "cdr")
+
+
+@pytest.mark.parametrize(
+    ("topics", "name", "chosen"),
+    [
+        ([IMU, EMPTY, FRONT], "", FRONT),
+        ([FRONT, REAR], "/rear/points", REAR),
+        ([FRONT, REAR], "rear/points", REAR),
+        ([FRONT, EMPTY], "/empty", EMPTY),
+    ],
+)
+def test_the_topic_is_the_named_one_or_the_only_one(
+    topics: Sequence[Topic], name: str, chosen: Topic
+) -> None:
+    assert cloud_topic(BAG, topics, name) == chosen
+
+
+@pytest.mark.parametrize(
+    ("topics", "name", "words"),
+    [
+        ([FRONT, REAR], "", ["/front/points", "/rear/points", "--topic"]),
+        ([FRONT, IMU], "imu/data", ["/imu/data is sensor_msgs/msg/Imu"]),
+        ([FRONT, IMU], "points", ["no topic points", "/front/points"]),
+        ([IMU], "", ["no point clouds", "/imu/data (sensor_msgs/msg/Imu, 1,000)"]),
+        ([], "", ["no point clouds"]),
+        ([PACKETS], "", ["/packets", "velodyne_pointcloud"]),
+        ([PACKETS], "packets", ["/packets", "velodyne_pointcloud"]),
+    ],
+)
+def test_a_refusal_names_the_topics_and_what_to_do(
+    topics: Sequence[Topic], name: str, words: Sequence[str]
+) -> None:
+    with pytest.raises(InputError) as error:
+        cloud_topic(BAG, topics, name)
+    assert not [word for word in words if word not in str(error.value)]
+
+
+def test_vendors_are_known_in_ros_1_and_ros_2() -> None:
+    for type_, decoder in PACKET_DECODERS.items():
+        assert decoder_of(type_) == decoder_of(type_.replace("/", "/msg/")) == decoder
+    assert decoder_of("sensor_msgs/msg/Imu") is None
