@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.track_scene import scene_of_track
-from derain.annotation.boxes import Correction
 from derain.annotation.picture import annotation_figure
 from derain.annotation.plane import Plane
-from derain.annotation.scene import Scene, inside
+from derain.annotation.scene import Correction, Scene, inside
 from derain.annotation.steps import annotate, road_plane
 from derain.evaluation.counts import intersection_over_union
 from derain.fusion.label_transfer import UNKNOWN

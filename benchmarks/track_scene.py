@@ -1,14 +1,13 @@
 """Describes a simulated track as a scene, as a person would who annotates it with patience."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.annotation.boxes import Box
 from derain.annotation.plane import Plane
-from derain.annotation.rectangle import Rectangle
-from derain.annotation.scene import Polygon, Scene
+from derain.annotation.scene import Box, Polygon, Rectangle, Scene
 from derain.simulation.classes import TrackClass
 from derain.simulation.sensor import Sensor
 from derain.simulation.track import Track
@@ -24,6 +23,9 @@ BOX_CLEARANCE = 0.02
 
 # A box is this many standard deviations of the sensor's range noise wider than what is in it.
 BOX_MARGIN = 3.0
+
+# Accuracy of a rectangle's heading, degrees; at 100 m it makes 2 mm.
+FINEST_HEADING = 1e-3
 
 
 def scene_of_track(track: Track, sensor: Sensor, beside: float = 0.0) -> Scene:
@@ -45,8 +47,8 @@ def scene_of_track(track: Track, sensor: Sensor, beside: float = 0.0) -> Scene:
     """
     triangles = track.triangles.astype(np.float64) - (0, 0, sensor.mounting_height)
     asphalt = triangles[track.label == TrackClass.ROAD].reshape(-1, 3)
-    road, plane = Rectangle.around(asphalt[:, :2]), _plane_near(asphalt)
-    area = road.widened(beside)
+    road, plane = rectangle_around(asphalt[:, :2]), _plane_near(asphalt)
+    area = _widened(road, beside)
     margin = BOX_MARGIN * sensor.range_noise
     boxes = {}
     for kind in sorted(set(TrackClass) - {TrackClass.ROAD, TrackClass.RAIN}, reverse=True):
@@ -58,6 +60,32 @@ def scene_of_track(track: Track, sensor: Sensor, beside: float = 0.0) -> Scene:
         for number, part in enumerate(parts, 1):
             boxes[f"{kind.name.lower()}_{number}"] = _box(kind, part.reshape(-1, 3), margin, plane)
     return Scene(_polygon(road), boxes, _polygon(area) if beside else None)
+
+
+def rectangle_around(points: NDArray[np.float64]) -> Rectangle:
+    """The rectangle of the shortest outline around points, float64 (N ≥ 1, 2), metres."""
+    heading, span = 45.0, 45.0
+    while span > FINEST_HEADING:
+        headings = heading + np.linspace(-span, span, 91)
+        outline = [np.ptp(points @ _axes(each), axis=0).sum() for each in headings]
+        heading, span = float(headings[np.argmin(outline)]), span / 45
+    turned = points @ _axes(heading)
+    lowest, highest = turned.min(axis=0), turned.max(axis=0)
+    x, y = _axes(heading) @ (lowest + highest) / 2
+    length, width = highest - lowest
+    return Rectangle((float(x), float(y)), (float(length), float(width)), heading)
+
+
+def _axes(heading: float) -> NDArray[np.float64]:
+    """Directions ahead and left of a heading in degrees as columns, (2, 2)."""
+    cosine, sine = np.cos(np.radians(heading)), np.sin(np.radians(heading))
+    return np.array([[cosine, -sine], [sine, cosine]])
+
+
+def _widened(rectangle: Rectangle, margin: float) -> Rectangle:
+    """The rectangle with a margin on every side, metres."""
+    length, width = rectangle.size
+    return replace(rectangle, size=(length + 2 * margin, width + 2 * margin))
 
 
 def _polygon(rectangle: Rectangle) -> Polygon:
@@ -108,10 +136,10 @@ def _grouped(triangles: NDArray[np.float64], group: Any) -> list[NDArray[np.floa
 
 def _box(kind: TrackClass, corners: NDArray[np.float64], margin: float, road: Plane) -> Box:
     """A box around corners (N, 3), with a margin on every side but that of the road."""
-    footprint = Rectangle.around(corners[:, :2])
+    footprint = rectangle_around(corners[:, :2])
     x, y = footprint.centre
     bottom, top = corners[:, 2].min(), corners[:, 2].max() + margin
     above_road = float(road.height(np.array([[x, y, bottom]]))[0])
     bottom += max(BOX_CLEARANCE - above_road, -margin)
-    size = (*footprint.widened(margin).size, float(top - bottom))
+    size = (*_widened(footprint, margin).size, float(top - bottom))
     return Box(kind, (x, y, float(bottom + top) / 2), size, footprint.heading)

@@ -1,10 +1,14 @@
 """The scene described for a simulated track labels what the simulator knows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from benchmarks.track_scene import scene_of_track
-from derain.annotation.scene import Scene
+from benchmarks.track_scene import rectangle_around, scene_of_track
+from derain.annotation.scene import Rectangle, Scene
 from derain.annotation.steps import annotate, road_plane
 from derain.fusion.label_transfer import UNKNOWN
 from derain.simulation import objects
@@ -77,3 +81,26 @@ def test_the_road_is_the_one_of_the_track() -> None:
     scene = scene_of_track(track, SENSOR)
     assert scene == Scene(scene.road)
     np.testing.assert_allclose(sorted(scene.road), [(0, -4), (0, 4), (50, -4), (50, 4)], atol=1e-2)
+
+
+lengths = st.floats(0.1, 50)
+places = st.floats(-100, 100)
+rectangles = st.builds(
+    Rectangle, st.tuples(places, places), st.tuples(lengths, lengths), st.floats(-180, 180)
+)
+
+
+@given(rectangles)
+def test_the_tightest_rectangle_around_corners_is_the_one_they_are_of(
+    rectangle: Rectangle,
+) -> None:
+    found = rectangle_around(rectangle.corners())
+    assert sorted(found.size) == pytest.approx(sorted(rectangle.size), abs=5e-3)
+    assert found.centre == pytest.approx(rectangle.centre, abs=5e-3)
+    assert replace(found, size=np.add(found.size, 2e-6)).contains(rectangle.corners()).all()
+
+
+def test_a_single_point_has_a_rectangle_without_extent() -> None:
+    found = rectangle_around(np.array([[3.0, 4.0]]))
+    assert found.size == (0, 0)
+    assert found.centre == pytest.approx((3, 4))

@@ -12,7 +12,7 @@ import yaml
 
 from benchmarks.fuzzing.mutations import as_json, changed
 from benchmarks.fuzzing.reader import Reader
-from derain.annotation.scene_file import read_scene, write_scene
+from derain.annotation.scene_file import read_scene
 from derain.cards.card import load_card, packaged_cards
 from derain.cards.layout import Layout
 from derain.evaluation.contents import find_sequences
@@ -178,8 +178,6 @@ def _read_card(path: Path) -> None:
 
 def _read_scene(path: Path) -> None:
     read = read_scene(path)
-    write_scene(path.with_name("again.yaml"), read)
-    assert read_scene(path.with_name("again.yaml")) == read
     points = scene(40).astype(np.float64)
     for sequence in ("", *read.corrections):
         for box in read.in_sequence(sequence).boxes.values():

@@ -1,5 +1,6 @@
 """Labels the scans of a static scene by its geometry, as REHEARSE-3D was labelled.
 
-A scene file (`scene`) says where things stand. The road's plane (`plane`) is found in the scans of
-a sequence, and every point gets its class from where it lies (`steps`).
+A scene file (`scene_file`) describes the road and boxes around objects (`scene`). The road's plane
+is found in the scans of a sequence (`plane`), and every point gets its class from its position
+(`steps`).
 """

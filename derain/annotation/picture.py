@@ -1,4 +1,4 @@
-"""A picture of a labelled scan and of the scene it was labelled by."""
+"""A picture of a labelled scan and its scene."""
 
 import numpy as np
 from matplotlib.axes import Axes

@@ -9,24 +9,24 @@ from numpy.typing import NDArray
 from derain.errors import InputError
 from derain.system.open3d_import import import_open3d
 
-# A plane that leans more than this is a wall and not a road, degrees.
+# A steeper plane is a wall and not a road, degrees.
 STEEPEST = 30.0
 
-# RANSAC compares every candidate with all of its points. So it is given no more than this many,
-# drawn at random, which give a plane to the millimetre.
+# RANSAC compares every candidate with all points. This many, drawn at random, give the plane to the
+# millimetre.
 MOST_POINTS = 50_000
 
 
 @dataclass(frozen=True)
 class PlaneSearch:
-    """How the plane of the road is sought.
+    """Parameters of the search for the road's plane.
 
     Attributes:
         distance: A point this near to a plane counts as lying in it, metres.
         points: Number of points that each candidate plane is fitted to.
         iterations: Number of candidate planes.
-        scans: Number of scans of a sequence that the plane is sought in, evenly spread. A few are
-            enough, because the scene does not move.
+        scans: Number of scans of a sequence to search, evenly spread. A few are enough, because the
+            scene does not move.
         seed: Seed of the random generators.
 
     Source: distance and points as in the ground removal of sporsho/3DUnOutDet. Its 50,000
@@ -68,7 +68,7 @@ class Plane:
 
     @property
     def slope(self) -> float:
-        """How far the plane leans, degrees."""
+        """Angle to the horizontal, degrees."""
         return math.degrees(math.acos(min(self.normal[2], 1.0)))
 
 
@@ -77,11 +77,11 @@ def find_plane(points: NDArray[np.float64], search: PlaneSearch, name: str) -> P
 
     Args:
         points: x, y and z, finite, float64 (N, 3), metres, sensor frame.
-        search: How it is sought. The same points and search give the same plane.
+        search: Parameters. The same points and parameters give the same plane.
         name: Where the points come from, for messages.
 
     Raises:
-        InputError: Fewer points than a candidate needs, a plane that is no road's, or Open3D
+        InputError: Fewer points than a candidate needs, a plane too steep for a road, or Open3D
             cannot be imported.
     """
     if len(points) < search.points:
@@ -97,7 +97,7 @@ def find_plane(points: NDArray[np.float64], search: PlaneSearch, name: str) -> P
     if not plane.slope <= STEEPEST:
         raise InputError(
             name,
-            f"the plane found leans by {plane.slope:.0f} degrees",
+            f"the plane found is inclined by {plane.slope:.0f} degrees",
             "Check the scene's road polygon, which is in the sensor's frame.",
         )
     return plane

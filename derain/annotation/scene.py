@@ -1,4 +1,4 @@
-"""A static scene as a person describes it: boxes around things, and where the road is."""
+"""A static scene as a person describes it: the road, and boxes around objects."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -6,10 +6,118 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.annotation.boxes import Box, Correction
 from derain.annotation.plane import PlaneSearch
+from derain.simulation.classes import TrackClass
 
+Triple = tuple[float, float, float]
 Polygon = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """A rectangle seen from above.
+
+    Attributes:
+        centre: Its centre x, y, metres.
+        size: Its length along the heading and its width across, metres.
+        heading: Degrees from x towards y.
+    """
+
+    centre: tuple[float, float]
+    size: tuple[float, float]
+    heading: float
+
+    def relative(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where points lie in the rectangle's frame: ahead and left of its centre.
+
+        Args:
+            points: float64 (..., 2), metres.
+
+        Returns:
+            float64 (..., 2), metres.
+        """
+        x, y = points[..., 0] - self.centre[0], points[..., 1] - self.centre[1]
+        (cosine, _), (sine, _) = self._axes
+        return np.stack([cosine * x + sine * y, cosine * y - sine * x], axis=-1)
+
+    def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which points, float64 (N, 2), metres, lie inside or on the outline; bool (N,)."""
+        ahead, left = self.relative(points).T
+        length, width = self.size
+        inside: NDArray[np.bool_] = (np.abs(ahead) <= length / 2) & (np.abs(left) <= width / 2)
+        return inside
+
+    def corners(self) -> NDArray[np.float64]:
+        """Its corners x, y in order, float64 (4, 2), metres."""
+        halves = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
+        corners: NDArray[np.float64] = (halves * self.size) @ self._axes.T + self.centre
+        return corners
+
+    @property
+    def _axes(self) -> NDArray[np.float64]:
+        """Directions ahead and left as columns, (2, 2)."""
+        cosine, sine = np.cos(np.radians(self.heading)), np.sin(np.radians(self.heading))
+        return np.array([[cosine, -sine], [sine, cosine]])
+
+
+@dataclass(frozen=True)
+class Correction:
+    """How a box differs in one sequence.
+
+    Attributes:
+        shift: Shift of its centre along x, y and z, metres.
+        size: Its length, width and height there, metres; None keeps them.
+        heading: Its heading there, degrees; None keeps it.
+    """
+
+    shift: Triple = (0.0, 0.0, 0.0)
+    size: Triple | None = None
+    heading: float | None = None
+
+
+@dataclass(frozen=True)
+class Box:
+    """An upright box, whose points are all of one class.
+
+    Attributes:
+        kind: The class.
+        centre: Its centre x, y, z, metres, sensor frame.
+        size: Its length, width and height, metres; the length runs along the heading.
+        heading: Its rotation about the z axis, degrees from x towards y.
+    """
+
+    kind: TrackClass
+    centre: Triple
+    size: Triple
+    heading: float = 0.0
+
+    @property
+    def footprint(self) -> Rectangle:
+        """Its outline seen from above."""
+        return Rectangle(self.centre[:2], self.size[:2], self.heading)
+
+    def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which points lie in the box or on its faces.
+
+        Args:
+            points: x, y and z, float64 (N, 3), metres, sensor frame.
+
+        Returns:
+            bool (N,).
+        """
+        inside = self.footprint.contains(points[:, :2])
+        inside &= np.abs(points[:, 2] - self.centre[2]) <= self.size[2] / 2
+        return inside
+
+    def corrected(self, correction: Correction) -> "Box":
+        """The box with a correction applied."""
+        x, y, z = (here + shift for here, shift in zip(self.centre, correction.shift, strict=True))
+        return replace(
+            self,
+            centre=(x, y, z),
+            size=self.size if correction.size is None else correction.size,
+            heading=self.heading if correction.heading is None else correction.heading,
+        )
 
 
 @dataclass(frozen=True)
@@ -18,15 +126,15 @@ class Scene:
 
     Attributes:
         road: Corners x, y of the road polygon in order, metres.
-        boxes: Boxes around the things in the scene, by name.
-        rain_area: Corners x, y of the polygon that drops are labelled over, in order, metres; None
-            takes the road, as the paper does. Drops beside the road are background then.
-        height: Height above the road's plane, metres. Points that are higher, lie over the area of
-            the rain and are in no box are rain. The paper does not state it. The default is the
-            distance within which a point counts as lying in the plane: with a smaller one parts of
-            an uneven road become rain, with a greater one low drops become road.
-        plane: How the road's plane is sought.
-        corrections: What is different about boxes in a sequence, by sequence and box.
+        boxes: Boxes around the objects in the scene, by name.
+        rain_area: Corners x, y of the polygon in which drops are labelled, in order, metres; None
+            takes the road, as the paper does, and drops beside the road are then background.
+        height: Height above the road's plane, metres. Points above it, over the rain area and in
+            no box are rain. The paper does not state it. The default is the distance within which
+            a point counts as lying in the plane: with a smaller one parts of an uneven road become
+            rain, with a greater one low drops become road.
+        plane: Parameters of the search for the road's plane.
+        corrections: Corrections of boxes, by sequence and box.
     """
 
     road: Polygon
@@ -37,7 +145,7 @@ class Scene:
     corrections: Mapping[str, Mapping[str, Correction]] = field(default_factory=dict)
 
     def in_sequence(self, sequence: str) -> "Scene":
-        """The scene as it is in a sequence: its boxes corrected."""
+        """The scene with the boxes as corrected for a sequence."""
         corrections = self.corrections.get(sequence, {})
         boxes = {
             name: box.corrected(corrections[name]) if name in corrections else box

@@ -6,33 +6,28 @@
       car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
       mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
     plane: {distance: 0.1, points: 9, iterations: 1000, scans: 10, seed: 0}
-    corrections:                                 # what is different in some sequences
+    corrections:                                 # of boxes in some sequences
       "003": {boxes: {car_1: {shift: [0.2, 0, 0]}}}
 
-Only the road is required. Where it rains beside the road, `rain_area` has the corners of the ground
-over which to look for drops. A correction may have shift, size and heading.
+Only the road is required. Where it rains beside the road, `rain_area` lists the corners of the area
+in which drops are labelled. A correction may have shift, size and heading.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import yaml
-
-from derain.annotation.boxes import Box, Correction, Triple
 from derain.annotation.plane import PlaneSearch
-from derain.annotation.scene import Polygon, Scene
-from derain.files.atomic import replacing
+from derain.annotation.scene import Box, Correction, Polygon, Scene, Triple
 from derain.files.documents import Entry, shown
 from derain.simulation.classes import TrackClass
 
-# Most points that a candidate for the plane may be fitted to. More would not make it better, and
-# would make it less likely that all of them are road.
+# Most points that a candidate plane may be fitted to: more make it no better, and make it less
+# likely that all of them are road.
 MOST_FITTED = 100
 
-# Largest coordinate and length, metres: farther than any LiDAR sees, and so small that a product of
-# three does not overflow.
+# Largest coordinate and length, metres: beyond the range of any LiDAR, and a product of three does
+# not overflow.
 FARTHEST = 1e6
 
 # Open3D's whole numbers have 32 bits.
@@ -45,8 +40,8 @@ def read_scene(path: Path) -> Scene:
     """Reads a scene file.
 
     Raises:
-        InputError: A file that cannot be read, or a value in it that makes no sense; the message
-            names its key.
+        InputError: A file that cannot be read, or an invalid value in it; the message names its
+            key.
     """
     parsers = {
         "road": _polygon,
@@ -68,53 +63,6 @@ def read_scene(path: Path) -> Scene:
             for sequence, entry in corrections.members().items()
         },
     )
-
-
-def write_scene(path: Path, scene: Scene) -> None:
-    """Writes a scene file.
-
-    Raises:
-        InputError: It cannot be written.
-    """
-    with replacing(path) as temporary:
-        text = yaml.safe_dump(as_dict(scene), sort_keys=False, default_flow_style=None)
-        temporary.write_text(text, "utf-8")
-
-
-def as_dict(scene: Scene) -> dict[str, Any]:
-    """A scene as its file holds it: dictionaries, lists, texts and numbers."""
-    area = {} if scene.rain_area is None else {"rain_area": _corners(scene.rain_area)}
-    return {
-        "height": scene.height,
-        "road": _corners(scene.road),
-        **area,
-        "boxes": {
-            name: {
-                "class": box.kind.name.lower(),
-                "centre": list(box.centre),
-                "size": list(box.size),
-                "heading": box.heading,
-            }
-            for name, box in scene.boxes.items()
-        },
-        "plane": asdict(scene.plane),
-        "corrections": {
-            sequence: {"boxes": {name: _stated(each) for name, each in corrections.items()}}
-            for sequence, corrections in scene.corrections.items()
-        },
-    }
-
-
-def _corners(polygon: Polygon) -> list[list[float]]:
-    return [list(corner) for corner in polygon]
-
-
-def _stated(correction: Correction) -> dict[str, Any]:
-    return {
-        key: list(value) if isinstance(value, tuple) else value
-        for key, value in asdict(correction).items()
-        if value is not None
-    }
 
 
 def _polygon(entry: Entry) -> Polygon:
@@ -158,7 +106,7 @@ def _corrections(entry: Entry, boxes: Mapping[str, Box]) -> dict[str, Correction
 
 
 def _itself(entry: Entry) -> Entry:
-    """Leaves a value to be read later: corrections name boxes, which have to be known first."""
+    """Keeps a value for later: corrections name boxes, which are read first."""
     return entry
 
 

@@ -1,19 +1,19 @@
-"""The steps that label a scan of a static scene by where its points lie.
+"""The steps that label a scan of a static scene by the positions of its points.
 
 Source: REHEARSE-3D, section III.B. Step by step:
 
 1. Scans are read by `derain.files`.
 2. The road's plane: `road_plane`.
-3. Sprinklers, boxes; what is in one of them but below the plane is omitted: `annotate`.
-4. Other things, boxes: `annotate`.
+3. Points in boxes of sprinklers; those below the plane are omitted: `annotate`.
+4. Points in boxes of other objects: `annotate`.
 5. A polygon around the road: `Scene.road`.
-6. What is above the plane, over the polygon and in no box is rain: `annotate`.
-7. The rest over the polygon is road: `annotate`.
-8. The rest is background: `annotate`.
+6. Points above the plane, over the polygon and in no box are rain: `annotate`.
+7. Other points over the polygon are road: `annotate`.
+8. All other points are background: `annotate`.
 9. Boxes are corrected by sequence: `Scene.in_sequence`.
 10. Points of the radar take the label of the nearest LiDAR point: `derain.fusion.label_transfer`.
 
-Rows are never dropped: what the paper omits, and rows that cannot be judged, are unknown here.
+No row is dropped: points that the paper omits, and invalid rows, are unknown here.
 """
 
 from collections.abc import Sequence
@@ -29,15 +29,15 @@ from derain.simulation.classes import TrackClass
 
 NO_BOX = -1
 
-# More than what the corners of a box may be off by rounding, metres.
+# More than the rounding errors of a box's corners, metres.
 CORNER_TOLERANCE = 1e-6
 
 
 def road_plane(scans: Sequence[Scan], scene: Scene) -> Plane:
     """Finds the plane of the road in the scans of one sequence.
 
-    The paper seeks it in all points. Here only points over the road polygon and outside boxes are
-    used, most of which are road, so that no wall can be found in its place.
+    The paper searches all points. Here only points over the road polygon and outside boxes are
+    used, most of which are road, so that no wall is found instead.
 
     Args:
         scans: One or more scans of the sequence.
@@ -55,7 +55,7 @@ def road_plane(scans: Sequence[Scan], scene: Scene) -> Plane:
 def annotate(scan: Scan, scene: Scene, plane: Plane) -> NDArray[np.int64]:
     """Labels the points of a scan.
 
-    Where boxes overlap, that of a sprinkler counts, else the one that the scene names first.
+    Where boxes overlap, a sprinkler's box counts, otherwise the first in the scene.
 
     Args:
         scan: The scan.
@@ -63,7 +63,7 @@ def annotate(scan: Scan, scene: Scene, plane: Plane) -> NDArray[np.int64]:
         plane: The plane of its road.
 
     Returns:
-        TrackClass of every row, int64 (N,); UNKNOWN for rows that cannot be judged, and for points
+        TrackClass of every row, int64 (N,); UNKNOWN for invalid rows, and for points
         in a sprinkler's box but below the road's plane.
     """
     label = np.full(len(scan), UNKNOWN, dtype=np.int64)
@@ -93,12 +93,12 @@ def _bare_road(scan: Scan, scene: Scene) -> NDArray[np.float64]:
 
 def _boxed(points: NDArray[np.float64], scene: Scene) -> NDArray[np.int64]:
     """Class of the box that each point is in, int64 (N,); NO_BOX where it is in none."""
-    # The points are sorted by x, so that a box need only be compared with those in its span of x.
+    # Sorted by x, so that a box is compared only with the points in its span of x.
     order = np.argsort(points[:, 0])
     points = points[order]
     kind = np.full(len(points), NO_BOX, dtype=np.int64)
     by_rank = sorted(scene.boxes.values(), key=lambda box: box.kind is not TrackClass.SPRINKLER)
-    for box in reversed(by_rank):  # the last to claim a point keeps it
+    for box in reversed(by_rank):  # later boxes overwrite earlier ones
         x = box.footprint.corners()[:, 0]
         span = x.min() - CORNER_TOLERANCE, x.max() + CORNER_TOLERANCE
         first, last = np.searchsorted(points[:, 0], span)

@@ -48,16 +48,16 @@ A scene file, in metres and degrees in the sensor's frame (x forward, y left, z 
   boxes:               # size: length along the heading, width, height
     car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
     mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
-  height: 0.1          # above the road's plane, from which it is rain
-  rain_area: [[2, -9], [60, -9], [60, 9], [2, 9]] # where to look for rain; without it, the road
-  corrections:         # what is different in some sequences: shift, size or heading
+  height: 0.1          # points higher above the road's plane are rain
+  rain_area: [[2, -9], [60, -9], [60, 9], [2, 9]] # where drops are labelled (default: the road)
+  corrections:         # of boxes in some sequences: shift, size or heading
     "003": {boxes: {car_1: {shift: [0.2, 0, 0]}}}
 
 The classes are background, car, sprinkler, rain, pedestrian, bike, target and road. Only the road
-is required: begin with it alone, and box what the picture shows in rain's colour and is none.
+is required: begin with it alone, and put boxes around what the picture wrongly shows as rain.
 
-Radar frames are paired with scans of the same name, in the LiDAR's frame, and labelled by the
-nearest LiDAR point, in the folder radar; `derain fuse` pairs frames in time and moves them there.
+Radar frames need the names of their scans and the LiDAR's frame: `derain fuse` pairs frames in
+time and transforms them. They get the labels of the nearest LiDAR points, in the folder radar.
 """
 
 CLASS_NAMES = {kind.value: kind.name.lower() for kind in TrackClass} | {UNKNOWN: "unknown"}
@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", type=Path, required=True, help="scene file")
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument(
-        "--sequence", help="name whose corrections hold (default: that of the folder)"
+        "--sequence", help="sequence whose corrections apply (default: the folder's name)"
     )
     parser.add_argument("--radar", type=Path, help="folder of radar frames to label as well")
     parser.add_argument(
@@ -79,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=factor,
         default=LABEL_WITHIN,
         metavar="METRES",
-        help="how far a label reaches to a radar point (default: %(default)s)",
+        help="largest distance from a radar point to its LiDAR point (default: %(default)s)",
     )
     parser.add_argument(
         "--picture",
@@ -190,7 +190,7 @@ def _as_text(report: dict[str, Any]) -> str:
     plane, points = report["plane"], report["points"]
     lines = [
         f"sequence {report['sequence']}: {report['scans']:,} scans, {points:,} points",
-        f"road: {plane['offset']:.3f} m under the sensor, leaning by {plane['slope']:.2f} degrees",
+        f"road: {plane['offset']:.3f} m under the sensor, inclined by {plane['slope']:.2f} degrees",
         *(
             f"  {name:<11}{count:>14,} {count / max(points, 1):>8.2%}"
             for name, count in report["points_by_class"].items()

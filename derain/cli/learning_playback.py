@@ -3,10 +3,9 @@
 from pathlib import Path
 
 from derain.cli.learning_report import LearningReport
-from derain.cli.view_recording import write_told
+from derain.cli.view_recording import write_and_report
 from derain.export.runtime import Derainer
-from derain.playback.labels import Labels
-from derain.playback.selection import Selection
+from derain.playback.selection import Labels, Selection
 from derain.sources.frame import Frame
 from derain.sources.source import Frames
 from derain.sources.spread import evenly_spaced
@@ -32,7 +31,7 @@ def show_lesson(report: LearningReport, out: Path) -> None:
     held_out = frozenset(frame.key for frame in report.held_out)
     selection = Selection(Frames(frames), shown, held_out)
     student = Derainer(report.lesson.out)
-    write_told(out, selection, {STUDENT_TITLE: student}, Labels(report.data.card, "teacher"))
+    write_and_report(out, selection, {STUDENT_TITLE: student}, Labels(report.data.card, "teacher"))
 
 
 def _in_time(frame: Frame) -> tuple[str, int]:

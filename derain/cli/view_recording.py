@@ -1,4 +1,4 @@
-"""Writes a recording as several methods clean it, to be looked at in Rerun's viewer."""
+"""Writes a recording as several methods clean it, for Rerun's viewer."""
 
 import argparse
 import sys
@@ -27,14 +27,13 @@ from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 
 if TYPE_CHECKING:
-    from derain.playback.labels import Labels
-    from derain.playback.selection import Selection
+    from derain.playback.selection import Labels, Selection
 
 SUFFIX = ".rrd"
 
 
 def view_recording(arguments: argparse.Namespace) -> int:
-    """Writes the file, and says how large it becomes and is.
+    """Writes the file, and prints its size.
 
     Returns:
         The exit code: 2 where something could not be shown.
@@ -45,8 +44,7 @@ def view_recording(arguments: argparse.Namespace) -> int:
     """
     out: Path = arguments.rerun
     refuse_unusable(out)
-    from derain.playback.labels import Labels
-    from derain.playback.selection import Selection
+    from derain.playback.selection import Labels, Selection
 
     keep_freed_memory()
     methods = _methods(arguments.methods, arguments.threads)
@@ -64,33 +62,33 @@ def view_recording(arguments: argparse.Namespace) -> int:
     numbers = range(len(source))[arguments.frames][:: arguments.every]
     selection = Selection(source, numbers)
     if card is not None and not any(frame.has_labels for frame in selection.frames):
-        warn(f"{selection.frames[0].name}: no scan has labels, and so there is no truth")
+        warn(f"{selection.frames[0].name}: no scan has labels, so no truth is shown")
         card = None
     for method in methods.values():
         for sentence in irregularities(source, method.window):
             warn(sentence)
-    return write_told(out, selection, methods, None if card is None else Labels(card))
+    return write_and_report(out, selection, methods, None if card is None else Labels(card))
 
 
 def refuse_unusable(out: Path) -> None:
-    """Refuses, before any work, a file that could not be written or that no viewer would open.
+    """Refuses, before any work, a file that cannot be written or that no viewer would open.
 
     Raises:
         InputError: Rerun is not installed, another suffix, or a folder that is not writable.
     """
     RERUN.load(out)
     if out.suffix.lower() != SUFFIX:
-        raise InputError(out, "is no name that Rerun's viewer opens", f"Let it end in {SUFFIX}.")
+        raise InputError(out, f"must end in {SUFFIX}", "Rerun's viewer opens no other files.")
     refuse_unwritable(out)
 
 
-def write_told(
+def write_and_report(
     out: Path,
     selection: "Selection",
     methods: dict[str, Method],
     labels: "Labels | None",
 ) -> int:
-    """Writes the file, and tells of it on the screen before and after.
+    """Writes the file, and prints what it shows, its size and what is wrong with its scans.
 
     Returns:
         The exit code: 2 where something could not be shown.
@@ -99,56 +97,32 @@ def write_told(
         InputError: No scan that can be read, or a file that cannot be written.
     """
     from derain.playback.playback import write_playback
-    from derain.playback.sensor_look import SensorLook
-    from derain.playback.size import LARGE, megabytes
 
-    look = SensorLook.of(selection.frames)
     scans = len(selection.frames)
-    expected = look.expected_bytes(scans, len(methods))
-    say(
-        f"{scans:,} scans of about {look.points:,} points, methods: {', '.join(methods)}. {out} "
-        f"will take about {megabytes(expected)}"
-    )
-    if expected > LARGE:
-        warn(f"{out}: the viewer keeps all of it in memory; --every 10 shows one scan of ten")
-    passing, notices = _Passing(), Notices()
+    say(f"{scans:,} scans, methods: {', '.join(methods)}")
+    notices, errors = Notices(), set()
+
+    @contextmanager
+    def reporting(frame: Frame) -> Iterator[None]:
+        """Prints an error and goes on; once, for every method reads the frame again."""
+        try:
+            with reading(Path(frame.name)):
+                yield
+        except InputError as error:
+            if str(error) not in errors:
+                tqdm.write(f"derain: {error}", sys.stderr)
+            errors.add(str(error))
 
     def watch(title: str, judgement: Judgement) -> None:
         assert judgement.frame is not None
         notices.tell(judgement.frame.name, methods[title].oddities(judgement), title)
 
-    write_playback(out, selection, look, methods, labels, passing.over, watch)
+    write_playback(out, selection, methods, labels, reporting, watch)
     notices.tell_how_many_more()
-    say(f"{out}: {megabytes(out.stat().st_size)}. Look at it: rerun {out}")
-    if passing.told:
-        print(f"derain: of {scans:,} scans not all could be shown", file=sys.stderr)
-    return 2 if passing.told else 0
-
-
-class _Passing:
-    """Tells what is wrong with scans, each fault once, and lets the others go on.
-
-    Attributes:
-        told: What was told.
-    """
-
-    def __init__(self) -> None:
-        self.told: set[str] = set()
-
-    @contextmanager
-    def over(self, frame: Frame) -> Iterator[None]:
-        """Holds an error back.
-
-        Args:
-            frame: What the block works on; every method reads it again, and fails again.
-        """
-        try:
-            with reading(Path(frame.name)):
-                yield
-        except InputError as error:
-            if str(error) not in self.told:
-                tqdm.write(f"derain: {error}", sys.stderr)
-            self.told.add(str(error))
+    say(f"{out}: {out.stat().st_size / 1e6:,.1f} MB. To view it: rerun {out}")
+    if errors:
+        print(f"derain: not all of the {scans:,} scans could be shown", file=sys.stderr)
+    return 2 if errors else 0
 
 
 def _methods(names: Sequence[str], threads: int) -> dict[str, Method]:
@@ -162,7 +136,7 @@ def _methods(names: Sequence[str], threads: int) -> dict[str, Method]:
         title, name = titled(text)
         if title in methods:
             raise InputError(
-                title, "two methods are called so", "Give titles, as in `first=a.onnx second=dror`."
+                title, "is the title of two methods", "Give titles: `first=a.onnx second=dror`."
             )
         methods[title] = load_method(*named_method(name), threads)
     return methods

@@ -1,5 +1,5 @@
-"""Recordings to look at, scan after scan, in the viewer of Rerun: files ``.rrd``.
+"""Recordings for Rerun's viewer: files ``.rrd`` that show scan after scan.
 
-:func:`derain.playback.playback.write_playback` writes one. What stands in it, and where, says
-:mod:`derain.playback.entities`. Rerun is what ``pip install 'derain[view]'`` installs.
+:func:`derain.playback.playback.write_playback` writes one; :mod:`derain.playback.entities` lists
+its entities. It needs Rerun: ``pip install 'derain[view]'``.
 """

@@ -1,124 +1,113 @@
 """A file of Rerun's, written whole or not at all."""
 
-import warnings
+import os
+import shutil
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
 import rerun
 from rerun.blueprint import Blueprint
-from rerun.chunk import RrdReader
 
-from derain.errors import InputError, reason_of
 from derain.files.atomic import replacing
-from derain.playback.entities import FRAME, TIME
-from derain.playback.piped_file import PipedFile, PlainFile, piped_file
+
+# Folder of this process's open files by number. Windows has none.
+OPEN_FILES = Path("/dev/fd")
+
+# Bytes copied from the pipe to the file at a time.
+PIPE_BLOCK = 1 << 20
 
 
 class RecordingFile:
-    """What is logged, on its way to a file.
+    """What Rerun logs, on its way to a file.
 
-    Args:
-        path: The file that the user named, for messages.
-        stream: What Rerun logs to.
-        written: What Rerun's library writes to.
+    Attributes:
+        stream: Rerun's stream.
+        copying: The copying of what Rerun writes to the file; done early only where it fails.
     """
 
-    def __init__(
-        self, path: Path, stream: rerun.RecordingStream, written: PipedFile | PlainFile
-    ) -> None:
-        self.path = path
+    def __init__(self, stream: rerun.RecordingStream, copying: Future[None]) -> None:
         self.stream = stream
-        self.written = written
+        self.copying = copying
 
-    def at(self, number: int, seconds: float | None) -> None:
-        """Says of which scan all that is logged from here on is.
-
-        Args:
-            number: Its place in the recording.
-            seconds: When it was taken, after the first one that is shown; None if not known.
-        """
-        self.stream.reset_time()
-        self.stream.set_time(FRAME, sequence=number)
-        if seconds is not None:
-            self.stream.set_time(TIME, duration=seconds)
-
-    def log(self, path: str, *what: rerun.AsComponents, static: bool = False) -> None:
-        """Logs something.
+    def log(self, entity: str, *archetypes: rerun.AsComponents, static: bool = False) -> None:
+        """Logs archetypes of an entity.
 
         Args:
-            path: Where it stands.
-            what: Archetypes of Rerun's.
-            static: Whether it is so at all times.
+            entity: Path of the entity.
+            archetypes: One or more archetypes of Rerun's.
+            static: Whether they hold at all times.
         """
-        first, *others = what
-        self.stream.log(path, first, *others, static=static, strict=True)
+        first, *others = archetypes
+        self.stream.log(entity, first, *others, static=static, strict=True)
 
     def flush(self) -> None:
-        """Has everything written, so that little waits in memory.
+        """Writes everything logged so far, which bounds the memory in use.
 
         Raises:
-            InputError: It cannot be written.
+            OSError: The file cannot be written.
         """
-        try:
-            self.stream.flush()
-        except RuntimeError as error:
-            raise _not_written(self.path, error) from error
-        self.refuse_not_written()
-
-    def refuse_not_written(self) -> None:
-        """Says so where something could not be written.
-
-        Raises:
-            InputError: Something could not.
-        """
-        if self.written.error is not None:
-            raise _not_written(self.path, self.written.error)
+        self.stream.flush()
+        if self.copying.done():
+            self.copying.result()
 
 
 @contextmanager
 def recording_file(path: Path, name: str, blueprint: Blueprint) -> Iterator[RecordingFile]:
-    """Lends a file that takes the place of `path` when the block ends well.
+    """Opens a file that replaces `path` when the block ends without an error.
 
     Args:
         path: The file, ``.rrd``.
-        name: What the viewer calls the recording.
-        blueprint: What the viewer opens with.
+        name: Name of the recording in the viewer.
+        blueprint: Layout of the viewer.
 
     Raises:
-        InputError: It cannot be written.
+        InputError: The file cannot be written.
     """
-    with replacing(path) as temporary:
-        with piped_file(temporary) as written:
-            stream = rerun.RecordingStream("derain")
-            stream.set_log_time_enabled(False)  # when it was written tells nothing of the scans
-            stream.set_log_tick_enabled(False)
-            stream.save(written.path, default_blueprint=blueprint)
-            file = RecordingFile(path, stream, written)
-            try:
-                stream.send_recording_name(name)
-                yield file
-                file.flush()
-            finally:
-                stream.disconnect()  # ends its thread, and writes the index
-        file.refuse_not_written()
-        _refuse_incomplete(path, temporary)
+    with replacing(path) as temporary, _copied_to(temporary) as (written, copying):
+        stream = rerun.RecordingStream("derain")
+        stream.set_log_time_enabled(False)  # the time of writing has no meaning here
+        stream.set_log_tick_enabled(False)
+        stream.save(written, default_blueprint=blueprint)
+        try:
+            stream.send_recording_name(name)
+            file = RecordingFile(stream, copying)
+            yield file
+            file.flush()
+        finally:
+            stream.disconnect()  # ends its thread, and writes the index
 
 
-def _refuse_incomplete(path: Path, temporary: Path) -> None:
-    """Refuses a file without the index that is written last."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            RrdReader(temporary).store()
-    except (RuntimeError, ValueError, Warning) as error:
-        raise _not_written(path, error) from error
+@contextmanager
+def _copied_to(file: Path) -> Iterator[tuple[Path, Future[None]]]:
+    """Gives a path for Rerun to write to, and copies what it writes to a file.
+
+    Rerun's library waits for ever once its file cannot grow: on a full disk, or beyond a quota. So
+    it writes to a pipe, which a thread empties. On Windows it writes to the file itself.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    if not OPEN_FILES.is_dir():
+        yield file, Future()
+        return
+    outlet, inlet = os.pipe()
+    with ThreadPoolExecutor(1) as executor:
+        copying = executor.submit(_copy, outlet, file)
+        try:
+            yield OPEN_FILES / str(inlet), copying
+        finally:
+            os.close(inlet)
+        copying.result()
 
 
-def _not_written(path: Path, error: Exception) -> InputError:
-    reason = getattr(error, "strerror", None) or reason_of(error)
-    return InputError(
-        path,
-        f"cannot be written whole ({reason})",
-        "Choose a folder that has room, or show fewer scans: --every 10.",
-    )
+def _copy(outlet: int, file: Path) -> None:
+    with open(outlet, "rb") as pipe:
+        try:
+            with file.open("wb") as opened:
+                shutil.copyfileobj(pipe, opened, PIPE_BLOCK)
+        except OSError:
+            while pipe.read(PIPE_BLOCK):  # keeps the other end from waiting
+                pass
+            raise

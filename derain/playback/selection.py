@@ -1,4 +1,4 @@
-"""Which scans of a recording are shown, and when and where each was taken."""
+"""The scans of a recording that are shown: when and where each was taken, and its labels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,9 +8,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.cards.card import DataCard
 from derain.errors import InputError
+from derain.playback.entities import LabelEntities
+from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.method import Method
+from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.system.notices import warn
 
@@ -20,12 +24,12 @@ class Selection:
     """Some scans of a source, in time order.
 
     Attributes:
-        source: All of them.
-        numbers: The places of those that are shown, ascending.
-        held_out: Keys of scans from which nothing was learnt, where something was.
+        source: All scans.
+        numbers: The places of the scans shown, ascending.
+        held_out: Keys of scans that a model was not trained on, where one was trained.
 
     Raises:
-        InputError: None is shown.
+        InputError: No scan is shown.
     """
 
     source: Source
@@ -42,20 +46,16 @@ class Selection:
 
     @cached_property
     def frames(self) -> list[Frame]:
-        """Those that are shown."""
+        """The frames shown."""
         return [self.source[number] for number in self.numbers]
 
     @cached_property
     def number_of(self) -> dict[str, int]:
-        """The place of each that is shown among all, by its key."""
+        """The place of each shown frame in the source, by the frame's key."""
         return {frame.key: n for n, frame in zip(self.numbers, self.frames, strict=True)}
 
     def for_method(self, method: Method) -> Sequence[Frame]:
-        """What a method is given: one that sees several scans also gets those that are not shown.
-
-        Args:
-            method: The method.
-        """
+        """The frames to give to a method; one of several scans also gets frames not shown."""
         window = method.window
         if window.is_one_scan:
             return self.frames
@@ -64,10 +64,10 @@ class Selection:
 
     @cached_property
     def seconds(self) -> dict[str, float]:
-        """When each was taken, by its key, seconds after the first one.
+        """Seconds from the first shown frame to each, by the frame's key.
 
-        Empty where it is not known of all of them, or they do not follow one another in time, as
-        where several recordings are shown.
+        Empty where a frame has no time, or where the times do not ascend, as with several
+        recordings.
         """
         try:
             times = [frame.time for frame in self.frames]
@@ -81,11 +81,11 @@ class Selection:
 
     @cached_property
     def poses(self) -> dict[str, NDArray[np.float64]]:
-        """Where each was taken, by its key, float64 (4, 4), metres.
+        """Pose of each shown frame, by the frame's key, float64 (4, 4), metres.
 
-        They take the sensor's frame to that of the first scan of its sequence that is shown: far
-        from the origin the viewer, which computes in float32, would let the points tremble. Empty
-        where a scan has none.
+        A pose takes the sensor's frame to that of the first scan shown of its sequence: the viewer
+        computes in float32, in which points far from the origin would tremble. Empty where a frame
+        has no pose.
         """
         try:
             poses = [frame.pose for frame in self.frames]
@@ -102,10 +102,56 @@ class Selection:
         return placed
 
     @cached_property
-    def ways(self) -> list[NDArray[np.float32]]:
-        """Where the sensor went in each sequence, float32 (scans, 3), metres."""
-        ways: dict[str, list[NDArray[np.float64]]] = {}
+    def paths(self) -> list[NDArray[np.float32]]:
+        """The sensor's path in each sequence, float32 (scans, 3), metres."""
+        paths: dict[str, list[NDArray[np.float64]]] = {}
         for frame in self.frames:
             if frame.key in self.poses:
-                ways.setdefault(frame.sequence, []).append(self.poses[frame.key][:3, 3])
-        return [np.array(way, np.float32) for way in ways.values()]
+                paths.setdefault(frame.sequence, []).append(self.poses[frame.key][:3, 3])
+        return [np.array(path, np.float32) for path in paths.values()]
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledRain:
+    """Labels of the points of one scan.
+
+    Attributes:
+        rain: True for rain, bool (N,).
+        known: False for points whose label is unknown, bool (N,).
+    """
+
+    rain: NDArray[np.bool_]
+    known: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Labels that lie with scans.
+
+    Attributes:
+        card: Their data card.
+        name: ``truth``, or ``teacher``.
+    """
+
+    card: DataCard
+    name: str = "truth"
+
+    @property
+    def entities(self) -> LabelEntities:
+        """Paths of their entities."""
+        return LabelEntities(self.name)
+
+    def of(self, frame: Frame, scan: Scan) -> LabelledRain | None:
+        """The labels of a scan; None where it has none.
+
+        Args:
+            frame: The frame.
+            scan: The scan read from it.
+
+        Raises:
+            InputError: Labels that are damaged, or that the data card does not know.
+        """
+        if not frame.has_labels:
+            return None
+        labelled = FrameReader(self.card).with_labels(scan, frame)
+        return LabelledRain(self.card.rain_of(labelled), ~self.card.unknown_of(labelled))

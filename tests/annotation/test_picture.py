@@ -8,9 +8,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 
-from derain.annotation.boxes import Box
 from derain.annotation.picture import CLASS_COLOURS, SURROUNDINGS, UNKNOWN_COLOUR, annotation_figure
-from derain.annotation.scene import Scene
+from derain.annotation.scene import Box, Scene
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.fusion.label_transfer import UNKNOWN
 from derain.pictures.scan_pictures import save

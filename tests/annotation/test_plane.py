@@ -57,7 +57,7 @@ def test_the_normal_points_up_whatever_the_order_of_the_points() -> None:
 
 def test_a_wall_is_no_road() -> None:
     wall = road(500)[:, [2, 1, 0]]
-    with pytest.raises(InputError, match=r"scan: the plane found leans by 8[0-9] degrees"):
+    with pytest.raises(InputError, match=r"scan: .* 8[0-9] degrees"):
         find_plane(wall, PlaneSearch(), "scan")
 
 

@@ -1,16 +1,13 @@
-"""Scene files are read as they are written, and say what is wrong with them."""
+"""Scene files: every key is read, and an invalid one is named."""
 
 from pathlib import Path
 
-import numpy as np
 import pytest
-import yaml
 
 from derain.annotation import scene_file
-from derain.annotation.boxes import Box, Correction
 from derain.annotation.plane import PlaneSearch
-from derain.annotation.scene import Scene, inside
-from derain.annotation.scene_file import as_dict, read_scene, write_scene
+from derain.annotation.scene import Box, Correction, Scene
+from derain.annotation.scene_file import read_scene
 from derain.errors import InputError
 from derain.simulation.classes import TrackClass
 
@@ -27,21 +24,31 @@ SCENE = Scene(
 )
 
 
+TEXT = """\
+road: [[2, -4], [60, -4], [60, 4], [2, 4]]
+boxes:
+  car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
+  mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
+rain_area: [[0, -9], [60, -9], [60, 9], [0, 9]]
+height: 0.15
+plane: {distance: 0.2, points: 3, iterations: 50, scans: 2, seed: 7}
+corrections:
+  "003": {boxes: {car_1: {shift: [0.2, 0, 0], size: [4, 2, 1], heading: 0}}}
+  "010": {boxes: {}}
+"""
+
+
 def written(path: Path, text: str) -> Path:
     path.write_text(text, "utf-8")
     return path
 
 
-def test_a_scene_is_read_as_it_was_written(tmp_path: Path) -> None:
-    write_scene(tmp_path / "scene.yaml", SCENE)
-    assert read_scene(tmp_path / "scene.yaml") == SCENE
-    assert yaml.safe_load((tmp_path / "scene.yaml").read_text()) == as_dict(SCENE)
+def test_every_key_of_a_scene_is_read(tmp_path: Path) -> None:
+    assert read_scene(written(tmp_path / "scene.yaml", TEXT)) == SCENE
 
 
 def test_the_road_is_all_that_a_scene_needs(tmp_path: Path) -> None:
     path = written(tmp_path / "scene.yaml", "road: [[0, 0], [1, 0], [0, 1]]")
-    assert read_scene(path) == Scene(((0, 0), (1, 0), (0, 1)))
-    write_scene(path, read_scene(path))
     assert read_scene(path) == Scene(((0, 0), (1, 0), (0, 1)))
 
 
@@ -125,12 +132,3 @@ def test_a_file_that_is_not_yaml_is_refused(tmp_path: Path, content: bytes) -> N
         read_scene(tmp_path / "scene.yaml")
     with pytest.raises(InputError, match="no such file"):
         read_scene(tmp_path / "none.yaml")
-
-
-def test_a_bent_road_holds_what_lies_in_one_of_its_parts() -> None:
-    bend = ((0, 0), (10, 0), (10, 10), (8, 10), (8, 2), (0, 2))
-    points = np.random.default_rng(0).uniform(-2, 12, (2000, 3))
-    x, y, _ = points.T
-    first = (x > 0) & (x < 10) & (y > 0) & (y < 2)
-    second = (x > 8) & (x < 10) & (y > 0) & (y < 10)
-    assert np.array_equal(inside(bend, points), first | second)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.annotation.boxes import Box
 from derain.annotation.plane import Plane
-from derain.annotation.scene import Scene
+from derain.annotation.scene import Box, Scene
 from derain.annotation.steps import annotate, road_plane
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
