@@ -37,13 +37,11 @@ class BagOptions:
         cleaned_topic: Name of the topic of clean clouds, beside the one that there is; None puts
             them in its place.
         removed_topic: Name of a topic of what was removed; None where nobody asks for it.
-        probability: Whether points have a field of their probability to be rain.
         keep_shape: Whether organised clouds stay organised.
     """
 
     cleaned_topic: str | None = None
     removed_topic: str | None = None
-    probability: bool = False
     keep_shape: bool = False
 
 
@@ -58,14 +56,24 @@ class CleanedBags:
         source: All frames that there will be; those of bags of which only some clouds are among
             them are left to others.
         options: What is written of each cloud.
+        probability: Whether points have a field of their probability to be rain.
 
     Raises:
-        InputError: Something is in the way of a bag.
+        InputError: Something is in the way of a bag, or options that contradict each other.
     """
 
-    def __init__(self, out: Path, source: Iterable[Frame], options: BagOptions) -> None:
+    def __init__(
+        self, out: Path, source: Iterable[Frame], options: BagOptions, probability: bool = False
+    ) -> None:
+        if options.cleaned_topic and options.cleaned_topic == options.removed_topic:
+            raise InputError(
+                "--removed-topic",
+                f"{options.removed_topic} is --cleaned-topic too",
+                "Name another.",
+            )
         self.out = out
         self.options = options
+        self.probability = probability
         self._whole = _whole_topics(source)
         for clouds in self._whole:
             self._refuse_clashes(clouds)
@@ -112,7 +120,7 @@ class CleanedBags:
     def _write(self, copy: BagCopy, frame: BagFrame, judgement: Judgement) -> None:
         recorded = copy.forward_to(frame.number)
         options = self.options
-        columns = {RAIN_PROBABILITY: judgement.probability} if options.probability else {}
+        columns = {RAIN_PROBABILITY: judgement.probability} if self.probability else {}
         try:
             message = CloudMessage.parse(recorded.data, frame.clouds.topic.encoding)
             new = cleaned(message, judgement.rain, columns, options.keep_shape)
