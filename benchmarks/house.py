@@ -38,6 +38,7 @@ NO_CODE = {
 FOLLOW = """
 import sys
 import derain
+from derain.cli import run  # imported beforehand, so that only the run itself is followed
 from derain.cli.main import main
 from derain.files import labels
 

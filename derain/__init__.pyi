@@ -42,6 +42,9 @@ from derain.models.salsanext_lite import SalsaNextLite as SalsaNextLite
 from derain.models.salsanext_lite import SalsaNextLiteNetwork as SalsaNextLiteNetwork
 from derain.odometry.odometry import Odometry as Odometry
 from derain.scan import Scan as Scan
+from derain.sources.clean_sink import CleanSink as CleanSink
+from derain.sources.cleaning import CleanReport as CleanReport
+from derain.sources.cleaning import clean as clean
 from derain.sources.folders import named_frames as named_frames
 from derain.sources.source import Frames as Frames
 from derain.weather.alarm import Alarm as Alarm

@@ -91,7 +91,12 @@ def test_the_runtime_needs_what_reads_files_and_a_model_onnxruntime_and_the_knn_
         assert loaded - of_yaml == needed
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["info", "--help"]])
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_a_start_without_a_command_loads_no_library(option: str) -> None:
+    assert loaded_by(COMMAND, option) == {"derain"}
+
+
+@pytest.mark.parametrize("arguments", [["run", "--help"], ["info", "--help"]])
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     loaded = loaded_by(COMMAND, *arguments)
     assert "derain" in loaded

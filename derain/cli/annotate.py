@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from derain.annotation.scene import Scene
     from derain.scan import Scan
 
-SUMMARY = "label the scans of a static scene by its geometry"
-
 DESCRIPTION = """\
 Labels the scans of one sequence as REHEARSE-3D was labelled: finds the road's plane, gives what is
 in a box the box's class, calls the rest over the road rain or road by its height above the plane,

@@ -2,11 +2,12 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from derain.bags.names import within
-from derain.errors import InputError
-from derain.sources.cleaned_bags import BagOptions, CleanedBags
-from derain.sources.source import Source
+
+if TYPE_CHECKING:
+    from derain.sources.cleaned_bags import BagOptions
 
 
 def add_topic(parser: argparse.ArgumentParser) -> None:
@@ -43,22 +44,8 @@ def add_cleaned_bags(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def cleaned_bags(arguments: argparse.Namespace, source: Source) -> CleanedBags:
-    """What takes the clouds of whole bags, and writes the bags without rain.
+def bag_options(arguments: argparse.Namespace) -> "BagOptions":
+    """What the arguments have written of bags."""
+    from derain.sources.cleaned_bags import BagOptions
 
-    Raises:
-        InputError: Something is in the way of a bag, or options that contradict each other.
-    """
-    cleaned, removed = arguments.cleaned_topic, arguments.removed_topic
-    if cleaned and cleaned == removed:
-        raise InputError("--removed-topic", f"{removed} is --cleaned-topic too", "Name another.")
-    options = BagOptions(cleaned, removed, arguments.probability, arguments.keep_shape)
-    bags = CleanedBags(arguments.out, source, options)
-    in_bag = next(filter(bags.takes, source), None)
-    if arguments.removed is not None and in_bag is not None:
-        raise InputError(
-            "--removed",
-            f"is a folder for files, and {in_bag.name} is in a bag",
-            "Give --removed-topic NAME.",
-        )
-    return bags
+    return BagOptions(arguments.cleaned_topic, arguments.removed_topic, arguments.keep_shape)

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from derain.sources.frame import Frame
     from derain.sources.source import Frames
 
-SUMMARY = "compare methods on labelled scans: error, time and memory"
-
 DESCRIPTION = """\
 Runs every method on the same labelled scans, and writes one table (bench.md, bench.csv, bench.json)
 and one picture of error against time (speed_error.png).
@@ -103,7 +101,11 @@ def main(arguments: argparse.Namespace) -> int:
 
     data = labelled(arguments, arguments.data)
     rates = rain_rates(arguments.data, arguments.rain_rates)
-    methods = contestants(arguments.methods, _learn_from(arguments, data), runtime_of(arguments))
+    methods = contestants(
+        arguments.methods,
+        _learn_from(arguments, data),
+        runtime_of(arguments.runtime, arguments.precision),
+    )
     refuse_unwritable(arguments.out / "bench.json")
     if arguments.paper is None:
         scans = _labelled_frames(data, _frames(data, arguments.part), rates)

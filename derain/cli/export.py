@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from derain.sources.frame import Frame
     from derain.spec import Spec
 
-SUMMARY = "make an ONNX file that runs on a CPU without torch"
-
 DESCRIPTION = """\
 Exports a checkpoint as one ONNX file, proves it against PyTorch, and times it.
 
@@ -94,7 +92,7 @@ def main(arguments: argparse.Namespace) -> int:
         raise InputError(arguments.scan, "there is no such file", "Check --scan.")
     if arguments.inside is not None and not arguments.candidates:
         raise InputError("--inside", "bounds candidates, and there are none", "Give --candidates.")
-    runtime = runtime_of(arguments)
+    runtime = runtime_of(arguments.runtime, arguments.precision)
     model = load_model(arguments.checkpoint)
     calibration = _calibration(arguments)
     _warn_of_odd(calibration, model.spec)

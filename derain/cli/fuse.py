@@ -26,8 +26,6 @@ from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.source import Source
 
-SUMMARY = "merge the frames of a LiDAR and of a 4D radar"
-
 DESCRIPTION = f"""\
 Merges LiDAR scans with the radar frames nearest in time, in the layout of REHEARSE-3D: writes
 lidar_radar_pcd, in each file the points of the LiDAR, then those of the radar in the LiDAR's frame,

@@ -9,8 +9,6 @@ from derain.cli.outputs import say
 from derain.errors import InputError, did_you_mean
 from derain.system.extras import OF_CHECKPOINTS, require
 
-SUMMARY = "make a checkpoint from published weights"
-
 DESCRIPTION = """\
 Makes a checkpoint of derain from published weights.
 

@@ -11,10 +11,10 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from derain.bags.names import is_bag, split
+from derain.bags.names import is_bag, split, within
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
-from derain.cli.bag_options import add_topic, in_topic
+from derain.cli.bag_options import add_topic
 from derain.cli.info_bag import facts_of_bag
 from derain.cli.info_default import card_as_text
 from derain.cli.info_folder import draw, facts_of_folder
@@ -35,8 +35,6 @@ from derain.views.directions import directions
 from derain.views.grid_fit import fit_grid
 from derain.views.morton import distinct_rows
 from derain.views.oddities import no_points
-
-SUMMARY = "say what is in a scan, a label file, a model or a data set"
 
 DESCRIPTION = """\
 Says what is in a scan, a label file, a bag, an exported model or a checkpoint, what range image
@@ -93,7 +91,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     _refuse_unclear_picture(arguments)
     if arguments.grid:
-        paths = in_topic([Path(name) for name in arguments.files], arguments)
+        paths = within([Path(name) for name in arguments.files], arguments.topic)
         frames = named_frames(paths, arguments.columns)
         fit = fit_grid([frame.read() for frame in frames]).as_dict()
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
@@ -113,7 +111,7 @@ def _describe(name: str, arguments: argparse.Namespace) -> None:
     if name == DEFAULT:  # ./default is another thing, and a Path would not tell them apart
         _describe_default(arguments)
         return
-    path = in_topic([Path(name)], arguments)[0]
+    path = within([Path(name)], arguments.topic)[0]
     if os.path.isdir(path) and not is_bag(path):
         _describe_folder(path, arguments)
         return

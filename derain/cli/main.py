@@ -7,29 +7,12 @@ import signal
 import sys
 import warnings
 from contextlib import suppress
+from importlib import import_module
 from types import ModuleType
 
 from derain import __version__
-from derain.cli import (
-    annotate,
-    bench,
-    demo,
-    export,
-    fuse,
-    import_weights,
-    info,
-    learn,
-    odometry,
-    run,
-    simulate,
-    teach,
-    tune,
-    view,
-)
 from derain.cli.parser import Parser
 from derain.cli.signals import interrupting
-from derain.cli.training.configurations import require_configuration
-from derain.cli.training.help import short_help
 from derain.errors import InputError, ScanWarning
 from derain.system.extras import OF_TRAINING, missing_extra, require
 
@@ -45,21 +28,22 @@ Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
   derain export outdet.ckpt --out model.onnx            make a file that runs without torch
 """
 
-COMMANDS: dict[str, ModuleType] = {
-    "run": run,
-    "bench": bench,
-    "tune": tune,
-    "view": view,
-    "info": info,
-    "export": export,
-    "import-weights": import_weights,
-    "simulate": simulate,
-    "annotate": annotate,
-    "teach": teach,
-    "fuse": fuse,
-    "learn": learn,
-    "odometry": odometry,
-    "demo": demo,
+# What each command does. Its module, of the same name, is imported when it is chosen.
+COMMANDS = {
+    "run": "clean scans on a CPU, without torch",
+    "bench": "compare methods on labelled scans: error, time and memory",
+    "tune": "find a method's best parameters on labelled scans",
+    "view": "look at a scan, or a recording, as several methods clean it",
+    "info": "describe a scan, a label file, a model or a data set",
+    "export": "make an ONNX file that runs on a CPU without torch",
+    "import-weights": "make a checkpoint from published weights",
+    "simulate": "make a data set of simulated rain, or let it rain on clean scans",
+    "annotate": "label the scans of a static scene by its geometry",
+    "teach": "label recordings by a method, for a network to learn from",
+    "fuse": "merge the frames of a LiDAR and of a 4D radar",
+    "learn": "a derainer from an unlabelled recording, in about six minutes",
+    "odometry": "find where the sensor was, scan by scan",
+    "demo": "the whole story on simulated rain, in about six minutes",
 }
 
 # Exit code where whoever read the output has closed it, as of programs that SIGPIPE ends.
@@ -154,36 +138,51 @@ def _refused(error: InputError) -> int:
     return 2
 
 
+def module_of(command: str) -> ModuleType:
+    """The module of a command, with its ``DESCRIPTION``, ``add_arguments`` and ``main``.
+
+    Args:
+        command: One of COMMANDS.
+    """
+    return import_module(f"derain.cli.{command.replace('-', '_')}")
+
+
 def _run(arguments: list[str]) -> int:
     if arguments and arguments[0] in TRAINING:
-        if {"-h", "--help"} & {*arguments}:
-            print(short_help(arguments[0]))
-            return 0
-        require_configuration(arguments)
-        require(arguments[0], *OF_TRAINING)
-        from derain.cli.training.train import train
+        return _run_training(arguments)
+    command = next((word for word in arguments if word in COMMANDS), None)
+    chosen = _parser(command).parse_args(arguments)
+    return int(module_of(chosen.command).main(chosen))
 
-        train(arguments)
+
+def _run_training(arguments: list[str]) -> int:
+    from derain.cli.training.configurations import require_configuration
+    from derain.cli.training.help import short_help
+
+    if {"-h", "--help"} & {*arguments}:
+        print(short_help(arguments[0]))
         return 0
-    chosen = _parser().parse_args(arguments)
-    return int(COMMANDS[chosen.command].main(chosen))
+    require_configuration(arguments)
+    require(arguments[0], *OF_TRAINING)
+    from derain.cli.training.train import train
+
+    train(arguments)
+    return 0
 
 
-def _parser() -> Parser:
+def _parser(command: str | None) -> Parser:
+    """The parser, with the arguments of one command; it only lists the others."""
     parser = Parser(
         "derain", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--version", action="version", version=f"derain {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, summary in TRAINING.items():
-        subparsers.add_parser(name, help=summary)
-    for name, module in COMMANDS.items():
-        module.add_arguments(
-            subparsers.add_parser(
-                name,
-                help=module.SUMMARY,
-                description=module.DESCRIPTION,
-                formatter_class=argparse.RawDescriptionHelpFormatter,
-            )
+    for name, summary in (TRAINING | COMMANDS).items():
+        of_command = subparsers.add_parser(
+            name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter
         )
+        if name == command:
+            module = module_of(name)
+            of_command.description = module.DESCRIPTION
+            module.add_arguments(of_command)
     return parser

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from derain.cli.filter_help import list_methods
-from derain.cli.runtime_options import runtime_of
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method
+from derain.export.runtimes.registry import Runtime
 from derain.filters import read_parameters
 from derain.sources.method import Method
 
@@ -40,30 +40,31 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def method_of(arguments: argparse.Namespace) -> Method:
-    """The method that the arguments name, ready to judge scans.
+def method_of(
+    method: str, file: Path | None, settings: dict[str, Any], threads: int, runtime: Runtime
+) -> Method:
+    """The method that a command line names, ready to judge scans.
+
+    Args:
+        method: Its name or file.
+        file: File of parameters, over those of the method's own file; None where there is none.
+        settings: Single parameters, over those of the files.
+        threads: Threads to use; 0 takes all cores.
+        runtime: What runs a model's network.
 
     Raises:
         InputError: No such method, parameters of another, or some that it cannot have.
     """
-    runtime = runtime_of(arguments)
-    return load_method(*_named_method(arguments), arguments.threads, runtime)
-
-
-def _named_method(arguments: argparse.Namespace) -> tuple[str, dict[str, Any]]:
-    """The method, and its parameters: those of the files, and over them those set one by one."""
-    name, parameters = named_method(arguments.method)
-    if arguments.parameters is not None:
-        method, tuned = read_parameters(arguments.parameters)
+    name, parameters = named_method(method)
+    if file is not None:
+        of_method, tuned = read_parameters(file)
         # Models are files, which have more than one name.
-        if Path(method).resolve() != Path(name).resolve():
+        if Path(of_method).resolve() != Path(name).resolve():
             raise InputError(
-                arguments.parameters,
-                f"holds parameters of {method}, not of {name}",
-                f"Run {method} with it.",
+                file, f"holds parameters of {of_method}, not of {name}", f"Run {of_method} with it."
             )
         parameters |= tuned
-    return name, parameters | dict(arguments.set)
+    return load_method(name, parameters | settings, threads, runtime)
 
 
 def _assignment(text: str) -> tuple[str, int | float | str]:

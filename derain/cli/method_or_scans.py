@@ -41,14 +41,18 @@ def add_method_and_scans(parser: argparse.ArgumentParser, *, help: str) -> None:
     scans.required = False
 
 
-def method_and_scans(arguments: argparse.Namespace) -> tuple[str, list[Path]]:
+def method_and_scans(first: str, others: list[Path], command: str) -> tuple[str, list[Path]]:
     """The method and the scans that a command line means.
+
+    Args:
+        first: The first word, a method or a scan.
+        others: The words after it, scans.
+        command: Name of the command.
 
     Raises:
         InputError: A first word that is neither, or could be both where that matters; a method
             without scans.
     """
-    first, others = arguments.method, arguments.scans or []
     named, there = (
         _names_method(first),
         os.path.isdir(first) or is_file(Path(first)) or _in_bag(first),
@@ -63,7 +67,7 @@ def method_and_scans(arguments: argparse.Namespace) -> tuple[str, list[Path]]:
         return DEFAULT, [Path(first), *others]
     if others:
         return first, others
-    beside = f"`derain {arguments.command} {first} SCANS --out cleaned`"
+    beside = f"`derain {command} {first} SCANS --out cleaned`"
     if there and not _is_method_file(first):
         raise InputError(
             first,

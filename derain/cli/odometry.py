@@ -12,11 +12,12 @@ from statistics import median
 import numpy as np
 from tqdm import tqdm
 
+from derain.bags.names import within
 from derain.cli.arguments import add_threads
-from derain.cli.bag_options import add_topic, in_topic
+from derain.cli.bag_options import add_topic
 from derain.cli.outputs import say, tell
 from derain.cli.pose_files import files_of, tell_whose_poses
-from derain.cli.scan_by_scan import ScanByScan
+from derain.cli.scan_by_scan import ScanByScan, exit_code
 from derain.cli.scan_options import add_columns
 from derain.errors import InputError, printable
 from derain.odometry.recordings import FrameOdometry
@@ -29,8 +30,6 @@ from derain.sources.trajectory import Trajectory, write_trajectory
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import warn
 from derain.system.stopwatch import Stopwatch
-
-SUMMARY = "find where the sensor was, scan by scan"
 
 DESCRIPTION = """\
 Finds how the sensor moved from the scans alone, each laid upon the one before it, and writes its
@@ -112,7 +111,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
-    source = named_frames(in_topic(arguments.sequences, arguments), arguments.columns)
+    source = named_frames(within(arguments.sequences, arguments.topic), arguments.columns)
     recordings = recordings_of(source)
     files = files_of(recordings, arguments.out, arguments.replace)
     times = [_times(recording, arguments.format) for recording in recordings]
@@ -120,6 +119,7 @@ def main(arguments: argparse.Namespace) -> int:
         tell_whose_poses(files, recordings)
     scans, odometry = ScanByScan(source), FrameOdometry(arguments.threads)
     found = [_register(frame, scans, odometry, arguments.json) for frame in scans]
+    untrusted = sum(not registration.trusted for registration in found)
     for recording, file, seconds in zip(recordings, files, times, strict=True):
         of_recording, found = found[: len(recording)], found[len(recording) :]
         try:
@@ -129,7 +129,7 @@ def main(arguments: argparse.Namespace) -> int:
             continue
         summary = _summary(file, of_recording, recording, seconds)
         say(summary, sys.stderr if arguments.json else None)
-    return scans.exit_code("{scans} could not be registered")
+    return exit_code(untrusted, len(source), "{scans} could not be registered")
 
 
 def _register(
@@ -137,13 +137,11 @@ def _register(
 ) -> Registration:
     """Registers one scan, and tells what was found."""
     stopwatch, scan = Stopwatch(), None
-    failed = scans.failed
     with scans.passing_over(frame), stopwatch.stage("read"):
         scan = frame.read()
     with stopwatch.stage("register"):
         registration = odometry.take(frame, scan)
-    if not registration.trusted and scans.failed == failed:
-        scans.failed += 1
+    if scan is not None and not registration.trusted:
         warn(f"{frame.name}: not to be trusted: {registration.reason}")
     residual = None if math.isnan(registration.residual) else registration.residual
     facts = Registered(

@@ -22,26 +22,30 @@ def add_poses(parser: argparse._ActionsContainer) -> None:
     )
 
 
-def placed(source: Source, arguments: argparse.Namespace) -> Source:
-    """The same frames, where the option says that they were taken.
+def placed(source: Source, poses: str | None, threads: int) -> Source:
+    """The same frames with their poses.
 
-    Without it they are as they were: a method that needs poses takes those beside the scans, or
-    finds them as it goes. Where odometry fails, that is warned of.
+    It warns of scans where odometry fails.
+
+    Args:
+        source: The frames.
+        poses: What ``--poses`` names; None leaves the frames as they are.
+        threads: Threads of the odometry; 0 takes all cores.
 
     Raises:
         InputError: Poses that cannot be read or do not fit the scans.
     """
-    if arguments.poses is None:
+    if poses is None:
         return source
-    if arguments.poses != ODOMETRY:
-        return with_poses(source, arguments.poses)
+    if poses != ODOMETRY:
+        return with_poses(source, poses)
     notices = Notices()
     with tqdm(total=len(source), desc=ODOMETRY, unit="scan", disable=None) as bar:
 
-        def tell(frame: Frame, registration: Registration) -> None:
+        def watch(frame: Frame, registration: Registration) -> None:
             notices.tell(frame.name, registration.oddities())
             bar.update()
 
-        posed = with_poses(source, ODOMETRY, arguments.threads, tell)
+        posed = with_poses(source, ODOMETRY, threads, watch)
     notices.tell_how_many_more()
     return posed

@@ -1,24 +1,22 @@
 """Lets it rain on clean scans: ``derain simulate --on``."""
 
-import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.cli.outputs import folder_sink, noting_what_is_written, tell
-from derain.cli.scan_by_scan import ScanByScan
-from derain.errors import InputError, printable
+from derain.cli.outputs import noting_what_is_written, tell
+from derain.cli.scan_by_scan import ScanByScan, exit_code
+from derain.errors import printable
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.recorded import rain_on_scan
 from derain.simulation.sensor import Sensor
-from derain.simulation.sensor_file import load_sensor
-from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.sink import FolderSink
+from derain.sources.source import Source
 
 
 @dataclass(frozen=True)
@@ -46,34 +44,38 @@ class Rained:
         )
 
 
-def rain_on_scans(arguments: argparse.Namespace) -> int:
-    """Runs the command.
+def rain_on_scans(
+    source: Source,
+    rain: UniformRain,
+    sensor: Sensor,
+    sink: FolderSink,
+    seed: int,
+    picture: bool,
+    as_json: bool,
+) -> int:
+    """Writes the scans in the rain, and prints what it did to each.
 
     Args:
-        arguments: Of ``derain simulate``.
+        source: The clean scans.
+        rain: The rain.
+        sensor: The sensor that took the scans.
+        sink: Takes the scans in the rain, with their labels.
+        seed: Random seed.
+        picture: Whether a picture of each scan is drawn.
+        as_json: Whether each line is a JSON object.
 
     Returns:
         Exit code: 2 where a scan was passed over, else 0.
-
-    Raises:
-        InputError: An impossible rate, no such sensor, no scans, or an output that would overwrite
-            them.
     """
-    if not arguments.rain or len(arguments.rain) > 1:
-        raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")
-    rain, sensor = UniformRain(arguments.rain[0]), load_sensor(arguments.sensor or "spinning_64")
-    source = named_frames(arguments.on, arguments.columns)
-    sink = folder_sink(arguments.out, source)
     scans, written = ScanByScan(source), 0
     with noting_what_is_written(lambda: f"{written:,} of {len(source):,} scans are written"):
         for number, frame in enumerate(scans):
-            seed = np.random.SeedSequence(arguments.seed, spawn_key=(number,))
+            generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
             with scans.passing_over(frame):
-                generator = np.random.default_rng(seed)
-                rained = _rain_on(frame, rain, sensor, generator, sink, arguments.picture)
+                rained = _rain_on(frame, rain, sensor, generator, sink, picture)
                 written += 1
-                tell(rained, arguments.json)
-    return scans.exit_code("it could not rain on {scans}")
+                tell(rained, as_json)
+    return exit_code(len(scans.errors), len(source), "it could not rain on {scans}")
 
 
 def _rain_on(

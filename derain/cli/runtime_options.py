@@ -26,10 +26,14 @@ def add_runtime(parser: argparse.ArgumentParser, help: str) -> None:
     )
 
 
-def runtime_of(arguments: argparse.Namespace) -> Runtime:
-    """What is to run a model's network.
+def runtime_of(name: str | None, precision: str | None) -> Runtime:
+    """The runtime and the precision that a command line names.
+
+    Args:
+        name: What ``--runtime`` names; None is the default.
+        precision: What ``--precision`` names; None is the default.
 
     Raises:
-        InputError: No such runtime, or a precision that it has not.
+        InputError: No such runtime, or a precision that it does not have.
     """
-    return Runtime(arguments.runtime or DEFAULT_RUNTIME, arguments.precision or FLOAT32_PRECISION)
+    return Runtime(name or DEFAULT_RUNTIME, precision or FLOAT32_PRECISION)

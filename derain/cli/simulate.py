@@ -6,14 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from derain.cli.arguments import count
-from derain.cli.outputs import say
+from derain.cli.outputs import folder_sink, say
 from derain.cli.scan_options import add_columns
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.system.cores import usable_cores
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
-
-SUMMARY = "make a data set of simulated rain, or let it rain on clean scans"
 
 DESCRIPTION = """\
 Simulates a rain facility in the layout of REHEARSE-3D: LiDAR, radar, both merged, labels, weather.
@@ -150,13 +148,8 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.seed < 0:
         raise InputError("--seed", f"{arguments.seed} is negative", "Give 0 or more.")
     if arguments.on is not None:
-        from derain.cli.rain_on_scans import rain_on_scans
-
-        foreign = [*OF_DATA_SETS, "world"]
-        _settle(arguments, OF_SCANS, foreign, needs="without --on")
-        if arguments.picture:
-            require("--picture", MATPLOTLIB)
-        return rain_on_scans(arguments)
+        _settle(arguments, OF_SCANS, foreign=[*OF_DATA_SETS, "world"], needs="without --on")
+        return _rain_on_scans(arguments)
     require("simulate", OPEN3D)
     if arguments.world is not None:
         foreign = [name for name in (*OF_DATA_SETS, *OF_SCANS) if name not in OF_WORLDS]
@@ -179,6 +172,23 @@ def _settle(
     for name, default in own.items():
         if getattr(arguments, name) is None:
             setattr(arguments, name, default)
+
+
+def _rain_on_scans(arguments: argparse.Namespace) -> int:
+    if arguments.picture:
+        require("--picture", MATPLOTLIB)
+    from derain.cli.rain_on_scans import rain_on_scans
+    from derain.simulation.rain_field import UniformRain
+    from derain.simulation.sensor_file import load_sensor
+    from derain.sources.folders import named_frames
+
+    if not arguments.rain or len(arguments.rain) > 1:
+        raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")
+    rain, sensor = UniformRain(arguments.rain[0]), load_sensor(arguments.sensor or "spinning_64")
+    source = named_frames(arguments.on, arguments.columns)
+    sink = folder_sink(arguments.out, source)
+    options = (arguments.seed, arguments.picture, arguments.json)
+    return rain_on_scans(source, rain, sensor, sink, *options)
 
 
 def _simulate(arguments: argparse.Namespace) -> int:

@@ -6,15 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from derain.bags.names import within
 from derain.cards.card import DataCard, load_card, packaged_cards
 from derain.cards.known import layouts_for
 from derain.cli.arguments import add_threads
-from derain.cli.bag_options import add_topic, in_topic
+from derain.cli.bag_options import add_topic
 from derain.cli.method_options import add_method, add_parameters, method_of
 from derain.cli.outputs import say, tell
 from derain.cli.pose_options import add_poses, placed
-from derain.cli.runtime_options import add_runtime
-from derain.cli.scan_by_scan import ScanByScan
+from derain.cli.runtime_options import add_runtime, runtime_of
+from derain.cli.scan_by_scan import ScanByScan, exit_code
 from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.errors import InputError, printable
 from derain.evaluation.answers import Answers
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
     from derain.sources.method import Method
     from derain.sources.source import Source
     from derain.teaching.manifest import Manifest
-
-SUMMARY = "label recordings by a method, for a network to learn from"
 
 DESCRIPTION = """\
 Labels recordings by what a method says of them, for a network to learn from: 0 is not rain, 1 rain,
@@ -114,17 +113,19 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.teaching.teach import refuse_to_overwrite, teach
 
     keep_freed_memory()
-    method = method_of(arguments)
+    runtime = runtime_of(arguments.runtime, arguments.precision)
+    settings = dict(arguments.set)
+    method = method_of(arguments.method, arguments.parameters, settings, arguments.threads, runtime)
     card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
-        in_topic(arguments.scans, arguments),
+        within(arguments.scans, arguments.topic),
         arguments.columns,
         labelled=True,
         layouts=layouts_for(card),
         recordings=True,
     )
     refuse_to_overwrite(arguments.out, found)
-    source = placed(found, arguments).map(
+    source = placed(found, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
     for sentence in irregularities(source, method.window):
@@ -133,7 +134,8 @@ def main(arguments: argparse.Namespace) -> int:
     telling = _Telling(method, source, card, arguments.json)
     manifest = teach(method, source, arguments.out, card, scans.passing_over, telling.watch)
     telling.tell_all(manifest)
-    return scans.exit_code("{scans} could not be judged, and have no labels")
+    failed = len(scans.errors)
+    return exit_code(failed, len(source), "{scans} could not be judged, and have no labels")
 
 
 class _Telling:

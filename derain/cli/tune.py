@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from derain.scan import Scan
     from derain.sources.frame import Frame
 
-SUMMARY = "find a method's best parameters on labelled scans"
-
 DESCRIPTION = """\
 Finds the parameters of a filter, or the threshold of a model, that give the greatest IoU of rain on
 labelled scans, and writes them for `derain run --parameters` and `derain bench --methods`.

@@ -12,8 +12,6 @@ from derain.cli.scan_options import add_columns, add_intensity_scale
 from derain.default import DEFAULT
 from derain.errors import InputError
 
-SUMMARY = "look at a scan, or a recording, as several methods clean it"
-
 DESCRIPTION = """\
 Draws a scan, its truth where it has labels, and what each method makes of it, from above and as the
 sensor sees it; or writes a whole recording, to be looked at scan after scan in Rerun's viewer.

@@ -56,7 +56,7 @@ def view_recording(arguments: argparse.Namespace) -> int:
         layouts=layouts_for(card),
         recordings=True,
     )
-    source = placed(found, arguments).map(
+    source = placed(found, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
     numbers = range(len(source))[arguments.frames][:: arguments.every]

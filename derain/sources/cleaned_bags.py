@@ -39,13 +39,11 @@ class BagOptions:
         cleaned_topic: Name of a further topic, of clean clouds; None replaces the clouds of the
             topic that is read.
         removed_topic: Name of a further topic, of the points that were removed; None for none.
-        probability: Whether points get a field of their probability to be rain.
         keep_shape: Whether organised clouds stay organised.
     """
 
     cleaned_topic: str | None = None
     removed_topic: str | None = None
-    probability: bool = False
     keep_shape: bool = False
 
 
@@ -58,15 +56,26 @@ class CleanedBags:
         out: The folder to write to.
         source: All frames of the run. Bags of which it has only some clouds are not copied.
         options: What is written of each cloud.
+        probability: Whether points get a field of their probability to be rain.
 
     Raises:
         InputError: A copy would replace or enter a bag that is read, or something that is no bag;
-            or a topic has a name that ROS does not allow, or that the bag has already.
+            or a topic has a name that ROS does not allow, that the bag has already, or that is
+            given twice.
     """
 
-    def __init__(self, out: Path, source: Iterable[Frame], options: BagOptions) -> None:
+    def __init__(
+        self, out: Path, source: Iterable[Frame], options: BagOptions, probability: bool = False
+    ) -> None:
+        if options.cleaned_topic and options.cleaned_topic == options.removed_topic:
+            raise InputError(
+                "--removed-topic",
+                f"{options.removed_topic} is --cleaned-topic too",
+                "Name another.",
+            )
         self.out = out
         self.options = options
+        self.probability = probability
         self._whole = _whole_topics(source)
         for clouds in self._whole:
             self._refuse_clashes(clouds)
@@ -132,7 +141,7 @@ class CleanedBags:
                 cannot be NaN.
         """
         cloud, rain = message.cloud, judgement.rain
-        columns = {RAIN_PROBABILITY: judgement.probability} if self.options.probability else {}
+        columns = {RAIN_PROBABILITY: judgement.probability} if self.probability else {}
 
         def part(rows: NDArray[np.bool_]) -> PointCloud:
             return cloud.take(rows).with_columns({name: columns[name][rows] for name in columns})

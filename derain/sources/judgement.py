@@ -1,6 +1,7 @@
 """What a method says of a scan."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +44,7 @@ class Judgement:
         """Share of rain among the points that can be judged; 0 where there are none."""
         return int(self.rain.sum()) / max(int(self.scan.valid.sum()), 1)
 
-    @property
+    @cached_property
     def weather(self) -> ScanWeather:
         """How bad the weather is that the scan shows: where its rays meet rain, and how far on."""
         return ScanWeather.of(self.scan, self.rain)

@@ -1,8 +1,11 @@
 """Frame after frame of whole recordings given to a method, and what it says of each."""
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
 
+from derain.errors import InputError
+from derain.files.reading import reading
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
@@ -19,6 +22,35 @@ Answer = tuple[Frame, Judgement, Stopwatch]
 def unguarded(frame: Frame) -> AbstractContextManager[None]:
     """Lets whatever is wrong with a frame end the whole work."""
     return nullcontext()
+
+
+class Failures:
+    """Holds back what is wrong with single frames, so that the others go on.
+
+    Args:
+        report: Called with each error.
+
+    Attributes:
+        errors: The errors so far.
+    """
+
+    def __init__(self, report: Callable[[InputError], None]) -> None:
+        self.errors: list[InputError] = []
+        self._report = report
+
+    @contextmanager
+    def passing_over(self, frame: Frame) -> Iterator[None]:
+        """Reports and keeps the error of the block.
+
+        Args:
+            frame: What the block works on.
+        """
+        try:
+            with reading(Path(frame.name)):  # which names the file where the memory is full
+                yield
+        except InputError as error:
+            self.errors.append(error)
+            self._report(error)
 
 
 def judgements(

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import derain
-from derain.cli.main import BROKEN_PIPE, COMMANDS, TRAINING
+from derain.cli.main import BROKEN_PIPE, COMMANDS, TRAINING, module_of
 from derain.evaluation.hard_cases import scene
 
 MAIN = "import sys; from derain.cli.main import main; sys.exit(main())"
@@ -33,7 +33,7 @@ def test_the_help_of_a_command_starts_with_examples_of_it(run_derain, command: s
     outcome = run_derain(command, "--help")
     assert outcome.code == 0
     assert f"\n  derain {command}" in outcome.out.split("options:")[0]
-    assert max(map(len, str(COMMANDS[command].DESCRIPTION).splitlines())) <= 100
+    assert max(map(len, str(module_of(command).DESCRIPTION).splitlines())) <= 100
 
 
 @pytest.mark.parametrize("arguments", [["wash"], [], ["run"], ["run", "model.onnx", "scan.bin"]])
@@ -66,7 +66,7 @@ def test_an_interruption_is_no_traceback(run_derain, monkeypatch: pytest.MonkeyP
     def interrupted(arguments: object) -> int:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(COMMANDS["info"], "main", interrupted)
+    monkeypatch.setattr(module_of("info"), "main", interrupted)
     outcome = run_derain("info", "scan.bin")
     assert (outcome.code, outcome.err) == (130, "derain: interrupted\n")
 

@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from derain.cli.main import COMMANDS
+from derain.cli.main import COMMANDS, module_of
 from derain.cli.parser import Parser
 from derain.cli.scan_options import column_names
 from derain.errors import InputError
 
 
 def parser_of(command: str) -> Parser:
-    parser = Parser(f"derain {command}", description=COMMANDS[command].DESCRIPTION)
-    COMMANDS[command].add_arguments(parser)
+    parser = Parser(f"derain {command}", description=module_of(command).DESCRIPTION)
+    module_of(command).add_arguments(parser)
     return parser
 
 

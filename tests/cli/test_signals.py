@@ -14,7 +14,8 @@ from derain.files.atomic import replacing
 WRITES = """
 import signal, sys, time
 from pathlib import Path
-from derain.cli.main import COMMANDS, main
+from derain.cli import info
+from derain.cli.main import main
 from derain.files.atomic import replacing
 
 def write(arguments):
@@ -23,7 +24,7 @@ def write(arguments):
         print("writing", flush=True)
         time.sleep(60)
 
-COMMANDS["info"].main = write
+info.main = write
 # A shell that starts the tests in the background has them ignore what a terminal would send.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.exit(main(["info", "scan.bin"]))

@@ -188,7 +188,7 @@ def test_an_import_that_no_command_saw_coming_is_told_too(plain: Any) -> None:
         "import sys\n"
         "from derain.cli import main\n"
         "def fails(arguments): import matplotlib.figure\n"
-        "main.COMMANDS['info'].main = fails\n"
+        "main.module_of('info').main = fails\n"
         "sys.stderr = sys.stdout\n"
         "print(main.main(['info', 'x']))"
     )

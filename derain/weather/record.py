@@ -1,4 +1,4 @@
-"""The weather of one scan, as it is printed and written."""
+"""The weather of one scan in figures: how a recording is printed, and written as a table."""
 
 import math
 from dataclasses import dataclass, fields
@@ -17,7 +17,7 @@ SHARE_DIGITS = 5
 
 
 @dataclass(frozen=True)
-class ToldWeather:
+class WeatherRecord:
     """The weather of one scan; None stands for what is not known.
 
     Attributes:
@@ -81,15 +81,15 @@ class ToldWeather:
 
 
 # The columns of a table: the figures of a scan, then the shares by sector and by range.
-FIGURES = [field.name for field in fields(ToldWeather) if field.name != "shares"]
+FIGURES = [field.name for field in fields(WeatherRecord) if field.name != "shares"]
 SECTOR_TITLES = [f"share_at_{360 // RAY_SECTORS * sector}_deg" for sector in range(RAY_SECTORS)]
 BAND_TITLES = [f"share_from_{band}_m" for band in RANGE_BANDS]
 WEATHER_COLUMNS = [*FIGURES, *SECTOR_TITLES, *BAND_TITLES]
 
 
-def row_of(told: ToldWeather, weather: ScanWeather) -> list[object]:
+def row_of(record: WeatherRecord, weather: ScanWeather) -> list[object]:
     """The row of a table, in the order of WEATHER_COLUMNS."""
-    figures = [getattr(told, name) for name in FIGURES]
+    figures = [getattr(record, name) for name in FIGURES]
     return [*figures, *_known(weather.shares_by_sector), *_known(weather.shares_by_range)]
 
 

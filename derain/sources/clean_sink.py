@@ -1,0 +1,154 @@
+"""Scans without their rain: files in a folder, and whole bags written anew."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Self
+
+from derain.errors import InputError
+from derain.files.columns import with_column
+from derain.files.format import format_of
+from derain.scan import Scan
+from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions, CleanedBags
+from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
+from derain.sources.method import Method
+from derain.sources.sink import FolderSink
+from derain.sources.source import Source
+
+
+class CleanSink:
+    """Writes the scans of a source without their rain, and their labels (1 = rain).
+
+    Bags of which all clouds are in the source are written anew. It is a context manager: a bag is
+    in its place when its last cloud is written, the last bag at the end of the block.
+
+    Example:
+        >>> source = derain.named_frames("scan.bin")
+        >>> with derain.CleanSink("cleaned", source, removed="rain") as sink:
+        ...     report = derain.clean(source, derain.FilterDerainer(derain.DROR()), sink)
+        >>> len(derain.read_scan("rain/scan.bin"))
+        20
+
+    Args:
+        folder: Folder to write to, made if missing.
+        source: The scans.
+        removed: Folder for the removed points of files; None leaves them out.
+        probability: Whether the written scans have the column ``rain_probability``.
+        bags: What is written of the clouds of bags.
+
+    Raises:
+        InputError: The folder holds files that must not be overwritten, two scans have one name, or
+            options that contradict each other.
+    """
+
+    def __init__(
+        self,
+        folder: Path | str,
+        source: Source,
+        *,
+        removed: Path | str | None = None,
+        probability: bool = False,
+        bags: BagOptions = BagOptions(),
+    ) -> None:
+        self.probability = probability
+        self._source = source
+        removed = None if removed is None else Path(removed)
+        self._files = FolderSink(Path(folder), again=False, removed=removed)
+        self._files.refuse_clashes(source)
+        self._bags = CleanedBags(Path(folder), source, bags, probability)
+        in_bag = next(filter(self._bags.takes, source), None)
+        if removed is not None and in_bag is not None:
+            raise InputError(
+                "--removed",
+                f"is a folder for files, and {in_bag.name} is in a bag",
+                "Give --removed-topic NAME.",
+            )
+        self._written = 0
+
+    def __enter__(self) -> Self:
+        self._bags.__enter__()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._bags.__exit__(*error)
+
+    def targets(self) -> Iterator[Path]:
+        """Every file and bag that it may write."""
+        for frame in self._source:
+            yield from self._files.files_of(frame)
+        yield from self._bags.targets()
+
+    def write(self, judgement: Judgement) -> None:
+        """Writes a scan without its rain; a method's best guess decides where it is not sure.
+
+        Args:
+            judgement: The scan, judged; scans of a bag come in the order of the bag.
+
+        Raises:
+            InputError: It cannot be written.
+        """
+        frame, rain = judgement.frame, judgement.rain
+        assert frame is not None
+        if self._bags.takes(frame):
+            self._bags.write(judgement)
+            return
+        scan = _with_probability(frame, judgement) if self.probability else judgement.scan
+        removed = None if self._files.removed is None else scan.take(rain)
+        self._files.write(frame, scan.take(~rain), rain, removed)
+        self._written += 1
+
+    def so_far(self) -> str:
+        """Number of scans in files, and of bags, that are written."""
+        scans = sum(not self._bags.takes(frame) for frame in self._source)
+        parts = (
+            (self._written, scans, "scans"),
+            (len(self._bags.written), len(self._bags.targets()), "bags"),
+        )
+        counts = (f"{written:,} of {there:,} {what}" for written, there, what in parts if there)
+        return f"{' and '.join(counts)} are written, each of them whole"
+
+
+def refuse_improbable(method: Method, source: Source) -> None:
+    """Refuses a method without probabilities, and files that cannot name a column.
+
+    It reads the first file of each format.
+
+    Args:
+        method: The method.
+        source: The scans.
+
+    Raises:
+        InputError: The method has no probabilities, or a file does not name its columns.
+    """
+    if not method.gives_probabilities:
+        raise InputError(
+            "--probability",
+            f"{method.as_dict()['method']} says which points are rain, and not how probably",
+            "Leave it out, or take a model or persistence.",
+        )
+    for frame in {frame.suffix: frame for frame in reversed(source)}.values():
+        try:
+            scan = frame.read()
+        except InputError:  # reported when its turn comes
+            continue
+        _refuse_nameless(frame, scan)
+
+
+def _with_probability(frame: Frame, judgement: Judgement) -> Scan:
+    """The judged scan with the column, in place of one of this name.
+
+    Raises:
+        InputError: Its file does not name its columns.
+    """
+    _refuse_nameless(frame, judgement.scan)
+    return with_column(judgement.scan, RAIN_PROBABILITY, judgement.probability)
+
+
+def _refuse_nameless(frame: Frame, scan: Scan) -> None:
+    """Refuses a file in which a further column would have no name."""
+    if frame.suffix and not format_of(Path(frame.name)).names_columns(scan):
+        raise InputError(
+            frame.name,
+            f"the columns of such a file have no names, so that none can be {RAIN_PROBABILITY}",
+            "Leave --probability out, or convert the scans, to .pcd or .npz for instance.",
+        )

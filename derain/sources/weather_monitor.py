@@ -1,0 +1,135 @@
+"""The weather of a recording, scan by scan and of all scans together."""
+
+from collections import Counter
+from dataclasses import dataclass
+
+from derain.errors import InputError
+from derain.sources.frame import Frame
+from derain.sources.recordings import unbroken_recordings
+from derain.sources.source import Source
+from derain.sources.spread import evenly_spaced
+from derain.weather.alarm import ERROR, HOLD, WARNING, Alarm, Level, Threshold
+from derain.weather.record import WeatherRecord
+from derain.weather.scan_weather import ScanWeather
+from derain.weather.visibility import Visibility
+
+# Unless every scan is measured, this many are, spread over the recording.
+SAMPLED_SCANS = 5
+
+
+@dataclass(frozen=True)
+class WeatherOptions:
+    """How the weather of a recording is measured.
+
+    Attributes:
+        every_scan: Whether every scan is measured; otherwise SAMPLED_SCANS are, for the weather of
+            all scans together.
+        warning: Where the warning begins and ends.
+        error: Where the error begins and ends.
+        hold: Number of scans in a row that change the alarm.
+        dry: Reach of dry scans of the same sensor; None without such a reference.
+    """
+
+    every_scan: bool = False
+    warning: Threshold = WARNING
+    error: Threshold = ERROR
+    hold: int = HOLD
+    dry: Visibility | None = None
+
+    def new_alarm(self) -> Alarm:
+        """The alarm at the start of a recording."""
+        return Alarm(self.warning, self.error, self.hold, self.dry)
+
+
+class WeatherMonitor:
+    """Adds up the weather of one scan after the other.
+
+    Args:
+        options: How it is measured.
+        source: The scans.
+
+    Attributes:
+        total: The weather of all measured scans together.
+        scans: Number of measured scans.
+        scans_at: Number of scans at each level, by the alarm of a recording, otherwise by the scan
+            alone; None stands for scans whose level is open. Empty unless every scan is measured.
+    """
+
+    def __init__(self, options: WeatherOptions, source: Source) -> None:
+        self.total = ScanWeather.none()
+        self.scans = 0
+        self.scans_at = Counter[Level | None]()
+        self._options = options
+        self._alarm, self._recording = options.new_alarm(), -1
+        self._recordings = _recording_numbers(source) if options.every_scan else {}
+        sampled = 0 if options.every_scan or len(source) == 1 else SAMPLED_SCANS
+        self._sample = {frame.key for frame in evenly_spaced(source, sampled)}
+        self._reaches: list[float] = []
+
+    def wants(self, frame: Frame) -> bool:
+        """Whether the weather of a scan is measured."""
+        return self._options.every_scan or frame.key in self._sample
+
+    def add(self, frame: Frame, weather: ScanWeather) -> WeatherRecord | None:
+        """Adds the weather of the next scan.
+
+        Args:
+            frame: The scan; a new recording starts with a new alarm.
+            weather: Its weather.
+
+        Returns:
+            Its figures; None unless every scan is measured.
+        """
+        self.total += weather
+        self.scans += 1
+        if weather.reach.metres is not None:
+            self._reaches.append(weather.reach.metres)
+        if not self._options.every_scan:
+            return None
+        level = self._alarm.level_of(weather.visibility, weather.reach)
+        alarm = self._alarm_after(frame, weather)
+        self.scans_at[level if alarm is None else alarm] += 1
+        return WeatherRecord.of(weather, self._options.dry, level, alarm)
+
+    def __str__(self) -> str:
+        """The weather of all scans together, and the number of scans at each level."""
+        if not self.scans:
+            return "visibility not known"
+        dry, reach = self._options.dry, ""
+        if self._reaches:
+            ends = dict.fromkeys(f"{end(self._reaches):.0f}" for end in (min, max))
+            reach = f", reach {' to '.join(ends)} m"
+            reach += "" if dry is None else f" (dry {dry})"
+        text = f"visibility {self.total.visibility}{reach}"
+        if not self._options.every_scan:
+            return f"{text} (of {self.scans} scans)"
+        levels = ", ".join(
+            f"{self.scans_at[level]:,} {'open' if level is None else level}"
+            for level in (*Level, None)
+            if self.scans_at[level]
+        )
+        by = "rain alone" if dry is None else "rain and range"
+        return f"{text} ({levels}, by {by})"
+
+    def _alarm_after(self, frame: Frame, weather: ScanWeather) -> Level | None:
+        """State of the alarm after a scan; None for a scan outside of any recording."""
+        recording = self._recordings.get(frame.key)
+        if recording is None:
+            return None
+        if recording != self._recording:
+            self._recording, self._alarm = recording, self._options.new_alarm()
+        return self._alarm.update(weather.visibility, weather.reach)
+
+
+def time_of(frame: Frame) -> float | None:
+    """Time of a scan in seconds; None where it is not recorded, or the record is damaged."""
+    try:
+        return frame.time
+    except InputError:
+        return None
+
+
+def _recording_numbers(source: Source) -> dict[str, int]:
+    """Number of the recording of each frame, by its key, without frames outside of recordings."""
+    recordings = enumerate(unbroken_recordings(source))
+    return {frame.key: number for number, recording in recordings for frame in recording}
