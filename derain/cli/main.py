@@ -28,10 +28,10 @@ from derain.cli import (
 )
 from derain.cli.parser import Parser
 from derain.cli.signals import interrupting
-from derain.cli.training.configurations import require_configuration
 from derain.cli.training.help import short_help
 from derain.errors import InputError, ScanWarning
 from derain.system.extras import OF_TRAINING, missing_extra, require
+from derain.workflows.configurations import require_configuration
 
 DESCRIPTION = """\
 Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.

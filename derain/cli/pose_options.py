@@ -2,13 +2,9 @@
 
 import argparse
 
-from tqdm import tqdm
-
-from derain.odometry.posed import ODOMETRY, STANDING, with_poses
-from derain.odometry.registration import Registration
-from derain.sources.frame import Frame
+from derain.odometry.posed import ODOMETRY, STANDING
 from derain.sources.source import Source
-from derain.system.notices import Notices
+from derain.workflows.odometry import placed as placed_by
 
 
 def add_poses(parser: argparse._ActionsContainer) -> None:
@@ -23,25 +19,9 @@ def add_poses(parser: argparse._ActionsContainer) -> None:
 
 
 def placed(source: Source, arguments: argparse.Namespace) -> Source:
-    """The same frames, where the option says that they were taken.
-
-    Without it they are as they were: a method that needs poses takes those beside the scans, or
-    finds them as it goes. Where odometry fails, that is warned of.
+    """The frames with the poses that the option names.
 
     Raises:
-        InputError: Poses that cannot be read or do not fit the scans.
+        InputError: As for :func:`derain.workflows.odometry.placed`.
     """
-    if arguments.poses is None:
-        return source
-    if arguments.poses != ODOMETRY:
-        return with_poses(source, arguments.poses)
-    notices = Notices()
-    with tqdm(total=len(source), desc=ODOMETRY, unit="scan", disable=None) as bar:
-
-        def tell(frame: Frame, registration: Registration) -> None:
-            notices.tell(frame.name, registration.oddities())
-            bar.update()
-
-        posed = with_poses(source, ODOMETRY, arguments.threads, tell)
-    notices.tell_how_many_more()
-    return posed
+    return placed_by(source, arguments.poses, arguments.threads)

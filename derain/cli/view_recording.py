@@ -12,10 +12,11 @@ from tqdm import tqdm
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
 from derain.cli.bag_options import in_topic
-from derain.cli.outputs import refuse_unwritable, say
+from derain.cli.outputs import say
 from derain.cli.pose_options import placed
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method, titled
+from derain.files.atomic import refuse_unwritable
 from derain.files.reading import reading
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
