@@ -27,13 +27,13 @@ import torch
 import yaml
 from jsonargparse import ArgumentParser
 
-from derain.cli.training.train import KEPT_IN_TRAINING, keep_freed_memory
 from derain.datamodules.base import ScanDataModule
 from derain.datamodules.order import Pick
 from derain.export.machine import versions
 from derain.learning.batch import Batch
 from derain.learning.task import agree
 from derain.models.base import DerainingModule
+from derain.workflows.training import KEPT_IN_TRAINING, keep_freed_memory
 
 NETWORKS = ("outdet", "salsanext", "lisnownet")
 WORKERS = (0, 1, 2)

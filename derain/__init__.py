@@ -38,7 +38,11 @@ def _table() -> dict[str, str]:
 _MODULE_OF = _table()
 
 # Packages whose modules train networks, and what they are made of.
-_TRAINING, _TORCH = ("derain.models.", "derain.datamodules."), "torch"
+_TRAINING = (
+    *("derain.models.", "derain.datamodules."),
+    *("derain.workflows.fit", "derain.workflows.learn"),
+)
+_TORCH = "torch"
 
 
 def __getattr__(name: str) -> object:

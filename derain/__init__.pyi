@@ -50,5 +50,8 @@ from derain.sources.source import Frames as Frames
 from derain.weather.alarm import Alarm as Alarm
 from derain.weather.alarm import Threshold as Threshold
 from derain.weather.scan_weather import ScanWeather as ScanWeather
+from derain.workflows.fit import fit as fit
+from derain.workflows.learn import learn as learn
+from derain.workflows.learn_config import LearnConfig as LearnConfig
 
 __version__: str

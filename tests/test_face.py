@@ -20,9 +20,9 @@ from lightning import Trainer
 
 import derain
 import derain.datamodules
-from derain.cli.training.train import choices
 from derain.datamodules.base import ScanDataModule
 from derain.models.registry import NETWORKS
+from derain.workflows.training import choices
 
 from .folder_of_examples import prepare
 

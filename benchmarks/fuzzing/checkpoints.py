@@ -173,8 +173,8 @@ def trained() -> bytes:
 
 def go_on(path: Path) -> None:
     """Trains another epoch from a checkpoint, as ``derain fit --ckpt_path`` does."""
-    from derain.cli.training.train import naming_the_trainer
     from derain.models.checkpoint import check_resumable, network_of_checkpoint
+    from derain.workflows.training import naming_the_trainer
 
     check_resumable(path)
     network, arguments = network_of_checkpoint(path)

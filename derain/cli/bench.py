@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from derain.cli.arguments import add_threads, command_line, count
 from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
-from derain.cli.outputs import refuse_unwritable, say
+from derain.cli.outputs import say
 from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.errors import InputError
 from derain.evaluation.published_tables import (
@@ -19,7 +19,7 @@ from derain.evaluation.published_tables import (
     paper_table,
     scans_by_group,
 )
-from derain.files.atomic import replacing
+from derain.files.atomic import refuse_unwritable, replacing
 
 if TYPE_CHECKING:
     from derain.datamodules.loading import Part

@@ -156,8 +156,8 @@ def _run(arguments: list[str]) -> int:
 
 
 def _run_training(arguments: list[str]) -> int:
-    from derain.cli.training.configurations import require_configuration
     from derain.cli.training.help import short_help
+    from derain.workflows.configurations import require_configuration
 
     if {"-h", "--help"} & {*arguments}:
         print(short_help(arguments[0]))

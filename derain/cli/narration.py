@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 
-from derain.cli.outputs import refuse_unwritable
+from derain.files.atomic import refuse_unwritable
 
 # Seconds between reports of how far a command has come: on a terminal (True), and in a file.
 PERIODS = {True: 0.5, False: 15.0}

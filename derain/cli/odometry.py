@@ -3,33 +3,25 @@
 import argparse
 import math
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
-from statistics import median
 
-import numpy as np
 from tqdm import tqdm
 
 from derain.bags.names import within
 from derain.cli.arguments import add_threads
 from derain.cli.bag_options import add_topic
 from derain.cli.outputs import say, tell
-from derain.cli.pose_files import files_of, tell_whose_poses
 from derain.cli.scan_by_scan import ScanByScan, exit_code
 from derain.cli.scan_options import add_columns
-from derain.errors import InputError, printable
-from derain.odometry.recordings import FrameOdometry
+from derain.errors import printable
 from derain.odometry.registration import Registration
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
-from derain.sources.recordings import recordings_of
 from derain.sources.records import POSES
-from derain.sources.trajectory import Trajectory, write_trajectory
 from derain.system.memory import keep_freed_memory
-from derain.system.notices import warn
 from derain.system.stopwatch import Stopwatch
+from derain.workflows.odometry import find_poses
 
 DESCRIPTION = """\
 Finds how the sensor moved from the scans alone, each laid upon the one before it, and writes its
@@ -112,119 +104,37 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
     source = named_frames(within(arguments.sequences, arguments.topic), arguments.columns)
-    recordings = recordings_of(source)
-    files = files_of(recordings, arguments.out, arguments.replace)
-    times = [_times(recording, arguments.format) for recording in recordings]
-    if arguments.format == "kitti":
-        tell_whose_poses(files, recordings)
-    scans, odometry = ScanByScan(source), FrameOdometry(arguments.threads)
-    found = [_register(frame, scans, odometry, arguments.json) for frame in scans]
-    untrusted = sum(not registration.trusted for registration in found)
-    for recording, file, seconds in zip(recordings, files, times, strict=True):
-        of_recording, found = found[: len(recording)], found[len(recording) :]
-        try:
-            _write(file, of_recording, seconds if arguments.format == "tum" else None)
-        except InputError as error:  # the other recordings are none the worse for it
-            tqdm.write(f"derain: {error}", sys.stderr)
-            continue
-        summary = _summary(file, of_recording, recording, seconds)
-        say(summary, sys.stderr if arguments.json else None)
+    scans = ScanByScan(source)
+
+    def show(frame: Frame, registration: Registration, stopwatch: Stopwatch) -> None:
+        tell(_registered(frame, registration, stopwatch), arguments.json)
+
+    recordings = find_poses(
+        source,
+        arguments.out,
+        form=arguments.format,
+        replace=arguments.replace,
+        threads=arguments.threads,
+        guard=scans.passing_over,
+        watch=show,
+    )
+    for found in recordings:
+        if found.fault is None:
+            say(str(found), sys.stderr if arguments.json else None)
+        else:
+            tqdm.write(f"derain: {found.fault}", sys.stderr)
+    untrusted = sum(found.untrusted for found in recordings)
     return exit_code(untrusted, len(source), "{scans} could not be registered")
 
 
-def _register(
-    frame: Frame, scans: ScanByScan, odometry: FrameOdometry, as_json: bool
-) -> Registration:
-    """Registers one scan, and tells what was found."""
-    stopwatch, scan = Stopwatch(), None
-    with scans.passing_over(frame), stopwatch.stage("read"):
-        scan = frame.read()
-    with stopwatch.stage("register"):
-        registration = odometry.take(frame, scan)
-    if scan is not None and not registration.trusted:
-        warn(f"{frame.name}: not to be trusted: {registration.reason}")
-    residual = None if math.isnan(registration.residual) else registration.residual
-    facts = Registered(
+def _registered(frame: Frame, registration: Registration, stopwatch: Stopwatch) -> Registered:
+    return Registered(
         frame.name,
         registration.distance,
         registration.turn,
-        residual,
+        None if math.isnan(registration.residual) else registration.residual,
         registration.matched,
         registration.trusted,
         registration.reason,
         dict(stopwatch.milliseconds),
     )
-    tell(facts, as_json)
-    return registration
-
-
-def _write(
-    file: Path, registrations: Sequence[Registration], times: Sequence[float] | None
-) -> None:
-    """Writes the poses of a recording, unless nothing is known of them."""
-    if len(registrations) > 1 and not any(each.trusted for each in registrations[1:]):
-        raise InputError(
-            file,
-            "was not written: no two scans of the recording could be laid upon one another "
-            f"({registrations[1].reason})",
-            "See that they are consecutive, in order of time, and of one sensor.",
-        )
-    poses = np.array([each.pose for each in registrations])
-    write_trajectory(file, Trajectory(poses, None if times is None else np.array(times)))
-
-
-def _summary(
-    file: Path,
-    registrations: Sequence[Registration],
-    recording: Sequence[Frame],
-    times: Sequence[float],
-) -> str:
-    """What was found of a whole recording."""
-    if len(registrations) == 1:
-        return f"{file}: 1 scan alone tells of no motion: its pose is the identity"
-    moves = registrations[1:]
-    path = sum(each.distance for each in moves)
-    lasted = times[-1] - times[0] if times else 0.0
-    speed = f", {path / lasted:.1f} m/s" if lasted > 0 else ""
-    residuals = [
-        (each.residual, frame.key)
-        for each, frame in zip(moves, recording[1:], strict=True)
-        if not math.isnan(each.residual)
-    ]
-    worst, of_scan = max(residuals, default=(math.nan, "none"))
-    usual = median([residual for residual, _ in residuals] or [math.nan])
-    failed = sum(not each.trusted for each in registrations)
-    return (
-        f"{file}: {len(registrations):,} scans, path {path:.1f} m, {path / len(moves):.2f} m a scan"
-        f"{speed}; residual median {usual:.3f} m, worst {worst:.3f} m "
-        f"({of_scan}); {failed:,} not to be trusted"
-    )
-
-
-def _times(recording: Sequence[Frame], form: str) -> list[float]:
-    """When the scans of a recording were taken, seconds; empty where not all of it is known."""
-    times = [time for frame in recording if (time := frame.time) is not None]
-    if len(times) == len(recording):
-        if form == "tum":
-            _refuse_times_that_turn_back(times, recording)
-        return times
-    if form == "tum":
-        lacking = next(frame for frame in recording if frame.time is None)
-        raise InputError(
-            lacking.name,
-            "nothing says when it was taken, and a line of TUM's form begins with the time",
-            "Write a times.txt beside the scans, a line of seconds each, or take --format kitti.",
-        )
-    return []
-
-
-def _refuse_times_that_turn_back(times: Sequence[float], recording: Sequence[Frame]) -> None:
-    """Refuses times by which poses could not be found again: they have to ascend."""
-    for (earlier, later), frame in zip(pairwise(times), recording[1:], strict=True):
-        if later <= earlier:
-            raise InputError(
-                frame.name,
-                f"was taken at {later:.3f} s, the scan before it at {earlier:.3f} s, and lines of "
-                "TUM's form go by ascending time",
-                "Name the scans in the order that they were taken in, or take --format kitti.",
-            )

@@ -4,7 +4,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, TextIO
 from tqdm import tqdm
 
 from derain.errors import InputError, printable
-from derain.files.atomic import replacing
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
 
@@ -87,22 +86,3 @@ def refuse_taken(option: str, path: Path, written: Iterable[Path]) -> None:
         else:
             continue
         raise InputError(path, reason, f"Give {option} another file.")
-
-
-def refuse_unwritable(path: Path) -> None:
-    """Refuses, before long work, a file that could not be written after it.
-
-    Its folder is made if missing; what is there stays as it is.
-
-    Args:
-        path: The file that is to be written.
-
-    Raises:
-        InputError: It cannot be written.
-    """
-    with suppress(_NotYet), replacing(path):
-        raise _NotYet
-
-
-class _NotYet(Exception):  # noqa: N818, for nothing went wrong
-    """Ends a writing that was only tried."""

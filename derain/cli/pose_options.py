@@ -2,13 +2,7 @@
 
 import argparse
 
-from tqdm import tqdm
-
-from derain.odometry.posed import ODOMETRY, STANDING, with_poses
-from derain.odometry.registration import Registration
-from derain.sources.frame import Frame
-from derain.sources.source import Source
-from derain.system.notices import Notices
+from derain.odometry.posed import ODOMETRY, STANDING
 
 
 def add_poses(parser: argparse._ActionsContainer) -> None:
@@ -20,32 +14,3 @@ def add_poses(parser: argparse._ActionsContainer) -> None:
         f"for each sequence, {STANDING}, or {ODOMETRY} (default: poses.txt beside the scans, else "
         f"{ODOMETRY})",
     )
-
-
-def placed(source: Source, poses: str | None, threads: int) -> Source:
-    """The same frames with their poses.
-
-    It warns of scans where odometry fails.
-
-    Args:
-        source: The frames.
-        poses: What ``--poses`` names; None leaves the frames as they are.
-        threads: Threads of the odometry; 0 takes all cores.
-
-    Raises:
-        InputError: Poses that cannot be read or do not fit the scans.
-    """
-    if poses is None:
-        return source
-    if poses != ODOMETRY:
-        return with_poses(source, poses)
-    notices = Notices()
-    with tqdm(total=len(source), desc=ODOMETRY, unit="scan", disable=None) as bar:
-
-        def watch(frame: Frame, registration: Registration) -> None:
-            notices.tell(frame.name, registration.oddities())
-            bar.update()
-
-        posed = with_poses(source, ODOMETRY, threads, watch)
-    notices.tell_how_many_more()
-    return posed

@@ -10,7 +10,7 @@ from derain.cli.bag_options import add_cleaned_bags, add_topic, bag_options
 from derain.cli.method_options import add_parameters, method_of
 from derain.cli.method_or_scans import RULE, add_method_and_scans, method_and_scans
 from derain.cli.outputs import noting_what_is_written, refuse_taken, say, tell
-from derain.cli.pose_options import add_poses, placed
+from derain.cli.pose_options import add_poses
 from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_by_scan import exit_code, print_error
 from derain.cli.scan_options import add_columns, add_intensity_scale
@@ -32,6 +32,7 @@ from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.views.oddities import MOST_RAIN, Oddity
+from derain.workflows.odometry import placed
 
 DESCRIPTION = f"""\
 Cleans scans: writes <stem>.label (1 = rain, one per row of the input) and the scan without its

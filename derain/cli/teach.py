@@ -4,38 +4,28 @@ import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from derain.bags.names import within
-from derain.cards.card import DataCard, load_card, packaged_cards
+from derain.cards.card import load_card, packaged_cards
 from derain.cards.known import layouts_for
 from derain.cli.arguments import add_threads
 from derain.cli.bag_options import add_topic
 from derain.cli.method_options import add_method, add_parameters, method_of
 from derain.cli.outputs import say, tell
-from derain.cli.pose_options import add_poses, placed
+from derain.cli.pose_options import add_poses
 from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_by_scan import ScanByScan, exit_code
 from derain.cli.scan_options import add_columns, add_intensity_scale
-from derain.errors import InputError, printable
-from derain.evaluation.answers import Answers
+from derain.errors import printable
 from derain.evaluation.counts import or_none
 from derain.evaluation.text_tables import number_text
 from derain.sources.folders import named_frames
-from derain.sources.recordings import irregularities
 from derain.system.memory import keep_freed_memory
-from derain.system.notices import Notices, warn
-from derain.teaching.labels import TAUGHT_CARD
-from derain.views.oddities import much_removed
+from derain.workflows.odometry import placed
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from derain.sources.judging import Answer
-    from derain.sources.method import Method
-    from derain.sources.source import Source
-    from derain.teaching.manifest import Manifest
+    from derain.workflows.teaching import LabelledScan, TeachResults
 
 DESCRIPTION = """\
 Labels recordings by what a method says of them, for a network to learn from: 0 is not rain, 1 rain,
@@ -59,14 +49,14 @@ the record only: they change nothing.
 
 @dataclass(frozen=True)
 class TaughtFacts:
-    """What was said of one scan.
+    """What is printed of one scan.
 
     Attributes:
         scan: Its file.
-        points: Its points that can be judged.
-        rain: Share of them called rain; None, as for those below, where there are no such points.
-        not_rain: Share of them called something else.
-        not_known: Share of them of which it is not known.
+        points: Its valid points.
+        rain: Share of them labelled rain; None, as for those below, without valid points.
+        not_rain: Share of them labelled not rain.
+        not_known: Share of them labelled not known.
         milliseconds: By stage.
     """
 
@@ -76,6 +66,12 @@ class TaughtFacts:
     not_rain: float | None
     not_known: float | None
     milliseconds: dict[str, float]
+
+    @classmethod
+    def of(cls, scan: "LabelledScan") -> "TaughtFacts":
+        """The facts of a labelled scan."""
+        not_rain, rain, unknown = map(or_none, scan.answers.shares.tolist())
+        return cls(scan.name, scan.answers.points, rain, not_rain, unknown, dict(scan.milliseconds))
 
     def __str__(self) -> str:
         return (
@@ -110,7 +106,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    from derain.teaching.teach import refuse_to_overwrite, teach
+    from derain.teaching.teach import refuse_to_overwrite
+    from derain.workflows.teaching import teach_recordings
 
     keep_freed_memory()
     runtime = runtime_of(arguments.runtime, arguments.precision)
@@ -128,68 +125,27 @@ def main(arguments: argparse.Namespace) -> int:
     source = placed(found, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
-    for sentence in irregularities(source, method.window):
-        warn(sentence)
     scans = ScanByScan(source)
-    telling = _Telling(method, source, card, arguments.json)
-    manifest = teach(method, source, arguments.out, card, scans.passing_over, telling.watch)
-    telling.tell_all(manifest)
+    results = teach_recordings(
+        method,
+        source,
+        arguments.out,
+        card=card,
+        guard=scans.passing_over,
+        watch=lambda scan: tell(TaughtFacts.of(scan), arguments.json),
+    )
+    _show(results, sys.stderr if arguments.json else sys.stdout)
     failed = len(scans.errors)
     return exit_code(failed, len(source), "{scans} could not be judged, and have no labels")
 
 
-class _Telling:
-    """Tells of each scan what was said of it, and of all of them at the end."""
-
-    def __init__(
-        self, method: "Method", source: "Source", card: DataCard | None, as_json: bool
-    ) -> None:
-        self.method = method
-        self.frames = {frame.key: frame for frame in source}
-        self.judged = 0
-        self.as_json = as_json
-        self.answers = Answers.none()
-        self.notices = Notices()
-        self.record = None
-        if card is not None and any(frame.has_labels for frame in source):
-            from derain.teaching.truth import TruthRecord
-
-            self.record = TruthRecord(card)
-
-    def watch(self, answer: "Answer", labels: "NDArray[np.uint32]") -> None:
-        """Tells of one scan, as it is judged."""
-        frame, judgement, stopwatch = answer
-        self.judged += 1
-        odd = [*self.method.oddities(judgement), *much_removed(judgement.share_of_rain)]
-        self.notices.tell(frame.name, odd)
-        answers = Answers.of(judgement.scan.with_label(labels), TAUGHT_CARD)
-        self.answers += answers
-        not_rain, rain, unknown = map(or_none, answers.shares.tolist())
-        times = dict(stopwatch.milliseconds)
-        facts = TaughtFacts(frame.name, answers.points, rain, not_rain, unknown, times)
-        tell(facts, self.as_json)
-        if self.record is not None:
-            try:
-                self.record.add(self.frames[frame.key], judgement)
-            except InputError as error:
-                warn(f"not measured: {error}")
-
-    def tell_all(self, manifest: "Manifest") -> None:
-        """Tells of all scans, and of what a student could not do with them."""
-        from derain.teaching.manifest import HELD_OUT_PART
-
-        stream = sys.stderr if self.as_json else sys.stdout
-        self.notices.tell_how_many_more()
-        say(f"{self.judged:,} scans\n{self.answers}", stream)
-        if self.record is not None and self.record.scans:
-            say(
-                f"for the record only, beside {self.record.card.title}'s own labels of "
-                f"{self.record.scans:,} scans, which changed nothing:\n{self.record}",
-                stream,
-            )
-        if nothing := self.judged - len(manifest.scans):
-            warn(f"{nothing:,} of {self.judged:,} scans are left out: of them nothing is known")
-        if not self.answers.rain:
-            warn("no rain was found: a network would learn that nothing is rain")
-        if not any(scan.part == HELD_OUT_PART for scan in manifest.scans):
-            warn("no scan is held out, for that a sequence needs three: all are for training")
+def _show(results: "TeachResults", stream: TextIO) -> None:
+    """Prints the counts of all scans."""
+    say(f"{results.judged:,} scans\n{results.answers}", stream)
+    record = results.record
+    if record is not None and record.scans:
+        say(
+            f"for the record only, beside {record.card.title}'s own labels of "
+            f"{record.scans:,} scans, which changed nothing:\n{record}",
+            stream,
+        )

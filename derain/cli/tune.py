@@ -18,11 +18,11 @@ from derain.cards.rain_found import require_rain
 from derain.cli.arguments import add_threads, command_line, count, file_named, share
 from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
-from derain.cli.outputs import refuse_unwritable, say
+from derain.cli.outputs import say
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.export.methods import PARAMETER_SUFFIXES
-from derain.files.atomic import replacing
+from derain.files.atomic import refuse_unwritable, replacing
 from derain.filters import FILTERS, filter_from
 from derain.filters.parameters import CANDIDATES
 from derain.sources.training_record import overlap

@@ -12,10 +12,10 @@ from tqdm import tqdm
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
 from derain.cli.bag_options import in_topic
-from derain.cli.outputs import refuse_unwritable, say
-from derain.cli.pose_options import placed
+from derain.cli.outputs import say
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method, titled
+from derain.files.atomic import refuse_unwritable
 from derain.files.reading import reading
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
@@ -25,6 +25,7 @@ from derain.sources.recordings import irregularities
 from derain.system.extras import RERUN
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
+from derain.workflows.odometry import placed
 
 if TYPE_CHECKING:
     from derain.playback.selection import Labels, Selection

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from derain.cli.arguments import count
-from derain.cli.outputs import refuse_unwritable
 from derain.errors import InputError
-from derain.files.atomic import replacing
+from derain.files.atomic import refuse_unwritable, replacing
 from derain.files.reading import is_file, reading
 from derain.sources.cleaning import CleanedScan
 from derain.sources.folders import named_frames

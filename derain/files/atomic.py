@@ -3,7 +3,7 @@
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from derain.errors import InputError
@@ -50,3 +50,22 @@ def replacing(path: Path) -> Iterator[Path]:
             f"cannot be written ({error.strerror or error})",
             "Choose a folder that is writable and has room.",
         ) from error
+
+
+def refuse_unwritable(path: Path) -> None:
+    """Refuses, before long work, a file that could not be written after it.
+
+    Its folder is made if missing; an existing file stays as it is.
+
+    Args:
+        path: The file to write later.
+
+    Raises:
+        InputError: It cannot be written.
+    """
+    with suppress(_OnlyTried), replacing(path):
+        raise _OnlyTried
+
+
+class _OnlyTried(Exception):  # noqa: N818, it signals no error
+    """Ends a trial of :func:`replacing` before the file takes its place."""

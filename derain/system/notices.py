@@ -2,7 +2,8 @@
 
 import sys
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Protocol
 
@@ -61,8 +62,25 @@ def warn(text: str) -> None:
     Args:
         text: What of.
     """
+    for record in _records:
+        record.append(text)
     # Not print: a progress bar may stand in the line.
     tqdm.write(f"derain: warning: {printable(text)}", sys.stderr)
+
+
+# Of the blocks of `recorded_warnings` that run, the innermost last.
+_records: list[list[str]] = []
+
+
+@contextmanager
+def recorded_warnings() -> Iterator[list[str]]:
+    """Lends a list of the warnings of :func:`warn`, which grows while the block runs."""
+    record: list[str] = []
+    _records.append(record)
+    try:
+        yield record
+    finally:
+        _records.pop()
 
 
 @cache

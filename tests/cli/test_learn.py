@@ -9,9 +9,6 @@ import pytest
 from matplotlib.image import imread
 from recording_read_back import ReadBack
 
-from derain.cli import learn, learning_report, learning_text, narration
-from derain.cli.lesson import Lesson
-from derain.cli.training import train
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
@@ -20,7 +17,10 @@ from derain.files import read_scan
 from derain.files.labels import read_labels, write_labels
 from derain.scan import Scan
 from derain.system.notices import warn
-from derain.teaching.manifest import Manifest, TaughtScan
+from derain.teaching.manifest import Manifest
+from derain.teaching.shares import TaughtShares
+from derain.workflows import learn, learn_report
+from derain.workflows.teaching import TeachResults
 
 QUICK = ("--teacher", "dror", "--epochs", "1")
 
@@ -28,8 +28,7 @@ QUICK = ("--teacher", "dror", "--epochs", "1")
 @pytest.fixture(autouse=True)
 def _quickly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    # How far a step is has a test of its own, and so has the whole proof.
-    monkeypatch.setattr(narration, "PERIODS", {True: 3600, False: 3600})
+    # The whole proof has a test of its own.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
 
 
@@ -66,8 +65,8 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
     command = ("learn", recording, "--out", "model.onnx", *QUICK)
     outcome = run_derain(*command)
     assert outcome.code == 0, outcome.err
-    commands = [line.split()[2] for line in outcome.out.splitlines() if line.startswith("$ ")]
-    assert commands == ["teach", "fit", "export"]
+    steps = [line.partition(":")[0] for line in outcome.out.splitlines()]
+    assert [step for step in steps if step.istitle()][:3] == ["Teaching", "Training", "Export"]
     derainer = Derainer("model.onnx")
     assert derainer.spec.network == "outdet"
     assert "taught by dror" in derainer.spec.data
@@ -79,10 +78,12 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
     for name in ("teacher", "removed", "held_out_1", "held_out_1_beside"):
         assert f"({name}.png)" in report
         assert imread(work / f"{name}.png")[..., :3].std() > 0
-    assert "Beside the labels" not in report
-    # What the report says is removed is what the model removes.
+    assert "Scores by the labels" not in report
+    # The share in the report is that of the model.
     removed = derainer(scene(600, seed=4)).mean()
-    assert f"removes {removed:.1%} of their points" in report
+    assert f"removes {removed:.1%} of the points" in report
+    for step in ("teach dror", "fit --config outdet_taught.yaml", "export"):
+        assert f"\n    derain {step} " in report
 
     # Again, with labels beside the scans that are all wrong, and asked to measure by them.
     without_labels = weights(Path("model.onnx"))
@@ -99,7 +100,7 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
 
 
 def shows_teacher_and_student(found: ReadBack, recording: Path, work: Path) -> None:
-    """What the viewer is given is what the teacher's labels and the finished model say."""
+    """The Rerun file holds the teacher's labels and the answers of the finished model."""
     teacher, student = found.points("/sensor/scan/teacher"), Derainer("model.onnx")
     removed = found.points("/sensor/methods/student/removed")
     probability = found.points("/sensor/methods/student/probability")
@@ -134,7 +135,7 @@ def test_a_folder_of_something_else_is_not_cleared(run_derain, write: WriteRecor
 
 
 @pytest.mark.parametrize(
-    ("scans", "options", "says"),
+    ("scans", "options", "names"),
     [
         (1, (), "1 scan: too few to learn from some and choose by others"),
         (2, (), "2 scans: too few"),
@@ -142,12 +143,12 @@ def test_a_folder_of_something_else_is_not_cleared(run_derain, write: WriteRecor
         (3, ("--poses", "none.txt", "--teacher", "dror"), "none.txt"),
     ],
 )
-def test_what_cannot_be_learnt_from_is_told_and_leaves_no_model(
-    run_derain, write: WriteRecording, scans: int, options: tuple[str, ...], says: str
+def test_what_cannot_be_learnt_from_is_refused_and_leaves_no_model(
+    run_derain, write: WriteRecording, scans: int, options: tuple[str, ...], names: str
 ) -> None:
     outcome = run_derain("learn", write(scans=scans), "--out", "model.onnx", *options)
     assert outcome.code == 2
-    assert says in outcome.err
+    assert names in outcome.err
     assert not Path("model.onnx").exists()
 
 
@@ -160,39 +161,29 @@ def test_scans_that_nothing_connects_are_refused_with_the_reason(run_derain) -> 
     outcome = run_derain("learn", recording, "--out", "model.onnx")
     assert outcome.code == 2
     assert "no two scans of the recording could be laid upon one another" in outcome.err
-    assert "3 scans could not be registered" in outcome.err
     assert not Path("model.onnx").exists()
 
 
 def test_a_recording_of_which_too_few_scans_can_be_labelled_is_refused_with_the_reason(
     write: WriteRecording, monkeypatch: pytest.MonkeyPatch, run_derain
 ) -> None:
-    recording = write(scans=5)
-    known = [TaughtScan(name, recording / f"{name}.bin", "", 0, "train") for name in "ab"]
+    def teach(*_: object, **options: object) -> TeachResults:
+        warn("2.bin: not to be trusted: it is of another place")
+        return TeachResults(Manifest({"method": "dror"}), 5, TaughtShares(), None)
 
-    def run(command: list[str]) -> int:
-        if command[0] == "odometry":
-            warn("2.bin: not to be trusted: it is of another place")
-            print("poses.txt: 5 scans, 1 not to be trusted")
-        else:
-            Manifest({"method": "persistence"}, known).write(Path("model_learning/taught"))
-        return 0
-
-    monkeypatch.setattr(
-        learn, "Narrator", lambda _, log, steps: narration.Narrator(run, log, steps)
-    )
-    outcome = run_derain("learn", recording, "--out", "model.onnx")
+    monkeypatch.setattr(learn, "teach_recordings", teach)
+    outcome = run_derain("learn", write(scans=5), "--out", "model.onnx", "--teacher", "dror")
     assert outcome.code == 2
-    assert "only 2 of 5 scans could be labelled" in outcome.err
-    assert "2.bin: not to be trusted: it is of another place" in outcome.err
+    assert "only 0 of 5 scans could be labelled" in outcome.err
+    assert outcome.err.count("2.bin: not to be trusted: it is of another place") == 2
 
 
 def test_a_clean_recording_is_refused_with_a_report_of_it(
     run_derain, write: WriteRecording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A recording of which a filter finds nothing to be rain is hard to make up.
-    monkeypatch.setattr(learning_report, "LEAST_RAIN", 1.0)
-    monkeypatch.setattr(learning_text, "LEAST_RAIN", 1.0)
+    monkeypatch.setattr(learn, "LEAST_RAIN", 1.0)
+    monkeypatch.setattr(learn_report, "LEAST_RAIN", 1.0)
     outcome = run_derain("learn", write(), "--out", "model.onnx", *QUICK)
     assert outcome.code == 2
     assert "hardly any rain was found" in outcome.err
@@ -200,78 +191,21 @@ def test_a_clean_recording_is_refused_with_a_report_of_it(
     assert not Path("model.onnx").exists()
 
 
-@pytest.mark.parametrize(
-    ("options", "columns", "fitted_with"),
-    [
-        ((), 4, ["outdet_taught.yaml"]),
-        (("--blind", "--model", "salsanext"), 4, ["salsanext_taught.yaml", "[range,x,y,z]"]),
-        (("--columns", "x,y,z"), 3, ["outdet_taught.yaml", "[x,y,z]"]),
-    ],
-)
-def test_the_student_is_what_was_asked_for(
-    run_derain,
-    write: WriteRecording,
-    monkeypatch: pytest.MonkeyPatch,
-    options: tuple[str, ...],
-    columns: int,
-    fitted_with: list[str],
+def test_a_recording_without_intensities_is_learnt_without(
+    run_derain, write: WriteRecording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording = write(scans=3)
     for scan in recording.iterdir():
-        np.fromfile(scan, np.float32).reshape(-1, 4)[:, :columns].copy().tofile(scan)
-    trained: list[list[str]] = []
-    monkeypatch.setattr(train, "train", lambda arguments: trained.append(arguments) or 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        run_derain("learn", recording, "--out", "model.onnx", *QUICK, *options)
-    (arguments,) = trained
-    assert [word for word in arguments if ".yaml" in word or word.startswith("[")] == fitted_with
-    assert not Path("model.onnx").exists()
+        np.fromfile(scan, np.float32).reshape(-1, 4)[:, :3].copy().tofile(scan)
+    trained: list[dict[str, object]] = []
 
+    def fit(config: str, settings: dict[str, object], quiet: bool) -> None:
+        trained.append(settings)
+        raise InputError("fit", "is not run", "")
 
-@pytest.mark.parametrize(
-    ("teacher", "recordings", "options", "asked"),
-    [
-        ("persistence", 1, (), True),
-        ("persistence", 1, ("--poses", "standing"), False),
-        ("persistence", 1, ("--poses", "odometry"), True),
-        ("persistence", 1, ("--poses", "poses.txt"), False),
-        ("persistence", 2, (), True),
-        ("dror", 1, (), False),
-    ],
-)
-def test_odometry_is_asked_where_nobody_says_where_the_sensor_was(
-    write: WriteRecording,
-    monkeypatch: pytest.MonkeyPatch,
-    run_derain,
-    teacher: str,
-    recordings: int,
-    options: tuple[str, ...],
-    asked: bool,
-) -> None:
-    folders = [write(f"drive{number}", scans=3) for number in range(recordings)]
-    commands: list[list[str]] = []
-
-    def run(command: list[str]) -> int:
-        commands.append(command)
-        return 2
-
-    monkeypatch.setattr(learn, "Narrator", lambda _, log, steps: narration.Narrator(run, log))
-    outcome = run_derain("learn", *folders, "--out", "model.onnx", "--teacher", teacher, *options)
+    monkeypatch.setattr(learn, "fit", fit)
+    outcome = run_derain("learn", recording, "--out", "model.onnx", *QUICK, "--columns", "x,y,z")
     assert outcome.code == 2
-    assert commands[0][0] == ("odometry" if asked else "teach")
+    assert [settings["model.channels"] for settings in trained] == ["[x,y,z]"]
+    assert "no intensities" in outcome.out
     assert not Path("model.onnx").exists()
-
-
-def test_poses_beside_the_scans_are_taken(
-    write: WriteRecording, monkeypatch: pytest.MonkeyPatch, run_derain
-) -> None:
-    recording = write(scans=3)
-    recording.with_name("poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
-    monkeypatch.setattr(
-        learn, "Narrator", lambda _, log, steps: narration.Narrator(commands.append, log)
-    )
-    commands: list[list[str]] = []
-    monkeypatch.setattr(learn, "_fit", None)
-    with pytest.raises(InputError, match="taught"):
-        learn.learn(Lesson([recording], Path("model.onnx"), Path("work")))
-    assert [command[0] for command in commands] == ["teach"]

@@ -9,20 +9,16 @@ import pytest
 import torch
 
 from derain.cards.card import load_card
-from derain.cli.learning_student import network_options
-from derain.cli.lesson import Lesson
-from derain.cli.start import checkpoint_of
 from derain.default import packaged_model
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.runtime import Derainer
 from derain.learning.start import STARTED_FROM
-from derain.models import registry
 from derain.models.checkpoint import load_model, save_model
 from derain.models.outdet import OutDet
-from derain.models.salsanext import SalsaNext
 from derain.scan import Scan
+from derain.workflows.start import checkpoint_of
 
 
 def trained(path: Path, neighbours: int = 4, seed: int = 0) -> OutDet:
@@ -142,7 +138,7 @@ def test_learn_takes_over_what_its_start_sees_and_says_so(
     ("channels", "columns", "options", "says"),
     [
         (("x", "intensity"), 3, (), "has no intensities, which mine.ckpt sees"),
-        (("x", "intensity"), 4, ("--blind",), "mine.ckpt sees intensity, and so will a student"),
+        (("x", "intensity"), 4, ("--blind",), "mine.ckpt sees intensity"),
         (("range",), 4, ("--model", "salsanext"), "mine.ckpt is of outdet, from which salsanext"),
         (("range",), 4, ("--work", "."), "mine.ckpt: lies in ., which this run clears first"),
     ],
@@ -167,20 +163,3 @@ def test_learn_tells_what_does_not_go_with_its_start(
     assert outcome.code == 2
     assert says in outcome.err
     assert not Path("student.onnx").exists()
-
-
-def test_a_network_without_a_configuration_is_trained_as_the_one_that_sees_as_it_does(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    others = {"on_points": OutDet, "on_images": SalsaNext, "outdet": OutDet}
-    monkeypatch.setattr(registry, "NETWORKS", others)
-
-    def options(network: str) -> tuple[str, ...]:
-        lesson = Lesson([Path("drive")], Path("out.onnx"), Path("work"), network, start="mine.ckpt")
-        return network_options(lesson)
-
-    start = ("--start", "mine.ckpt")
-    assert options("outdet") == ("--config", "outdet_taught.yaml", *start)
-    points = ("--config", "outdet_taught.yaml", "--model", "derain.models.outdet.module.OutDet")
-    assert options("on_points") == (*points, *start)
-    assert options("on_images")[:2] == ("--config", "salsanext_taught.yaml")

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from derain.cli.training.configurations import packaged_configs
+from derain.workflows.configurations import packaged_configs
 
 # What `--help` becomes where all options are asked for.
 ALL = "--help-all"

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import yaml
 
-from derain.cli.training.configurations import packaged_configs
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
@@ -20,6 +19,7 @@ from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.system.open3d_import import import_open3d
 from derain.teaching.teach import teach
+from derain.workflows.configurations import packaged_configs
 
 WriteScan = Callable[..., None]
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from derain.cli.training.configurations import packaged_configs
+from derain.workflows.configurations import packaged_configs
 
 
 @pytest.mark.parametrize("command", ["fit", "validate", "test", "predict"])

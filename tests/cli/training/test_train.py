@@ -12,9 +12,9 @@ import torch
 import yaml
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from derain.cli.training.configurations import packaged_configs, with_packaged_configs
 from derain.errors import InputError
 from derain.models.checkpoint import load_model
+from derain.workflows.configurations import packaged_configs, with_packaged_configs
 
 
 @pytest.fixture(autouse=True)

@@ -6,9 +6,9 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from derain.cli.training.options import IMPLIED
 from derain.errors import InputError
 from derain.files.documents import Entry
+from derain.workflows.training_options import IMPLIED
 
 # How jsonargparse names an option that it does not know, on the command line and in a file.
 _UNKNOWN = (

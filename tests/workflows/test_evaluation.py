@@ -7,7 +7,6 @@ import pytest
 from small_bags import small_bag
 
 from derain.cards.card import load_card
-from derain.cli.learning_record import record_of
 from derain.datamodules.taught import Taught
 from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import scene
@@ -16,6 +15,7 @@ from derain.filters import DROR, FilterDerainer
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.teaching.teach import teach
+from derain.workflows.evaluation import scores_by_labels
 
 DROPS = np.arange(300) >= 270
 
@@ -43,7 +43,7 @@ def label(tmp_path: Path, rain: int) -> None:
 def test_teacher_and_student_are_measured_by_the_labels(data: Taught, tmp_path: Path) -> None:
     label(tmp_path, rain=110)
     frames = data.frames("validation")
-    text = record_of(frames, data.card, "wads", student)
+    text = scores_by_labels(frames, data.card, "wads", student)
     (scan,) = map(data.read, frames)
     taught = Counts.of(data.card.rain_of(scan), DROPS)
     rows = {line.split("|")[1].strip(): line for line in text.splitlines() if "|" in line}
@@ -61,12 +61,12 @@ def test_labels_beside_a_bag_measure_too(tmp_path: Path) -> None:
     write_labels(tmp_path / "drive.labels/000002.label", np.where(DROPS, 110, 0))
     teach(FilterDerainer(DROR()), named_frames([bag]), tmp_path / "taught")
     data = Taught(str(tmp_path / "taught"))
-    text = record_of(data.frames("validation"), data.card, "wads", student)
+    text = scores_by_labels(data.frames("validation"), data.card, "wads", student)
     assert "0.750 | 1.000 | 0.857 | 0.750" in text
 
 
 @pytest.mark.parametrize("card", ["wads", "no_such_card"])
-def test_labels_that_cannot_be_used_are_told(data: Taught, tmp_path: Path, card: str) -> None:
+def test_labels_that_cannot_be_used_are_named(data: Taught, tmp_path: Path, card: str) -> None:
     label(tmp_path, rain=65535)
-    text = record_of(data.frames("validation"), data.card, card, student)
+    text = scores_by_labels(data.frames("validation"), data.card, card, student)
     assert text.startswith("Nothing could be measured: ")

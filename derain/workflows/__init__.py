@@ -1,0 +1,1 @@
+"""What commands do, as functions: odometry, teaching, training, learning from a recording."""

@@ -1,0 +1,172 @@
+"""Measures a student on held-out scans: beside its teacher, and by labels where asked to."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from derain.cards.card import DataCard, load_card
+from derain.cards.known import label_of, layouts_for
+from derain.datamodules.taught import Taught
+from derain.errors import InputError
+from derain.evaluation.answers import NOT_KNOWN, RAIN, Answers, AnswersOfScan, answer_of
+from derain.evaluation.counts import SCORES
+from derain.evaluation.rain_counts import RainCounts
+from derain.evaluation.text_tables import markdown_table, number_text
+from derain.pictures.answers import answers_figure
+from derain.pictures.scan_pictures import before_after_figure, save
+from derain.scan import Scan
+from derain.sources.bag_frame import BagFrame
+from derain.sources.file_frame import FileFrame
+from derain.sources.frame import Frame
+from derain.sources.reader import FrameReader
+from derain.sources.spread import evenly_spaced
+from derain.views.morton import first_rows
+from derain.workflows.learn_report import LearnResults
+
+# Returns which points of a scan of N points are rain, bool (N,).
+Student = Callable[[Scan], NDArray[np.bool_]]
+
+# Scans counted of a long recording, held-out scans measured, and of these drawn.
+MOST_COUNTED = 300
+MOST_EVALUATED = 50
+DRAWN = 3
+
+SURE = "teacher, where it is sure"
+
+
+def teacher_answers(data: Taught) -> list[AnswersOfScan]:
+    """The teacher's answers, scan by scan in time order; of a long recording, of a part of it.
+
+    Raises:
+        InputError: A scan that cannot be read.
+    """
+    held_out = evenly_spaced(data.frames("validation"), MOST_EVALUATED)
+    frames = [*evenly_spaced(data.frames("train"), MOST_COUNTED), *held_out]
+    keys = {frame.key for frame in held_out}
+    return [
+        AnswersOfScan(frame.key, frame.key in keys, _answers(data, frame))
+        for frame in tqdm(sorted(frames, key=_in_time), "counting", disable=None)
+    ]
+
+
+def evaluate_student(
+    results: LearnResults, data: Taught, student: Student, card: str | None = None
+) -> None:
+    """Measures a student on held-out scans, and draws some of them.
+
+    Args:
+        results: Takes the answers, the pictures, which lie beside the report, and the scores.
+        data: The scans with the teacher's labels.
+        student: The finished model.
+        card: Data card of the scans' own labels; None measures nothing by them.
+
+    Raises:
+        InputError: A scan that cannot be read, or a picture that cannot be written.
+    """
+    frames = evenly_spaced(data.frames("validation"), MOST_EVALUATED)
+    results.evaluated = [
+        AnswersOfScan(frame.key, True, _answers(data, frame, student))
+        for frame in tqdm(frames, "evaluating", disable=None)
+    ]
+    for number, frame in enumerate(evenly_spaced(data.frames("validation"), DRAWN), 1):
+        _draw(results, data, frame, student, f"held_out_{number}")
+    if card is not None:
+        results.record = scores_by_labels(frames, data.card, card, student)
+
+
+def _answers(data: Taught, frame: Frame, student: Student | None = None) -> Answers:
+    scan = data.read_measured(frame)
+    return Answers.of(scan, data.card, None if student is None else student(scan))
+
+
+def _draw(results: LearnResults, data: Taught, frame: Frame, student: Student, name: str) -> None:
+    """Draws a held-out scan before and after, and the student beside the teacher."""
+    scan = data.read(frame)
+    rain = student(scan)
+    before_after = results.path.with_name(f"{name}.png")
+    heading = f"{frame.key}, held out: cleaned by {results.student}"
+    save(before_after_figure(scan, rain, heading), before_after)
+    results.pictures[before_after] = f"{frame.key} before and after"
+    beside = results.path.with_name(f"{name}_beside.png")
+    heading = f"{frame.key}: {results.teacher} and {results.student}"
+    save(answers_figure(scan, data.card, rain, heading), beside)
+    results.pictures[beside] = f"{frame.key}: teacher and student"
+
+
+def _in_time(frame: Frame) -> tuple[str, int]:
+    return frame.sequence, frame.number
+
+
+def scores_by_labels(frames: Sequence[Frame], taught: DataCard, name: str, student: Student) -> str:
+    """Scores of teacher and student on held-out scans, by the labels that lie beside these.
+
+    It runs when the model is finished: nothing follows from the scores.
+
+    Args:
+        frames: Held-out scans with the teacher's labels.
+        taught: Data card of the teacher's labels.
+        name: Data card of the labels that lie beside the scans.
+        student: The finished model.
+
+    Returns:
+        Tables in Markdown; where the labels cannot be used, the reason.
+    """
+    try:
+        card = load_card(name)
+        return _tables(card, _counted(frames, taught, card, student))
+    except InputError as error:
+        return f"Nothing could be measured: {error}"
+
+
+def _counted(
+    frames: Sequence[Frame], taught: DataCard, card: DataCard, student: Student
+) -> dict[str, RainCounts]:
+    """Teacher and student beside the labels, over all points and where the teacher is sure."""
+    titles = ("teacher", SURE, "student")
+    counts = {t: RainCounts(card.classes, card.rain, unknown=card.unknown) for t in titles}
+    reader, layouts = FrameReader(taught), layouts_for(card)
+    for frame in frames:
+        assert isinstance(frame, FileFrame)  # taught scans lie in files
+        scan = reader.read(frame)
+        answer, rain = answer_of(scan, taught), student(scan)
+        own = (
+            frame.label_beside_bag if isinstance(frame, BagFrame) else label_of(frame.path, layouts)
+        )
+        labelled = replace(frame, label_path=own).read_label(len(scan))
+        rows = first_rows(scan) if card.deduplicate else np.flatnonzero(scan.valid)
+        sure = rows[answer[rows] != NOT_KNOWN]
+        truth = scan.with_label(labelled)
+        counts["teacher"].add(truth.take(rows), answer[rows] == RAIN)
+        counts[SURE].add(truth.take(sure), answer[sure] == RAIN)
+        counts["student"].add(truth.take(rows), rain[rows])
+    return counts
+
+
+def _tables(card: DataCard, counts: Mapping[str, RainCounts]) -> str:
+    """Scores over the points of all scans, and the share of each class that is called rain."""
+    scores = [
+        [title, *(number_text(getattr(counted.pooled(), score)) for score in SCORES)]
+        for title, counted in counts.items()
+    ]
+    of_classes = {title: counted.by_class() for title, counted in counts.items()}
+    called = [
+        [
+            name + " (rain)" * of_class.rain,
+            f"{of_class.points:,}",
+            *(f"{of_classes[title][name].share_lost:.2%}" for title in ("teacher", "student")),
+        ]
+        for name, of_class in of_classes["student"].items()
+        if of_class.points
+    ]
+    return "\n\n".join(
+        (
+            f"Labels of {card.title} on the held-out scans, pooled over their points. They were "
+            "read when the model was finished, and chose nothing.",
+            markdown_table(("", "P", "R", "F1", "IoU"), scores),
+            "Called rain, by class:",
+            markdown_table(("class", "points", "teacher", "student"), called),
+        )
+    )

@@ -1,0 +1,118 @@
+"""Trains a network from a packaged configuration or one of your own."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import lightning
+from lightning.pytorch.callbacks import Callback, ModelCheckpoint
+from tqdm import tqdm
+
+from derain.workflows.lightning_silence import quiet_lightning
+from derain.workflows.training import run_trainer
+
+
+@dataclass(frozen=True)
+class FitResults:
+    """A finished training.
+
+    Attributes:
+        checkpoint: The best checkpoint.
+        folder: Folder of the logs and the configuration; None without a logger.
+        metrics: Values that the last epoch logged, by name.
+    """
+
+    checkpoint: Path
+    folder: Path | None
+    metrics: Mapping[str, float]
+
+    @property
+    def iou(self) -> float | None:
+        """IoU of rain on the validation scans after the last epoch; None where it has none."""
+        return self.metrics.get("val_iou")
+
+
+def fit(
+    config: str | Path | None = None,
+    settings: Mapping[str, Any] | None = None,
+    quiet: bool = False,
+) -> FitResults:
+    """Trains a network, as ``derain fit`` does.
+
+    Example:
+        >>> settings = {"data.root": "taught", "trainer.max_epochs": 3}
+        >>> results = fit("outdet_taught.yaml", settings)  # doctest: +SKIP
+        >>> results.checkpoint, results.iou  # doctest: +SKIP
+        (PosixPath('runs/outdet_taught/version_0/checkpoints/best.ckpt'), 0.93)
+        >>> " ".join(fit_options("outdet_taught.yaml", settings))
+        '--config outdet_taught.yaml --data.root taught --trainer.max_epochs 3'
+
+    Args:
+        config: A YAML file, or the name of a packaged configuration; None where the settings are
+            the whole configuration.
+        settings: Values of the options of ``derain fit``, by name: ``{"data.root": "WADS",
+            "trainer.max_epochs": 5}``. They replace those of the configuration.
+        quiet: Whether one bar over the epochs stands for all that Lightning prints.
+
+    Raises:
+        InputError: A configuration, option or checkpoint that cannot be used, a folder that cannot
+            be written, or data that cannot be read.
+    """
+    options = fit_options(config, settings or {})
+    if quiet:
+        with quiet_lightning():
+            run = run_trainer(
+                ["fit", *options],
+                trainer={"enable_progress_bar": False, "callbacks": [EpochBar()]},
+            )
+    else:
+        run = run_trainer(["fit", *options])
+    trainer = run.trainer
+    best = trainer.checkpoint_callback
+    assert isinstance(best, ModelCheckpoint)  # every run has one
+    return FitResults(
+        Path(best.best_model_path),
+        None if trainer.log_dir is None else Path(trainer.log_dir),
+        {name: float(value) for name, value in trainer.callback_metrics.items()},
+    )
+
+
+def fit_options(config: str | Path | None, settings: Mapping[str, Any]) -> list[str]:
+    """The options of ``derain fit`` that do the same as :func:`fit`.
+
+    Args:
+        config: As for :func:`fit`.
+        settings: As for :func:`fit`.
+    """
+    words = [] if config is None else ["--config", str(config)]
+    for name, value in settings.items():
+        text = str(value) if isinstance(value, str | Path) else json.dumps(value)
+        words += [f"--{name}", text]
+    return words
+
+
+class EpochBar(Callback):
+    """A progress bar over the epochs of a training, on terminals alone."""
+
+    def on_train_start(
+        self, trainer: lightning.Trainer, pl_module: lightning.LightningModule
+    ) -> None:
+        """Shows the bar."""
+        hidden = None if trainer.is_global_zero else True
+        self.bar = tqdm(desc="training", total=trainer.max_epochs, unit="epoch", disable=hidden)
+
+    def on_train_epoch_end(
+        self, trainer: lightning.Trainer, pl_module: lightning.LightningModule
+    ) -> None:
+        """Moves it on, with the IoU on the validation scans."""
+        if "val_iou" in trainer.callback_metrics:
+            self.bar.set_postfix(IoU=f"{trainer.callback_metrics['val_iou']:.3f}", refresh=False)
+        self.bar.update()
+
+    def on_train_end(
+        self, trainer: lightning.Trainer, pl_module: lightning.LightningModule
+    ) -> None:
+        """Removes it."""
+        self.bar.close()

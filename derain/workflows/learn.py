@@ -1,0 +1,263 @@
+"""Learns to take out rain from an unlabelled recording: teacher, network, ONNX file, report."""
+
+import shlex
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from derain.datamodules.taught import Taught
+from derain.errors import InputError
+from derain.export.methods import load_method, named_method
+from derain.export.onnx_file import export
+from derain.export.runtime import Derainer
+from derain.files.atomic import refuse_unwritable, replacing
+from derain.files.reading import reading
+from derain.models.checkpoint import load_model
+from derain.odometry.posed import ODOMETRY, STANDING
+from derain.sources.folders import named_frames
+from derain.sources.frame import Frame
+from derain.sources.recordings import recordings_of
+from derain.sources.records import POSES
+from derain.sources.source import Source
+from derain.system.memory import keep_freed_memory
+from derain.system.notices import recorded_warnings, warn
+from derain.teaching.held_out import FEWEST_SCANS
+from derain.workflows.evaluation import evaluate_student, teacher_answers
+from derain.workflows.fit import fit, fit_options
+from derain.workflows.learn_config import (
+    LearnConfig,
+    epochs_of,
+    network_settings,
+    with_network,
+    without_intensity,
+)
+from derain.workflows.learn_report import LEAST_RAIN, LearnResults, write_report
+from derain.workflows.odometry import find_poses, placed
+from derain.workflows.steps import Show, Steps, show_nothing
+from derain.workflows.teaching import TeachResults, teach_recordings
+
+# A folder with this file may be cleared by a second run.
+MARK = "learning.txt"
+
+
+def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
+    """Labels a recording by a teacher, trains a network on the labels, exports and measures it.
+
+    Example:
+        >>> drive = LearnConfig([Path("drive")], Path("model.onnx"))
+        >>> learn(drive, print).agreement.agreement.iou  # doctest: +SKIP
+        0.93
+        >>> learn(LearnConfig([Path("scan.bin")], Path("model.onnx")))  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+            ...
+        derain.errors.InputError: scan.bin: 1 scan: too few to learn from ...
+
+    Args:
+        config: What is learnt from what.
+        show: Receives a line for each step, and one for its result.
+
+    Returns:
+        How good teacher and student are; the report holds the same.
+
+    Raises:
+        InputError: Too few scans, or too few that can be labelled; a folder that holds something
+            else; nothing to be learnt; or what a step raises. No model is left then.
+    """
+    config = with_network(config)
+    source = named_frames(config.recordings, config.columns)
+    _refuse_too_few(config, source)
+    refuse_unwritable(config.out)
+    _clear(config.work)
+    keep_freed_memory()
+    show(f"{len(source):,} scans to learn from. Everything but the model goes to {config.work}/")
+    if not config.blind and source[0].read().intensity is None:
+        config = without_intensity(config)
+        show("The scans have no intensities: the network learns without.")
+    steps = Steps(show)
+    with recorded_warnings() as warnings:
+        poses = _find_poses(config, source, steps)
+        _teach(config, poses, len(source), steps, warnings)
+        data = Taught(str(config.taught))
+        results = LearnResults(
+            title=", ".join(map(str, config.recordings)),
+            teacher=config.teacher,
+            student=config.student,
+            model=config.out,
+            path=config.work / "report.md",
+            scans=teacher_answers(data),
+            stood=config.poses == STANDING,
+            sees_intensity=not config.blind,
+            warnings=warnings,
+            commands=commands(config, source, poses),
+        )
+        write_report(results)  # the teacher's labels are worth a look, whatever follows
+        _refuse_clean(results)
+        _fit(config, steps)
+        _export(config, steps)
+    evaluate_student(results, data, Derainer(config.out), config.card)
+    write_report(results)
+    show(f"Done in {steps.elapsed}")
+    return results
+
+
+def commands(config: LearnConfig, source: Source, poses: str | None) -> list[str]:
+    """Commands that repeat the steps of :func:`learn`.
+
+    Args:
+        config: What is learnt, with its network.
+        source: The scans.
+        poses: Poses that the teacher is given; None for those beside the scans.
+    """
+    scans, columns = [*map(str, config.recordings)], ("--columns", ",".join(config.columns))
+    taught = str(config.taught)
+    steps: list[Sequence[str]] = []
+    if config.needs_odometry(source):
+        steps += [("odometry", *scans, "--out", str(_poses_file(config, source)), *columns)]
+    given = () if poses is None else ("--poses", poses)
+    steps += [
+        ("teach", config.teacher, *scans, "--out", taught, *given, *columns),
+        ("fit", *fit_options(*_training(config))),
+        ("export", str(config.checkpoint), "--out", str(config.out)),
+    ]
+    return [f"derain {shlex.join(words)}" for words in steps]
+
+
+def _refuse_too_few(config: LearnConfig, source: Source) -> None:
+    """Refuses a recording in which nothing can be held out."""
+    if len(source) < FEWEST_SCANS:
+        scans = "1 scan" if len(source) == 1 else f"{len(source)} scans"
+        raise InputError(
+            config.recordings[0],
+            f"{scans}: too few to learn from some and choose by others",
+            f"Record {FEWEST_SCANS} or more, one right after the other; twenty are enough.",
+        )
+
+
+def _clear(work: Path) -> None:
+    """Makes the folder of everything but the model anew.
+
+    Raises:
+        InputError: It holds something that no earlier run has written.
+    """
+    mark = work / MARK
+    if work.is_dir() and any(work.iterdir()) and not mark.is_file():
+        raise InputError(
+            work, "holds something other than what an earlier run left", "Give another --work."
+        )
+    refuse_unwritable(mark)
+    for left in work.iterdir():
+        shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
+    with replacing(mark) as temporary:
+        temporary.write_text("Written by derain learn, which clears this folder.\n", "utf-8")
+
+
+def _poses_file(config: LearnConfig, source: Source) -> Path:
+    return config.work / (POSES if len(recordings_of(source)) == 1 else "poses")
+
+
+def _find_poses(config: LearnConfig, source: Source, steps: Steps) -> str | None:
+    """Runs odometry where the teacher needs it.
+
+    Returns:
+        The poses for the teacher, as :func:`derain.workflows.odometry.placed` takes them.
+    """
+    if not config.needs_odometry(source):
+        return config.poses
+    file = _poses_file(config, source)
+    steps.begin(f"Odometry: poses of {len(source):,} scans")
+    recordings = find_poses(source, file, guard=_warning_of)
+    faults = [found.fault for found in recordings if found.fault is not None]
+    if len(faults) == len(recordings):
+        raise faults[0]
+    steps.end("\n        ".join(str(found) for found in recordings if found.fault is None))
+    # A file of poses does not mark where odometry failed; done again, it leaves a gap there.
+    failed = any(found.untrusted for found in recordings)
+    return ODOMETRY if failed else str(file)
+
+
+def _teach(
+    config: LearnConfig, poses: str | None, scans: int, steps: Steps, warnings: Sequence[str]
+) -> TeachResults:
+    """Has the teacher label the scans.
+
+    Raises:
+        InputError: So few scans are labelled that none of them is held out.
+    """
+    found = named_frames(config.recordings, config.columns, labelled=True, recordings=True)
+    method = load_method(*named_method(config.teacher))
+    steps.begin(f"Teaching: {config.teacher} labels the scans")
+    results = teach_recordings(method, placed(found, poses), config.taught, guard=_warning_of)
+    labelled = len(results.manifest.scans)
+    if not results.held_out:
+        reason = f": {warnings[0]}" if warnings else ""
+        raise InputError(
+            config.recordings[0],
+            f"only {labelled} of {scans} scans could be labelled, and a recording needs "
+            f"{FEWEST_SCANS}{reason}",
+            "Record scans that overlap.",
+        )
+    steps.end(f"{labelled:,} scans labelled")
+    return results
+
+
+@contextmanager
+def _warning_of(frame: Frame) -> Iterator[None]:
+    """Turns what is wrong with one scan into a warning; the others go on."""
+    try:
+        with reading(Path(frame.name)):
+            yield
+    except InputError as error:
+        warn(str(error))
+
+
+def _refuse_clean(results: LearnResults) -> None:
+    """Refuses to train on a recording in which the teacher has found nothing to learn.
+
+    Raises:
+        InputError: No point of which it is sure, or hardly any rain among them.
+    """
+    taught = results.taught
+    if taught.shares[2] == 1 or not taught.points:
+        raise InputError(
+            results.title,
+            f"{results.teacher} is sure of no point, so that there is nothing to learn",
+            f"See {results.path}: the scans have to follow one another, and to overlap.",
+        )
+    if taught.rain_among_known < LEAST_RAIN:
+        raise InputError(
+            results.title,
+            f"hardly any rain was found ({taught.rain_among_known:.3%} of the points that "
+            f"{results.teacher} is sure of): it seems to be clean",
+            f"Record in rain. What was found: {results.path}.",
+        )
+
+
+def _training(config: LearnConfig) -> tuple[str, dict[str, object]]:
+    """Configuration and settings of the training, for :func:`derain.workflows.fit.fit`."""
+    file, network = network_settings(config)
+    return file, {
+        **network,
+        "data.root": config.taught,
+        "trainer.logger.save_dir": config.work / "runs",
+        "checkpoint.dirpath": config.work,
+        "checkpoint.filename": config.checkpoint.stem,
+        "trainer.max_epochs": epochs_of(config),
+    }
+
+
+def _fit(config: LearnConfig, steps: Steps) -> None:
+    """Trains the student, and keeps the epoch that agrees best with the teacher."""
+    steps.begin(f"Training: {config.student}, {epochs_of(config)} epochs")
+    trained = fit(*_training(config), quiet=True)
+    scored = trained.iou is not None
+    steps.end(f"IoU {trained.iou:.3f} on held-out scans, last epoch" if scored else "trained")
+
+
+def _export(config: LearnConfig, steps: Steps) -> None:
+    steps.begin(f"Export: {config.out}")
+    proof = export(load_model(config.checkpoint), config.out)
+    steps.end(
+        f"{config.out.stat().st_size:,} bytes; beside PyTorch the largest logit difference is "
+        f"{proof.worst.difference:.1e}, {proof.flipped:,} labels differ"
+    )

@@ -1,0 +1,182 @@
+"""What is learnt from which recording, and by which network."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import yaml
+
+from derain.errors import InputError
+from derain.files import DEFAULT_COLUMNS
+from derain.odometry.posed import ODOMETRY
+from derain.sources.source import Source
+from derain.workflows.configurations import packaged_configs
+from derain.workflows.start import checkpoint_of
+
+PERSISTENCE = "persistence"
+
+# Networks that learn from labels, and the beginning of their configurations' names.
+STUDENTS = ("outdet", "salsanext", "salsanext_lite")
+
+# Channels of a network that is blind to intensity, as the option `--model.channels` takes them.
+BLIND = {"outdet": "[x,y,z]", "salsanext": "[range,x,y,z]", "salsanext_lite": "[range,x,y,z]"}
+
+
+@dataclass(frozen=True)
+class LearnConfig:
+    """What is learnt from what.
+
+    Example:
+        >>> config = LearnConfig([Path("drive")], Path("model.onnx"), epochs=5)
+        >>> str(config.work), config.teacher
+        ('model_learning', 'persistence')
+
+    Attributes:
+        recordings: Folders of consecutive scans, or bags.
+        out: The ONNX file.
+        folder: Folder of everything else; None for ``<out>_learning`` beside the model. A second
+            run clears it.
+        model: Name of the network; None for that of the start, and for 3D-OutDet without one.
+        teacher: Name of the teacher, or the file of a model.
+        poses: Poses of the scans, as the option ``--poses`` takes them; None for those beside the
+            scans, and for odometry where there are none.
+        blind: Whether the network learns without intensity.
+        columns: Names of the columns of files that do not name them.
+        epochs: Epochs of the training; None for those of the network's configuration.
+        card: Data card of the scans' own labels, which measure the finished model; None measures
+            nothing.
+        start: The trained model whose weights the network begins with; None draws them at random.
+    """
+
+    recordings: Sequence[Path]
+    out: Path
+    folder: Path | None = None
+    model: str | None = None
+    teacher: str = PERSISTENCE
+    poses: str | None = None
+    blind: bool = False
+    columns: Sequence[str] = DEFAULT_COLUMNS
+    epochs: int | None = None
+    card: str | None = None
+    start: str | None = None
+
+    @property
+    def work(self) -> Path:
+        """Folder of everything but the model."""
+        return self.folder or self.out.with_name(f"{self.out.stem}_learning")
+
+    @property
+    def student(self) -> str:
+        """Title of the student in a report."""
+        blind = ", blind to intensity" if self.blind else ""
+        start = "" if self.start is None else f", started from {self.start}"
+        return f"{self.model}{blind}{start}"
+
+    @property
+    def taught(self) -> Path:
+        """Folder of the teacher's labels."""
+        return self.work / "taught"
+
+    @property
+    def checkpoint(self) -> Path:
+        """Checkpoint of the student, the best by its agreement with the teacher."""
+        return self.work / "student.ckpt"
+
+    def needs_odometry(self, source: Source) -> bool:
+        """Whether the teacher needs poses and neither the configuration nor the scans have them.
+
+        Args:
+            source: The scans.
+
+        Raises:
+            InputError: A record of poses that is damaged or does not fit the scans.
+        """
+        known = self.poses is not None or all(frame.pose is not None for frame in source)
+        return self.teacher == PERSISTENCE and (self.poses == ODOMETRY or not known)
+
+
+def with_network(config: LearnConfig) -> LearnConfig:
+    """The same configuration with the network: a student has the channels of its start.
+
+    Raises:
+        InputError: A start that cannot be read, that lies in the folder to be cleared, that is of
+            another network, or that sees intensity where the student is to be blind.
+    """
+    if config.start is None:
+        return replace(config, model=config.model or STUDENTS[0])
+    from derain.models.checkpoint import load_model
+
+    checkpoint = checkpoint_of(config.start)
+    if config.work.resolve() in checkpoint.resolve().parents:
+        raise InputError(
+            config.start,
+            f"lies in {config.work}, which this run clears first",
+            "Give another --work, or copy it elsewhere.",
+        )
+    spec = load_model(checkpoint).spec
+    if config.model not in (None, spec.network):
+        raise InputError(
+            "--model",
+            f"{config.start} is of {spec.network}, from which {config.model} cannot start",
+            f"Leave --model out, or give a start of {config.model}.",
+        )
+    sees_intensity = "intensity" in spec.channels
+    if config.blind and sees_intensity:
+        raise InputError(
+            "--blind",
+            f"{config.start} sees intensity, and so does a student that starts from it",
+            "Leave one of the two out, or give a start that is blind to intensity.",
+        )
+    return replace(config, model=spec.network, blind=not sees_intensity)
+
+
+def without_intensity(config: LearnConfig) -> LearnConfig:
+    """The same configuration for a recording without intensities.
+
+    Raises:
+        InputError: A start that sees intensity.
+    """
+    if config.start is not None:
+        raise InputError(
+            config.recordings[0],
+            f"has no intensities, which {config.start} sees",
+            "Give a start that is blind to intensity, or none.",
+        )
+    return replace(config, blind=True)
+
+
+def network_settings(config: LearnConfig) -> tuple[str, dict[str, str]]:
+    """The configuration of the student's training, and settings of its network.
+
+    Args:
+        config: What is learnt, with its network.
+
+    Returns:
+        The two as :func:`derain.workflows.fit.fit` takes them.
+    """
+    file, settings = _configuration(str(config.model))
+    if config.start is not None:
+        settings["start"] = config.start
+    elif config.blind:
+        settings["model.channels"] = BLIND[str(config.model)]
+    return file, settings
+
+
+def epochs_of(config: LearnConfig) -> int:
+    """Epochs of the training: those of the configuration, or those that are usual."""
+    file, _ = _configuration(str(config.model))
+    usual = yaml.safe_load(packaged_configs()[file].read_text("utf-8"))["trainer"]["max_epochs"]
+    return config.epochs or int(usual)
+
+
+def _configuration(network: str) -> tuple[str, dict[str, str]]:
+    """The packaged configuration of a network; without one, that of a network of the same view."""
+    from derain.models.registry import NETWORKS
+    from derain.views.neighbours import NeighbourView
+
+    own = f"{network}_taught.yaml"
+    if own in packaged_configs():
+        return own, {}
+    kind = NETWORKS[network]
+    alike = "outdet" if issubclass(kind.VIEW, NeighbourView) else "salsanext"
+    return f"{alike}_taught.yaml", {"model": f"{kind.__module__}.{kind.__qualname__}"}

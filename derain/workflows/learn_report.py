@@ -1,0 +1,258 @@
+"""The report on a network that a teacher has taught: how far to trust it, and when not to."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from derain.evaluation.answers import Answers, AnswersOfScan, coarse_bands, total
+from derain.evaluation.counts import Counts
+from derain.evaluation.text_tables import markdown_table, number_text
+from derain.files.atomic import replacing
+from derain.pictures.answers import removed_figure, teacher_figure
+from derain.pictures.scan_pictures import save
+
+# Shares of rain among the points that a teacher is sure of. Less than a thousandth of a scan is
+# what a few moving things make of clean air. Of simulated dry streets persistence calls up to .7 %
+# rain, the leaves and boughs (BENCHMARK.md): such a recording is learnt from, with a warning.
+LEAST_RAIN = 0.001
+DOUBTFUL_RAIN = 0.01
+
+# Bounds beyond which the report raises no doubt. They choose nothing: they are what a reader is
+# to look at.
+ENOUGH_SCANS = 10
+ENOUGH_KNOWN = 0.7
+ENOUGH_AGREEMENT = 0.7
+ENOUGH_RAIN = 1000
+MORE_THAN_TAUGHT = 1.5
+MORE_BY = 0.005
+
+ALWAYS = """\
+- The held-out scans are of the same drive as those that the student learnt from. They measure
+  nothing of another sensor, another mounting, heavier rain or another kind of it.
+- Agreement is not truth: where the teacher errs in the same way again and again, such as on cars
+  that move as it does, the student learns the error, and the agreement does not show it. The
+  pictures do: look for red and blue on things.
+- Run the model on a recording in dry air, and check that it removes nothing: `derain run` prints
+  the share."""
+
+AGREEMENT_EXPLAINED = """\
+P, R and IoU compare the student with the teacher as if that were the truth, on the points of
+held-out scans that the teacher is sure of. A student can be better than its teacher: it does not
+learn errors that the teacher makes only now and then."""
+
+
+@dataclass
+class LearnResults:
+    """What was learnt from a recording.
+
+    Attributes:
+        title: The recording.
+        teacher: Name of the teacher.
+        student: Name of the network, and what it sees.
+        model: The ONNX file.
+        path: File of the report.
+        scans: The teacher's answers, scan by scan in time order.
+        evaluated: The student's answers beside them on held-out scans; none before it is trained.
+        stood: Whether the sensor stood, by the configuration.
+        sees_intensity: Whether the student does.
+        warnings: Warnings of all steps, in order.
+        pictures: What each picture shows, by file in the folder of the report.
+        record: Scores by the scans' own labels, in Markdown; empty where none were measured.
+        commands: Commands that repeat the steps.
+    """
+
+    title: str
+    teacher: str
+    student: str
+    model: Path
+    path: Path
+    scans: Sequence[AnswersOfScan]
+    evaluated: Sequence[AnswersOfScan] = ()
+    stood: bool = False
+    sees_intensity: bool = True
+    warnings: Sequence[str] = ()
+    pictures: dict[Path, str] = field(default_factory=dict)
+    record: str = ""
+    commands: Sequence[str] = ()
+
+    @property
+    def taught(self) -> Answers:
+        """The teacher's answers of all scans."""
+        return total([scan.answers for scan in self.scans])
+
+    @property
+    def agreement(self) -> Answers:
+        """The student's answers beside the teacher's, of the held-out scans."""
+        return total([scan.answers for scan in self.evaluated])
+
+    @property
+    def trained_on(self) -> int:
+        """How many scans the student learns from."""
+        return sum(not scan.held_out for scan in self.scans)
+
+    def __str__(self) -> str:
+        """Two or three sentences."""
+        _, rain, unknown = self.taught.shares
+        text = (
+            f"{self.teacher} labels {len(self.scans):,} scans: {number_text(rain, '.1%')} of the "
+            f"points are rain, {number_text(unknown, '.1%')} are not known."
+        )
+        if self.evaluated:
+            iou, removed = self.agreement.agreement.iou, self.agreement.removed
+            text += (
+                f" On held-out scans {self.student} agrees with it to an IoU of "
+                f"{number_text(iou)}, and removes {number_text(removed, '.1%')} of the points."
+            )
+        first = next(doubts(self), None)
+        return text if first is None else f"{text}\nNote: {first}"
+
+
+def write_report(results: LearnResults) -> None:
+    """Writes the report, with pictures of all scans together.
+
+    Raises:
+        InputError: An output that cannot be written.
+    """
+    teacher = results.path.with_name("teacher.png")
+    save(teacher_figure(results.scans, f"Labels of {results.teacher}"), teacher)
+    results.pictures[teacher] = "shares of rain, not rain and not known"
+    if results.evaluated:
+        removed = results.path.with_name("removed.png")
+        title = "Removed from held-out scans, by range"
+        save(removed_figure(results.agreement, title), removed)
+        results.pictures[removed] = "share removed by range"
+    with replacing(results.path) as temporary:
+        temporary.write_text(as_markdown(results), "utf-8")
+
+
+def as_markdown(results: LearnResults) -> str:
+    """The text of the report."""
+    parts = [f"# What was learnt from {results.title}", _in_short(results)]
+    parts += ["## What could not be learnt, and when not to trust it", _doubts_text(results)]
+    parts += [f"## The teacher: {results.teacher}", _teacher_table(results.taught)]
+    parts += _pictures(results.pictures, "teacher")
+    if results.evaluated:
+        parts += [
+            f"## The student: {results.student}",
+            AGREEMENT_EXPLAINED,
+            _student_table(results.agreement),
+        ]
+        parts += _pictures(results.pictures, "removed")
+        parts += ["## Held-out scans", *_pictures(results.pictures, "held_out")]
+    if results.record:
+        parts += ["## Scores by the labels, for the record", results.record]
+    parts += ["## How it was made", "\n".join(f"    {step}" for step in results.commands)]
+    return "\n\n".join(parts) + "\n"
+
+
+def doubts(results: LearnResults) -> Iterator[str]:
+    """What a reader should know before trusting the model, a sentence or two each."""
+    taught = results.taught
+    known = 1 - taught.shares[2]
+    if taught.rain_among_known < LEAST_RAIN:
+        yield (
+            f"Hardly any rain was found ({taught.rain_among_known:.2%} of the points that the "
+            "teacher is sure of): this recording seems to be clean, and nothing can be learnt from "
+            "a clean one."
+        )
+    elif taught.rain_among_known < DOUBTFUL_RAIN:
+        yield (
+            f"Little rain was found ({taught.rain_among_known:.2%} of the points that the teacher "
+            "is sure of): leaves and boughs alone may come to as much in dry air. Check in the "
+            "pictures what is removed."
+        )
+    if results.trained_on < ENOUGH_SCANS:
+        yield (
+            f"{results.trained_on} scans to learn from are few: they show one place, and the "
+            "student may recognise its solid things by their place alone."
+        )
+    if known < ENOUGH_KNOWN:
+        yield (
+            f"The teacher is sure of {known:.0%} of the points only: too few scans around each, "
+            "wrong poses, or a sensor whose scan pattern changes from scan to scan."
+        )
+    if results.stood:
+        yield (
+            "The sensor stood: all scans show one place. Drive a little, or record in several "
+            "places, if the model is to be used while driving."
+        )
+    yield from _doubts_of_student(results)
+    if results.warnings:
+        others = len(results.warnings) - 1
+        more = f" (and {others} more warnings)" if others else ""
+        yield f"The recording is unusual: {results.warnings[0]}{more}"
+
+
+def _doubts_of_student(results: LearnResults) -> Iterator[str]:
+    """Doubts that the held-out scans raise."""
+    if not results.evaluated:
+        return
+    agreement = results.agreement
+    rain = agreement.agreement.true_positive + agreement.agreement.false_negative
+    if rain < ENOUGH_RAIN:
+        yield (
+            f"The teacher found {rain:,} points of rain in the held-out scans: too few to measure "
+            "the agreement well."
+        )
+    if agreement.agreement.iou < ENOUGH_AGREEMENT:
+        yield (
+            "On held-out scans the student agrees with the teacher to an IoU of "
+            f"{agreement.agreement.iou:.2f} only: one of the two is often wrong. Look at the "
+            "pictures."
+        )
+    for name, band in coarse_bands(agreement).items():
+        _, rain_share, unknown = band.shares
+        perhaps = rain_share + unknown
+        if band.removed > max(MORE_THAN_TAUGHT * perhaps, perhaps + MORE_BY):
+            yield (
+                f"At {name} it removes {band.removed:.1%} of the points, of which the teacher "
+                f"labels {rain_share:.1%} rain and {unknown:.1%} not known."
+            )
+    if results.sees_intensity:
+        yield (
+            "The student sees intensity in the unit of this recording: for a sensor of another "
+            "unit, learn anew or with --blind."
+        )
+
+
+def _in_short(results: LearnResults) -> str:
+    held_out = len(results.scans) - results.trained_on
+    return (
+        f"{results}\n\n{results.trained_on:,} scans to learn from, {held_out:,} held out: these "
+        "choose the best epoch and measure the student, which does not learn from them. No "
+        "person's label is read for any of this."
+    )
+
+
+def _doubts_text(results: LearnResults) -> str:
+    return "\n".join([*(f"- {doubt}" for doubt in doubts(results)), ALWAYS])
+
+
+def _teacher_table(answers: Answers) -> str:
+    rows = [
+        [name, f"{band.points:,}", *(f"{share:.1%}" for share in band.shares)]
+        for name, band in {"all": answers, **coarse_bands(answers)}.items()
+        if band.points
+    ]
+    return markdown_table(("range", "points", "not rain", "rain", "not known"), rows)
+
+
+def _student_table(answers: Answers) -> str:
+    rows = [
+        [name, f"{band.points:,}", f"{band.removed:.1%}", *_scores(band.agreement)]
+        for name, band in {"all": answers, **coarse_bands(answers)}.items()
+        if band.points
+    ]
+    return markdown_table(("range", "points", "removed", "P", "R", "IoU"), rows)
+
+
+def _scores(counts: Counts) -> list[str]:
+    return [number_text(score) for score in (counts.precision, counts.recall, counts.iou)]
+
+
+def _pictures(pictures: Mapping[Path, str], beginning: str) -> list[str]:
+    return [
+        f"![{shows}]({path.name})"
+        for path, shows in pictures.items()
+        if path.name.startswith(beginning)
+    ]

@@ -1,0 +1,294 @@
+"""Finds where a sensor was, scan by scan, and writes its poses."""
+
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from dataclasses import replace as replaced
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+from typing import Literal
+
+import numpy as np
+from tqdm import tqdm
+
+from derain.cards.layout import folder_above
+from derain.errors import InputError
+from derain.files import RECORDS
+from derain.files.atomic import refuse_unwritable
+from derain.files.reading import is_file
+from derain.odometry.posed import ODOMETRY, with_poses
+from derain.odometry.recordings import FrameOdometry
+from derain.odometry.registration import Registration
+from derain.sources.frame import Frame
+from derain.sources.judging import Guard, unguarded
+from derain.sources.recordings import recordings_of
+from derain.sources.records import POSES
+from derain.sources.source import Source
+from derain.sources.trajectory import CALIBRATION, Trajectory, write_trajectory
+from derain.system.notices import Notices, warn
+from derain.system.stopwatch import Stopwatch
+
+# Receives the registration of each scan as soon as it is found, and the times of its stages.
+Watch = Callable[[Frame, Registration, Stopwatch], None]
+
+PoseFormat = Literal["kitti", "tum"]
+
+
+@dataclass(frozen=True)
+class FoundPoses:
+    """The poses of one recording; as text, a summary in one line.
+
+    Attributes:
+        file: Where they are written.
+        frames: The scans, in time order.
+        registrations: How each scan was registered, one a scan.
+        times: When the scans were taken, seconds; empty where that is not known of all.
+        fault: Why the file could not be written; None where it is.
+    """
+
+    file: Path
+    frames: Sequence[Frame]
+    registrations: Sequence[Registration]
+    times: Sequence[float]
+    fault: InputError | None = None
+
+    @property
+    def untrusted(self) -> int:
+        """How many scans could not be registered."""
+        return sum(not each.trusted for each in self.registrations)
+
+    def __str__(self) -> str:
+        if len(self.registrations) == 1:
+            return f"{self.file}: 1 scan shows no motion: its pose is the identity"
+        moves = self.registrations[1:]
+        path = sum(each.distance for each in moves)
+        lasted = self.times[-1] - self.times[0] if self.times else 0.0
+        speed = f", {path / lasted:.1f} m/s" if lasted > 0 else ""
+        residuals = [
+            (each.residual, frame.key)
+            for each, frame in zip(moves, self.frames[1:], strict=True)
+            if not math.isnan(each.residual)
+        ]
+        worst, of_scan = max(residuals, default=(math.nan, "none"))
+        usual = median([residual for residual, _ in residuals] or [math.nan])
+        return (
+            f"{self.file}: {len(self.registrations):,} scans, path {path:.1f} m, "
+            f"{path / len(moves):.2f} m a scan{speed}; residual median {usual:.3f} m, worst "
+            f"{worst:.3f} m ({of_scan}); {self.untrusted:,} not to be trusted"
+        )
+
+
+def find_poses(
+    source: Source,
+    out: Path,
+    *,
+    form: PoseFormat = "kitti",
+    replace: bool = False,
+    threads: int = 0,
+    guard: Guard = unguarded,
+    watch: Watch = lambda frame, registration, stopwatch: None,
+) -> list[FoundPoses]:
+    """Registers every scan with the one before it, and writes the poses of each recording.
+
+    Args:
+        source: Scans of one recording or more, in time order.
+        out: The file of the only recording; of several, a folder with ``<sequence>.txt`` for each.
+        form: What a line of a file is: ``kitti``, twelve numbers of a matrix, or ``tum``, time,
+            position and quaternion.
+        replace: Whether poses that came with the scans may be replaced.
+        threads: Threads to use; 0 takes every core.
+        guard: Surrounds the reading of each scan; one whose error it holds back is not trusted.
+        watch: Receives each registration.
+
+    Returns:
+        The poses of each recording, in the order of the source.
+
+    Raises:
+        InputError: A file that cannot be written, that came with the scans, or that two recordings
+            would share; times that are missing or do not ascend, for ``tum``; a scan that cannot
+            be read, where the guard lets that through.
+    """
+    recordings = recordings_of(source)
+    files = _files_of(recordings, out, replace)
+    times = [_times(recording, form) for recording in recordings]
+    if form == "kitti":
+        _warn_of_calibrations(files, recordings)
+    odometry = FrameOdometry(threads)
+    registrations = iter(
+        [
+            _register(frame, odometry, guard, watch)
+            for frame in tqdm(source, "odometry", unit="scan", disable=None)
+        ]
+    )
+    return [
+        _written(
+            FoundPoses(file, recording, [next(registrations) for _ in recording], seconds), form
+        )
+        for file, recording, seconds in zip(files, recordings, times, strict=True)
+    ]
+
+
+def placed(source: Source, poses: str | None, threads: int = 0) -> Source:
+    """The same frames with poses; warns of scans that odometry cannot register.
+
+    Args:
+        source: The frames.
+        poses: As :func:`derain.odometry.posed.with_poses` takes it. None leaves the frames as they
+            are: a method that needs poses takes those beside the scans, or finds them itself.
+        threads: Threads of odometry; 0 takes every core.
+
+    Raises:
+        InputError: Poses that cannot be read or do not fit the scans.
+    """
+    if poses is None:
+        return source
+    if poses != ODOMETRY:
+        return with_poses(source, poses)
+    notices = Notices()
+    with tqdm(total=len(source), desc=ODOMETRY, unit="scan", disable=None) as bar:
+
+        def watch(frame: Frame, registration: Registration) -> None:
+            notices.tell(frame.name, registration.oddities())
+            bar.update()
+
+        posed = with_poses(source, ODOMETRY, threads, watch)
+    notices.tell_how_many_more()
+    return posed
+
+
+def _register(frame: Frame, odometry: FrameOdometry, guard: Guard, watch: Watch) -> Registration:
+    stopwatch, scan = Stopwatch(), None
+    with guard(frame), stopwatch.stage("read"):
+        scan = frame.read()
+    with stopwatch.stage("register"):
+        registration = odometry.take(frame, scan)
+    if scan is not None and not registration.trusted:
+        warn(f"{frame.name}: not to be trusted: {registration.reason}")
+    watch(frame, registration, stopwatch)
+    return registration
+
+
+def _written(found: FoundPoses, form: PoseFormat) -> FoundPoses:
+    """Writes the poses of a recording; the other recordings go on where that fails."""
+    try:
+        _write(found, form)
+    except InputError as error:
+        return replaced(found, fault=error)
+    return found
+
+
+def _write(found: FoundPoses, form: PoseFormat) -> None:
+    registrations = found.registrations
+    if len(registrations) > 1 and not any(each.trusted for each in registrations[1:]):
+        raise InputError(
+            found.file,
+            "was not written: no two scans of the recording could be laid upon one another "
+            f"({registrations[1].reason})",
+            "See that they are consecutive, in order of time, and of one sensor.",
+        )
+    poses = np.array([each.pose for each in registrations])
+    times = np.array(found.times) if form == "tum" else None
+    write_trajectory(found.file, Trajectory(poses, times))
+
+
+def _files_of(recordings: Sequence[Sequence[Frame]], out: Path, replace: bool) -> list[Path]:
+    """The file of each recording's poses, once it is known that it can be written.
+
+    Args:
+        recordings: The recordings.
+        out: The file of the only one; of several, a folder with ``<sequence>.txt`` for each.
+        replace: Whether poses that came with the scans may be replaced.
+
+    Raises:
+        InputError: A file that cannot be written, that came with the scans, or that two recordings
+            would share.
+    """
+    files = [out]
+    if len(recordings) > 1:
+        files = [out / f"{recording[0].sequence}.txt" for recording in recordings]
+    for place, (file, recording) in enumerate(zip(files, recordings, strict=True)):
+        if file in files[:place]:
+            raise InputError(
+                recording[0].name,
+                f"another recording is called {recording[0].sequence} too, and the poses of both "
+                f"would be {file}",
+                "Take them in two runs, each to its --out.",
+            )
+        _refuse_to_overwrite(file, recording, replace)
+        refuse_unwritable(file)
+    return files
+
+
+def _warn_of_calibrations(files: Sequence[Path], recordings: Sequence[Sequence[Frame]]) -> None:
+    """Warns of poses that would be taken for a camera's if they were put beside the scans.
+
+    Args:
+        files: The file of each recording's poses, of KITTI's form.
+        recordings: The recordings.
+    """
+    for file, recording in zip(files, recordings, strict=True):
+        for folder in _folders(recording):
+            here = folder / CALIBRATION
+            if is_file(here) and not is_file(file.with_name(CALIBRATION)):
+                warn(
+                    f"{file}: holds poses of the LiDAR; beside {here} they would be read as those "
+                    f"of its camera: to use them there, write them there, with --out {folder}/..."
+                )
+
+
+def _refuse_to_overwrite(file: Path, recording: Sequence[Frame], replace: bool) -> None:
+    target = os.path.realpath(file)
+    for frame in recording:
+        for own in filter(None, (Path(frame.name), frame.label_path)):
+            if os.path.realpath(own) == target:
+                raise InputError(file, "is one of the scans or their labels", "Name another file.")
+    for folder in _folders(recording):
+        for record in RECORDS:
+            if os.path.realpath(folder / record) != target or not is_file(file):
+                continue
+            if record != POSES:
+                raise InputError(file, "came with the scans", "Name another file.")
+            if not replace:
+                raise InputError(
+                    file,
+                    "holds poses that came with the scans",
+                    "Name another file, or replace them with --replace.",
+                )
+
+
+def _folders(recording: Sequence[Frame]) -> Iterator[Path]:
+    """The folders in which records of a recording may lie."""
+    folder = Path(recording[0].name).parent
+    yield folder
+    yield folder_above(folder)
+
+
+def _times(recording: Sequence[Frame], form: PoseFormat) -> list[float]:
+    """When the scans of a recording were taken, seconds; empty where not all of it is known."""
+    times = [time for frame in recording if (time := frame.time) is not None]
+    if len(times) == len(recording):
+        if form == "tum":
+            _refuse_times_that_turn_back(times, recording)
+        return times
+    if form == "tum":
+        lacking = next(frame for frame in recording if frame.time is None)
+        raise InputError(
+            lacking.name,
+            "nothing says when it was taken, and a line of TUM's form begins with the time",
+            "Write a times.txt beside the scans, a line of seconds each, or take --format kitti.",
+        )
+    return []
+
+
+def _refuse_times_that_turn_back(times: Sequence[float], recording: Sequence[Frame]) -> None:
+    """Refuses times by which poses could not be found again: they have to ascend."""
+    for (earlier, later), frame in zip(pairwise(times), recording[1:], strict=True):
+        if later <= earlier:
+            raise InputError(
+                frame.name,
+                f"was taken at {later:.3f} s, the scan before it at {earlier:.3f} s, and lines of "
+                "TUM's form go by ascending time",
+                "Name the scans in the order that they were taken in, or take --format kitti.",
+            )

@@ -1,0 +1,41 @@
+"""What a long work shows while it runs: each step, and its result with the time that it took."""
+
+import time
+from collections.abc import Callable
+
+# Receives the lines to show.
+Show = Callable[[str], None]
+
+
+def show_nothing(text: str) -> None:
+    """Drops the lines."""
+
+
+class Steps:
+    """Shows steps and their results.
+
+    Args:
+        show: Receives each line.
+    """
+
+    def __init__(self, show: Show = show_nothing) -> None:
+        self.show = show
+        self._start = self._step = time.monotonic()
+
+    def begin(self, title: str) -> None:
+        """Shows what the next step does."""
+        self.show(title)
+        self._step = time.monotonic()
+
+    def end(self, result: str) -> None:
+        """Shows the result of the step, and its time."""
+        self.show(f"  {_clock(time.monotonic() - self._step)}  {result}")
+
+    @property
+    def elapsed(self) -> str:
+        """Time since the first step, as minutes and seconds."""
+        return _clock(time.monotonic() - self._start)
+
+
+def _clock(seconds: float) -> str:
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"

@@ -1,0 +1,287 @@
+"""Training and measuring networks by Lightning's Trainer, from configurations and options."""
+
+import argparse
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import torch
+from jsonargparse import DefaultHelpFormatter, Namespace
+from lightning.fabric.utilities.exceptions import MisconfigurationException
+from lightning.pytorch import Trainer
+from lightning.pytorch.callbacks import LearningRateMonitor, ModelCheckpoint
+from lightning.pytorch.cli import ArgsType, LightningArgumentParser, LightningCLI
+from lightning.pytorch.loggers import TensorBoardLogger
+
+# Imported so that a configuration may name them without their modules.
+from derain.datamodules.base import ScanDataModule
+from derain.datamodules.folder import Folder
+from derain.datamodules.mixture import Mixture
+from derain.datamodules.rehearse3d import Rehearse3D
+from derain.datamodules.scan_check import ScanCheck
+from derain.datamodules.sequences import Sequences
+from derain.datamodules.simulated import Simulated
+from derain.datamodules.taught import Taught
+from derain.datamodules.wads import Wads
+from derain.datamodules.worlds import Worlds
+from derain.default.model_card import LARGEST_SEED
+from derain.errors import InputError, reason_of
+from derain.files.documents import Entry
+from derain.models.base import DerainingModule
+from derain.models.callbacks.best_checkpoint import BestCheckpoint
+from derain.models.callbacks.dashboard import Dashboard
+from derain.models.callbacks.errors import ErrorPanels
+from derain.models.callbacks.panels import ScanPanels
+from derain.models.callbacks.prediction import PredictionWriter
+from derain.models.callbacks.report import TestReport
+from derain.models.callbacks.step_times import StepTimes
+from derain.models.callbacks.whole_checkpoints import save_whole
+from derain.models.checkpoint import check_resumable, class_path, load_model, network_of_checkpoint
+from derain.models.limits import check_hyperparameters
+from derain.models.measured import MONITOR
+from derain.models.registry import NETWORKS
+from derain.models.start import started
+from derain.system.cores import usable_cores
+from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
+from derain.system.open3d_import import warn_where_tensorboard_cannot_start
+from derain.system.workers import end_with_launcher
+from derain.workflows.configurations import own_configurations, with_packaged_configs
+from derain.workflows.lightning_silence import silence_advertisements
+from derain.workflows.run_folder import (
+    WholeConfig,
+    folder_of_run,
+    writing_to_the_run_folder,
+)
+from derain.workflows.start import START_HELP, checkpoint_of
+from derain.workflows.training_errors import as_input_error, read_configuration
+from derain.workflows.training_options import known_options
+
+# What `--ckpt_path` may be besides a file: checkpoints that Lightning looks for itself.
+FOUND_BY_LIGHTNING = ("last", "hpc")
+
+# Numbers that Lightning and the callbacks take as they are.
+LEAST = {
+    "trainer.accumulate_grad_batches": 1,
+    "trainer.log_every_n_steps": 0,
+    "panels.scans": 0,
+    "panels.pictures": 0,
+    "errors.pictures": 0,
+}
+
+
+class ExamplesFormatter(argparse.RawDescriptionHelpFormatter, DefaultHelpFormatter):
+    """Leaves the line breaks of the examples alone."""
+
+
+def choices() -> dict[str, tuple[type, ...]]:
+    """What has options of its own, by the option that chooses it.
+
+    They are loaded then, and a configuration may name their classes without a module.
+    """
+    return {
+        "data": (Folder, Mixture, Rehearse3D, Sequences, Simulated, Taught, Wads, Worlds),
+        "model": tuple(NETWORKS.values()),
+        "trainer.logger": (TensorBoardLogger,),
+    }
+
+
+class DerainCLI(LightningCLI):
+    """Lightning's command line with the callbacks that every run of derain has."""
+
+    def add_arguments_to_parser(self, parser: LightningArgumentParser) -> None:
+        """Adds the callbacks; ``--checkpoint.monitor`` and so on change them."""
+        parser.add_argument("--start", type=str | None, default=None, help=START_HELP)
+        parser.add_lightning_class_args(BestCheckpoint, "checkpoint")
+        parser.add_lightning_class_args(ModelCheckpoint, "last")
+        parser.add_lightning_class_args(LearningRateMonitor, "learning_rate")
+        parser.add_lightning_class_args(ScanPanels, "panels")
+        parser.add_lightning_class_args(ErrorPanels, "errors")
+        parser.add_lightning_class_args(StepTimes, "step_times")
+        parser.add_lightning_class_args(Dashboard, "dashboard")
+        parser.add_lightning_class_args(PredictionWriter, "predictions")
+        parser.add_lightning_class_args(TestReport, "report")
+        parser.add_lightning_class_args(ScanCheck, "scan_check")
+        parser.set_defaults(
+            {
+                "checkpoint.monitor": MONITOR,
+                "checkpoint.mode": "max",
+                "checkpoint.filename": "best",
+                "checkpoint.enable_version_counter": False,
+                # What `--ckpt_path` goes on from: the best epoch may lie far back.
+                "last.filename": "last",
+                "last.enable_version_counter": False,
+            }
+        )
+        self.parser_of_a_subcommand = parser  # the subcommands have nearly the same options
+
+    def parse_arguments(self, parser: LightningArgumentParser, args: ArgsType) -> None:
+        """Refuses what cannot be used: options, and checkpoints before Lightning reads them."""
+        known = known_options(self.parser_of_a_subcommand, choices())
+        arguments = args if isinstance(args, list) else []
+        files = [read_configuration(path, known) for path in own_configurations(arguments)]
+        parser.set_defaults({"test.verbose": False})  # the table is in our report
+        try:
+            super().parse_arguments(parser, args)
+        except argparse.ArgumentError as error:
+            raise as_input_error(error.message, known, files) from error
+        self._check_options()
+        path = self.config[self.config.subcommand].get("ckpt_path")
+        if path in (None, *FOUND_BY_LIGHTNING):
+            return
+        if "://" in str(path):  # Lightning would unpickle anything in it
+            raise InputError(path, "is an address", "Download it and give the file.")
+        check = check_resumable if self.config.subcommand == "fit" else load_model
+        check(Path(path))
+        if self.config.subcommand == "test":
+            self._log_beside(Path(path), arguments)
+
+    def _parse_ckpt_path(self) -> None:
+        """Takes the model's class and arguments from the checkpoint, as Lightning does.
+
+        Lightning would import whatever class the file names; here it is that of the registry.
+        """
+        config = self.config[self.config.subcommand]
+        path = config.get("ckpt_path")
+        if path not in (None, *FOUND_BY_LIGHTNING):
+            network, arguments = network_of_checkpoint(Path(path))
+            model = {"class_path": class_path(network), "dict_kwargs": arguments}
+            try:
+                self.config = self.parser.parse_object(
+                    {self.config.subcommand: {"model": model}}, self.config
+                )
+            except argparse.ArgumentError as error:
+                raise InputError(path, reason_of(error), "Give a checkpoint of derain.") from error
+
+    def _check_options(self) -> None:
+        """Refuses values of options that torch or Lightning would stumble over later."""
+        config = self.config[self.config.subcommand]
+        seed = Entry("--seed_everything", "", config.seed_everything)
+        if not isinstance(seed.value, bool):
+            seed.whole(0, LARGEST_SEED)
+        for option, least in LEAST.items():
+            number = config.get(option)
+            if isinstance(number, int) and number < least:
+                raise InputError(f"--{option}", f"{number} is too few", f"Give {least} or more.")
+        arguments = config.model.get("init_args") or {}
+        check_hyperparameters(
+            {name: Entry(f"--model.{name}", "", value) for name, value in arguments.items()}
+        )
+
+    def _log_beside(self, checkpoint: Path, arguments: list[str]) -> None:
+        """Has a test log into the folder of its training, unless it was told where to."""
+        told = any(argument.startswith("--trainer.logger") for argument in arguments)
+        folder, logger = folder_of_run(checkpoint), self.config.test.trainer.logger
+        if folder is None or told or not isinstance(logger, Namespace):
+            return
+        if logger.class_path.endswith(TensorBoardLogger.__name__):
+            place = {"save_dir": str(folder.parent), "name": "", "version": folder.name}
+            for name, value in place.items():
+                logger.init_args[name] = value
+
+    def instantiate_trainer(self, **kwargs: Any) -> Trainer:
+        """Makes the trainer, which writes its checkpoints whole or not at all.
+
+        Raises:
+            InputError: Options that no trainer can be made with.
+        """
+        try:
+            return save_whole(super().instantiate_trainer(**kwargs))
+        except (ValueError, TypeError) as error:  # Lightning checks some options in these ways
+            raise _of_the_trainer(error) from error
+
+    def instantiate_classes(self) -> None:
+        """Instantiates data, model and trainer; what they find wrong is not the parser's error."""
+        try:
+            super().instantiate_classes()
+        except ValueError as error:
+            if isinstance(error.__cause__, InputError):
+                raise error.__cause__ from None
+            raise
+        start = self.config[self.config.subcommand].get("start")
+        if start is not None and self.config.subcommand == "fit":
+            self.model = started(self.model, checkpoint_of(start), start)
+
+
+def _of_the_trainer(error: Exception) -> InputError:
+    """What Lightning finds wrong with its options; it names them itself."""
+    return InputError("--trainer", str(error).rstrip("."), "Correct the option that it names.")
+
+
+@contextmanager
+def naming_the_trainer() -> Iterator[None]:
+    """Turns what Lightning refuses, before a training or in it, into one line.
+
+    Raises:
+        InputError: Lightning refused something.
+    """
+    try:
+        yield
+    except MisconfigurationException as error:
+        raise _of_the_trainer(error) from error
+
+
+def run_trainer(
+    arguments: Sequence[str],
+    descriptions: Mapping[str, str] | None = None,
+    trainer: Mapping[str, Any] | None = None,
+) -> DerainCLI:
+    """Makes model, data and trainer from options, and runs one of the trainer's methods.
+
+    Args:
+        arguments: ``fit``, ``validate``, ``test`` or ``predict``, and its options; ``--config``
+            takes a file or the name of a packaged configuration.
+        descriptions: Text above the list of all options, by method.
+        trainer: Defaults of the trainer, and callbacks besides those that every run has.
+
+    Returns:
+        The trainer, the model and the data module, with their configuration.
+
+    Raises:
+        InputError: A configuration that does not exist, a folder that cannot be written, or what
+            data and model raise.
+    """
+    _prepare_process(arguments[0])
+    of_parsers = {
+        "formatter_class": ExamplesFormatter,
+        "allow_abbrev": False,  # a misspelling is no abbreviation
+        "exit_on_error": False,  # faults become InputErrors
+    }
+    texts = descriptions or {}
+    with writing_to_the_run_folder(), naming_the_trainer():
+        return DerainCLI(
+            DerainingModule,
+            ScanDataModule,
+            subclass_mode_model=True,
+            subclass_mode_data=True,
+            seed_everything_default=0,
+            auto_configure_optimizers=False,
+            save_config_callback=WholeConfig,
+            # Every run has a folder of its own; only one without a logger meets its last one.
+            save_config_kwargs={"overwrite": True},
+            trainer_defaults={"enable_model_summary": False, **(trainer or {})},
+            parser_kwargs={
+                **of_parsers,
+                **{name: {**of_parsers, "description": text} for name, text in texts.items()},
+            },
+            args=with_packaged_configs(arguments),
+        )
+
+
+def _prepare_process(method: str) -> None:
+    """Sets what holds for the whole process: messages, threads and memory."""
+    silence_advertisements()
+    if method == "fit":
+        warn_where_tensorboard_cannot_start()
+    # Lightning warns where sys.argv has options too; the arguments alone are used.
+    warnings.filterwarnings("ignore", message="LightningCLI's args parameter")
+    # Lightning 2.6 uses a name that torch 2.13 deprecates.
+    warnings.filterwarnings("ignore", message=".*LeafSpec")
+    # The last checkpoint has nothing to lose by it, and of the best one BestCheckpoint takes care.
+    warnings.filterwarnings("ignore", message="The dirpath has changed")
+    end_with_launcher()
+    torch.set_num_threads(min(torch.get_num_threads(), usable_cores()))
+    keep_freed_memory(KEPT_IN_TRAINING)
+    # Deterministic training would write to every new array before anything computes it.
+    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]

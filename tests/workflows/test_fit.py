@@ -1,0 +1,48 @@
+"""A network is trained by a function, as by the command."""
+
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.files.labels import write_labels
+from derain.models.checkpoint import load_model
+from derain.workflows.fit import fit, fit_options
+
+
+def test_settings_are_options_of_the_command() -> None:
+    settings = {"data.root": Path("my data"), "trainer.max_epochs": 2, "data.make": False}
+    words = shlex.join(fit_options("a.yaml", {**settings, "start": None, "model.channels": ["x"]}))
+    assert words == (
+        "--config a.yaml --data.root 'my data' --trainer.max_epochs 2 --data.make false "
+        "--start null --model.channels '[\"x\"]'"
+    )
+
+
+@pytest.mark.usefixtures("one_block")
+def test_a_training_returns_its_best_checkpoint_and_score(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for sequence in ("00", "01"):
+        folder = tmp_path / "WADS/sequences" / sequence
+        (folder / "velodyne").mkdir(parents=True)
+        scene(300).tofile(folder / "velodyne/0.bin")
+        write_labels(folder / "labels/0.label", np.where(np.arange(300) < 270, 0, 110))
+    settings = {
+        "data.root": tmp_path / "WADS",
+        "data.split": {"train": ["00"], "validation": ["01"], "test": []},
+        "data.loading.workers": 0,
+        "trainer.max_epochs": 1,
+        "trainer.logger.save_dir": tmp_path / "runs",
+        "panels.scans": 0,
+    }
+    results = fit("outdet_wads.yaml", settings, quiet=True)
+    assert load_model(results.checkpoint).spec.network == "outdet"
+    assert results.folder == tmp_path / "runs/outdet_wads/version_0"
+    assert results.iou == pytest.approx(results.metrics["val/iou"])
+    assert capsys.readouterr().out == ""
+    with pytest.raises(InputError, match=r"--data.rot: no such option"):
+        fit("outdet_wads.yaml", {"data.rot": "WADS"})
