@@ -55,6 +55,19 @@ def test_few_points_are_judged_without_a_warning(name: str, points: int) -> None
         assert FilterDerainer(filter_from(name, {}))(scene()[:points]).shape == (points,)
 
 
+def test_ssr_counts_the_points_that_there_are() -> None:
+    points = np.float32([[5, 0, 0, 1], [6, 0, 0, 1]])
+    norm = np.sqrt(2 * (1 + 4**2))
+    assert FilterDerainer(SSR(9, norm + 0.01))(points).all()
+    assert not FilterDerainer(SSR(9, norm - 0.01))(points).any()
+
+
+def test_a_point_at_the_radius_is_within_it() -> None:
+    points = np.float32([[5, 0, 0, 1], [6, 0, 0, 1]])
+    assert not FilterDerainer(ROR(2, 1.0))(points).any()
+    assert FilterDerainer(ROR(2, 0.999))(points).all()
+
+
 @every_filter
 def test_the_order_of_the_rows_does_not_matter(name: str) -> None:
     derainer = FilterDerainer(filter_from(name, MIXED[name]))

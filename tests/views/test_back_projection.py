@@ -162,6 +162,8 @@ def test_a_tied_vote_is_not_rain_and_a_lone_return_decides_for_itself() -> None:
     # The neighbour is farther off than the cutoff, so that only the own pixel votes.
     far = project([0, 1], [5.0, 9.0], (1, 8), False)
     assert vote(far, np.array([1, 0, 0, 0, 0, 0, 0, 0], np.float32)).tolist() == [1, 0]
+    # A pixel votes rain above one half, and not at it.
+    assert vote(far, np.full(8, 0.5, np.float32)).tolist() == [0, 0]
 
 
 @pytest.mark.parametrize("way_back", [nearest_range, vote])
