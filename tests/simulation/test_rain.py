@@ -30,35 +30,15 @@ from derain.simulation.rain import (
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
 from derain.simulation.sensor import Returns, Sensor
 
+from .surfaces import random_surfaces, surfaces
+
 SENSOR = Sensor()
 DUAL, LAST = replace(SENSOR, returns="dual"), replace(SENSOR, returns="last")
 RATES = (10.0, 25.0, 50.0)
 
 
-def surfaces(
-    distance: float, reflectivity: float, count: int, label: TrackClass = TrackClass.CAR
-) -> Returns:
-    return Returns(
-        np.full(count, distance),
-        np.full(count, reflectivity),
-        np.full(count, int(label)),
-        np.arange(count),
-    )
-
-
 def open_air(count: int) -> Returns:
-    return surfaces(SENSOR.maximum_range, 0.0, count, TrackClass.BACKGROUND)
-
-
-def random_surfaces(count: int, generator: np.random.Generator) -> Returns:
-    """Surfaces near and far, bright and too dark to be seen, and beams that meet nothing."""
-    nothing = generator.random(count) < 0.2
-    return Returns(
-        np.where(nothing, SENSOR.maximum_range, generator.uniform(1, 100, count)),
-        np.where(nothing, 0, 10 ** generator.uniform(-5, 0, count)),
-        np.where(nothing, 0, generator.choice([0, 1, 2, 4, 5, 6, 7], count)),
-        np.arange(count),
-    )
+    return surfaces(count, SENSOR.maximum_range, 0.0, TrackClass.BACKGROUND)
 
 
 def rained(clear: Returns, rain: RainField, seed: int, sensor: Sensor = SENSOR) -> Returns:
@@ -92,7 +72,7 @@ def test_open_beams_see_as_much_rain_as_the_integral_over_visible_drops(rate: fl
 
 def test_surfaces_fade_with_the_way_there_and_back() -> None:
     distance = 30.0
-    detected = rained(surfaces(distance, 0.8, 1000), UniformRain(50), seed=5)
+    detected = rained(surfaces(1000, distance, 0.8), UniformRain(50), seed=5)
     kept = detected.label == TrackClass.CAR
     assert kept.sum() > 900
     assert np.allclose(detected.reflectivity[kept], 0.8 * np.exp(-2 * extinction(50) * distance))
@@ -182,7 +162,7 @@ def test_energy_never_grows_and_a_beam_is_kept_weaker_or_ends_at_a_drop_or_is_lo
 
 
 def test_the_last_return_reports_less_rain_than_the_strongest() -> None:
-    clear = surfaces(60.0, 0.05, 20_000)
+    clear = surfaces(20_000, 60.0, 0.05)
     strongest, last, dual = (
         rained(clear, UniformRain(50), 1, sensor) for sensor in (SENSOR, LAST, DUAL)
     )

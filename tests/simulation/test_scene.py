@@ -68,11 +68,7 @@ def test_what_moves_is_seen_as_if_it_were_built_into_the_street(open3d: ModuleTy
         moving = Track.of(
             replace(thing.surface, triangles=moved(thing, time)) for thing in drive.traffic
         )
-        whole = Track(
-            np.concatenate([drive.track.triangles, moving.triangles]),
-            np.concatenate([drive.track.reflectivity, moving.reflectivity]),
-            np.concatenate([drive.track.label, moving.label]),
-        )
+        whole = Track.joined([drive.track, moving])
         expected = whole.cast(SENSOR, drive.course.pose(time, SENSOR))
         assert np.allclose(returns.range, expected.range, rtol=1e-5)
         assert np.allclose(returns.reflectivity, expected.reflectivity, atol=1e-5)
@@ -116,17 +112,6 @@ def test_without_a_drive_every_scan_is_of_the_same_cast(open3d: ModuleType) -> N
     assert standing.course is None
     assert first is second is third
     assert np.array_equal(first.range, standing.track.cast(SENSOR).range)
-
-
-def test_a_seed_gives_the_same_drive_again_and_another_seed_another_one() -> None:
-    first, again, other = (scene(DRIVING, seed) for seed in (1, 1, 2))
-    assert np.array_equal(first.track.triangles, again.track.triangles)
-    assert len(first.track.triangles) != len(other.track.triangles)
-    for one, two in zip(first.traffic, again.traffic, strict=True):
-        assert np.array_equal(moved(one, 0.4), moved(two, 0.4))
-    assert first.course is not None
-    assert again.course is not None
-    assert np.array_equal(first.course.pose(0.4, SENSOR), again.course.pose(0.4, SENSOR))
 
 
 @pytest.mark.parametrize("speed", [0.0, 13.0])

@@ -19,6 +19,8 @@ from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.sensor import Returns, Sensor
 
+from ..surfaces import random_surfaces, surfaces
+
 SENSOR = Sensor(columns=60, rows=30)
 BEAMS = SENSOR.beams()
 
@@ -33,33 +35,13 @@ SPARSE = Sensor(
 )
 
 
-def surfaces(count: int, distance: float, reflectivity: float) -> Returns:
-    return Returns(
-        np.full(count, distance),
-        np.full(count, reflectivity),
-        np.full(count, int(TrackClass.CAR)),
-        np.arange(count),
-    )
-
-
-def random_surfaces(generator: np.random.Generator) -> Returns:
-    count = len(BEAMS)
-    nothing = generator.random(count) < 0.2
-    return Returns(
-        np.where(nothing, SENSOR.maximum_range, generator.uniform(1, 100, count)),
-        np.where(nothing, 0, 10 ** generator.uniform(-5, 0, count)),
-        np.where(nothing, 0, generator.choice([0, 1, 2, 4, 5, 6, 7], count)),
-        np.arange(count),
-    )
-
-
 def assert_same(first: Returns, second: Returns) -> None:
     for name in ("range", "reflectivity", "label", "beam"):
         assert (getattr(first, name) == getattr(second, name)).all(), name
 
 
 def test_clear_air_is_the_clear_air_of_rain_without_rain() -> None:
-    clear = random_surfaces(np.random.default_rng(1))
+    clear = random_surfaces(len(BEAMS), np.random.default_rng(1))
     dry = rain_on_beams(clear, BEAMS, UniformRain(0), SENSOR, np.random.default_rng(2))
     assert_same(meet(clear, BEAMS, Precipitation(), SENSOR, np.random.default_rng(3)), dry)
 
@@ -124,7 +106,7 @@ def test_the_strongest_is_the_surface_or_the_particle_by_power(reflectivity: flo
     assert (last.label == TrackClass.CAR).mean() > 0.98
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     kind=st.sampled_from(sorted(KINDS)),
     seed=st.integers(0, 2**32),
@@ -134,7 +116,7 @@ def test_whatever_flies_each_beam_is_kept_weaker_or_ends_nearer_or_is_lost(
     kind: str, seed: int, returns: str
 ) -> None:
     generator = np.random.default_rng(seed)
-    sensor, clear = replace(SENSOR, returns=returns), random_surfaces(generator)
+    sensor, clear = replace(SENSOR, returns=returns), random_surfaces(len(BEAMS), generator)
     weather = KINDS[kind].draw(kind, generator)
     detected = meet(clear, BEAMS, weather, sensor, np.random.default_rng(seed))
     beam, returned = detected.beam, detected.returned
