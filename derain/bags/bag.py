@@ -141,8 +141,8 @@ class Bag:
                 f"cannot be read as a bag ({reason})",
                 "Decrypt it by rosbag decrypt."
                 if "encrypt" in reason
-                else "It is damaged, cut off, encrypted or of another kind. A bag that was cut off may be "
-                f"repaired by {self._rescuer}",
+                else "It is damaged, cut off, encrypted or of another kind. A bag that was cut off "
+                f"may be repaired by {self._rescuer}",
             ) from error
 
     def messages(self, topic: Topic | None = None, start: int | None = None) -> Iterator[Message]:
