@@ -1,7 +1,7 @@
 """A bag: which topics it has, and its messages one after the other.
 
-The libraries that read bags have one exception for each thing that they check, and whatever Python
-raises for what they do not. Here each is one InputError.
+The libraries that read bags raise many exceptions, and check little of what they read. Here each
+of these becomes one InputError.
 """
 
 import os
@@ -25,11 +25,11 @@ class Message(NamedTuple):
     """One message of a bag.
 
     Attributes:
-        connection: What the library knows of its topic.
+        connection: The reader's connection, which describes its topic and publisher.
         time: When it was recorded, nanoseconds.
         data: Its bytes.
-        published: When it was published, nanoseconds; 0 but in MCAP.
-        sequence: Its number, as the publisher counts; 0 but in MCAP.
+        published: When it was published, nanoseconds; 0 in storages other than MCAP.
+        sequence: Its number, as the publisher counts; 0 in storages other than MCAP.
     """
 
     connection: Any
@@ -40,7 +40,7 @@ class Message(NamedTuple):
 
 
 class Bag:
-    """A recording of ROS 1 or ROS 2, in whatever storage.
+    """A recording of ROS 1 or ROS 2, in any storage.
 
     Args:
         path: A file .bag, .mcap or .db3, or a folder with a metadata.yaml.
@@ -57,10 +57,10 @@ class Bag:
 
     @cached_property
     def metadata(self) -> Ros2Metadata | None:
-        """What the metadata.yaml of a folder says; None of a file.
+        """The metadata.yaml of a folder; None of a file.
 
         Raises:
-            InputError: It is damaged, or of a kind that is not known.
+            InputError: It is damaged, or of an unknown version or storage.
         """
         with self.reading():
             return Ros2Metadata.read(self.path) if os.path.isdir(self.path) else None
@@ -96,7 +96,7 @@ class Bag:
         return tuple(topic for _, topic in sorted(found.items()))
 
     def cloud_topic(self, name: str = "") -> Topic:
-        """The topic of point clouds that is meant.
+        """The topic of point clouds of a name, or the only one.
 
         Args:
             name: Its name; empty where the bag has only one of them.
@@ -108,11 +108,10 @@ class Bag:
 
     @contextmanager
     def opened(self) -> Iterator[Any]:
-        """Lends a reader of the bag, open: the library's, or one of MCAP.
+        """Lends an open reader of the bag: that of rosbags, or derain's of MCAP.
 
         Raises:
-            InputError: A library is not installed, or a bag that cannot be read; also what is
-                found out while it is read in the block.
+            InputError: A library is not installed; or the bag cannot be read, also in the block.
         """
         with self.reading():
             metadata = self.metadata
@@ -126,10 +125,10 @@ class Bag:
 
     @contextmanager
     def reading(self) -> Iterator[None]:
-        """Tells what goes wrong while the bag is read.
+        """Turns the errors of reading the bag into an InputError.
 
         Raises:
-            InputError: Anything but the end of a program went wrong.
+            InputError: An exception of the block.
         """
         try:
             yield
@@ -140,14 +139,14 @@ class Bag:
             raise InputError(
                 self.path,
                 f"cannot be read as a bag ({reason})",
-                "Have it made readable by rosbag decrypt."
+                "Decrypt it by rosbag decrypt."
                 if "encrypt" in reason
-                else "It is damaged, cut off, encrypted or of another kind. What was cut off may "
-                f"be saved by {self._rescuer}",
+                else "It is damaged, cut off, encrypted or of another kind. A bag that was cut off "
+                f"may be repaired by {self._rescuer}",
             ) from error
 
     def messages(self, topic: Topic | None = None, start: int | None = None) -> Iterator[Message]:
-        """Its messages in time order, read while they are asked for.
+        """Its messages in the order of time, read one at a time.
 
         Args:
             topic: The topic; None means all of them.
@@ -162,17 +161,16 @@ class Bag:
     def messages_of(
         self, reader: Any, topic: Topic | None = None, start: int | None = None
     ) -> Iterator[Message]:
-        """The same by a reader that is open already.
+        """As :meth:`messages`, by a reader that is open already.
 
         Args:
-            reader: What :meth:`opened` lends; one asked for messages anew has done with those
-                before.
+            reader: The reader that :meth:`opened` lends; a new call ends the one before.
             topic: As for :meth:`messages`.
             start: As for :meth:`messages`.
 
         Raises:
-            InputError: As for :meth:`messages`; or all messages are asked for, and the bag holds
-                some that cannot be read by its index and its topics.
+            InputError: As for :meth:`messages`; or no topic and no start is given, and the bag has
+                messages that its index or its topics lack.
         """
         with self.reading():
             chosen = [c for c in reader.connections if topic is None or topic.has(c)]
@@ -198,13 +196,13 @@ class Bag:
         return McapReader(path, [path / name for name in _names_of_files(metadata)])
 
     def _unpacked_path(self, metadata: Ros2Metadata) -> Path:
-        """The folder with the unpacked files, perhaps of the process that this one works for."""
+        """The folder with the unpacked files; another process may have unpacked them."""
         if self._unpacked is None or not os.path.isdir(self._unpacked.path):
             self._unpacked = unpacked_bag(self.path, metadata)
         return self._unpacked.path
 
     def _check(self, topics: Collection[Topic]) -> None:
-        """Refuses names and numbers that no recording has, before anything is made of them."""
+        """Refuses names and numbers of messages that no recording has."""
         for topic in topics:
             if "\0" in topic.name:
                 raise ValueError(f"the topic {topic.name} has a NUL in its name")

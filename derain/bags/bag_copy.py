@@ -1,4 +1,4 @@
-"""A bag written anew, message by message, with other clouds in one of its topics."""
+"""Copies a bag message by message, with other clouds in one of its topics."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -13,15 +13,15 @@ from derain.errors import InputError, reason_of
 
 
 class BagCopy:
-    """A copy of a bag that is being written, up to one of the clouds of a topic.
+    """A copy of a bag, written up to one of the clouds of a topic at a time.
 
-    It goes through the bag by itself, next to whoever reads the clouds: so it holds one message at
-    a time, however far a method looks ahead. What is not replaced is copied byte for byte.
+    It has its own reader of the bag, and so holds one message, however many clouds a method reads
+    ahead. Messages that are not replaced are copied byte for byte.
 
     Args:
         bag: The bag.
         topic: Its topic of clouds.
-        folder: Where the copy is written; what is not whole at the end is for the caller to remove.
+        folder: Where the copy is written; the caller removes an incomplete one.
 
     Raises:
         InputError: A bag that cannot be read, or a copy that cannot be written.
@@ -47,10 +47,10 @@ class BagCopy:
         return path
 
     def forward_to(self, number: int) -> Message:
-        """Copies what comes before one of the clouds.
+        """Copies the messages before one of the clouds.
 
         Args:
-            number: Which cloud, from 0: one after those of earlier calls.
+            number: The cloud, from 0; greater than in earlier calls.
 
         Returns:
             The cloud's message, which is not written yet.
@@ -66,12 +66,12 @@ class BagCopy:
             self.write(message)
         raise InputError(
             self.bag.path,
-            f"has {self._clouds:,} messages of {self.topic.name}, fewer than its index says",
-            "Have its index made anew by `ros2 bag reindex` or `rosbag reindex`.",
+            f"has {self._clouds:,} messages of {self.topic.name}, fewer than its index has",
+            "Rebuild its index by `ros2 bag reindex` or `rosbag reindex`.",
         )
 
     def write(self, message: Message, data: bytes | None = None, topic: str | None = None) -> None:
-        """Writes a message, or another in its place in time.
+        """Writes a message, or another one at its time.
 
         Args:
             message: The message of the bag.
@@ -89,7 +89,7 @@ class BagCopy:
         """Copies the rest.
 
         Returns:
-            The copy, whole.
+            The path of the copy.
 
         Raises:
             InputError: The bag cannot be read on, has more clouds than its index says, or the copy
@@ -101,9 +101,9 @@ class BagCopy:
         if self._clouds > self.topic.messages:
             raise InputError(
                 self.bag.path,
-                f"has {self._clouds:,} messages of {self.topic.name}, more than its index says, "
-                "and the last ones were not looked at",
-                "Have its index made anew by `ros2 bag reindex` or `rosbag reindex`.",
+                f"has {self._clouds:,} messages of {self.topic.name}, more than its index has, "
+                "so the last ones were not cleaned",
+                "Rebuild its index by `ros2 bag reindex` or `rosbag reindex`.",
             )
         with self._writing():
             self._writer.close()
@@ -115,17 +115,17 @@ class BagCopy:
 
     def __exit__(self, *_: object) -> None:
         with self._writing():
-            self._writer.abort()  # does nothing to a copy that is whole
+            self._writer.abort()  # does nothing to a finished copy
         self._stack.close()
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Tells what goes wrong while the copy is written."""
+        """Turns the errors of writing the copy into an InputError."""
         try:
             yield
         except (InputError, BrokenPipeError):
             raise
-        except Exception as error:  # the library checks little of what it is given
+        except Exception as error:  # of the libraries
             raise InputError(
                 self.bag.path,
                 f"its copy cannot be written ({reason_of(error)})",
@@ -134,7 +134,7 @@ class BagCopy:
 
 
 def written_name(bag: Bag) -> str:
-    """What a bag that is written like another is called: of ROS 1 a file, of ROS 2 a folder."""
+    """Name of the copy of a bag: of ROS 1 a file, of ROS 2 a folder."""
     return bag.path.name if bag.is_ros1 else stem(bag.path)
 
 

@@ -1,7 +1,7 @@
 """The point clouds of one topic of a bag, by their numbers.
 
-Read one after the other, they are read as they stand in the bag. Who asks for others, or for the
-times of all, has the topic gone through once; what is kept of it is two numbers a cloud.
+Clouds in sequence are read as they come in the bag. Access to others, or to the times of all, first
+reads through the topic once, and keeps two numbers of each cloud.
 """
 
 import os
@@ -22,7 +22,7 @@ from derain.bags.topics import Topic
 from derain.errors import InputError
 from derain.system.notices import warn
 
-# So many clouds ahead, going on is quicker than looking up where they are.
+# Up to so many clouds ahead, reading on is quicker than a search.
 NEAR = 8
 
 
@@ -32,8 +32,8 @@ class Stamps:
 
     Attributes:
         recorded: Nanoseconds, int64 (M,), of the bag's clock.
-        taken: Nanoseconds, int64 (M,), of the clock of whoever published them; as ``recorded``
-            where a cloud says nothing.
+        taken: Nanoseconds, int64 (M,), of the publisher's clock; as ``recorded`` where a cloud has
+            no stamp.
     """
 
     recorded: NDArray[np.int64]
@@ -41,7 +41,7 @@ class Stamps:
 
     @property
     def in_order(self) -> bool:
-        """Whether none was recorded before the one that it follows."""
+        """Whether the times of recording never decrease."""
         return bool((np.diff(self.recorded) >= 0).all())
 
 
@@ -53,8 +53,8 @@ class CloudTopic:
         topic: The topic, one of point clouds.
     """
 
-    # What only this process knows: the open bag, the number of the cloud that it gives next, the
-    # one that it gave last, and what was found out about all of them.
+    # State of this process: the open bag, the number of the cloud that it yields next, the message
+    # that it yielded last, and what is known of all clouds.
     _reader: Any
     _messages: Iterator[Message]
     _next: int | None
@@ -62,7 +62,7 @@ class CloudTopic:
     _stamps: Stamps | None
     _layouts: set[tuple[PointField, ...]]
     _first_of_stamp: dict[int, int]
-    _told_of_stamps: bool
+    _warned_of_stamps: bool
 
     def __init__(self, bag: Bag, topic: Topic) -> None:
         self.bag = bag
@@ -81,14 +81,14 @@ class CloudTopic:
         self._forget()
 
     def name_of(self, number: int) -> str:
-        """What messages call one of the clouds: the path that leads to it."""
+        """The path of one of the clouds, which names it in messages."""
         return f"{self.bag.path}/{self.topic.name.strip('/')}/{number:06d}"
 
     def message(self, number: int) -> Message:
         """One of the messages, from 0.
 
         Raises:
-            InputError: A bag that cannot be read, or one that has fewer clouds than it says.
+            InputError: A bag that cannot be read, or that has fewer clouds than its index says.
         """
         with self._lock:
             if self._process != os.getpid():  # an open file of a process before the fork
@@ -98,7 +98,7 @@ class CloudTopic:
             return self._last[1]
 
     def cloud(self, number: int) -> CloudMessage:
-        """One of the clouds, from 0, with what stands around it in its message.
+        """The message of one of the clouds, from 0, parsed.
 
         Raises:
             InputError: As for :meth:`message`, or a damaged cloud.
@@ -108,8 +108,8 @@ class CloudTopic:
             cloud = CloudMessage.parse(message.data, self.topic.encoding)
         except ValueError as error:
             raise damaged_cloud(self.name_of(number), error) from error
-        self._tell_of_other_fields(number, cloud.cloud.fields)
-        self._tell_of_one_stamp(number, cloud.stamp)
+        self._warn_of_other_fields(number, cloud.cloud.fields)
+        self._warn_of_one_stamp(number, cloud.stamp)
         return cloud
 
     def seconds(self, number: int) -> float:
@@ -124,7 +124,7 @@ class CloudTopic:
 
     @property
     def stamps(self) -> Stamps:
-        """When all the clouds were recorded and taken; the topic is gone through for it once."""
+        """When all the clouds were recorded and taken; the first access reads through the topic."""
         if self._stamps is None:
             times = [
                 (message.time, self._taken(number, message))
@@ -137,7 +137,7 @@ class CloudTopic:
     def _forget(self) -> None:
         self._lock = threading.Lock()
         self._process = os.getpid()
-        self._open = ExitStack()  # left when nobody asks for clouds any more
+        self._open = ExitStack()  # closed with the last reference to this object
         self._reader = None
         self._messages = iter(())
         self._next = None
@@ -145,7 +145,7 @@ class CloudTopic:
         self._stamps = None
         self._layouts = set()
         self._first_of_stamp = {}
-        self._told_of_stamps = False
+        self._warned_of_stamps = False
 
     def _read(self, number: int) -> Message:
         if self._next is None or not 0 <= number - self._next <= NEAR:
@@ -159,7 +159,7 @@ class CloudTopic:
         return message
 
     def _begin_near(self, number: int) -> None:
-        """Goes to a place in the bag from which a cloud is not far ahead."""
+        """Begins to read shortly before a cloud, or at it."""
         first, start = 0, None
         if number > NEAR and self.stamps.in_order:
             # Several may have been recorded at one time.
@@ -173,7 +173,7 @@ class CloudTopic:
     def _taken(self, number: int, message: Message) -> int:
         try:
             return stamp_of(message.data, self.topic.encoding) or message.time
-        except ValueError:  # who reads the cloud is told
+        except ValueError:  # reading the cloud raises it
             return message.time
 
     def _known(self, number: int) -> int:
@@ -184,32 +184,34 @@ class CloudTopic:
     def _too_few(self) -> InputError:
         return InputError(
             self.bag.path,
-            f"says that it has {len(self):,} messages of {self.topic.name}, and has fewer",
-            "Its index is damaged: have it made anew by `ros2 bag reindex` or `rosbag reindex`.",
+            f"has fewer messages of {self.topic.name} than the {len(self):,} of its index",
+            "Rebuild its index by `ros2 bag reindex` or `rosbag reindex`.",
         )
 
-    def _tell_of_other_fields(self, number: int, fields: tuple[PointField, ...]) -> None:
+    def _warn_of_other_fields(self, number: int, fields: tuple[PointField, ...]) -> None:
         if self._layouts and fields not in self._layouts:
             names = ", ".join(field.name for field in fields)
             warn(
-                f"{self.name_of(number)}: its fields are others than those of clouds before it; "
+                f"{self.name_of(number)}: its fields differ from those of clouds before it; "
                 f"it is read by its own ({names})"
             )
         self._layouts.add(fields)
 
-    def _tell_of_one_stamp(self, number: int, stamp: int) -> None:
-        """Warns of two clouds of one time, and of no more of them."""
+    def _warn_of_one_stamp(self, number: int, stamp: int) -> None:
+        """Warns of the first two clouds that have the same stamp."""
         first = self._first_of_stamp.setdefault(stamp, number)
-        if stamp and first != number and not self._told_of_stamps:
-            self._told_of_stamps = True
+        if stamp and first != number and not self._warned_of_stamps:
+            self._warned_of_stamps = True
             warn(
                 f"{self.name_of(number)}: has the stamp of {self.name_of(first)}; both are read, "
-                "and others like them are not told"
+                "and no more of these are reported"
             )
 
 
 def damaged_cloud(name: str, error: ValueError) -> InputError:
-    """What to tell of a cloud whose message cannot be read."""
+    """The error of a cloud whose message cannot be parsed."""
     return InputError(
-        name, f"is a damaged PointCloud2: {error}", "See what published it; the others are read."
+        name,
+        f"is a damaged PointCloud2: {error}",
+        "Check the node that published it; other clouds are read.",
     )

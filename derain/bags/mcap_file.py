@@ -91,7 +91,7 @@ class McapFile:
             yield message
         stated = sum(n for channel, n in self.counts.items() if channel in channels)
         if start is None and count != stated:
-            raise ValueError(f"it has {count:,} messages where its index says {stated:,}")
+            raise ValueError(f"it has {count:,} messages, and its index {stated:,}")
 
     def check_whole(self) -> None:
         """Checks that reading all messages leaves nothing of the file unread.

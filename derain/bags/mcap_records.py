@@ -169,7 +169,7 @@ class McapRecords:
         content = unpack(chunk.data, chunk.compression)
         if len(content) != chunk.uncompressed_size:
             raise ValueError(
-                f"a chunk of {len(content):,} bytes says that it has {chunk.uncompressed_size:,}"
+                f"a chunk states {chunk.uncompressed_size:,} bytes, and unpacks to {len(content):,}"
             )
         _check_crc("a chunk", chunk.uncompressed_crc, [content])
         return _records(content, most=len(chunk.data))
@@ -220,7 +220,7 @@ def _places(file: BinaryIO, begin: int, end: int) -> Iterator[Place]:
             raise ValueError("a record is cut off")
         kind, size = HEAD.unpack(head)
         if begin + HEAD.size + size > end:
-            raise ValueError(f"a record at byte {begin:,} says that it has {size:,} bytes")
+            raise ValueError(f"a record of {size:,} bytes at byte {begin:,} is cut off")
         yield Place(kind, begin, size)
         begin += HEAD.size + size
 
@@ -254,7 +254,13 @@ def _message(body: bytes | memoryview) -> Message:
     if len(body) < MESSAGE_HEAD.size:
         raise ValueError("a message is cut off")
     channel, sequence, time, published = MESSAGE_HEAD.unpack_from(body)
-    return Message(channel, time, bytes(body[MESSAGE_HEAD.size :]), published, sequence)
+    return Message(
+        channel_id=channel,
+        log_time=time,
+        data=bytes(body[MESSAGE_HEAD.size :]),
+        publish_time=published,
+        sequence=sequence,
+    )
 
 
 def _check_crc(what: str, stated: int, parts: Iterable[bytes]) -> None:

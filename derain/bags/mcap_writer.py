@@ -1,4 +1,4 @@
-"""Writes a bag in MCAP that is like another, with all that the other has besides messages."""
+"""Writes bags in MCAP, each with the settings, attachments and metadata of another bag."""
 
 import os
 from copy import deepcopy
@@ -24,22 +24,22 @@ from derain.system.extras import ZSTANDARD
 
 T = TypeVar("T")
 
-# The record in which ROS 2 repeats the metadata.yaml, and the one note in it.
+# The metadata record in which ROS 2 repeats the metadata.yaml, and the name of its entry.
 ROS2_RECORD, ROS2_NOTE = "rosbag2", "serialized_metadata"
 
-# What ROS 2 notes of a channel.
+# Names of what ROS 2 notes of a channel.
 QOS, TYPE_HASH = "offered_qos_profiles", "topic_type_hash"
 
 
 class McapWriter:
     """Writes messages to a folder of ROS 2 with one file of MCAP.
 
-    Channels keep their schemas and notes, and messages their numbers and times; attachments,
-    metadata and private records follow when the bag is ended.
+    Channels keep their schemas and notes, and messages their numbers and times. Attachments,
+    metadata and private records are written last.
 
     Args:
         bag: The other bag, open.
-        metadata: What its metadata.yaml says, if it has one.
+        metadata: Its metadata.yaml; None for a file.
         path: The folder, which is made.
     """
 
@@ -51,7 +51,7 @@ class McapWriter:
         self._file = (path / f"{path.name}.mcap").open("xb")
         chunks = [chunk for file in bag.files for chunk in file.chunks]
         used = {chunk.compression for chunk in chunks}
-        self._writer = Writer(
+        self._writer: Any = Writer(
             self._file,
             compression=next(
                 (kind for kind in CompressionType if kind.name.lower() in used),
@@ -67,7 +67,7 @@ class McapWriter:
         self._first, self._last = 2**63 - 1, 0
 
     def connection(self, like: McapConnection, topic: str | None = None) -> McapConnection:
-        """What messages are written to; see :meth:`RosbagsWriter.connection`."""
+        """A connection of this bag; see :meth:`RosbagsWriter.connection`."""
         new = replace(like, topic=topic or like.topic, msgcount=0)
         if new not in self._channels:
             number = 0
@@ -92,7 +92,7 @@ class McapWriter:
         self._first, self._last = min(self._first, like.time), max(self._last, like.time)
 
     def close(self) -> None:
-        """Ends the bag, which is whole then."""
+        """Completes the bag."""
         for record in self.bag.attachments_and_metadata():
             if isinstance(record, Attachment):
                 times = record.create_time, record.log_time
@@ -111,7 +111,7 @@ class McapWriter:
         metadata.write(self.path)
 
     def abort(self) -> None:
-        """Lets go of the bag, which is not whole."""
+        """Closes the bag, which stays incomplete."""
         self._file.close()
 
     @property
@@ -119,7 +119,7 @@ class McapWriter:
         return NONE if self.metadata is None else self.metadata.compression
 
     def _metadata(self) -> Ros2Metadata:
-        """That of the new bag: what the other's says, with what has changed."""
+        """The metadata of the new bag: that of the other, with what differs."""
         old = self._old_metadata()
         topics: dict[str, dict[str, Any]] = {
             each["topic_metadata"]["name"]: each["topic_metadata"]
@@ -154,7 +154,7 @@ class McapWriter:
         return Ros2Metadata(content, version, "mcap", (name,), self._compression)
 
     def _old_metadata(self) -> dict[str, Any]:
-        """What the other bag's metadata.yaml says, or its file, where that repeats it."""
+        """The content of the other bag's metadata.yaml, or of its repetition in the file."""
         if self.metadata is not None:
             return deepcopy(self.metadata.content)
         for record in self.bag.attachments_and_metadata():
@@ -163,7 +163,7 @@ class McapWriter:
         return {}
 
     def _version(self) -> int:
-        """The version that has quality of service as the channels have it."""
+        """The version that writes quality of service as the channels do."""
         texts = (dict(each.notes).get(QOS, "") for each in self._channels)
         newest = any("keep_last" in text or "keep_all" in text for text in texts)
         return NEWEST_VERSION if newest else OLDER_VERSION
@@ -172,7 +172,7 @@ class McapWriter:
 def _topic_metadata(
     connection: McapConnection, version: int, known: dict[str, dict[str, Any]]
 ) -> dict[str, Any]:
-    """What a metadata.yaml says of a topic."""
+    """The entry of a topic in a metadata.yaml."""
     notes = dict(connection.notes)
     profiles: Any = notes.get(QOS, "")
     if version >= NEWEST_VERSION:
@@ -197,7 +197,7 @@ def _from_yaml(note: str, kind: type[T]) -> T | None:
 
 
 def _pack(file: Path) -> None:
-    """Puts a compressed file in the place of a file."""
+    """Replaces a file by a compressed one."""
     compressor = ZSTANDARD.load(file).ZstdCompressor()
     packed = file.with_name(f"{file.name}.zstd")
     with file.open("rb") as source, packed.open("xb") as target:

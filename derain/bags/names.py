@@ -1,8 +1,7 @@
-"""Paths that lead to bags, and into them.
+"""Paths of bags, of topics in bags, and of clouds in topics.
 
-A bag is named like a folder of its topics, and those like folders of their clouds: in
-``drive.mcap`` there may be ``drive.mcap/points``, and ``drive.mcap/points/000012``
-in that.
+A bag is named like a folder of its topics, and a topic like a folder of its clouds:
+``drive.mcap/points/000012`` is a cloud of the topic ``/points`` of ``drive.mcap``.
 """
 
 import os
@@ -12,22 +11,22 @@ from pathlib import Path
 from derain.errors import InputError
 from derain.files.reading import reading
 
-# Files that are bags by themselves, of ROS 1 and of ROS 2.
+# Suffixes of files that are bags.
 ROS1_SUFFIX = ".bag"
 SUFFIXES = (ROS1_SUFFIX, ".mcap", ".db3")
 
-# Files of ROS 2 that are compressed as a whole are read by way of their folder.
+# Files of ROS 2 that are compressed as a whole; their folder is the bag.
 COMPRESSED_SUFFIXES = (".mcap.zstd", ".db3.zstd")
 
-# What ROS 1 calls a bag until its recording is ended.
+# Suffix of a bag of ROS 1 that is being recorded.
 UNFINISHED_SUFFIX = ".bag.active"
 
-# The file that makes a folder a bag of ROS 2, and the word in it that says so.
+# The file that makes a folder a bag of ROS 2, and the word that it contains.
 BAG_METADATA, METADATA_WORD = "metadata.yaml", b"rosbag2_bagfile_information"
 
 
 def bags_at(path: Path) -> list[Path]:
-    """The bags that a path stands for.
+    """The bags at a path.
 
     Args:
         path: A bag, or a folder with bags and no scans in it.
@@ -50,20 +49,18 @@ def is_bag(path: Path) -> bool:
     """Whether something is a bag: a file by its suffix, a folder by what it holds.
 
     Raises:
-        InputError: A file of ROS 2 that is compressed as a whole, which its folder tells; or a bag
-            of ROS 1 whose recording was not ended.
+        InputError: A file of ROS 2 that is compressed as a whole, or a bag of ROS 1 whose recording
+            was not ended.
     """
     if os.path.isfile(path):
         if path.name.lower().endswith(UNFINISHED_SUFFIX):
             raise InputError(
                 path,
-                "is a bag whose recording goes on, or was cut off",
-                "End the recording; or name a copy .bag, and have it mended by rosbag reindex.",
+                "is a bag that is still being recorded, or was cut off",
+                "End the recording; or rename a copy to .bag, and repair it by rosbag reindex.",
             )
         if path.name.lower().endswith(COMPRESSED_SUFFIXES):
-            raise InputError(
-                path, "is compressed, as its bag's metadata.yaml tells", "Name the bag's folder."
-            )
+            raise InputError(path, "is one compressed file of a bag", "Name the bag's folder.")
         return path.suffix.lower() in SUFFIXES
     metadata = path / BAG_METADATA
     if not os.path.isfile(metadata):
@@ -73,14 +70,14 @@ def is_bag(path: Path) -> bool:
 
 
 def split(path: Path) -> tuple[Path, str] | None:
-    """The bag that a path leads to or into, and what it names there.
+    """Splits a path into a bag and the topic or cloud in it.
 
     Args:
         path: The path.
 
     Returns:
-        The bag, and ``""``, ``"topic"``, ``"number"`` or ``"topic/number"``; None where the path
-        leads into none.
+        The bag, and ``""``, ``"topic"``, ``"number"`` or ``"topic/number"``; None where no part of
+        the path is a bag.
     """
     inner: list[str] = []
     for place in (path, *path.parents):
@@ -91,7 +88,7 @@ def split(path: Path) -> tuple[Path, str] | None:
 
 
 def within(paths: Iterable[Path], topic: str | None) -> list[Path]:
-    """The same paths, of which those to bags lead to a topic of theirs.
+    """The same paths, where a topic is appended to those of bags.
 
     Args:
         paths: Bags and whatever else.

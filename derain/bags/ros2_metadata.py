@@ -12,24 +12,24 @@ from derain.bags.names import BAG_METADATA, METADATA_WORD
 from derain.errors import reason_of
 from derain.files.documents import LARGEST_DOCUMENT, parsed_yaml
 
-# The newest version that is known. It spells quality of service in words, which readers older
-# than it do not know; the one before it has it in numbers, as text.
+# The newest version that derain reads, which writes quality of service in words, and the one before
+# it, which writes numbers as text.
 NEWEST_VERSION, OLDER_VERSION = 9, 8
 
 STORAGES = ("sqlite3", "mcap")
 
-# How bags are compressed: not, message by message, each chunk, or file by file.
+# Modes of compression: none, of each message, of each file.
 NONE, MESSAGE, FILE = "", "message", "file"
 
 
 def small_yaml(text: str) -> Any:
-    """What a text within a bag says.
+    """Parses a YAML text of a bag.
 
     Args:
         text: The text.
 
     Raises:
-        ValueError: No YAML, or more of it than a bag needs.
+        ValueError: No YAML, or more than a bag needs.
     """
     try:
         return parsed_yaml(text, aliases=True)
@@ -39,7 +39,7 @@ def small_yaml(text: str) -> Any:
 
 @dataclass(frozen=True)
 class Ros2Metadata:
-    """What a metadata.yaml says.
+    """The content of a metadata.yaml.
 
     Attributes:
         content: All of it, below its one key.
@@ -60,8 +60,8 @@ class Ros2Metadata:
         """Reads that of a bag.
 
         Raises:
-            ValueError: It is no small YAML, says what no bag of ROS 2 does, or names what is not
-                there.
+            ValueError: It is no small YAML, has values that no bag of ROS 2 has, or lists files
+                that do not exist.
             OSError: It cannot be read.
         """
         with (folder / BAG_METADATA).open("rb") as file:
@@ -88,7 +88,7 @@ class Ros2Metadata:
         return cls(content, version, storage, files, mode)
 
     def unpacked(self) -> "Ros2Metadata":
-        """That of the same bag, whose files are compressed as a whole no more."""
+        """The metadata of the same bag after its files are unpacked."""
         files = [PurePath(name).stem for name in self.files]
         content = deepcopy(self.content) | {
             "relative_file_paths": files,

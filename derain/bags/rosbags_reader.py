@@ -1,4 +1,4 @@
-"""Opens bags of ROS 1 and SQLite by the library, which then unpacks no more than a bag needs."""
+"""Opens bags of ROS 1 and SQLite by the library, with bounds on what it unpacks and reads."""
 
 import os
 from collections import Counter
@@ -13,11 +13,11 @@ from typing import Any, BinaryIO
 from derain.bags.unpacking import MOST_UNPACKED, unpack
 from derain.system.extras import APSW, ROSBAGS
 
-# The most topics of a bag, each publisher of ROS 1 counted: the time that the library takes grows
-# with the square, and a metadata.yaml that lists many more is too large to be read.
+# The most topics of a bag, where each publisher of ROS 1 counts as one. The library's time grows
+# with their square, and a metadata.yaml that lists many more is too large to be read.
 MOST_TOPICS = 4096
 
-# What ROS 2 has in a database.
+# Tables of a database of ROS 2.
 ROS2_TABLES = {"schema", "metadata", "topics", "message_definitions", "messages"}
 
 # Records of ROS 1 begin with the size of their header and the header, then the size of their data.
@@ -31,11 +31,11 @@ OP_MESSAGE, OP_BAG_HEADER, OP_INDEX, OP_CHUNK, OP_CHUNK_INFO, OP_CONNECTION = ra
 def rosbags_reader(path: Path, is_ros1: bool) -> Iterator[Any]:
     """Lends a reader of the library, open.
 
-    Where messages are compressed one by one, it gives them as they are.
+    It does not unpack messages that are compressed one by one.
 
     Args:
-        path: A file of ROS 1, a file of SQLite, or a folder of ROS 2 with those.
-        is_ros1: Whether it is ROS 1's.
+        path: A file of ROS 1 or of SQLite, or a folder of ROS 2 with files of SQLite.
+        is_ros1: Whether it is a file of ROS 1.
     """
     if is_ros1:
         reader = ROSBAGS.load(path, "rosbag1").Reader(path)
@@ -67,7 +67,7 @@ def compressions_of(reader: Any) -> set[str]:
 
 
 def other_tables(reader: Any) -> list[str]:
-    """Names of tables in the databases of a bag that ROS 2 does not know.
+    """Names of tables in the databases of a bag that are none of ROS 2.
 
     Args:
         reader: What :func:`rosbags_reader` lends.
@@ -78,7 +78,7 @@ def other_tables(reader: Any) -> list[str]:
 
 
 def stored_messages(reader: Any) -> int:
-    """Number of messages in the files of a bag, be they of a topic that it names or not.
+    """Number of messages in the files of a bag, also of topics that it does not list.
 
     Args:
         reader: What :func:`rosbags_reader` lends.
@@ -92,7 +92,7 @@ def stored_messages(reader: Any) -> int:
     if reader.chunks.keys() != set(_chunk_places(reader.path)):
         raise ValueError("its index does not name all chunks")
     for chunk in reader.chunks.values():
-        if not chunk.decompressor.messages:  # nobody unpacks it for a message
+        if not chunk.decompressor.messages:  # otherwise unpacked, and so checked, by its messages
             reader.bio.seek(chunk.datapos)
             chunk.decompressor(reader.bio.read(chunk.datasize))
     return sum(map(len, reader.indexes.values()))
@@ -136,7 +136,7 @@ class ChunkUnpacker:
 
 
 def _records(file: BinaryIO) -> Iterator[tuple[int, int]]:
-    """Place and kind of records of ROS 1 that follow one another."""
+    """Place and kind of consecutive records of ROS 1."""
     while head := file.read(RECORD_SIZE.size):
         place = file.tell() - RECORD_SIZE.size
         (size,) = RECORD_SIZE.unpack(head)
@@ -160,7 +160,7 @@ def _chunk_places(path: Path) -> Iterator[int]:
 
 
 def _each_chunk_once(read_chunk_info: Callable[[], Any]) -> Callable[[], Any]:
-    """Reads what the index of ROS 1 has of one chunk after the other, and of none again."""
+    """Wraps what reads the index of ROS 1, to refuse a chunk that is listed twice."""
     places: set[int] = set()
 
     def read() -> Any:
@@ -174,7 +174,7 @@ def _each_chunk_once(read_chunk_info: Callable[[], Any]) -> Callable[[], Any]:
 
 
 def _bounded(chunk: Any, messages: int) -> Any:
-    """A chunk of ROS 1 that is unpacked by derain."""
+    """The same chunk of ROS 1, unpacked by derain."""
     by_name = ROSBAGS.load("bags", "rosbag1.reader").decompressors
     names = {function: name for name, function in by_name.items()}
     return chunk._replace(decompressor=ChunkUnpacker(names[chunk.decompressor], messages))
@@ -182,10 +182,7 @@ def _bounded(chunk: Any, messages: int) -> Any:
 
 @contextmanager
 def _bounded_databases(path: Path) -> Iterator[None]:
-    """Has SQLite refuse values larger than any message, and too many topics.
-
-    It holds for what is opened in the block.
-    """
+    """Bounds the databases that are opened in the block: the size of a value, and the topics."""
     apsw = APSW.load(path)
 
     def bound(database: Any) -> None:

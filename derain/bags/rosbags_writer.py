@@ -13,10 +13,10 @@ from derain.system.notices import warn
 
 
 class RosbagsWriter:
-    """Writes messages to a bag like another.
+    """Writes messages to a bag of ROS 1 or SQLite that is like another.
 
-    Of ROS 1 and SQLite. Connections keep definition, hash, quality of service, caller and latching.
-    Two publishers that differ in nothing that a bag tells become one.
+    Connections keep definition, hash, quality of service, caller and latching. Two publishers that
+    differ in none of these become one.
 
     Args:
         bag: The other bag.
@@ -32,11 +32,11 @@ class RosbagsWriter:
         self._connections: dict[Any, Any] = {}
 
     def connection(self, like: Any, topic: str | None = None) -> Any:
-        """What messages are written to that come from a connection of the other bag.
+        """The connection of this bag that corresponds to one of the other bag.
 
         Args:
             like: The other bag's connection.
-            topic: Name of another topic that is otherwise the same; None for the connection's own.
+            topic: Name of the topic; None for the same one.
         """
         new = like._replace(
             id=0, topic=topic or like.topic, msgcount=0, owner=None, ext=repr(like.ext)
@@ -51,17 +51,17 @@ class RosbagsWriter:
 
         Args:
             connection: What :meth:`connection` gave.
-            like: A message of the other bag, in whose place in time it is.
+            like: The message of the other bag whose time it gets.
             data: Its bytes.
         """
         self._writer.write(connection, like.time, data)
 
     def close(self) -> None:
-        """Ends the bag, which is whole then."""
+        """Completes the bag."""
         self._writer.close()
 
     def abort(self) -> None:
-        """Lets go of the bag, which is not whole."""
+        """Closes the bag, which stays incomplete."""
         self._writer.abort()
 
     def _declare_ros1(self, like: Any, topic: str) -> Any:
@@ -75,10 +75,10 @@ class RosbagsWriter:
         )
 
     def _declare_ros2(self, like: Any, topic: str) -> Any:
-        """Declares a connection as it is.
+        """Declares a connection without a change.
 
-        The library's own way asks for definition and hash, which bags of older ROS 2 lack, and
-        guesses the language of the definition.
+        The library's `add_connection` requires definition and hash, which bags of older ROS 2 lack,
+        and guesses the language of the definition.
         """
         writer = self._writer
         new = like._replace(id=len(writer.connections) + 1, topic=topic, msgcount=0, owner=writer)
@@ -111,7 +111,7 @@ def _ros1(reader: Any, path: Path) -> Any:
 
 
 def _lz4_of_ros1(data: bytes) -> bytes:
-    """Compresses a chunk such that ROS 1 can read it.
+    """Compresses a chunk in the way that ROS 1 can read.
 
     Source: roslz4, which refuses linked blocks, wants a checksum, and knows no size of the content.
     """
@@ -134,7 +134,7 @@ def _ros2(bag: Bag, reader: Any, path: Path) -> Any:
         mode = library.CompressionMode[bag.metadata.compression.upper()]
         writer.set_compression(mode, library.CompressionFormat.ZSTD)
     for table in other_tables(reader):
-        warn(f"{bag.path}: its table '{table}' is none of ROS 2, and its copy does not have it")
+        warn(f"{bag.path}: its table '{table}' is not one of ROS 2, and is not copied")
     for key, value in (reader.storage.metadata.custom or {}).items():
         writer.set_custom_data(str(key), str(value))
     return writer

@@ -66,7 +66,7 @@ def _lz4(data: bytes) -> bytes:
 
 def _zstd(data: bytes) -> bytes:
     library = ZSTANDARD.load("bags")
-    check_size(library.frame_content_size(data))  # -1 where it does not say
+    check_size(library.frame_content_size(data))  # -1 where the frame has none
     unpacked: bytes = library.decompress(data, MOST_UNPACKED)
     return unpacked
 
@@ -91,8 +91,8 @@ UNPACKERS: Mapping[str, Callable[[bytes], bytes]] = {
 class UnpackedBag:
     """A folder with the files of a compressed bag, not compressed.
 
-    It is removed when the process that unpacked the bag ends or holds this no more. Pickled, it is
-    the path alone: another process reads the folder and leaves it.
+    The process that unpacked it removes the folder when it ends, or drops the last reference. A
+    pickled copy is the path alone: another process reads the folder and leaves it.
 
     Attributes:
         path: The folder.
@@ -106,15 +106,15 @@ _HELD: WeakValueDictionary[tuple[object, ...], UnpackedBag] = WeakValueDictionar
 
 
 def unpacked_bag(folder: Path, metadata: Ros2Metadata) -> UnpackedBag:
-    """The same bag with files that are not compressed; unpacked unless this process holds it.
+    """Unpacks the files of a bag, unless this process holds them already.
 
     Args:
         folder: The bag's folder.
-        metadata: What its metadata.yaml says.
+        metadata: Its metadata.yaml.
 
     Raises:
         ValueError: A damaged file, or one that unpacks to more than there is room for.
-        OSError: It cannot be read, or the other not written.
+        OSError: A file cannot be read or written.
     """
     files = [(folder / name).stat() for name in metadata.files]
     key = (*((f.st_dev, f.st_ino, f.st_size, f.st_mtime_ns) for f in files), repr(metadata))
@@ -123,7 +123,7 @@ def unpacked_bag(folder: Path, metadata: Ros2Metadata) -> UnpackedBag:
         return held
     with ExitStack() as stack:
         lent = stack.enter_context(temporary_folder(Path(tempfile.gettempdir())))
-        lent.chmod(0o700)  # others may look into the folder that it is in
+        lent.chmod(0o700)  # the folder of temporary files is open to all users
         plain = metadata.unpacked()
         for packed, file in zip(metadata.files, plain.files, strict=True):
             _unpack_file(folder / packed, lent / file)

@@ -186,4 +186,4 @@ def test_more_topics_than_a_recording_has_are_refused(
 def test_a_bag_with_fewer_clouds_than_it_says_is_refused(tmp_path: Path) -> None:
     bag = small_bag(tmp_path, "sqlite3")
     say_there_are(bag, 5)
-    assert "says that it has 5 messages" in refusal(lambda: read_all(bag))
+    assert "than the 5 of its index" in refusal(lambda: read_all(bag))

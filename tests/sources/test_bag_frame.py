@@ -177,7 +177,7 @@ def test_other_fields_on_the_way_are_told_once(
 
     assert intensities == [True, False, False, False]
     told = capsys.readouterr().err
-    assert told.count("its fields are others") == 1
+    assert told.count("its fields differ") == 1
     assert "000001" in told
 
 
