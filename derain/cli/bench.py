@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from derain.datamodules.loading import Part
     from derain.datamodules.scan_data import ScanData
     from derain.export.bench.bench import Bench
-    from derain.export.bench.contestant import Contestant
-    from derain.export.bench.contestants import LearnFrom
+    from derain.export.bench.contestants import Contestant, LearnFrom
     from derain.export.bench.labelled_frames import LabelledFrames
     from derain.sources.frame import Frame
     from derain.sources.source import Frames

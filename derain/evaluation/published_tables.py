@@ -1,4 +1,4 @@
-"""The tables of the REHEARSE-3D paper, and ours beside them."""
+"""The tables of the REHEARSE-3D paper, with rows of our own."""
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
@@ -25,14 +25,14 @@ class PublishedRow:
     """A row as it is printed.
 
     Attributes:
-        method: What the paper calls the method.
-        kind: What derain calls it.
+        method: The method's name in the paper.
+        kind: Its name in derain.
         group: Part of the split in table II, rain in table III.
         scores: Precision, recall, F1 and IoU of rain, in percent.
         ms: Milliseconds, where the table has them.
-        average: How the scores agree with each other: pooled over points, or the mean over scans.
+        average: The average that fits the scores: pooled over points, or the mean over scans.
         simulated: On rain simulated by the paper's authors, not on REHEARSE-3D.
-        misprint: What the row's own figures contradict.
+        misprint: A contradiction among the row's own figures.
     """
 
     method: str
@@ -46,11 +46,11 @@ class PublishedRow:
 
 
 class MeasuredRow(Protocol):
-    """A row of ours: a method that was measured."""
+    """A row of our own: a measured method."""
 
     @property
     def title(self) -> str:
-        """What it is called."""
+        """The method's title."""
 
     @property
     def kind(self) -> str:
@@ -58,11 +58,11 @@ class MeasuredRow(Protocol):
 
     @property
     def scores(self) -> "Scores":
-        """What it scored."""
+        """Its scores."""
 
     @property
     def milliseconds(self) -> float:
-        """Median time from file to mask; not a number where it could not be timed."""
+        """Median time from file to mask; NaN where it could not be timed."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class PaperTable:
     """A table of the paper.
 
     Attributes:
-        title: What it shows.
-        groups: Part of the split, or rain rate in mm/h, by the name of a group.
+        title: Its title.
+        groups: Part of the split or rain rate in mm/h, by the name of the group.
         rows: Its rows.
     """
 
@@ -102,8 +102,7 @@ def scans_by_group(
     Args:
         table: The table.
         scans_of_part: The scans of a part of our split, ``validation`` or ``test``.
-        rain_rate_of: Rain rate of a scan in mm/h, None where it is not known; table III asks for
-            it.
+        rain_rate_of: Rain rate of a scan in mm/h, for table III; None where it is not known.
 
     Raises:
         InputError: No scan belongs to any group.
@@ -129,7 +128,7 @@ def scans_by_group(
 def beside_published(
     table: PaperTable, ours: Mapping[str, Sequence[MeasuredRow]], card: DataCard
 ) -> str:
-    """Our rows under the published ones of the same method, in Markdown.
+    """Our rows below the published rows of the same method, in Markdown.
 
     Args:
         table: The table.
