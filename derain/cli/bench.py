@@ -15,7 +15,6 @@ from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.errors import InputError
 from derain.evaluation.published_tables import (
     TABLES,
-    beside_published,
     paper_table,
     scans_by_group,
 )
@@ -99,6 +98,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     from derain.datamodules.labelled import rain_rates
     from derain.export.bench.contestants import contestants
+    from derain.export.bench.report import beside_published
 
     data = labelled(arguments, arguments.data)
     rates = rain_rates(arguments.data, arguments.rain_rates)

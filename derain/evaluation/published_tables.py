@@ -1,19 +1,13 @@
-"""The tables of the REHEARSE-3D paper, with rows of our own."""
+"""The tables of the REHEARSE-3D paper, and the scans that each of their groups is measured on."""
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol, TypeVar
+from typing import Literal, TypeVar
 
-from derain.cards.card import DataCard
 from derain.errors import InputError
-from derain.evaluation.counts import SCORES, mean_over_scans
-from derain.evaluation.text_tables import markdown_table, number_text
 from derain.files.documents import Entry
 from derain.files.packaged import packaged
-
-if TYPE_CHECKING:
-    from derain.evaluation.scores import Scores
 
 Item = TypeVar("Item")
 
@@ -43,26 +37,6 @@ class PublishedRow:
     average: Literal["pooled", "scans"] = "pooled"
     simulated: bool = False
     misprint: str | None = None
-
-
-class MeasuredRow(Protocol):
-    """A row of our own: a measured method."""
-
-    @property
-    def title(self) -> str:
-        """The method's title."""
-
-    @property
-    def kind(self) -> str:
-        """Name of its network, filter or baseline."""
-
-    @property
-    def scores(self) -> "Scores":
-        """Its scores."""
-
-    @property
-    def milliseconds(self) -> float:
-        """Median time from file to mask; NaN where it could not be timed."""
 
 
 @dataclass(frozen=True)
@@ -123,52 +97,3 @@ def scans_by_group(
             'Give --rain-rates: a YAML file with lines such as "005": 25.',
         )
     return groups
-
-
-def beside_published(
-    table: PaperTable, ours: Mapping[str, Sequence[MeasuredRow]], card: DataCard
-) -> str:
-    """Our rows below the published rows of the same method, in Markdown.
-
-    Args:
-        table: The table.
-        ours: Our rows, by the names of the table's groups.
-        card: Data card of our scans.
-    """
-    published = [row for row in table.rows if row.simulated == card.simulated]
-    if not published:  # table II has no row on simulated rain
-        published = list(table.rows)
-    head = ["method", *("P", "R", "F1", "IoU"), "ms", "average"]
-    parts = [f"# {table.title}", f"Ours on {card.title}."]
-    for name, rows in ours.items():
-        group = [row for row in published if row.group == name]
-        parts += [f"## {name}", markdown_table(head, _beside(group, rows))]
-    misprints = [
-        f"(*) {row.method}, {row.group}: {row.misprint}." for row in published if row.misprint
-    ]
-    return "\n\n".join([*parts, *misprints])
-
-
-def _beside(published: Sequence[PublishedRow], rows: Sequence[MeasuredRow]) -> list[list[str]]:
-    body = []
-    for paper in published:
-        body.append(_published_cells(paper))
-        body += [_our_cells(row, paper.average) for row in rows if row.kind == paper.kind]
-    kinds = {paper.kind for paper in published}
-    return body + [_our_cells(row, "pooled") for row in rows if row.kind not in kinds]
-
-
-def _published_cells(row: PublishedRow) -> list[str]:
-    title = f"{row.method}, published{' (*)' if row.misprint else ''}"
-    scores = [f"{score:.2f}" for score in row.scores]
-    return [title, *scores, number_text(row.ms, "g"), row.average]
-
-
-def _our_cells(row: MeasuredRow, average: str) -> list[str]:
-    pooled, per_scan = row.scores.pooled, row.scores.per_scan
-    values = [
-        getattr(pooled, score) if average == "pooled" else mean_over_scans(per_scan, score)
-        for score in SCORES
-    ]
-    cells = (number_text(100 * value, ".2f") for value in values)
-    return [f"{row.title}, ours", *cells, number_text(row.milliseconds, ".0f"), average]

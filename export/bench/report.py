@@ -8,7 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from derain.evaluation.counts import SCORES, Counts
+from derain.cards.card import DataCard
+from derain.evaluation.counts import SCORES, Counts, mean_over_scans
+from derain.evaluation.published_tables import PaperTable, PublishedRow
 from derain.evaluation.text_tables import markdown_table, number_text
 from derain.export.bench.contestants import FILE_SIZE, LEARNT, TRIVIAL, Contestant
 from derain.export.bench.rows import Row
@@ -156,6 +158,28 @@ def group_of(contestant: Contestant) -> str:
     return "baseline" if contestant.kind in (*LEARNT, *TRIVIAL) else "network"
 
 
+def beside_published(table: PaperTable, ours: Mapping[str, Sequence[Row]], card: DataCard) -> str:
+    """Our rows below the published rows of the same method, in Markdown.
+
+    Args:
+        table: The table.
+        ours: Our rows, by the names of the table's groups.
+        card: Data card of our scans.
+    """
+    published = [row for row in table.rows if row.simulated == card.simulated]
+    if not published:  # table II has no row on simulated rain
+        published = list(table.rows)
+    head = ["method", *("P", "R", "F1", "IoU"), "ms", "average"]
+    parts = [f"# {table.title}", f"Ours on {card.title}."]
+    for name, rows in ours.items():
+        group = [row for row in published if row.group == name]
+        parts += [f"## {name}", markdown_table(head, _beside(group, rows))]
+    misprints = [
+        f"(*) {row.method}, {row.group}: {row.misprint}." for row in published if row.misprint
+    ]
+    return "\n\n".join([*parts, *misprints])
+
+
 def _changed_cells(row: Mapping[str, Any]) -> list[str]:
     if "failure" in row:
         return [row["method"], row["failure"], "-", "-", "-"]
@@ -249,3 +273,28 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         else:
             flat[prefix + name] = value
     return flat
+
+
+def _beside(published: Sequence[PublishedRow], rows: Sequence[Row]) -> list[list[str]]:
+    body = []
+    for paper in published:
+        body.append(_published_cells(paper))
+        body += [_our_cells(row, paper.average) for row in rows if row.kind == paper.kind]
+    kinds = {paper.kind for paper in published}
+    return body + [_our_cells(row, "pooled") for row in rows if row.kind not in kinds]
+
+
+def _published_cells(row: PublishedRow) -> list[str]:
+    title = f"{row.method}, published{' (*)' if row.misprint else ''}"
+    scores = [f"{score:.2f}" for score in row.scores]
+    return [title, *scores, number_text(row.ms, "g"), row.average]
+
+
+def _our_cells(row: Row, average: str) -> list[str]:
+    pooled, per_scan = row.scores.pooled, row.scores.per_scan
+    values = [
+        getattr(pooled, score) if average == "pooled" else mean_over_scans(per_scan, score)
+        for score in SCORES
+    ]
+    cells = (number_text(100 * value, ".2f") for value in values)
+    return [f"{row.title}, ours", *cells, number_text(row.milliseconds, ".0f"), average]
