@@ -16,11 +16,10 @@ from benchmarks.sensor_table.unit import factor_for
 from derain.errors import reason_of
 from derain.evaluation.counts import ratio
 from derain.evaluation.scores import Scores, score
-from derain.export.bench.contestant import Contestant
-from derain.export.bench.contestants import contestants
+from derain.export.bench.bench import scored_methods
+from derain.export.bench.contestants import Contestant, contestants
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
-from derain.export.bench.shared_search import scored_methods
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.training_record import overlap

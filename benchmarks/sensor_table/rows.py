@@ -9,8 +9,7 @@ from typing import TypeVar
 from benchmarks.sensor_table.plan import Asked
 from derain.cards.card import load_card
 from derain.errors import InputError
-from derain.export.bench.contestant import Contestant
-from derain.export.bench.contestants import GivenMethod, contestants
+from derain.export.bench.contestants import Contestant, GivenMethod, contestants
 from derain.export.methods import load_method_of_one_scan
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer

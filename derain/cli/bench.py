@@ -15,7 +15,6 @@ from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.errors import InputError
 from derain.evaluation.published_tables import (
     TABLES,
-    beside_published,
     paper_table,
     scans_by_group,
 )
@@ -25,8 +24,7 @@ if TYPE_CHECKING:
     from derain.datamodules.loading import Part
     from derain.datamodules.scan_data import ScanData
     from derain.export.bench.bench import Bench
-    from derain.export.bench.contestant import Contestant
-    from derain.export.bench.contestants import LearnFrom
+    from derain.export.bench.contestants import Contestant, LearnFrom
     from derain.export.bench.labelled_frames import LabelledFrames
     from derain.sources.frame import Frame
     from derain.sources.source import Frames
@@ -98,6 +96,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     from derain.datamodules.labelled import rain_rates
     from derain.export.bench.contestants import contestants
+    from derain.export.bench.report import beside_published
 
     data = labelled(arguments, arguments.data)
     rates = rain_rates(arguments.data, arguments.rain_rates)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from derain.export.bench.contestant import Contestant
+    from derain.export.bench.contestants import Contestant
     from derain.scan import Scan
     from derain.sources.frame import Frame
 

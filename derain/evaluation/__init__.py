@@ -1,1 +1,1 @@
-"""How good methods are: counts, metrics, baselines, hard cases."""
+"""Counts, metrics, baselines and hard cases, by which methods are measured."""

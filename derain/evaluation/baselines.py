@@ -1,7 +1,7 @@
-"""Baselines: what a derainer has to beat before its scores say that it knows rain.
+"""Baselines that a derainer must beat before its scores are evidence that it detects rain.
 
-They call every point rain, or none, or whatever lies where it rained in the training scans. A
-fourth, whatever is dim and near, is in :mod:`derain.evaluation.intensity_rule`.
+They call every point rain, or none, or those at places where training scans had rain. A fourth,
+which calls dim and near points rain, is in :mod:`derain.evaluation.intensity_rule`.
 """
 
 import math
@@ -21,7 +21,7 @@ AXIS_BITS = 21
 
 
 def all_points(scan: Scan) -> NDArray[np.bool_]:
-    """Calls every point rain that can be judged, bool (N,)."""
+    """Calls every valid point rain, bool (N,)."""
     return scan.valid
 
 
@@ -32,16 +32,16 @@ def no_points(scan: Scan) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, eq=False)
 class PositionPrior:
-    """Calls a point rain if training scans mostly had rain where it lies.
+    """Calls a point rain if training scans mostly had rain at its position.
 
-    It sees neither intensity nor neighbours. Where all scans show the same scene, as those of
-    REHEARSE-3D do, it scores well without knowing what rain is. There, a method that does not beat
-    it may have learnt no more than places.
+    It uses neither intensity nor neighbours. Where all scans show the same scene, as in
+    REHEARSE-3D, it scores well without detecting rain: a method that does not beat it there may
+    have learnt the places only.
 
     Attributes:
         voxel: Edge of the voxels in metres, which are fixed to the sensor.
-        rain: Numbers of the voxels of rain, int64 (V,), ascending. Any other voxel, those that no
-            training scan has seen included, is not rain.
+        rain: Numbers of the voxels of rain, int64 (V,), ascending. Any other voxel is not rain,
+            including those without points in training.
     """
 
     voxel: float
@@ -58,16 +58,15 @@ class PositionPrior:
     def learn(cls, scans: Iterable[tuple[Scan, NDArray[np.bool_]]], voxel: float = 0.5) -> Self:
         """Finds the voxels that, called rain, give the greatest IoU on the training scans.
 
-        They are those with the greatest shares of rain. To each voxel's points one more is added,
-        which counts as rain by the average share of all points: otherwise a voxel with a single
-        point, which happened to be rain, would come first.
+        They are those with the greatest shares of rain. One point with the average share of rain is
+        added to each voxel: otherwise a voxel with a single point of rain would come first.
 
         Args:
             scans: Scans, and their rain, bool (N,). One is in memory at a time.
             voxel: Edge of the voxels, metres.
 
         Returns:
-            The prior; one that finds nothing where there is no rain to learn from.
+            The prior; without rain to learn from, it calls nothing rain.
 
         Raises:
             InputError: Voxels without an extent.
@@ -109,7 +108,7 @@ class _Voxels(NamedTuple):
         order = np.argsort(-share, kind="stable")
         hits, called = np.cumsum(self.rain[order]), np.cumsum(self.points[order])
         iou = intersection_over_union(hits, total - hits + called - hits)
-        # Voxels with equal shares are called alike, so that a choice ends at the last of them.
+        # Voxels with equal shares are called alike: a choice ends at the last of them.
         iou[:-1][np.diff(share[order]) == 0] = 0
         return order[: np.argmax(iou) + 1]
 

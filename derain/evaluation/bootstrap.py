@@ -1,4 +1,4 @@
-"""How much scores would differ on other scans of the same kind: the bootstrap over scans."""
+"""Confidence intervals of scores, by the bootstrap over scans."""
 
 from dataclasses import dataclass
 
@@ -18,10 +18,10 @@ class Bootstrap:
     """95 % intervals of every method's pooled IoU.
 
     Attributes:
-        iou: Interval of the IoU itself, one a method; None where no draw has an IoU.
-        behind_best: Interval of the best method's IoU minus this method's, on the same draws, one a
-            method. Where it holds 0, these scans cannot tell which of the two is better. None where
-            in no draw both have an IoU.
+        iou: Interval of each method's IoU; None where no draw has an IoU.
+        behind_best: Interval of the best method's IoU minus each method's, on the same draws. Where
+            it contains 0, these scans do not show which of the two is better. None where no draw
+            has an IoU of both.
     """
 
     iou: list[Interval | None]
@@ -31,12 +31,11 @@ class Bootstrap:
 def bootstrap(
     found: NDArray[np.int64], errors: NDArray[np.int64], generator: np.random.Generator
 ) -> Bootstrap:
-    """Draws as many scans as there are, with replacement, again and again.
+    """Draws as many scans as there are, with replacement, ``DRAWS`` times.
 
-    Every method is scored on the same draws: a hard scan then lowers the IoU of all of them alike,
-    and hardly changes the difference between two. Scans that follow each other in a sequence are
-    alike, so that intervals over the scans of few sequences are too narrow. A draw without rain in
-    which none is found has no IoU, and is left out.
+    Every method is scored on the same draws: a hard scan lowers the IoU of all of them and hardly
+    changes the difference between two. Consecutive scans of a sequence are alike, so that intervals
+    over few sequences are too narrow. Draws without an IoU are left out.
 
     Args:
         found: Rain called rain, by method and scan, int64 (methods, scans).

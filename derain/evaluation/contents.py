@@ -1,4 +1,4 @@
-"""What a data set holds: scans and points by class and by rain rate."""
+"""Counts of a data set: scans and points by class and by rain rate."""
 
 import csv
 import math
@@ -29,7 +29,7 @@ class SequenceOfFrames:
     Attributes:
         name: Its name.
         frames: Its scans, in order, and where their labels are or should be.
-        rain_rate: Rain rate in mm/h; None where nothing says it.
+        rain_rate: Rain rate in mm/h; None where it is not known.
     """
 
     name: str
@@ -39,13 +39,13 @@ class SequenceOfFrames:
 
 @dataclass
 class Contents:
-    """What was counted.
+    """Numbers of sequences, scans and points.
 
     Attributes:
         sequences: Sequences.
         scans: Scans.
         points: Points.
-        labelled: Points by semantic class id; those of scans without labels are not among them.
+        labelled: Points of labelled scans, by semantic class id.
     """
 
     sequences: int = 0
@@ -54,16 +54,16 @@ class Contents:
     labelled: Counter[int] = field(default_factory=Counter)
 
     def add(self, other: "Contents") -> None:
-        """Adds what another counted."""
+        """Adds the numbers of another."""
         self.sequences += other.sequences
         self.scans += other.scans
         self.points += other.points
         self.labelled.update(other.labelled)
 
     def as_dict(self, classes: Mapping[int, str]) -> dict[str, Any]:
-        """Counts, and points and their share by the name of the class, as JSON knows them.
+        """Numbers, and points and their share by the name of the class, as JSON-able primitives.
 
-        Where there are labels, every class is named, also those that no point has.
+        Where there are labels, classes without points are named, too.
         """
         total = self.labelled.total()
         ids = sorted({*self.labelled, *classes}) if total else []
@@ -79,12 +79,12 @@ class Contents:
 
 
 def class_name(id_: int, classes: Mapping[int, str]) -> str:
-    """Name of a class, also of one that its data card does not know."""
+    """Name of a class; ``class <id>`` where the data card does not name it."""
     return classes.get(id_, f"class {id_}")
 
 
 def rate_name(rate: float | None) -> str:
-    """What a rain rate is called in tables and pictures."""
+    """Name of a rain rate in tables and pictures."""
     return "rain unknown" if rate is None else f"{rate:g} mm/h" if rate else "clean"
 
 
@@ -96,11 +96,11 @@ def find_sequences(
     Args:
         root: A folder with a folder of sequences, the folder of sequences, a sequence, its folder
             of scans, or any folder of scans, which counts as one sequence.
-        layout: What the folders are called; None for a folder of scans.
+        layout: Names of the folders; None for a folder of scans.
         columns: Names of the columns of files that do not name them.
 
     Raises:
-        InputError: A folder that holds nothing of this kind, or a damaged weather record.
+        InputError: A folder without sequences or scans, or a damaged weather record.
     """
     if layout is None:
         frames = frames_of(listed_scans([root]), label_beside, columns)

@@ -1,4 +1,4 @@
-"""Points by what they are and what they were called, and the scores that follow from them."""
+"""Points by truth and by answer, and the scores that follow from them."""
 
 import math
 from collections.abc import Sequence
@@ -11,9 +11,7 @@ SCORES = ("precision", "recall", "f1", "iou")
 
 
 def ratio(part: ArrayLike, whole: ArrayLike) -> NDArray[np.float64]:
-    """What share each part is of its whole, float64, of the shape that the two have together.
-
-    It is NaN where the whole is 0.
+    """Share of each part in its whole, float64, of their broadcast shape; NaN for a whole of 0.
 
     Args:
         part: Numbers, or one.
@@ -26,12 +24,10 @@ def ratio(part: ArrayLike, whole: ArrayLike) -> NDArray[np.float64]:
 
 
 def intersection_over_union(hits: ArrayLike, errors: ArrayLike) -> NDArray[np.float64]:
-    """IoU of rain, float64, of the shape that hits and errors have together.
-
-    It is NaN where no point is rain or called rain.
+    """IoU of rain, float64, of their broadcast shape; NaN where no point is rain or called rain.
 
     Args:
-        hits: Points of rain called rain, or one number of them for each choice.
+        hits: Points of rain called rain, one number or several.
         errors: Rain not called rain and other points called rain, together.
     """
     return ratio(hits, np.add(hits, errors))
@@ -39,7 +35,7 @@ def intersection_over_union(hits: ArrayLike, errors: ArrayLike) -> NDArray[np.fl
 
 @dataclass(frozen=True)
 class Counts:
-    """Points by what they are and what they were called; rain is the positive class.
+    """Points by truth and by answer; rain is the positive class.
 
     A score whose denominator is zero is undefined: it is NaN. A scan without rain has no recall; if
     no point of it is called rain either, it has no score at all, and one point falsely called rain

@@ -1,4 +1,4 @@
-"""Scans that break derainers: every method must survive them with a finite, defined answer."""
+"""Scans that break derainers; every method must return a finite, defined answer for them."""
 
 from collections.abc import Iterator
 
@@ -85,7 +85,7 @@ def hard_cases(largest: int = 20_000) -> Iterator[tuple[str, Scan]]:
 
 
 def _with_rows(points: NDArray[np.float32], values: list[float]) -> NDArray[np.float32]:
-    """Overwrites every tenth row with one of the values."""
+    """Overwrites every tenth row with one of the values, in turn."""
     points = points.copy()
     rows = np.arange(0, len(points), 10)
     points[rows] = np.resize(np.array(values, np.float32), len(rows))[:, None]
@@ -99,7 +99,7 @@ def _scaled_to_range(points: NDArray[np.float32], reach: float) -> NDArray[np.fl
 
 
 def _behind(points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Puts every point exactly behind the sensor, y being 0.0 or -0.0."""
+    """Moves every point exactly behind the sensor, with y 0.0 or -0.0."""
     points = points * np.array([-1, 0, 1, 1], np.float32)
     points[::2, 1] = 0.0
     points[1::2, 1] = -0.0
@@ -109,7 +109,7 @@ def _behind(points: NDArray[np.float32]) -> NDArray[np.float32]:
 def _without_inclinations(
     points: NDArray[np.float32], lowest: float, highest: float
 ) -> NDArray[np.float32]:
-    """Leaves out what lies between two inclinations, in degrees."""
+    """Removes the points between two inclinations, in degrees."""
     x, y, z = points[:, :3].T
     inclination = np.degrees(np.arctan2(z, np.hypot(x, y)))
     outside: NDArray[np.bool_] = (inclination < lowest) | (inclination > highest)

@@ -1,4 +1,4 @@
-"""The rule on intensity and range that every derainer has to beat: rain is dim and near."""
+"""The baseline that calls dim and near points rain."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from derain.evaluation.counts import intersection_over_union
 from derain.scan import Scan
 from derain.views.oddities import Oddity, missing_intensity
 
-# Limits of intensity, and as many of range, that are tried where the rain has more values.
+# Most limits of intensity, and of range, that are tried.
 MOST_LIMITS = 200
 
 
@@ -20,10 +20,10 @@ class IntensityRule:
     """Calls a point rain if its intensity and its range are both small.
 
     On the WADS sample, "intensity 0 and nearer than 20 m" reaches an IoU of .72: a method that
-    does not beat it has learnt nothing.
+    does not beat it is of no use.
 
     Attributes:
-        intensity: Largest intensity of rain, in the scans' own unit.
+        intensity: Largest intensity of rain, in the unit of the scans.
         range: Largest range of rain, in metres.
     """
 
@@ -39,7 +39,7 @@ class IntensityRule:
         return dim & (scan.range <= self.range) & scan.valid
 
     def oddities(self, scan: Scan) -> Iterator[Oddity]:
-        """What is odd about a scan: no intensity. Its unit is that of the scans learnt from."""
+        """Warns of a scan without intensity. Its unit is not checked."""
         yield from missing_intensity(scan)
 
     @classmethod
@@ -47,10 +47,10 @@ class IntensityRule:
         """Finds the two limits of the greatest IoU.
 
         Args:
-            scans: Scans, and their rain, bool (N,). Those without intensity tell nothing.
+            scans: Scans, and their rain, bool (N,). Those without intensity are skipped.
 
         Returns:
-            The rule; one that finds nothing where there is no rain to learn from.
+            The rule; without rain to learn from, it calls nothing rain.
         """
         parts = [
             (intensity[scan.valid], scan.range[scan.valid], rain[scan.valid])
@@ -60,14 +60,14 @@ class IntensityRule:
         if not any(rain.any() for _, _, rain in parts):
             return cls(-np.inf, -np.inf)
         intensity, distance, rain = (np.concatenate(column) for column in zip(*parts, strict=True))
-        # Only a value of the rain itself can be the best limit. Where there are very many values,
-        # those at evenly spaced quantiles are tried.
+        # The best limit is a value of the rain itself. Of many values, those at evenly spaced
+        # quantiles are tried.
         shares = np.linspace(0, 1, MOST_LIMITS)
         limits = [
             np.unique(np.quantile(column[rain], shares, method="lower"))
             for column in (intensity, distance)
         ]
-        # A point's cell is the pair of the lowest limits that let it pass.
+        # A point's cell is the pair of the lowest limits that it passes.
         cells = [
             np.searchsorted(limit, column)
             for limit, column in zip(limits, (intensity, distance), strict=True)
@@ -81,7 +81,7 @@ class IntensityRule:
 def _within(
     cells: list[NDArray[np.int64]], chosen: NDArray[np.bool_], limits: list[NDArray[np.float32]]
 ) -> NDArray[np.int64]:
-    """How many of the chosen points pass each pair of limits."""
+    """Number of the chosen points that pass each pair of limits."""
     shape = tuple(len(limit) + 1 for limit in limits)
     flat = np.ravel_multi_index([cell[chosen] for cell in cells], shape)
     counts = np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape)

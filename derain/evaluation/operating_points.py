@@ -1,4 +1,4 @@
-"""What a method would find at other thresholds: precision and recall, counted at many at once."""
+"""Precision and recall at many thresholds at once."""
 
 import math
 from collections.abc import Sequence
@@ -13,19 +13,19 @@ from torchmetrics import Metric
 from derain.errors import InputError
 from derain.evaluation.counts import Counts, intersection_over_union, ratio
 
-# Thresholds from 0 to 1 in equal steps, as TensorBoard's curves have them: no more than 127.
+# Thresholds from 0 to 1 in equal steps; TensorBoard's curves take no more than 127.
 CURVE_THRESHOLDS = np.linspace(0, 1, 101)
 
-# Near 0 and 1, where networks that are sure put most points, they lie closer.
+# Denser thresholds near 0 and 1, where confident networks put most points.
 CLOSE = np.array([digit * 10.0**-power for power in (6, 5, 4, 3) for digit in (1, 2, 5)])
 
 
 @dataclass(frozen=True, eq=False)
 class OperatingPoints:
-    """Points by what they are and what they would be called, at each of many thresholds.
+    """Points by truth and by answer, at each of many thresholds.
 
-    A point is called rain where its probability is greater than the threshold; at the first
-    threshold, 0, all are, those without any probability of rain, too.
+    A point is called rain where its probability is greater than the threshold. At the first
+    threshold, 0, all points are called rain, including those of probability 0.
 
     Attributes:
         thresholds: Rising from 0 to 1, float64 (T,).
@@ -59,9 +59,7 @@ class OperatingPoints:
 
     @property
     def average_precision(self) -> float:
-        """Mean of the precision over the recall, in steps from one threshold to the next.
-
-        It is NaN where there is no rain.
+        """Mean precision over the recall, in steps between thresholds; NaN without rain.
 
         Source: the sum over thresholds of (R_n - R_{n-1}) P_n, as scikit-learn's
         ``average_precision_score`` defines it.
@@ -69,12 +67,12 @@ class OperatingPoints:
         if not self.rain:
             return math.nan
         gained = self.recall - np.append(self.recall[1:], 0)
-        some = gained > 0  # elsewhere the precision may be undefined
+        some = gained > 0  # otherwise the precision may be undefined
         return float(gained[some] @ self.precision[some])
 
     @property
     def best(self) -> int:
-        """Number of the threshold with the greatest IoU; of equal ones, that of the middle.
+        """Number of the threshold with the greatest IoU; the middle one of several.
 
         There must be rain.
         """
@@ -82,16 +80,16 @@ class OperatingPoints:
         return int(best[len(best) // 2])
 
     def at(self, threshold: float) -> int:
-        """Number of the threshold that is nearest to one."""
+        """Number of the nearest threshold."""
         return int(np.abs(self.thresholds - threshold).argmin())
 
     def counts(self, number: int) -> Counts:
-        """Counts at one of the thresholds, given its number."""
+        """Counts at a threshold, given by its number."""
         hits, false = int(self.true_positive[number]), int(self.false_positive[number])
         return Counts(hits, false, self.rain - hits, self.other - false)
 
     def among(self, thresholds: NDArray[np.float64]) -> "OperatingPoints":
-        """The same counts at some of the thresholds alone.
+        """The same counts at some of the thresholds.
 
         Args:
             thresholds: Some of them, rising, float64 (S,).
@@ -107,12 +105,12 @@ class OperatingPoints:
 
 
 class ThresholdCounts(Metric):
-    """Counts probabilities of rain between thresholds: int64, the same memory for any data.
+    """Counts probabilities of rain between thresholds, in int64 and constant memory.
 
     Counts add up across processes. As :meth:`points` gathers them, each process must call it.
 
     Args:
-        chosen: Thresholds that are wanted exactly, besides ``CURVE_THRESHOLDS`` and ``CLOSE``.
+        chosen: Further thresholds, besides ``CURVE_THRESHOLDS`` and ``CLOSE``.
 
     Raises:
         InputError: One that is not between 0 and 1.
@@ -128,7 +126,7 @@ class ThresholdCounts(Metric):
                 "threshold", f"{list(chosen)} is not within 0 and 1", "Give a probability."
             )
         self.thresholds = np.unique([*CURVE_THRESHOLDS, *CLOSE, *(1 - CLOSE), *chosen])
-        # Whether points are rain, and how many of the thresholds their probability exceeds.
+        # Points by whether they are rain, and by how many thresholds their probability exceeds.
         bins = torch.zeros(2, len(self.thresholds) + 1, dtype=torch.int64)
         self.add_state("bins", bins, dist_reduce_fx="sum")
 
@@ -139,7 +137,7 @@ class ThresholdCounts(Metric):
             probability: Probability of rain of every point, float32 (N,), 0 to 1.
             rain: Points that are rain, bool (N,).
         """
-        # As a threshold is compared with them: in their own precision.
+        # A threshold is compared with probabilities in their own precision.
         exceeded = np.searchsorted(self.thresholds.astype(probability.dtype), probability)
         cell = rain * self.bins.shape[1] + exceeded
         counted = np.bincount(cell, minlength=self.bins.numel()).reshape(self.bins.shape)
@@ -151,7 +149,7 @@ class ThresholdCounts(Metric):
         return {"average_precision": torch.tensor(score, dtype=torch.float32, device=self.device)}
 
     def points(self) -> OperatingPoints:
-        """What was counted, at each threshold."""
+        """The counts at each threshold."""
         with self.sync_context():
             return self._points()
 

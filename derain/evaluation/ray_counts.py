@@ -1,4 +1,4 @@
-"""How many rays of a scan have two returns, and what the second one gives back behind rain."""
+"""Counts of rays with two returns, and of second returns behind rain."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -19,7 +19,7 @@ class RayCounts:
         rays: All of them.
         dual: Those with two returns or more.
         met_rain: Those whose nearest return is rain.
-        given_back: Of these, those with another return behind that is not rain: what a sensor of
+        given_back: Of these, those with another return behind that is not rain, which a sensor of
             one return would have lost to the drop.
     """
 
@@ -35,13 +35,13 @@ class RayCounts:
         Args:
             scan: The scan, of N rows; a radar's detections are of no ray.
             returns: Its returns.
-            rain: Which rows are rain, bool (N,), by their labels or by a method; None where nobody
-                says.
+            rain: Which rows are rain, bool (N,), by their labels or by a method; None where it is
+                not known.
         """
         nearest = distinct_rows(scan)[0]
         if scan.radar is not None:
             nearest = nearest[~scan.radar[nearest]]
-        # What lies behind a return that is a row itself is counted there.
+        # A farther return whose nearer return is a row, too, is counted with that row.
         nearest = nearest[~(returns.farther & (returns.partner >= 0))[nearest]]
         dual = (returns.nearer | returns.farther)[nearest]
         if rain is None:
@@ -58,5 +58,5 @@ class RayCounts:
 
     @property
     def given_back_share(self) -> float:
-        """Share of the rays whose nearest return is rain that go on to what is not rain."""
+        """Share of the rays with rain nearest that have another return behind that is not rain."""
         return self.given_back / max(self.met_rain, 1)

@@ -1,4 +1,4 @@
-"""What methods score: over the points of all scans, and by scan, class, range and rain rate."""
+"""Scores of methods: over the points of all scans, and by scan, class, range and rain rate."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,24 +13,23 @@ from derain.evaluation.rain_counts import ClassCounts, RainCounts
 from derain.scan import Scan
 from derain.views.morton import first_rows
 
-# Says which points of a scan are rain, bool (N,).
+# Returns which points of a scan are rain, bool (N,).
 ScoredMethod = Callable[[Scan], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
 class Scores:
-    """What became of the points of all scans.
+    """Counts of the points of all scans.
 
     Attributes:
         pooled: All points together.
         per_scan: Those of each scan, in order.
         by_class: Each semantic class, by name.
-        by_range: Each band of ranges, by names such as ``0-10 m``.
+        by_range: Each band of range, by names such as ``0-10 m``.
         by_rain_rate: Scans of one rain rate, by names such as ``25 mm/h``; empty where none is
             known.
-        by_sensor: Points of the LiDAR and of the radar; empty where it is not known whose they are.
-        failures: What went wrong, by the scan's name. Such a scan counts as one in which the method
-            found nothing: it stays as it came.
+        by_sensor: Points of the LiDAR and of the radar; empty where they are not distinguished.
+        failures: Errors, by the scan's name. In such a scan, no point counts as called rain.
     """
 
     pooled: Counts
@@ -54,9 +53,9 @@ def score(
     Args:
         methods: The methods.
         scans: Labelled scans. One is in memory at a time, if they are read as they are asked for.
-        card: Their data card, which says what of them is rain.
+        card: Their data card.
         distinct: Count points at one position once.
-        rain_rates: Rain rate of each scan in mm/h, None where it is not known; None knows of none.
+        rain_rates: Rain rate of each scan in mm/h, None where it is not known; None for all scans.
 
     Returns:
         The scores of each method, in the order of the methods.
@@ -74,7 +73,7 @@ def score(
 
 
 class _Scoring:
-    """Counts what one method calls rain in one scan after the other."""
+    """Counts the answers of one method, scan after scan."""
 
     def __init__(self, card: DataCard) -> None:
         self.card = card
@@ -86,7 +85,7 @@ class _Scoring:
         """Judges a whole scan, and counts some of its rows."""
         try:
             predicted = method(scan)
-        except Exception as error:  # whatever its libraries raise is told in the method's row
+        except Exception as error:  # its row states whatever a library raises
             self.failures[scan.name] = reason_of(error)
             predicted = np.zeros(len(scan), bool)
         scan, predicted = scan.take(counted), predicted[counted]

@@ -15,7 +15,7 @@ def number_text(value: float | None, form: str = ".3f") -> str:
 
 
 def markdown_table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown that can be read as it is: its first column is aligned to the left.
+    """A table in Markdown with padded cells; the first column is aligned to the left.
 
     Args:
         head: Titles of the columns.
@@ -28,7 +28,7 @@ def markdown_table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
 
 
 def plain_table(rows: Sequence[Sequence[str]]) -> str:
-    """An indented table without lines: its first column is aligned to the left.
+    """An indented table without lines; the first column is aligned to the left.
 
     Args:
         rows: The cells of each row.
@@ -42,7 +42,7 @@ def _widths(rows: Sequence[Sequence[str]]) -> list[int]:
 
 
 def _padded(cells: Sequence[str], widths: Sequence[int]) -> list[str]:
-    """Cells as wide as their columns, of which all but the first are aligned to the right."""
+    """Cells padded to the widths of their columns, the first aligned to the left."""
     return [
         cell.rjust(width) if number else cell.ljust(width)
         for number, (cell, width) in enumerate(zip(cells, widths, strict=True))

@@ -1,4 +1,4 @@
-"""Which scans of a recording are held out, to see how well a student agrees with its teacher."""
+"""Chooses the held-out scans, on which a student is compared with its teacher."""
 
 from collections.abc import Iterator, Sequence
 from itertools import repeat
@@ -6,15 +6,15 @@ from itertools import repeat
 from derain.sources.frame import Frame
 from derain.teaching.manifest import HELD_OUT_PART, TRAINING_PART, TaughtPart
 
-# One scan in so many is held out, and one at least of a recording of so many scans.
+# One scan in ONE_IN is held out, and at least one of a sequence of FEWEST_SCANS or more.
 ONE_IN, FEWEST_SCANS = 5, 3
 
 
 def parts_of(frames: Sequence[Frame]) -> Iterator[TaughtPart]:
-    """What each frame is for: a stretch at the end of each sequence is held out.
+    """The part of each frame: the end of each sequence is held out.
 
-    Neighbouring scans show nearly the same: one that is held out between two of the training would
-    be known by heart.
+    Neighbouring scans show nearly the same: a held-out scan between two training scans would not
+    be new to the student.
 
     Args:
         frames: Frames in time order, one sequence after the other, perhaps with some missing.
@@ -29,7 +29,7 @@ def parts_of(frames: Sequence[Frame]) -> Iterator[TaughtPart]:
 
 
 def _is_later(frame: Frame, other: Frame) -> bool:
-    """Whether a frame comes later in the same sequence; two folders may be called the same."""
+    """Whether a frame is later in the same sequence; two sequences may have one name."""
     return frame.sequence == other.sequence and frame.number > other.number
 
 

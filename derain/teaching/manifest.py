@@ -1,7 +1,7 @@
-"""The manifest of taught labels: who taught, and which scans, where they lie.
+"""The manifest of taught labels: the teacher, and the scans with their paths.
 
-Scans are not copied. Where their paths are relative, they are so to the folder of the labels: both
-can be moved together.
+Scans are not copied. Relative paths start from the folder of the labels, so that both can be moved
+together.
 """
 
 import json
@@ -28,16 +28,16 @@ from derain.sources.source import Frames
 
 TAUGHT_MANIFEST, CARD, LABELS = "taught.yaml", "card.yaml", "labels"
 
-# What stands under ``made_by``: by this the manifest is told from any other YAML file.
+# The value of ``made_by``, which distinguishes the manifest from any other YAML file.
 TEACHING = "derain.teaching"
 
-# In bytes. The entry of a scan takes some hundred, and eleven values: ninety thousand fit.
+# In bytes. The entry of a scan takes about a hundred bytes and eleven values: 90,000 entries fit.
 LARGEST_TAUGHT = 2**24
 
-# More scans than any recording has, and more than any unit of intensity is of another.
+# More scans than any recording has, and a larger factor than between any units of intensity.
 HIGHEST_NUMBER, LARGEST_SCALE = 10**9, 1e9
 
-# What a scan is for: every sequence ends with scans that are held out.
+# The part of a scan: the last scans of every sequence are held out.
 TaughtPart = Literal["train", "validation"]
 TRAINING_PART: TaughtPart = "train"
 HELD_OUT_PART: TaughtPart = "validation"
@@ -46,14 +46,14 @@ TAUGHT_PARTS = (TRAINING_PART, HELD_OUT_PART)
 
 @dataclass(frozen=True)
 class TaughtScan:
-    """One scan that has labels of a teacher.
+    """One scan with labels of a teacher.
 
     Attributes:
         key: Its labels are ``labels/<key>.label``.
         scan: Its file.
         sequence: Name of its sequence.
-        number: Its place in that, from 0.
-        part: What it is for.
+        number: Its number in the sequence, from 0.
+        part: Whether it is for training or held out.
     """
 
     key: str
@@ -65,13 +65,13 @@ class TaughtScan:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What stands in a folder of taught labels.
+    """The contents of a folder of taught labels.
 
     Attributes:
         teacher: Its name under ``method``, and its parameters.
         scans: The scans, in time order, one sequence after the other.
         columns: Names of the columns of files that do not name them.
-        intensity_scale: What takes the scans' intensities to the unit that the teacher saw.
+        intensity_scale: Factor from the scans' intensities to the unit that the teacher read.
         finished: Whether all labels are there.
     """
 
@@ -83,10 +83,10 @@ class Manifest:
 
     @classmethod
     def read(cls, root: Path) -> Self:
-        """Reads the manifest of a folder, and trusts nothing in it.
+        """Reads and checks the manifest of a folder.
 
         Raises:
-            InputError: None, one that is damaged, or one of a teaching that was not finished.
+            InputError: No manifest, a damaged one, or one of an unfinished teaching.
         """
         path = root / TAUGHT_MANIFEST
         if not is_file(path):
@@ -116,7 +116,7 @@ class Manifest:
         return manifest
 
     def write(self, root: Path) -> None:
-        """Writes it.
+        """Writes the manifest.
 
         Raises:
             InputError: It cannot be written.
@@ -125,7 +125,7 @@ class Manifest:
         content = {
             "made_by": TEACHING,
             "derain": __version__,
-            # Values of their own, for what stands twice would be written once, and be no value.
+            # A copy, because YAML would write an object that occurs twice as an alias.
             "teacher": json.loads(json.dumps(dict(self.teacher))),
             "columns": list(self.columns),
             "intensity_scale": self.intensity_scale,
@@ -137,7 +137,7 @@ class Manifest:
             temporary.write_text(text, "utf-8")
 
     def frames(self, root: Path, part: TaughtPart) -> Frames:
-        """The scans of a part, in order, each with the labels that it was given."""
+        """The scans of a part, in order, each with its taught labels."""
         folders = {scan.scan.parent for scan in self.scans}
         records = {folder: Records(folder) for folder in folders}
         clouds = {folder: clouds_at(folder) for folder in folders if split(folder) is not None}
@@ -174,7 +174,7 @@ def is_taught(root: Path) -> bool:
 
 
 def label_path(root: Path, key: str) -> Path:
-    """Where the labels of a scan lie."""
+    """Path of the labels of a scan."""
     return root / LABELS / f"{key}{LABEL}"
 
 
@@ -185,15 +185,15 @@ def _is_ours(content: object) -> bool:
 def _as_dict(scan: TaughtScan, home: Path) -> dict[str, Any]:
     return {
         "key": scan.key,
-        "scan": _seen_from(home, scan.scan),
+        "scan": _relative_path(home, scan.scan),
         "sequence": scan.sequence,
         "number": scan.number,
         "part": scan.part,
     }
 
 
-def _seen_from(home: Path, scan: Path) -> str:
-    """The path of a scan from a folder; the whole path where no way leads from there to it."""
+def _relative_path(home: Path, scan: Path) -> str:
+    """The path of a scan relative to a folder; absolute where there is no relative one."""
     place = Path(os.path.realpath(scan.parent)) / scan.name
     try:
         return Path(os.path.relpath(place, home)).as_posix()
@@ -216,7 +216,7 @@ def _scan_of(entry: Entry, home: Path) -> TaughtScan:
 
 
 def _key(entry: Entry) -> str:
-    """A path that leads nowhere but into the folder of labels."""
+    """A relative path that stays in the folder of labels."""
     key = entry.text()
     if not key or Path(key).is_absolute() or {"..", ""} & set(key.split("/")):
         raise entry.fault(f"{shown(key)} is not the name of a scan", "Teach it again.")

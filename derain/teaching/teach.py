@@ -1,4 +1,4 @@
-"""Labels recordings by what a method says of them."""
+"""Labels recordings by a method."""
 
 import os
 import shutil
@@ -32,10 +32,10 @@ from derain.teaching.manifest import (
     label_path,
 )
 
-# Labels lie there until all of them are known.
+# The folder of the labels until all of them are known.
 UNFINISHED = ".unfinished"
 
-# Told of each scan: what the teacher says of it, and the labels, uint32 (N,), that come of that.
+# Called for each scan with the teacher's answer and the labels made of it, uint32 (N,).
 Watch = Callable[[Answer, NDArray[np.uint32]], None]
 
 
@@ -49,26 +49,25 @@ def teach(
 ) -> Manifest:
     """Labels recordings: 0 is not rain, 1 rain, 255 not known.
 
-    Labels of the scans are never read. A scan of which nothing is known teaches nothing, and agrees
-    with whatever is said of it: it is left out. Until every scan is judged, what the folder held
-    before stays as it was.
+    Labels of the scans are never read. Scans of which nothing is known are left out: they neither
+    train nor measure a student. The folder stays unchanged until every scan is judged.
 
     Args:
         method: The teacher.
         source: Scans in files, in time order, one sequence after the other.
-        out: Folder to write: a new one, or one that was written so before. It gets the labels,
-            their data card, and a manifest that names the scans where they lie.
-        card: Data card of the scans, of which the new one takes over licence and unit.
-        guard: Surrounds the work on each scan; one whose error it holds back gets no labels.
-        watch: Is told of each scan as soon as it is judged, in order.
+        out: Folder to write: a new one, or one of an earlier teaching. It gets the labels, their
+            data card, and a manifest with the paths of the scans.
+        card: Data card of the scans, from which the new one takes licence and unit.
+        guard: Surrounds the work on each scan; a scan whose error it suppresses gets no labels.
+        watch: Called for each scan as soon as it is judged, in order.
 
     Returns:
-        What was written to the manifest.
+        The manifest.
 
     Raises:
-        InputError: Scans that are in no files; a folder that holds something else, or where the
-            labels would lie that belong to the scans; a scan that cannot be read or judged, where
-            the guard lets that through; nothing that is known of any point.
+        InputError: Scans that are in no files; a folder that holds something else, or in which the
+            scans' own labels are; a scan that cannot be read or judged, unless the guard suppresses
+            the error; no point of which anything is known.
     """
     refuse_to_overwrite(out, source)
     frames: list[FileFrame] = []
@@ -109,7 +108,7 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
             raise InputError(
                 frame.name, "its name is no text, which a list of scans could hold", "Rename it."
             )
-    # Neither where labels of the scans lie, nor where they would be looked for.
+    # Refuses the places where the scans' own labels are or would be searched for.
     for sink in (FolderSink(out / LABELS, again=False), LabelSink(out / LABELS, again=False)):
         sink.refuse_clashes(source)
     if is_taught(out):
@@ -122,7 +121,7 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
 
 
 def _is_text(path: Path) -> bool:
-    """Whether a path can be written in UTF-8: names of files may be any bytes."""
+    """Whether a path can be written in UTF-8; names of files may be any bytes."""
     try:
         os.path.realpath(path).encode()
     except UnicodeEncodeError:
@@ -143,7 +142,7 @@ def _manifest_of(method: Method, frames: Sequence[FileFrame]) -> Manifest:
 
 
 def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | None) -> None:
-    """Replaces what the folder held; what is killed meanwhile is known to be incomplete."""
+    """Replaces the folder's contents; if it is interrupted, the manifest is marked unfinished."""
     former = _former_keys(out)
     Manifest(manifest.teacher, finished=False).write(out)
     for key in (scan.key for scan in manifest.scans):
@@ -156,7 +155,7 @@ def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | 
 
 
 def _former_keys(out: Path) -> set[str]:
-    """Keys of the scans that were taught here before."""
+    """Keys of the scans in the folder's present manifest."""
     with suppress(InputError):
         return {scan.key for scan in Manifest.read(out).scans}
     return set()
@@ -164,14 +163,14 @@ def _former_keys(out: Path) -> set[str]:
 
 @contextmanager
 def _unfinished(out: Path) -> Iterator[Path]:
-    """Lends a hidden folder that is gone at the end, as is the folder around it if it is empty."""
+    """A temporary hidden folder; at the end, a new and empty folder around it is removed, too."""
     folder = out / UNFINISHED
     there = out.is_dir()
     try:
         shutil.rmtree(folder, ignore_errors=True)  # left behind by a run that was killed
         folder.mkdir(parents=True)
         yield folder
-    except BrokenPipeError:  # of the terminal, not of the folder: nobody reads what is told
+    except BrokenPipeError:  # of the terminal, not of the folder
         raise
     except OSError as error:
         raise InputError(

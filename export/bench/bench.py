@@ -4,27 +4,29 @@ import platform
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.cards.card import DataCard, load_card
 from derain.cards.rain_found import warn_without_rain
-from derain.evaluation.scores import score
-from derain.export.bench.contestant import Contestant
-from derain.export.bench.contestants import GivenMethod, contestants
+from derain.evaluation.scores import ScoredMethod, score
+from derain.export.bench.contestants import Contestant, GivenMethod, TimedMethod, contestants
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.other_runtime import changes
-from derain.export.bench.report import main_table, runtimes_table, write_report
+from derain.export.bench.report import draw_speed_error, main_table, runtimes_table, write_report
 from derain.export.bench.rows import Row, joined
-from derain.export.bench.shared_search import scored_methods
 from derain.export.machine import processor, versions
 from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
 from derain.export.runtimes.session import FLOAT32_PRECISION
 from derain.files import DEFAULT_COLUMNS
+from derain.filters import PointFilter
+from derain.filters.filter_view import filter_view, rain_among
 from derain.scan import Scan
 from derain.sources.given import GivenScans, source_of
 from derain.sources.spread import evenly_spaced
@@ -32,14 +34,16 @@ from derain.sources.training_record import overlap
 from derain.spec import Spec
 from derain.system.extras import MATPLOTLIB, MissingExtraError, require
 from derain.system.notices import Notices, warn
+from derain.system.stopwatch import Stopwatch
+from derain.views.candidates import Candidates
 
 
 @dataclass(frozen=True)
 class Bench:
-    """What a bench found; as text, its main table, and what other runtimes change.
+    """The results of a bench; as text, its main table and the effect of other runtimes.
 
     Attributes:
-        rows: How each method did, in the order of the methods.
+        rows: The results of each method, in the order of the methods.
         facts: What the figures depend on besides the methods, as JSON-able primitives: scans, data
             card, seed, processor, versions.
     """
@@ -56,17 +60,17 @@ class Bench:
         """The row of a method, by its title.
 
         Raises:
-            KeyError: No method is called so.
+            KeyError: No method has this title.
         """
         return {row.title: row for row in self.rows}[title]
 
     def write(self, folder: str | Path) -> None:
         """Writes ``bench.md``, ``bench.csv``, ``bench.json`` and ``speed_error.png``.
 
-        Without matplotlib there is no picture, which a warning says.
+        Without matplotlib there is no picture, but a warning.
 
         Args:
-            folder: Where to, made if missing.
+            folder: The folder, made if missing.
 
         Raises:
             InputError: A folder that cannot be written.
@@ -79,21 +83,18 @@ class Bench:
             warn(str(error))
             picture.unlink(missing_ok=True)  # of an earlier bench, which is not this one
             return
-        from derain.export.bench.speed_error import draw_speed_error
-
         draw_speed_error(self.rows, self.facts, picture)
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is timed and drawn.
+    """How much is timed, and the seed.
 
     Attributes:
         threads: Threads of views and networks; 0 takes every core this process may use.
-        timed: Scans that each method is timed on, spread over all; fewer where there are not as
-            many.
+        timed: Scans that each method is timed on, at most, spread evenly.
         repeats: Timed runs on each of them.
-        seed: Of the draws behind the intervals.
+        seed: Random seed of the bootstrap intervals.
     """
 
     threads: int = 0
@@ -121,9 +122,8 @@ def bench(
 ) -> Bench:
     """Compares methods on the same labelled scans: error, time and memory.
 
-    A method that another process can be given is timed alone in one of its own. A function that is
-    defined in the running script or session cannot; it is timed in this process, which its row
-    says.
+    Each method is timed alone, in a process of its own. A function that is defined in the running
+    script or session cannot be sent to one; it is timed in this process, and its row states so.
 
     Example:
         >>> import numpy as np
@@ -137,30 +137,29 @@ def bench(
     Args:
         methods: Each an exported model (``.onnx``), parameters that ``derain tune`` wrote
             (``.yaml``), ``default``, the name of a filter or baseline (``position``,
-            ``intensity``, ``all``, ``none``), a ``Derainer``, a filter, or any function that takes
-            a Scan and says which points are rain, bool (N,). A mapping gives them titles.
-        scans: Labelled scans, in memory or in files and folders: all that a source gives.
+            ``intensity``, ``all``, ``none``), a ``Derainer``, a filter, or any function from a Scan
+            to which of its points are rain, bool (N,). A mapping gives them titles.
+        scans: Labelled scans, in memory or in files and folders.
         card: What their labels mean: a data card, the name of a packaged one, or a YAML file.
         train: Labelled scans that ``position`` and ``intensity`` learn from.
         columns: Names of the columns of files that do not name them.
-        intensity_scale: What takes the scans' intensities to the unit of the methods, e.g. 255.
-        distinct: Whether points at one position count once; None does as the card says.
-        rain_rates: Rain rate in mm/h by sequence, as far as it is known.
+        intensity_scale: Factor from the scans' intensities to the unit of the methods, e.g. 255.
+        distinct: Whether points at one position count once; None follows the card.
+        rain_rates: Rain rate in mm/h by sequence, where it is known.
         threads: Threads of views and networks; 0 takes every core this process may use.
-        timed: Scans that each method is timed on, spread over all.
+        timed: Scans that each method is timed on, spread evenly.
         repeats: Timed runs on each of them.
-        seed: Of the draws behind the intervals.
-        runtime: Another runtime that every model is run by besides onnxruntime, such as
-            ``openvino``; what it changes is told.
-        precision: What that computes in: ``float32``, or ``bf16`` where it and the processor have
-            it.
+        seed: Random seed of the bootstrap intervals.
+        runtime: Another runtime for every model besides onnxruntime, such as ``openvino``; the
+            results state what it changes.
+        precision: Of that runtime: ``float32``, or ``bf16`` where it and the processor have it.
 
     Returns:
         A row for each method, which can be printed and written.
 
     Raises:
         InputError: A method that is not known or cannot be read, or two of one title; no scans, or
-            one that cannot be read or has no labels. A method that fails is told in its row.
+            one that cannot be read or has no labels. The row of a method that fails states so.
     """
     card = card if isinstance(card, DataCard) else load_card(card)
     asked = card.deduplicate if distinct is None else distinct
@@ -184,11 +183,11 @@ def run_bench(
     Args:
         methods: The methods, one or more.
         data: The scans.
-        effort: How much is timed and drawn.
-        command: What makes this bench, for its report.
+        effort: How much is timed, and the seed.
+        command: The command or call of this bench, for its report.
 
     Raises:
-        InputError: A scan that cannot be read. A method that fails is told in its row.
+        InputError: A scan that cannot be read. The row of a method that fails states so.
     """
     notes, notices = _notes(methods, data), Notices()
     timed_on = evenly_spaced(data.frames, effort.timed)
@@ -213,8 +212,51 @@ def run_bench(
     return Bench(rows, {**facts, "notes": notes, "runtimes": changed})
 
 
+def scored_methods(contestants: Sequence[Contestant], threads: int) -> list[ScoredMethod]:
+    """The methods, ready to judge one scan after the other; filters share their search.
+
+    Args:
+        contestants: The methods.
+        threads: Threads of views and networks; 0 takes every core this process may use.
+    """
+    shared = SharedSearch([row.filter for row in contestants if row.filter], threads)
+    return [
+        partial(shared.judge, row.filter, row.candidates)
+        if row.filter
+        else partial(_untimed, row.ready(threads))
+        for row in contestants
+    ]
+
+
+class SharedSearch:
+    """Searches each scan once, for as many neighbours as any of some filters needs.
+
+    Args:
+        filters: The filters.
+        threads: Threads of the search; 0 takes every core this process may use.
+    """
+
+    def __init__(self, filters: Sequence[PointFilter], threads: int) -> None:
+        most = max((filter.neighbours for filter in filters), default=0)
+        self._view = filter_view(most, threads)
+        self._scan: Scan | None = None
+
+    def judge(
+        self, filter: PointFilter, candidates: Candidates | None, scan: Scan
+    ) -> NDArray[np.bool_]:
+        """The points that one of the filters calls rain among candidates, bool (N,)."""
+        if scan is not self._scan:
+            self._scan, self._seen = scan, self._view(scan)
+        rain = rain_among(filter, self._seen, scan, candidates)
+        return self._seen.back(rain.astype(np.float32)) > 0
+
+
+def _untimed(method: TimedMethod, scan: Scan) -> NDArray[np.bool_]:
+    return method(scan, Stopwatch())
+
+
 def _notes(methods: Sequence[Contestant], data: LabelledFrames) -> list[str]:
-    """Says, and gives back, which models were trained on what they are measured on."""
+    """Prints and returns a note for each model that was trained on the scans it is measured on."""
     notes = [
         note
         for method in methods
@@ -227,7 +269,7 @@ def _notes(methods: Sequence[Contestant], data: LabelledFrames) -> list[str]:
 
 
 def _scans(methods: Sequence[Contestant], data: LabelledFrames, notices: Notices) -> Iterator[Scan]:
-    """Reads the scans one by one, and warns of what is odd about them for each method."""
+    """Reads the scans one by one, and warns where one does not suit a method."""
     for frame in tqdm(data.frames, desc="scoring", unit="scan", disable=None):
         scan = data.read(frame)
         for method in methods:

@@ -3,9 +3,10 @@
 Nothing here loads torch, so that a process that measures a method's memory holds little else.
 """
 
+import pickle
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,7 @@ from numpy.typing import NDArray
 from derain.errors import InputError, printable
 from derain.evaluation.baselines import PositionPrior, all_points, no_points
 from derain.evaluation.intensity_rule import IntensityRule
-from derain.export.bench.contestant import FILE_SIZE, Contestant
-from derain.export.bench.functions import TimedFunction
-from derain.export.bench.other_runtime import beside_themselves, run_by
+from derain.export.bench.other_runtime import OtherRuntime, beside_themselves, run_by
 from derain.export.methods import load_method_of_one_scan, named_method, require_one_scan, titled
 from derain.export.model_file import number_of_weights
 from derain.export.runtime import Derainer
@@ -26,19 +25,64 @@ from derain.export.runtimes.registry import Runtime
 from derain.filters import FilterDerainer, PointFilter
 from derain.filters.parameters import CANDIDATES
 from derain.scan import Scan
+from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
+from derain.views.oddities import Examiner
 
-# A method as a user gives it: a name or a file, a derainer, a filter, or a function that says which
-# points of a scan are rain, bool (N,).
+# Returns which points of a scan are rain, bool (N,), and times its stages.
+TimedMethod = Callable[[Scan, Stopwatch], NDArray[np.bool_]]
+
+# Name of the fact that holds the bytes of a method's file.
+FILE_SIZE = "file_bytes"
+
+# A method as a user gives it: a name or a file, a derainer, a filter, or a function from a scan to
+# which of its points are rain, bool (N,).
 GivenMethod = str | Path | Derainer | FilterDerainer | PointFilter | Callable[[Scan], NDArray[Any]]
 
-# Gives scans and their rain, bool (N,), to whatever is learnt from them; points of which it is not
-# known whether they are rain are left out.
+# Returns scans without points of unknown class, and their rain, bool (N,), for baselines to learn
+# from.
 LearnFrom = Callable[[], Iterable[tuple[Scan, NDArray[np.bool_]]]]
 
-# The baselines that look at nothing, and those that are learnt from labelled scans.
+# The baselines that ignore the scan, and those that learn from labelled scans.
 TRIVIAL = {"all": all_points, "none": no_points}
 LEARNT = ("position", "intensity")
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """One row of a bench.
+
+    Attributes:
+        title: Its title; no two have the same.
+        kind: Name of its network, filter or baseline.
+        ready: Makes the method, with a number of threads.
+        facts: File or parameters, from which the bench can be repeated.
+        filter: The filter, where it is one: filters share one search for neighbours.
+        candidates: Bounds outside which that filter calls nothing rain, if it has any.
+        judges_by: Checks whether a scan suits the method: a model's Spec or a filter.
+        by_other: The runtime of a model, where that is not onnxruntime in float32.
+    """
+
+    title: str
+    kind: str
+    ready: Callable[[int], TimedMethod]
+    facts: dict[str, Any] = field(default_factory=dict)
+    filter: PointFilter | None = None
+    candidates: Candidates | None = None
+    judges_by: Examiner | None = None
+    by_other: OtherRuntime | None = None
+
+    @cached_property
+    def can_be_sent(self) -> bool:
+        """Whether it can be sent to another process.
+
+        Objects that cannot be pickled cannot, nor can those that the user's own script or session
+        defines, which no other process can import.
+        """
+        try:
+            return b"__main__" not in pickle.dumps(self.ready)
+        except Exception:  # objects that cannot be pickled raise errors of many types
+            return False
 
 
 def contestants(
@@ -53,7 +97,7 @@ def contestants(
             exported model, a YAML file of parameters, a filter or a baseline (position, intensity,
             all, none), and without a mapping may have ``title=`` before it.
         learn_from: Scans for position and intensity; None where there are none to learn from.
-        runtime: What every model is run by besides onnxruntime, where it is another.
+        runtime: A second runtime for every model, besides onnxruntime.
 
     Raises:
         InputError: No method; one that is not known or cannot be read, or has nothing to learn
@@ -113,7 +157,7 @@ def _named(text: str, learn_from: LearnFrom | None) -> Contestant:
 
 
 def _deployable(title: str, name: str, parameters: dict[str, Any]) -> Contestant:
-    """What ``derain run`` runs; made here once, so that it is refused before any work."""
+    """A method of ``derain run``; made here once, so that errors come before any work."""
     ready = partial(load_method_of_one_scan, name, parameters)
     match ready(1):
         case FilterDerainer() as derainer:
@@ -171,3 +215,34 @@ def _learnt(title: str, name: str, learn_from: LearnFrom | None) -> Contestant:
 def _function(function: Callable[[Scan], NDArray[Any]]) -> Contestant:
     title = printable(getattr(function, "__name__", type(function).__name__))
     return Contestant(title, "function", TimedFunction(function).ready)
+
+
+@dataclass(frozen=True)
+class TimedFunction:
+    """A function without a view or a network of its own, timed as one stage.
+
+    Attributes:
+        function: Returns which points of a scan are rain, bool (N,).
+    """
+
+    function: Callable[[Scan], NDArray[Any]]
+
+    def ready(self, threads: int) -> "TimedFunction":
+        """The method itself; a bench does not control the threads of a function."""
+        return self
+
+    def __call__(self, scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
+        """Which points are rain, bool (N,).
+
+        Raises:
+            InputError: The function returns anything but one bool for each point.
+        """
+        with stopwatch.stage("network"):
+            rain = np.asarray(self.function(scan))
+        if rain.shape != (len(scan),) or rain.dtype != bool:
+            raise InputError(
+                scan.name,
+                f"the method gives {rain.dtype} of shape {rain.shape} for {len(scan):,} points",
+                "Let it return a bool array of shape (N,), True for rain.",
+            )
+        return rain

@@ -1,7 +1,7 @@
-"""What a method costs where it is deployed: milliseconds by stage, and memory.
+"""The cost of a method in deployment: milliseconds by stage, and memory.
 
-Each method is measured alone, in a fresh process that loads nothing of torch: no search for
-neighbours is shared, no other method's memory is counted, and a crash is that method's alone.
+Each method is measured alone, in a fresh process without torch: no search for neighbours is shared,
+no other method's memory is counted, and a crash affects that method alone.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import reason_of
-from derain.export.bench.contestant import Contestant
+from derain.export.bench.contestants import Contestant
 from derain.export.timing import RunTimes, timed_runs
 from derain.scan import Scan
 from derain.sources.frame import Frame
@@ -28,7 +28,7 @@ class Timing:
         frames: Scans to time them on, one or more.
         threads: Threads of view and network; 0 takes every core this process may use.
         repeats: Timed runs on each scan.
-        intensity_scale: What takes the scans' intensities to the unit of the methods.
+        intensity_scale: Factor from the scans' intensities to the unit of the methods.
     """
 
     frames: Sequence[Frame]
@@ -44,8 +44,8 @@ class Cost:
     Attributes:
         times: Milliseconds of each run.
         peak_memory: Largest resident memory of a process that does this alone, in MiB, Python and
-            its libraries included; None where the system does not tell, or it was not alone.
-        failure: What went wrong, if anything did; there are no runs then.
+            its libraries included; None where it is not known, or the process did more.
+        failure: The error that stopped it, if any; there are no runs then.
         alone: Whether it was measured in a process of its own.
     """
 
@@ -56,11 +56,11 @@ class Cost:
 
 
 def measure_cost(contestant: Contestant, timing: Timing) -> Cost:
-    """Measures a method in a process of its own, or in this one where it can be sent to no other.
+    """Measures a method in a process of its own, or here where it cannot be sent to another.
 
     Args:
         contestant: The method.
-        timing: What it is timed on, and how.
+        timing: The scans to time it on, and how.
     """
     try:
         if not contestant.can_be_sent:
@@ -69,7 +69,7 @@ def measure_cost(contestant: Contestant, timing: Timing) -> Cost:
             with main_left_out():
                 measured = pool.submit(timed_here, contestant, timing)
             return measured.result()
-    except Exception as error:  # whatever its libraries raise is told in the method's row
+    except Exception as error:  # its row states whatever a library raises
         return Cost(RunTimes.of_no_runs(), None, reason_of(error), contestant.can_be_sent)
 
 
@@ -87,7 +87,7 @@ def timed_here(contestant: Contestant, timing: Timing) -> Cost:
 def _peak_memory() -> float | None:
     """Largest resident memory of this process so far, MiB.
 
-    Not getrusage's: what it says of a new process begins with the memory of the one that began it.
+    getrusage would not do: its value for a new process starts from the parent's memory.
     """
     try:
         lines = Path("/proc/self/status").read_text("utf-8").splitlines()

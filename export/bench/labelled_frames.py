@@ -1,4 +1,4 @@
-"""The labelled scans that a bench measures on, and that its baselines learn from."""
+"""Labelled scans for a bench to measure on, and for its baselines to learn from."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,11 +22,11 @@ class LabelledFrames:
     """Labelled scans, and how they are read and counted.
 
     Attributes:
-        card: Says what their labels mean.
+        card: Their data card.
         frames: The scans, one or more.
-        intensity_scale: What takes their intensities to the unit of the methods.
+        intensity_scale: Factor from their intensities to the unit of the methods.
         distinct: Count points at one position once.
-        rain_rates: Rain rate in mm/h by sequence, as far as it is known.
+        rain_rates: Rain rate in mm/h by sequence, where it is known.
 
     Raises:
         InputError: No scans, or one without labels.
@@ -57,7 +57,7 @@ class LabelledFrames:
         return self.rain_rates.get(frame.sequence)
 
     def truths(self) -> Iterator[tuple[Scan, NDArray[np.bool_]]]:
-        """What some of the scans, spread over all of them, teach: points, and which are rain.
+        """Reads some of the scans, spread evenly: points of known class, and which are rain.
 
         Raises:
             InputError: A file that cannot be read, or labels that are not on the data card.

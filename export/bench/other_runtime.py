@@ -1,4 +1,4 @@
-"""A model by another runtime, beside itself by onnxruntime."""
+"""Models in another runtime, compared with the same models in onnxruntime."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,18 +12,18 @@ from derain.scan import Scan
 from derain.spec import Spec
 
 if TYPE_CHECKING:
-    from derain.export.bench.contestant import Contestant, TimedMethod
+    from derain.export.bench.contestants import Contestant, TimedMethod
     from derain.export.bench.cost import Timing
     from derain.sources.frame import Frame
 
 
 @dataclass(frozen=True)
 class OtherRuntime:
-    """What runs a model in place of onnxruntime.
+    """A runtime of a model in place of onnxruntime.
 
     Attributes:
-        runtime: What runs it.
-        usual: Makes the same model by onnxruntime in float32, with a number of threads.
+        runtime: The runtime.
+        usual: Makes the same model in onnxruntime in float32, with a number of threads.
     """
 
     runtime: Runtime
@@ -31,16 +31,16 @@ class OtherRuntime:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What it is, for whoever repeats the bench."""
-        return {"runtime": str(self.runtime)}  # in one, for precision is a score as well
+        """The runtime, from which the bench can be repeated."""
+        return {"runtime": str(self.runtime)}  # one text, because precision is also a score
 
 
 def beside_themselves(rows: Sequence["Contestant"], runtime: Runtime) -> list["Contestant"]:
-    """The methods, each model followed by itself by another runtime.
+    """The methods, each model followed by the same in another runtime.
 
     Args:
         rows: The methods.
-        runtime: The other runtime; the usual one adds nothing.
+        runtime: The other runtime; the default one adds nothing.
 
     Raises:
         InputError: A runtime that cannot run one of the models, or no model.
@@ -58,16 +58,16 @@ def beside_themselves(rows: Sequence["Contestant"], runtime: Runtime) -> list["C
 
 
 def run_by(row: "Contestant", runtime: Runtime) -> "Contestant":
-    """A model by another runtime.
+    """A model in another runtime.
 
     Args:
-        row: The model by the usual one.
+        row: The model in the default one.
         runtime: The other runtime.
 
     Raises:
         InputError: It cannot run the model.
     """
-    make: Callable[..., TimedMethod] = row.ready  # that of a model, which takes a runtime
+    make: Callable[..., TimedMethod] = row.ready  # a model's takes a runtime
     ready = partial(make, runtime=runtime)
     ready(1)  # refused before any work
     other = OtherRuntime(runtime, row.ready)
@@ -77,11 +77,11 @@ def run_by(row: "Contestant", runtime: Runtime) -> "Contestant":
 def changes(
     methods: Sequence["Contestant"], timing: "Timing", read: Callable[["Frame"], Scan]
 ) -> list[dict[str, Any]]:
-    """What each model by another runtime changes beside itself by onnxruntime.
+    """Compares each model in another runtime with the same model in onnxruntime.
 
     Args:
         methods: The methods.
-        timing: What they are timed on, which is what is compared as well.
+        timing: The scans to compare them on.
         read: Reads a frame, in the unit of the methods.
 
     Returns:
@@ -98,16 +98,16 @@ def changes(
 def _change(
     method: "Contestant", timing: "Timing", read: Callable[["Frame"], Scan]
 ) -> dict[str, Any]:
-    from derain.export.proof import beside  # here: it brings torch, which is not to be measured
+    from derain.export.proof import beside  # here: it loads torch, whose memory is not measured
 
     assert method.by_other is not None
     try:
         usual, other = method.by_other.usual(timing.threads), method.ready(timing.threads)
         assert isinstance(usual, Derainer)
         assert isinstance(other, Derainer)
-        # Mapped, for a loop would hold on to one scan while the next is read.
+        # A map releases each scan before the next is read.
         proof = beside(usual, other, map(_named(read), timing.frames))
-    except Exception as error:  # whatever a runtime raises is told in the method's row
+    except Exception as error:  # its row states whatever a runtime raises
         return {"failure": reason_of(error)}
     numbers = proof.as_dict()
     del numbers["cases"]

@@ -1,14 +1,18 @@
-"""A bench as CSV, JSON and Markdown."""
+"""A bench as CSV, JSON, Markdown and a picture."""
 
 import csv
 import io
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from derain.evaluation.counts import SCORES, Counts
+from derain.cards.card import DataCard
+from derain.evaluation.counts import SCORES, Counts, mean_over_scans
+from derain.evaluation.published_tables import PaperTable, PublishedRow
 from derain.evaluation.text_tables import markdown_table, number_text
+from derain.export.bench.contestants import FILE_SIZE, LEARNT, TRIVIAL, Contestant
 from derain.export.bench.rows import Row
 from derain.export.timing import STAGES
 from derain.files.atomic import replacing
@@ -61,7 +65,7 @@ def write_report(rows: Sequence[Row], facts: Mapping[str, Any], out: Path) -> No
 
 
 def as_csv(rows: Sequence[Row]) -> str:
-    """One line a method; what is nested has names joined by dots, such as ``stages.view.p50``."""
+    """One line a method; names of nested values are joined by dots, as in ``stages.view.p50``."""
     lines = [_flat(row.as_dict()) for row in rows]
     columns = list(dict.fromkeys(name for line in lines for name in line))
     text = io.StringIO()
@@ -107,13 +111,73 @@ def main_table(rows: Sequence[Row]) -> str:
 
 
 def runtimes_table(changed: Sequence[Mapping[str, Any]]) -> str:
-    """What each model by another runtime changes, beside itself by onnxruntime.
+    """Each model in another runtime, compared with the same model in onnxruntime.
 
     Args:
-        changed: As :func:`.other_runtime.changes` has it, one or more.
+        changed: One or more results of :func:`.other_runtime.changes`.
     """
     head = ["method", "beside onnxruntime", "largest logit difference", "labels flipped"]
     return markdown_table([*head, "IoU of the rain"], [_changed_cells(row) for row in changed])
+
+
+def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) -> None:
+    """Writes the picture of error against time.
+
+    Methods that could not be timed, or whose IoU is undefined, are left out.
+
+    Args:
+        rows: The rows of the table.
+        facts: What the bench depends on besides its methods, as :class:`.bench.Bench` has it.
+        path: PNG file to write.
+
+    Raises:
+        InputError: An output that cannot be written.
+    """
+    from derain.pictures.scan_pictures import save  # here: they load matplotlib
+    from derain.pictures.speed_error import Standing, speed_error_figure
+
+    standings = [
+        Standing(
+            row.title,
+            1 - row.scores.pooled.iou,
+            row.milliseconds,
+            group_of(row.contestant),
+            row.contestant.facts.get(FILE_SIZE),
+        )
+        for row in rows
+        if row.cost.failure is None and not math.isnan(row.scores.pooled.iou)
+    ]
+    title = f"{facts['title']}, {facts['processor']}"
+    save(speed_error_figure(standings, title), path)
+
+
+def group_of(contestant: Contestant) -> str:
+    """The kind of a method: ``network``, ``filter`` or ``baseline``."""
+    if contestant.filter is not None:
+        return "filter"
+    return "baseline" if contestant.kind in (*LEARNT, *TRIVIAL) else "network"
+
+
+def beside_published(table: PaperTable, ours: Mapping[str, Sequence[Row]], card: DataCard) -> str:
+    """Our rows below the published rows of the same method, in Markdown.
+
+    Args:
+        table: The table.
+        ours: Our rows, by the names of the table's groups.
+        card: Data card of our scans.
+    """
+    published = [row for row in table.rows if row.simulated == card.simulated]
+    if not published:  # table II has no row on simulated rain
+        published = list(table.rows)
+    head = ["method", *("P", "R", "F1", "IoU"), "ms", "average"]
+    parts = [f"# {table.title}", f"Ours on {card.title}."]
+    for name, rows in ours.items():
+        group = [row for row in published if row.group == name]
+        parts += [f"## {name}", markdown_table(head, _beside(group, rows))]
+    misprints = [
+        f"(*) {row.method}, {row.group}: {row.misprint}." for row in published if row.misprint
+    ]
+    return "\n\n".join([*parts, *misprints])
 
 
 def _changed_cells(row: Mapping[str, Any]) -> list[str]:
@@ -209,3 +273,28 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         else:
             flat[prefix + name] = value
     return flat
+
+
+def _beside(published: Sequence[PublishedRow], rows: Sequence[Row]) -> list[list[str]]:
+    body = []
+    for paper in published:
+        body.append(_published_cells(paper))
+        body += [_our_cells(row, paper.average) for row in rows if row.kind == paper.kind]
+    kinds = {paper.kind for paper in published}
+    return body + [_our_cells(row, "pooled") for row in rows if row.kind not in kinds]
+
+
+def _published_cells(row: PublishedRow) -> list[str]:
+    title = f"{row.method}, published{' (*)' if row.misprint else ''}"
+    scores = [f"{score:.2f}" for score in row.scores]
+    return [title, *scores, number_text(row.ms, "g"), row.average]
+
+
+def _our_cells(row: Row, average: str) -> list[str]:
+    pooled, per_scan = row.scores.pooled, row.scores.per_scan
+    values = [
+        getattr(pooled, score) if average == "pooled" else mean_over_scans(per_scan, score)
+        for score in SCORES
+    ]
+    cells = (number_text(100 * value, ".2f") for value in values)
+    return [f"{row.title}, ours", *cells, number_text(row.milliseconds, ".0f"), average]

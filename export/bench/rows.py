@@ -1,4 +1,4 @@
-"""Rows of the bench's table: what a method scores beside what it costs."""
+"""Rows of the bench's table: scores and cost of each method."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -9,22 +9,22 @@ import numpy as np
 from derain.evaluation.bootstrap import Bootstrap, Interval, bootstrap
 from derain.evaluation.counts import SCORES, Counts, mean_over_scans, or_none
 from derain.evaluation.scores import Scores
-from derain.export.bench.contestant import Contestant
+from derain.export.bench.contestants import Contestant
 from derain.export.bench.cost import Cost
 from derain.export.timing import STAGES
 
 
 @dataclass(frozen=True)
 class Row:
-    """How one method did.
+    """The results of one method.
 
     Attributes:
         contestant: The method.
-        scores: What it scored.
-        cost: What it cost.
+        scores: Its scores.
+        cost: Its cost.
         iou_interval: 95 % interval of its IoU over scans; None for fewer than two scans, and where
             the IoU is undefined.
-        behind_best: That of what the best method's IoU has over its own.
+        behind_best: 95 % interval of the best method's IoU minus its own.
     """
 
     contestant: Contestant
@@ -35,7 +35,7 @@ class Row:
 
     @property
     def title(self) -> str:
-        """What the method is called."""
+        """The method's title."""
         return self.contestant.title
 
     @property
@@ -45,11 +45,11 @@ class Row:
 
     @property
     def milliseconds(self) -> float:
-        """Median time from file to mask; not a number where the method could not be timed."""
+        """Median time from file to mask; NaN where the method could not be timed."""
         return self.cost.times.percentile(50)
 
     def as_dict(self) -> dict[str, Any]:
-        """The row as JSON-able primitives; what is undefined or not known is None."""
+        """The row as JSON-able primitives; None for undefined or unknown values."""
         scores, times = self.scores, self.cost.times
         return {
             "method": self.title,
@@ -90,8 +90,8 @@ def joined(
 
     Args:
         contestants: The methods, one or more.
-        scores: What each scored, on the same scans.
-        costs: What each cost.
+        scores: The scores of each, on the same scans.
+        costs: The cost of each.
         generator: Draws scans for the intervals.
     """
     intervals = _intervals(scores, generator)
@@ -102,7 +102,7 @@ def _intervals(
     scores: Sequence[Scores], generator: np.random.Generator
 ) -> tuple[Sequence[Interval | None], Sequence[Interval | None]]:
     if len(scores[0].per_scan) < 2:
-        # One scan says nothing of how much scans differ.
+        # One scan does not show how much scans differ.
         nothing = [None] * len(scores)
         return nothing, nothing
     per_scan = [row.per_scan for row in scores]

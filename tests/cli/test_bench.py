@@ -9,7 +9,7 @@ import yaml
 from numpy.typing import NDArray
 
 from derain.export.bench import bench
-from derain.export.bench.contestant import Contestant
+from derain.export.bench.contestants import Contestant
 from derain.export.bench.cost import Timing, timed_here
 from derain.export.runtime import Derainer
 from derain.scan import Scan

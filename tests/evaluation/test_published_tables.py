@@ -9,11 +9,11 @@ from derain.errors import InputError
 from derain.evaluation.baselines import all_points
 from derain.evaluation.published_tables import (
     TABLES,
-    beside_published,
     paper_table,
     scans_by_group,
 )
 from derain.evaluation.scores import Scores, score
+from derain.export.bench.report import beside_published
 from derain.scan import Scan
 
 

@@ -9,8 +9,7 @@ import yaml
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.export.bench.contestant import FILE_SIZE
-from derain.export.bench.contestants import contestants
+from derain.export.bench.contestants import FILE_SIZE, contestants
 from derain.export.runtime import Derainer
 from derain.filters import DSOR
 from derain.scan import Scan

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from derain.export.bench.contestant import Contestant
-from derain.export.bench.contestants import contestants
+from derain.export.bench.contestants import Contestant, contestants
 from derain.export.bench.cost import Timing, measure_cost, timed_here
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.methods import load_method

@@ -12,14 +12,17 @@ from matplotlib.image import imread
 
 from derain.evaluation.counts import Counts, or_none
 from derain.evaluation.scores import Scores, score
-from derain.export.bench.contestant import FILE_SIZE, Contestant
-from derain.export.bench.contestants import contestants
+from derain.export.bench.bench import scored_methods
+from derain.export.bench.contestants import FILE_SIZE, Contestant, contestants
 from derain.export.bench.cost import Cost
 from derain.export.bench.labelled_frames import LabelledFrames
-from derain.export.bench.report import SIMULATED_IS_EASY, as_markdown, write_report
+from derain.export.bench.report import (
+    SIMULATED_IS_EASY,
+    as_markdown,
+    draw_speed_error,
+    write_report,
+)
 from derain.export.bench.rows import Row, joined
-from derain.export.bench.shared_search import scored_methods
-from derain.export.bench.speed_error import draw_speed_error
 from derain.export.timing import STAGES, RunTimes
 
 FACTS = {

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from derain.evaluation.scores import score
+from derain.export.bench.bench import scored_methods
 from derain.export.bench.contestants import contestants
 from derain.export.bench.labelled_frames import LabelledFrames
-from derain.export.bench.shared_search import scored_methods
 from derain.filters import FILTERS, FilterDerainer
 from derain.scan import Scan
 from derain.views.neighbours import NeighbourView
