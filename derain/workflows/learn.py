@@ -94,7 +94,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         write_report(results)  # the teacher's labels are worth a look, whatever follows
         _refuse_clean(results)
         _fit(config, steps)
-        _export(config, steps)
+        export_checkpoint(config.checkpoint, config.out, steps)
     evaluate_student(results, data, Derainer(config.out), config.card)
     write_report(results)
     show(f"Done in {steps.elapsed}")
@@ -254,10 +254,20 @@ def _fit(config: LearnConfig, steps: Steps) -> None:
     steps.end(f"IoU {trained.iou:.3f} on held-out scans, last epoch" if scored else "trained")
 
 
-def _export(config: LearnConfig, steps: Steps) -> None:
-    steps.begin(f"Export: {config.out}")
-    proof = export(load_model(config.checkpoint), config.out)
+def export_checkpoint(checkpoint: Path, out: Path, steps: Steps) -> None:
+    """Exports a checkpoint as a step of a longer work.
+
+    Args:
+        checkpoint: The checkpoint.
+        out: The ONNX file.
+        steps: Shows the step.
+
+    Raises:
+        InputError: As for :func:`derain.export.onnx_file.export`.
+    """
+    steps.begin(f"Export: {out}")
+    proof = export(load_model(checkpoint), out)
     steps.end(
-        f"{config.out.stat().st_size:,} bytes; beside PyTorch the largest logit difference is "
+        f"{out.stat().st_size:,} bytes; beside PyTorch the largest logit difference is "
         f"{proof.worst.difference:.1e}, {proof.flipped:,} labels differ"
     )

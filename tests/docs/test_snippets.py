@@ -13,7 +13,6 @@ import yaml
 
 import derain
 from derain.cli import main as command_line
-from derain.cli import narration
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.bench import bench
@@ -55,8 +54,7 @@ def page_folder(
     prepare(tmp_path, made_once("documented_drive", write_drive))
     put_networks(tmp_path, random_outdet, random_salsanext)
     monkeypatch.chdir(tmp_path)
-    # How far a step is has a test of its own, and so have the whole proof and the timing.
-    monkeypatch.setattr(narration, "PERIODS", {True: 3600, False: 3600})
+    # The whole proof and the timing have tests of their own.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     monkeypatch.setattr(bench, "measure_cost", timed_here)
     with torch.random.fork_rng(devices=[]):

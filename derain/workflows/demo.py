@@ -1,0 +1,330 @@
+"""The demonstration: simulated rain, three networks, and a comparison with other methods."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
+from derain.datamodules.loading import Loading
+from derain.datamodules.scan_data import ScanData
+from derain.default import DEFAULT
+from derain.export.bench.bench import Bench, Effort, run_bench
+from derain.export.bench.contestants import contestants
+from derain.export.bench.labelled_frames import LabelledFrames
+from derain.export.bench.report import SHORT, main_table
+from derain.export.labelled_neighbourhoods import LabelledNeighbourhoods
+from derain.export.methods import load_method
+from derain.export.tuning import Search, neighbours_to_find, tune_filter
+from derain.files import DEFAULT_COLUMNS
+from derain.files.atomic import refuse_unwritable, replacing
+from derain.pictures.comparison import comparison_figure
+from derain.pictures.scan_pictures import before_after_figure, save
+from derain.scan import Scan
+from derain.simulation.campaign import Campaign, partition
+from derain.simulation.dataset import simulate_track
+from derain.sources.folders import named_frames
+from derain.sources.frame import Frame
+from derain.sources.judging import judgements
+from derain.sources.method import Method
+from derain.sources.sink import FolderSink
+from derain.sources.source import Source
+from derain.system.cores import usable_cores
+from derain.system.notices import Notices, warn
+from derain.system.stopwatch import Stopwatch
+from derain.views.oddities import left_out, much_removed, no_points
+from derain.workflows.fit import fit
+from derain.workflows.learn import export_checkpoint
+from derain.workflows.steps import Show, Steps, show_nothing
+
+# Titles of the networks, and the beginning of their configurations' names.
+DEMO_NETWORKS = {"3D-OutDet": "outdet", "SalsaNext": "salsanext", "LiSnowNet-L1": "lisnownet"}
+
+# Methods that the networks are compared with: the model that comes with derain, a filter, and the
+# baselines that every method has to beat.
+OTHERS = (DEFAULT, "dror", "position", "intensity", "all", "none")
+
+# 16 streets to train on, 5 to choose by, 5 to test on.
+STREETS = Campaign(*partition(26), sensor="mems_64")
+
+# Trials of the filter's tuning.
+TRIALS = 100
+
+# Starts of the bands of range of what is removed from your own scans, metres; the last is open.
+BANDS = (0, 10, 20, 40, 80)
+
+
+@dataclass(frozen=True)
+class DemoConfig:
+    """What the demonstration does. Another than the usual one takes less time.
+
+    Attributes:
+        out: Folder that everything is written to.
+        streets: What is simulated.
+        networks: Networks that are trained, titles of ``DEMO_NETWORKS``.
+        others: Methods that they are compared with.
+        settings: Settings of every training, as :func:`derain.workflows.fit.fit` takes them.
+        effort: How much is timed in the comparison.
+        scan: A scan of your own, or a folder of them; None for none.
+        columns: Names of the columns of its file, where that does not name them.
+        workers: Processes of the simulation.
+    """
+
+    out: Path
+    streets: Campaign = STREETS
+    networks: Sequence[str] = tuple(DEMO_NETWORKS)
+    others: Sequence[str] = OTHERS
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    effort: Effort = field(default_factory=Effort)
+    scan: Path | None = None
+    columns: Sequence[str] = DEFAULT_COLUMNS
+    workers: int = field(default_factory=usable_cores)
+
+    @property
+    def data(self) -> Path:
+        """Folder of the simulated scans."""
+        return self.out / "simulated"
+
+    @property
+    def tuned(self) -> Path:
+        """File of the filter's tuned parameters."""
+        return self.out / "dsor.yaml"
+
+    def model(self, title: str) -> Path:
+        """The ONNX file of a network."""
+        return self.out / f"{DEMO_NETWORKS[title]}.onnx"
+
+
+def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
+    """Simulates, tunes, trains, exports, cleans and compares.
+
+    Args:
+        config: What is done.
+        show: Receives a line for each step, and lines for its result.
+
+    Returns:
+        The comparison.
+
+    Raises:
+        InputError: What a step raises.
+    """
+    steps = Steps(show)
+    steps.begin(f"Simulation: rain in {len(config.streets.names)} streets")
+    simulate_track(config.data, config.streets, config.workers)
+    steps.end(f"{len(config.streets.names) * config.streets.scans} scans in {config.data}")
+    data = labelled_scans([config.data], card_of([config.data], None), Loading())
+    _tune(config, data, steps)
+    frame = _rainiest(config, data)
+    _draw_filters(config, data, frame, steps)
+    for title in config.networks:
+        _train(config, title, steps)
+        if title == config.networks[0]:
+            _clean(config, title, frame, steps)
+    found = _compare(config, data, steps)
+    show(f"\n{main_table(found.rows, SHORT)}\n")
+    show("Simulated rain on streets like those of the training is easy: real rain is not.")
+    if config.scan is not None:
+        clean_own_scans(config.scan, config.columns, config.out / "yours", steps)
+    show(f"Done in {steps.elapsed}")
+    return found
+
+
+def _tune(config: DemoConfig, data: ScanData, steps: Steps) -> None:
+    steps.begin(f"Tuning: {TRIALS} trials of the filter dsor")
+    frames = data.frames("validation")
+    neighbours = neighbours_to_find("dsor")
+    scans = [
+        LabelledNeighbourhoods.of(data.read_measured(frame), data.card, neighbours, 0, None)
+        for frame in frames
+    ]
+    names = [frame.name for frame in frames]
+    tuned = tune_filter("dsor", scans, Search(TRIALS, 0, None, names, lambda: None))
+    with replacing(config.tuned) as temporary:
+        text = yaml.safe_dump({"method": "dsor", **tuned.parameters}, sort_keys=False)
+        command = f"derain tune dsor --data {config.data} --out {config.tuned}"
+        temporary.write_text(f"# {command}\n{text}", "utf-8")
+    steps.end(f"IoU {tuned.iou:.4f} on {len(frames)} scans, {tuned.default_iou:.4f} by default")
+
+
+def _rainiest(config: DemoConfig, data: ScanData) -> Frame:
+    """The last scan of the test sequence with the highest rain rate."""
+    rates = rain_rates([config.data], None)
+    return max(data.frames("test"), key=lambda frame: (rates[frame.sequence], frame.key))
+
+
+def _draw_filters(config: DemoConfig, data: ScanData, frame: Frame, steps: Steps) -> None:
+    picture = config.out / "filters.png"
+    steps.begin("Picture: two filters on the scan with the most rain")
+    scan = data.read(frame)
+    known = ~data.card.unknown_of(scan)
+    methods = contestants(["dror", f"dsor, tuned={config.tuned}"])
+    removed = {one.title: one.ready(0)(scan, Stopwatch())[known] for one in methods}
+    title = f"{Path(frame.name).name}: {len(scan):,} points"
+    rain = data.card.rain_of(scan)[known]
+    save(comparison_figure(scan.take(known), removed, rain, title), picture)
+    steps.end(str(picture))
+
+
+def _train(config: DemoConfig, title: str, steps: Steps) -> None:
+    """Trains a network and exports it."""
+    name, model = DEMO_NETWORKS[title], config.model(title)
+    checkpoint = config.out / f"{name}.ckpt"
+    checkpoint.unlink(missing_ok=True)
+    steps.begin(f"Training: {title}")
+    settings = {
+        "data.root": config.data,
+        "data.make": False,
+        "trainer.logger.save_dir": config.out / "runs",
+        "checkpoint.dirpath": config.out,
+        "checkpoint.filename": name,
+        **config.settings,
+    }
+    trained = fit(f"{name}_simulated.yaml", settings, quiet=True)
+    steps.end("trained" if trained.iou is None else f"IoU {trained.iou:.3f} on streets held out")
+    export_checkpoint(checkpoint, model, steps)
+
+
+def _clean(config: DemoConfig, title: str, frame: Frame, steps: Steps) -> None:
+    """Cleans the sequence of a scan, and draws the scan before and after."""
+    folder, model = Path(frame.name).parent, config.model(title)
+    steps.begin(f"Cleaning: {folder}, by {model}")
+    picture = Picture(
+        config.out / "before_after.png", frame.name, f"Simulated rain, cleaned by {title}"
+    )
+    source = named_frames([folder])
+    cleaned = clean(load_method(str(model), {}), source, config.out / "cleaned", picture)
+    steps.end(f"{cleaned}; before and after: {picture.file}")
+
+
+def _compare(config: DemoConfig, data: ScanData, steps: Steps) -> Bench:
+    steps.begin("Comparison: error, time and memory of every method on the same scans")
+    networks = [f"{title}={config.model(title)}" for title in config.networks]
+    names = [*networks, f"dsor, tuned={config.tuned}", *config.others]
+    rates = rain_rates([config.data], None)
+
+    def labelled(frames: Source) -> LabelledFrames:
+        return LabelledFrames(data.card, frames, 1.0, data.distinct, rates)
+
+    methods = contestants(names, lambda: labelled(data.frames("train")).truths())
+    out = config.out / "bench"
+    refuse_unwritable(out / "bench.json")
+    quoted = " ".join(f"'{name}'" if " " in name else name for name in names)
+    command = f"derain bench --data {config.data} --out {out} --methods {quoted}"
+    found = run_bench(methods, labelled(data.frames("test")), config.effort, command)
+    found.write(out)
+    steps.end(str(out / "bench.md"))
+    return found
+
+
+@dataclass(frozen=True)
+class Removed:
+    """What was removed of scans; as text, one line.
+
+    Attributes:
+        by_range: Valid points and removed points by band of BANDS, int64 (bands, 2).
+        scans: How many scans.
+    """
+
+    by_range: NDArray[np.int64]
+    scans: int
+
+    def __str__(self) -> str:
+        points, removed = self.by_range.sum(axis=0).tolist()
+        return (
+            f"{self.scans:,} scans: {points:,} valid points, {removed:,} removed "
+            f"({removed / max(points, 1):.1%})"
+        )
+
+    @property
+    def shares(self) -> str:
+        """Share removed in each band of range that holds points."""
+        names = [f"{start}-{end} m" for start, end in pairwise(BANDS)] + [f"{BANDS[-1]}+ m"]
+        return ", ".join(
+            f"{name} {removed / points:.2%}"
+            for name, (points, removed) in zip(names, self.by_range.tolist(), strict=True)
+            if points
+        )
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of one of the scans that are cleaned, before and after.
+
+    Attributes:
+        file: Where it is written.
+        scan: Name of the scan.
+        heading: Title above it.
+    """
+
+    file: Path
+    scan: str
+    heading: str
+
+
+def clean_own_scans(scans: Path, columns: Sequence[str], out: Path, steps: Steps) -> Removed:
+    """Cleans your own scans by the model that comes with derain, with a picture of the first.
+
+    Args:
+        scans: A scan, or a folder of them.
+        columns: Names of the columns of files that do not name them.
+        out: Folder of the clean scans and the picture.
+        steps: Shows the step.
+
+    Raises:
+        InputError: A scan that cannot be read, or an output that cannot be written.
+    """
+    steps.begin(f"Cleaning: {scans}, by the model that comes with derain")
+    source = named_frames([scans], columns)
+    heading = f"{source[0].key}, cleaned by the model that comes with derain"
+    picture = Picture(out / "before_after.png", source[0].name, heading)
+    removed = clean(load_method(DEFAULT, {}), source, out, picture)
+    steps.end(f"{removed}; before and after: {picture.file}")
+    steps.show(f"        removed by range: {removed.shares}")
+    return removed
+
+
+def clean(method: Method, source: Source, out: Path, picture: Picture) -> Removed:
+    """Writes scans without their rain, draws one of them, and warns of what is odd.
+
+    A scan of which more is called rain than the heaviest rain has is left whole.
+
+    Raises:
+        InputError: A scan that cannot be read, or an output that cannot be written.
+    """
+    sink, notices = FolderSink(out, again=False), Notices()
+    sink.refuse_clashes(source)
+    by_range = np.zeros((len(BANDS), 2), np.int64)
+    cleaned = 0
+    for frame, judgement, _ in judgements(method, source):
+        scan, rain = judgement.scan, judgement.rain
+        odd = [*method.oddities(judgement), *left_out(scan), *no_points(scan)]
+        notices.tell(frame.name, odd)
+        if frame.name == picture.scan:
+            save(before_after_figure(scan, rain, picture.heading), picture.file)
+        too_much = next(much_removed(judgement.share_of_rain), None)
+        if too_much is not None:
+            warn(f"{frame.name}: left whole: {too_much.detail}")
+            continue
+        sink.write(frame, scan.take(~rain), rain, None)
+        by_range += removed_by_range(scan, rain)
+        cleaned += 1
+    notices.tell_how_many_more()
+    return Removed(by_range, cleaned)
+
+
+def removed_by_range(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Valid points and those of them that are removed, by band of BANDS, int64 (bands, 2).
+
+    Args:
+        scan: The scan, of N points.
+        rain: Which points are removed, bool (N,).
+    """
+    band = np.searchsorted(BANDS, scan.range[scan.valid], side="right") - 1
+    points = np.bincount(band, minlength=len(BANDS))
+    removed = np.bincount(band[rain[scan.valid]], minlength=len(BANDS))
+    return np.stack([points, removed], axis=1)

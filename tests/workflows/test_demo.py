@@ -1,0 +1,132 @@
+"""The demonstration shows its steps, and leaves the files that it names."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from matplotlib.image import imread
+
+from derain.cli.main import main
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.export import onnx_file
+from derain.export.bench.bench import Effort
+from derain.export.bench.report import SHORT
+from derain.files import DEFAULT_COLUMNS, read_scan
+from derain.scan import Scan
+from derain.simulation.campaign import Campaign
+from derain.system.open3d_import import import_open3d
+from derain.workflows.demo import (
+    DEMO_NETWORKS,
+    STREETS,
+    DemoConfig,
+    clean_own_scans,
+    removed_by_range,
+    run_demo,
+)
+from derain.workflows.steps import Steps
+
+
+@pytest.fixture
+def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> DemoConfig:
+    """Three streets of one scan each, one network for one epoch, and two methods beside it."""
+    try:
+        import_open3d()
+    except InputError as error:
+        pytest.skip(str(error))
+    monkeypatch.chdir(tmp_path)
+    # The whole proof has a test of its own.
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
+    Path("sensor.yaml").write_text(yaml.safe_dump({"rows": 16, "columns": 60}))
+    return DemoConfig(
+        Path("demo"),
+        streets=Campaign(1, 1, 1, scans=1, rain_rates=(50.0,), sensor="sensor.yaml"),
+        networks=("3D-OutDet",),
+        others=("default", "none"),
+        settings={"trainer.max_epochs": 1, "panels.scans": 0},
+        effort=Effort(timed=1, repeats=1),
+        workers=1,
+    )
+
+
+@pytest.mark.usefixtures("one_block")
+def test_every_step_is_shown_and_leaves_its_files(small: DemoConfig) -> None:
+    lines: list[str] = []
+    bench = run_demo(small, lines.append)
+    steps = [line.partition(":")[0] for line in lines if re.match(r"[A-Z]\w+: ", line)]
+    of_network = ["Training", "Export", "Cleaning"]
+    assert steps == ["Simulation", "Tuning", "Picture", *of_network, "Comparison"]
+    times = [line for line in lines if re.match(r"  \d+:\d\d  \S", line)]
+    assert len(times) == len(steps)
+    assert any("IoU 0." in line for line in times)
+    (table,) = [line.splitlines() for line in lines if line.startswith("\n| method")]
+    assert [name.strip() for name in table[1].split("|")[1:-1]] == [*SHORT]
+    titles = ["3D-OutDet", "dsor, tuned", "default", "none"]
+    assert [row.title for row in bench.rows] == titles
+    assert [row.split("|")[1].strip() for row in table[3:]] == titles
+
+    out = small.out
+    for picture in ("filters.png", "before_after.png", "bench/speed_error.png"):
+        assert imread(out / picture)[..., :3].std() > 0
+    (scan,) = (out / "simulated/sequences/002/lidar_radar_pcd").glob("*.bin")
+    rain = np.fromfile(out / "cleaned" / f"{scan.stem}.label", "<u4") == 1
+    kept = read_scan(out / "cleaned" / scan.name)
+    np.testing.assert_array_equal(kept.xyz, read_scan(scan).xyz[~rain])
+    assert list(out.glob("runs/outdet_simulated/version_0/events.out.tfevents.*"))
+
+
+def test_the_model_that_comes_with_derain_cleans_your_own_scans(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    for number in range(2):
+        scene(500, number).tofile(mine / f"{number}.bin")
+    np.full((60, 4), 1e5, np.float32).tofile(mine / "far.bin")
+    out, lines = tmp_path / "out", []
+    removed = clean_own_scans(mine, DEFAULT_COLUMNS, out, Steps(lines.append))
+    assert removed.scans == 2
+    assert removed.by_range[:, 0].sum() == 1000
+    assert "far.bin: left whole" in capsys.readouterr().err
+    assert re.search(r"0-10 m [\d.]+%, .*, 40-80 m [\d.]+%$", lines[-1])
+    assert imread(out / "before_after.png")[..., :3].std() > 0
+    assert {path.name for path in out.glob("*.label")} == {"0.label", "1.label"}
+
+
+def test_what_is_removed_is_counted_by_range() -> None:
+    xyz = np.zeros((6, 3), np.float32)
+    xyz[:, 0] = [9.9, 10, 39, 500, 0, 8]
+    rain = np.array([True, False, True, False, True, False])
+    counted = removed_by_range(Scan(xyz), rain)
+    assert counted.tolist() == [[2, 1], [1, 0], [1, 1], [0, 0], [1, 0]]
+
+
+def test_an_unreadable_scan_is_refused_before_the_first_step(
+    tmp_path: Path, run_derain: Callable
+) -> None:
+    (tmp_path / "cut.bin").write_bytes(b"12345")
+    for name, reason in (("cut.bin", "5 bytes are not whole rows"), ("none", "there is no such")):
+        outcome = run_derain("demo", "--out", tmp_path / "out", "--scan", tmp_path / name)
+        assert (outcome.code, outcome.out) == (2, "")
+        assert reason in outcome.err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("small")
+def test_a_step_that_fails_ends_the_demonstration(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("demo/simulated").mkdir(parents=True)
+    Path("demo/simulated/mine.txt").touch()
+    assert main(["demo"]) == 2
+    outcome = capsys.readouterr()
+    assert "Tuning" not in outcome.out
+    assert "demo/simulated: holds something other than" in outcome.err
+
+
+def test_the_streets_have_rain_to_choose_by_and_to_test_on() -> None:
+    for part in ("validation", "test"):
+        rates = [STREETS.rain_rate[name] for name in STREETS.split[part]]
+        assert max(rates) == max(STREETS.rain_rates)
+    assert set(DEMO_NETWORKS.values()) == {"outdet", "salsanext", "lisnownet"}
