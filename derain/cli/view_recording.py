@@ -80,7 +80,7 @@ def refuse_unusable(out: Path) -> None:
     """
     RERUN.load(out)
     if out.suffix.lower() != SUFFIX:
-        raise InputError(out, "is no name that Rerun's viewer opens", f"Let it end in {SUFFIX}.")
+        raise InputError(out, f"must end in {SUFFIX}", "Rerun's viewer opens no other files.")
     refuse_unwritable(out)
 
 

@@ -195,7 +195,7 @@ def test_a_scan_that_cannot_be_read_is_told_of_once_and_shown_empty(
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--rerun", "out.png"], "is no name that Rerun's viewer opens. Let it end in .rrd."),
+        (["--rerun", "out.png"], "must end in .rrd"),
         (["--rerun", "out.rrd", "--frames", "9:"], "none of them is among the 4 scans"),
         (["--rerun", "out.rrd", "--methods", "nothing"], "nothing: no such file"),
         (["--rerun", "out.rrd", "--methods", "dror", "dror"], "dror: two methods are called so"),
