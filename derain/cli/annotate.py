@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from derain.scan import Scan
 
 DESCRIPTION = """\
-Labels the scans of one sequence as REHEARSE-3D was labelled: finds the road's plane, gives what is
-in a box the box's class, calls the rest over the road rain or road by its height above the plane,
-and everything else background. Writes <stem>.label with REHEARSE-3D's class ids (255: unknown), and
-a picture of the sequence.
+Labels the scans of one sequence as REHEARSE-3D is labelled. It fits a plane to the road. Points in
+a box get the class of the box; other points over the road are rain or road, by their height above
+the plane; everything else is background. It writes <stem>.label with the class ids of REHEARSE-3D
+(255: unknown), and a picture of the sequence.
 
   derain annotate sequences/003 --scene scene.yaml --out labels/003
   derain annotate scans/*.bin --scene scene.yaml --out labels --sequence 003 --json
@@ -46,16 +46,18 @@ A scene file, in metres and degrees in the sensor's frame (x forward, y left, z 
   boxes:               # size: length along the heading, width, height
     car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
     mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
-  height: 0.1          # points higher above the road's plane are rain
-  rain_area: [[2, -9], [60, -9], [60, 9], [2, 9]] # where drops are labelled (default: the road)
-  corrections:         # of boxes in some sequences: shift, size or heading
+  height: 0.1          # rain begins at this height above the road
+  rain_area: [[2, -9], [60, -9], [60, 9], [2, 9]] # area of the rain (default: the road)
+  corrections:         # shift, size or heading that differ in a sequence
     "003": {boxes: {car_1: {shift: [0.2, 0, 0]}}}
 
 The classes are background, car, sprinkler, rain, pedestrian, bike, target and road. Only the road
-is required: begin with it alone, and put boxes around what the picture wrongly shows as rain.
+is required: begin with the road alone, then add boxes around objects that the picture shows as
+rain.
 
-Radar frames need the names of their scans and the LiDAR's frame: `derain fuse` pairs frames in
-time and transforms them. They get the labels of the nearest LiDAR points, in the folder radar.
+Each radar frame, in the LiDAR's frame, belongs to the scan of the same name. Its points get the
+label of the nearest LiDAR point, in the folder radar. `derain fuse` pairs frames by time and
+transforms them into the LiDAR's frame.
 """
 
 CLASS_NAMES = {kind.value: kind.name.lower() for kind in TrackClass} | {UNKNOWN: "unknown"}
@@ -69,15 +71,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", type=Path, required=True, help="scene file")
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument(
-        "--sequence", help="sequence whose corrections apply (default: the folder's name)"
+        "--sequence", help="name of the sequence, for its corrections (default: name of the folder)"
     )
-    parser.add_argument("--radar", type=Path, help="folder of radar frames to label as well")
+    parser.add_argument("--radar", type=Path, help="also label the radar frames in this folder")
     parser.add_argument(
         "--within",
         type=factor,
         default=LABEL_WITHIN,
         metavar="METRES",
-        help="largest distance from a radar point to its LiDAR point (default: %(default)s)",
+        help="label radar points within METRES of a LiDAR point (default: %(default)s)",
     )
     parser.add_argument(
         "--picture",

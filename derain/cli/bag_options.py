@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def add_topic(parser: argparse.ArgumentParser) -> None:
     """Declares which topic of a bag is meant."""
     parser.add_argument(
-        "--topic", metavar="NAME", help="topic of point clouds, of bags that have several"
+        "--topic", metavar="NAME", help="topic of point clouds, for bags with several"
     )
 
 
@@ -32,15 +32,15 @@ def add_cleaned_bags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cleaned-topic",
         metavar="NAME",
-        help="of a bag, leave its clouds and add a topic of clean ones (default: in their place)",
+        help="bags: add a topic of clean clouds (default: replace the clouds)",
     )
     parser.add_argument(
-        "--removed-topic", metavar="NAME", help="of a bag, add a topic of what was removed"
+        "--removed-topic", metavar="NAME", help="bags: add a topic of the removed points"
     )
     parser.add_argument(
         "--keep-shape",
         action="store_true",
-        help="of a bag, keep rows and columns of organised clouds: removed points become NaN",
+        help="bags: keep rows and columns of organised clouds; removed points become NaN",
     )
 
 

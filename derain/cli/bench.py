@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from derain.sources.source import Frames
 
 DESCRIPTION = """\
-Runs every method on the same labelled scans, and writes one table (bench.md, bench.csv, bench.json)
-and one picture of error against time (speed_error.png).
+Runs every method on the same labelled scans, and writes a table (bench.md, bench.csv, bench.json)
+and a plot of error against time (speed_error.png).
 
   derain bench --data scans/ --card wads --methods default outdet.onnx dror dsor all none \\
       --out bench
@@ -45,12 +45,12 @@ and one picture of error against time (speed_error.png).
   derain bench --paper table3 --data REHEARSE3D_PUBLIC --rain-rates rates.yaml \\
       --methods outdet.onnx dsor.yaml position all none --out table3
 
-A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), default or a filter
-(below), or a baseline: position and intensity, learnt from the training scans, all and none.
-With --runtime, every model is run by that one too, in a row of its own,
-and what it changes beside onnxruntime is printed.
-Scoring runs all methods in this process, where filters share one search for neighbours; then each
-is timed alone, in a process of its own.
+A method is a model (.onnx), parameters from `derain tune` (.yaml), default or a filter (below), or
+a baseline: position and intensity, learnt from the training scans, all and none.
+With --runtime, each model has a second row for that runtime, and derain prints how it differs from
+onnxruntime.
+Scoring runs all methods in one process, where filters share one neighbour search. Each method is
+then timed alone, in its own process.
 """
 
 
@@ -64,32 +64,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--train",
         type=Path,
         nargs="+",
-        help="labelled scans that position and intensity learn from "
+        help="labelled scans for the baselines position and intensity "
         "(default: the training part of a data set)",
     )
-    parser.add_argument("--limit", type=count, help="scans, spread over all (default: all)")
+    parser.add_argument("--limit", type=count, help="number of scans, evenly spread (default: all)")
     parser.add_argument(
         "--distinct",
         action=argparse.BooleanOptionalAction,
-        help="count points at one position once, as results on WADS are published "
-        "(default: as the data card says)",
+        help="count points at the same position once, as published results on WADS do "
+        "(default: from the data card)",
     )
     parser.add_argument(
         "--rain-rates",
         type=Path,
         metavar="YAML",
-        help='rain rate of each sequence in mm/h, as "005": 25 (default: a simulation\'s own)',
+        help='rain rate of each sequence in mm/h, as "005": 25 (default: those of the simulation)',
     )
-    parser.add_argument("--paper", choices=TABLES, help="print beside this table")
+    parser.add_argument("--paper", choices=TABLES, help="also print this published table")
     add_threads(parser)
-    add_runtime(parser, help="another runtime to run models by")
+    add_runtime(parser, help="second runtime for the models")
     parser.add_argument(
-        "--timed", type=count, default=10, help="scans to time on (default: %(default)s)"
+        "--timed", type=count, default=10, help="number of timed scans (default: %(default)s)"
     )
     parser.add_argument(
-        "--repeats", type=count, default=3, help="timed runs on each (default: %(default)s)"
+        "--repeats", type=count, default=3, help="timed runs of each scan (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the intervals' draws (default: 0)")
+    parser.add_argument("--seed", type=int, default=0, help="random seed (default: 0)")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -27,9 +27,9 @@ from derain.sources.frame import Frame
 from derain.sources.source import Source
 
 DESCRIPTION = f"""\
-Merges LiDAR scans with the radar frames nearest in time, in the layout of REHEARSE-3D: writes
-lidar_radar_pcd, in each file the points of the LiDAR, then those of the radar in the LiDAR's frame,
-and with --labels lidar_radar_labels.
+Merges each LiDAR scan with the radar frame nearest in time, in the layout of REHEARSE-3D. Each file
+in lidar_radar_pcd holds the LiDAR's points, then the radar's points in the LiDAR's frame. With
+--labels it also writes lidar_radar_labels.
 
   derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused
   derain fuse --lidar innoviz --radar ext_radar --extrinsics radar_to_lidar.yaml \\
@@ -39,13 +39,13 @@ and with --labels lidar_radar_labels.
   derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused \\
     --labels innoviz_labels --label-within 0.5
 
-The extrinsics say where the radar is in the LiDAR's frame (x forward, y left, z up):
+The extrinsics are the pose of the radar in the LiDAR's frame (x forward, y left, z up):
 
   {{x: 0.5, y: 0.0, z: -0.7, roll: 0, pitch: 0, yaw: 1.5}}     metres and degrees
 
-or as a 4 x 4 matrix. When each scan was taken is in its folder's {METADATA}, a line for each:
-frame (its name), timestamp (in seconds). The label of a radar point is that of the nearest LiDAR
-point, {UNKNOWN} (unknown) if none is near. A LiDAR scan without a radar frame stays alone.
+or a 4 x 4 matrix. {METADATA} in each folder has one line per scan: frame (its name),
+timestamp (in seconds). A radar point gets the label of the nearest LiDAR point, or {UNKNOWN}
+(unknown) if none is near. A LiDAR scan without a radar frame is written alone.
 """
 
 LAYOUT = load_card("rehearse3d").layout
@@ -56,7 +56,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--lidar", type=Path, required=True, help="folder of LiDAR scans")
     parser.add_argument("--radar", type=Path, required=True, help="folder of radar frames")
     parser.add_argument(
-        "--extrinsics", type=Path, required=True, help="YAML file: the radar in the LiDAR's frame"
+        "--extrinsics",
+        type=Path,
+        required=True,
+        help="YAML file: radar's pose in the LiDAR's frame",
     )
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument(
@@ -64,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=factor,
         default=0.05,
         metavar="SECONDS",
-        help="farthest in time that a radar frame may be from its scan (default: %(default)s)",
+        help="pair frames at most SECONDS apart (default: %(default)s)",
     )
     parser.add_argument("--labels", type=Path, help="folder of the LiDAR scans' labels")
     parser.add_argument(
@@ -72,14 +75,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=factor,
         default=LABEL_WITHIN,
         metavar="METRES",
-        help="how far a LiDAR point's label reaches (default: %(default)s)",
+        help="label radar points within METRES of a LiDAR point (default: %(default)s)",
     )
     parser.add_argument(
         "--extra",
         default="",
         metavar="COLUMNS",
-        help="radar columns to keep, such as doppler,rcs: writes .npz, whose column radar tells "
-        "the sensors apart",
+        help="radar columns to keep, such as doppler,rcs; writes .npz files, whose column radar "
+        "marks the radar points",
     )
     for sensor in ("lidar", "radar"):
         add_columns(parser, f"--{sensor}-columns", of=f"the {sensor}'s ")
@@ -87,7 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--metadata-columns",
         type=_two_names,
         default=",".join(FRAME_COLUMNS),
-        help=f"columns of {METADATA} with a scan's name and its time (default: %(default)s)",
+        help=f"columns of {METADATA} with the name and the time of a scan (default: %(default)s)",
     )
 
 

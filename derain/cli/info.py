@@ -37,13 +37,13 @@ from derain.views.morton import distinct_rows
 from derain.views.oddities import no_points
 
 DESCRIPTION = """\
-Says what is in a scan, a label file, a bag, an exported model or a checkpoint, what range image
-fits a scan, and how many of its rays have two returns; with --card, also how often the second one
-of a labelled scan gives back what lies behind rain. And how many scans and points, by class and by
-rain rate, are in a data set: a folder of sequences (REHEARSE-3D, SemanticKITTI, WADS, simulated),
-one sequence, or a folder of scans. With --grid, fits one grid to all the scans, to be written into
-a configuration. Of the model that comes with derain (default) it prints the card: what it is, how
-good, and when not to use it.
+Describes scans, label files, bags, exported models and checkpoints. For a scan it also prints the
+range image that fits, and how many rays have two returns; with --card, how often the second return
+of a labelled scan is the surface behind rain. For a data set (a folder of sequences as of
+REHEARSE-3D, SemanticKITTI or WADS, or simulated; one sequence; or a folder of scans) it counts
+scans and points by class and rain rate. With --grid it fits one grid to all scans, for a
+configuration. `derain info default` prints the card of the model that comes with derain: what it
+is, how good it is, and when not to use it.
 
   derain info default
   derain info scan.bin
@@ -67,21 +67,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--grid", action="store_true", help="fit one grid to all the scans")
     parser.add_argument(
-        "--json", action="store_true", help="print one JSON object a file or folder"
+        "--json", action="store_true", help="print one JSON object per file or folder"
     )
     parser.add_argument(
         "--card",
-        help="data card that names a folder's classes, and its folders (default: as those tell), "
-        "or says which points of a labelled scan are rain",
+        help="data card with the classes and folders of a data set (default: found by its "
+        "folders), or with the rain classes of a labelled scan",
     )
     parser.add_argument(
         "--layout",
         metavar="SCANS,LABELS",
-        help="names of a sequence's folders of scans and labels (default: those known)",
+        help="names of a sequence's folders of scans and labels (default: known names)",
     )
-    parser.add_argument("--picture", type=Path, help="PNG to draw of a folder's statistics")
+    parser.add_argument("--picture", type=Path, help="draw a folder's statistics to this PNG file")
     parser.add_argument(
-        "--formats", action=ListFormats, nargs=0, help="list the formats of scans, and end"
+        "--formats", action=ListFormats, nargs=0, help="list the formats of scans, and exit"
     )
     add_columns(parser)
     add_topic(parser)

@@ -31,12 +31,12 @@ def add_data_arguments(parser: argparse.ArgumentParser, part: str) -> None:
         "--part",
         choices=("train", "validation", "test"),
         default=part,
-        help="part of a data set's sequences (default: %(default)s)",
+        help="part of a data set (default: %(default)s)",
     )
     parser.add_argument(
         "--card",
-        help=f"data card, which says what labels mean: {', '.join(packaged_cards())} (derain: of "
-        "simulate --on), or a YAML file (default: as the data set's folders tell)",
+        help=f"data card with the meaning of the labels: {', '.join(packaged_cards())} (derain: "
+        "from simulate --on), or a YAML file (default: found by the data set's folders)",
     )
     add_columns(parser)
     add_intensity_scale(parser)

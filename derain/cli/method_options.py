@@ -28,7 +28,10 @@ def add_method(parser: argparse.ArgumentParser, metavar: str = "METHOD") -> None
 def add_parameters(parser: argparse.ArgumentParser) -> None:
     """Declares the method's parameters."""
     parser.add_argument(
-        "--parameters", type=Path, metavar="YAML", help="the method's parameters, as tuned"
+        "--parameters",
+        type=Path,
+        metavar="YAML",
+        help="parameters of the method, from derain tune",
     )
     parser.add_argument(
         "--set",
@@ -36,7 +39,7 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="one parameter of the method, over those of --parameters; may be given again",
+        help="set one parameter, over those of --parameters; repeatable",
     )
 
 

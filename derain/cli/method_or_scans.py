@@ -21,10 +21,10 @@ from derain.files.reading import is_file
 # Suffixes of files that name a method, or, as a checkpoint does, are refused as one.
 METHOD_SUFFIXES = (".onnx", CHECKPOINT_SUFFIX, *PARAMETER_SUFFIXES)
 
-# How a command's help says it.
+# The same for the help of a command.
 RULE = """\
-The first word is METHOD where it is one of these. Where it is a folder or a scan, METHOD is left
-out, and the model that comes with derain cleans them all. Write ./crf for a folder called crf."""
+METHOD is optional: if the first word is a folder or a scan, the model that comes with derain cleans
+all scans. Write ./crf for a folder called crf."""
 
 
 def add_method_and_scans(parser: argparse.ArgumentParser, *, help: str) -> None:

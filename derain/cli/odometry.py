@@ -24,19 +24,19 @@ from derain.system.stopwatch import Stopwatch
 from derain.workflows.odometry import find_poses
 
 DESCRIPTION = """\
-Finds how the sensor moved from the scans alone, each laid upon the one before it, and writes its
-poses: a line a scan, which takes its points to the frame of the first scan.
+Registers each scan to the scan before it, and writes the poses of the sensor: one line per scan,
+the transform of its points into the frame of the first scan.
 
   derain odometry drive --out poses.txt
-  derain odometry drive --out drive/poses.txt               where derain finds them from then on
+  derain odometry drive --out drive/poses.txt               later commands read them there
   derain odometry drive --out drive.tum --format tum        time x y z qx qy qz qw
   derain odometry WADS --out poses                          poses/11.txt, poses/12.txt, ...
   derain odometry drive --out poses.txt --json
 
 SEQUENCE is a folder of consecutive scans, or a data set, or a part of one. The residual is the
-median distance between a scan's surfaces and those of the scan before it. A scan that cannot be
-registered is warned of, with the reason: for it the file says where the sensor would be if it had
-gone on as it did, and the exit code is 2.
+median distance between the surfaces of a scan and of the scan before it. derain warns of a scan
+that it cannot register, with the reason. Its pose is then extrapolated at constant velocity, and
+the exit code is 2.
 """
 
 
@@ -82,19 +82,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         required=True,
-        help="file to write, or for several sequences a folder, of a file <sequence>.txt each",
+        help="file to write; for several sequences, folder of files <sequence>.txt",
     )
     parser.add_argument(
         "--format",
         choices=("kitti", "tum"),
         default="kitti",
-        help="what a line is: twelve numbers of a matrix, or time, position and quaternion, for "
-        "which the scans need times (default: %(default)s)",
+        help="format of a line: the twelve numbers of a matrix (kitti), or time, position and "
+        "quaternion (tum; the scans need times) (default: %(default)s)",
     )
     parser.add_argument(
-        "--replace", action="store_true", help=f"replace a {POSES} that came with the scans"
+        "--replace", action="store_true", help=f"replace a {POSES} that belongs to the scans"
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object a scan")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per scan")
     add_threads(parser)
     add_columns(parser)
     add_topic(parser)

@@ -10,7 +10,7 @@ def add_poses(parser: argparse._ActionsContainer) -> None:
     parser.add_argument(
         "--poses",
         metavar="POSES",
-        help=f"poses of the scans: a file in KITTI's or TUM's form, a folder with <sequence>.txt "
-        f"for each sequence, {STANDING}, or {ODOMETRY} (default: poses.txt beside the scans, else "
-        f"{ODOMETRY})",
+        help=f"poses of the scans: a file in the format of KITTI or TUM, a folder with one "
+        f"<sequence>.txt per sequence, {STANDING}, or {ODOMETRY} (default: poses.txt beside the "
+        f"scans, otherwise {ODOMETRY})",
     )

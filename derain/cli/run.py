@@ -36,8 +36,8 @@ from derain.workflows.odometry import placed
 
 DESCRIPTION = f"""\
 Cleans scans: writes <stem>.label (1 = rain, one per row of the input) and the scan without its
-rain, in the input's format with every field kept. With --weather, --fail-at, --dry or --json it
-measures how bad the weather is in every scan; else in five scans, for the last line alone.
+rain, in the format of the input with all its fields. With --weather, --fail-at, --dry or --json it
+measures the weather of every scan; otherwise of five scans, for the last line.
 
   derain run scans/ --out cleaned
   derain run model.onnx scan.bin --out cleaned
@@ -54,21 +54,20 @@ measures how bad the weather is in every scan; else in five scans, for the last 
   derain run scans/ --out cleaned --weather weather.csv --warning 30 40 --error 15 20 --hold 5
   derain run scans/ --out cleaned --json --fail-at error
 
-METHOD is a model written by `derain export` (.onnx), parameters that `derain tune` wrote (.yaml),
-or a name (below).
+METHOD is a model from `derain export` (.onnx), parameters from `derain tune` (.yaml), or a name
+(below).
 {RULE}
-For a method that sees several scans, those of a recording have to come in time order. Where a
-method is not sure of a point, its best guess decides. Of a data set, results are named by their
-paths in it.
-Of a bag (.bag of ROS 1; .mcap, .db3 or the folder of ROS 2), a bag of its name is written, in which
-the clouds of one topic have no rain and everything else is as it was, byte for byte.
-What is odd about a scan is warned of, each fault once. A scan is left whole where more than
---most-removed of its valid points are called rain: no file is written for it, and in a bag its
-cloud stays as it is. It and a scan that cannot be read are reported; the exit code is then 2.
-Visibility is the range that 90 % of the rays would get through if rain met them everywhere as often
-as in the first 10 m. It compares scans of one sensor, and is not what a weather station measures.
-Fog that returns nothing shows only beside dry scans of the sensor, with --dry.
-Where every scan was cleaned and one was at the level of --fail-at or worse, the exit code is 3.
+Methods that see several scans need the scans of a recording in time order. Where a method is not
+sure of a point, its best guess decides. Results of a data set are named by their paths in it.
+A bag (.bag of ROS 1; .mcap, .db3 or a folder of ROS 2) becomes a bag of the same name: the clouds
+of one topic have no rain, and everything else stays the same, byte for byte.
+derain warns once of each fault of the scans. It skips scans with more than --most-removed rain: it
+writes no file for them, and leaves the clouds of bags as they are. It also skips scans that it
+cannot read. The exit code is then 2.
+Visibility is the range that 90 % of the rays would reach if rain were as dense everywhere as in the
+first 10 m. It compares scans of one sensor; a weather station measures something else. Fog without
+returns shows only in comparison with dry scans of the sensor (--dry).
+The exit code is 3 if derain cleaned every scan and one was at the level of --fail-at or worse.
 """
 
 
@@ -78,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     add_threads(parser)
     add_runtime(parser, help="what runs the model")
-    parser.add_argument("--json", action="store_true", help="print one JSON object a scan")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per scan")
     add_columns(parser)
     add_intensity_scale(parser)
     parser.add_argument(
@@ -86,16 +85,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=share,
         default=MOST_RAIN,
         metavar="SHARE",
-        help="leave a scan whole if a greater share of its valid points is called rain (default: "
-        "%(default)g; 1 cleans every scan)",
+        help="skip scans with more than SHARE rain among their valid points (default: %(default)g; "
+        "1 cleans every scan)",
     )
     parser.add_argument(
-        "--removed", type=Path, metavar="DIR", help="write what is taken away of the scans too"
+        "--removed", type=Path, metavar="DIR", help="write the removed points to DIR"
     )
     parser.add_argument(
         "--probability",
         action="store_true",
-        help=f"write how probable rain is as the column {RAIN_PROBABILITY} of the scans",
+        help=f"add the column {RAIN_PROBABILITY} to the scans",
     )
     add_parameters(parser)
     add_poses(parser)

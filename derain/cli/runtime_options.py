@@ -21,8 +21,8 @@ def add_runtime(parser: argparse.ArgumentParser, help: str) -> None:
     parser.add_argument(
         "--precision",
         metavar="NAME",
-        help=f"what it computes in: {FLOAT32_PRECISION} (default), or bf16, where the runtime and "
-        "the processor have it",
+        help=f"precision of its arithmetic: {FLOAT32_PRECISION} (default), or bf16 if the runtime "
+        "and the processor support it",
     )
 
 

@@ -31,14 +31,14 @@ def add_columns(
         type=column_names,
         metavar="NAMES",
         default=default,
-        help=f"names of the columns of {of}files that do not name them: %(unnamed)s "
+        help=f"column names for {of}files without them: %(unnamed)s "
         f"(default: {','.join(DEFAULT_COLUMNS)})",
     )
     vars(action)["unnamed"] = _UnnamedFormats()
 
 
 def add_intensity_scale(parser: argparse.ArgumentParser, of: str = "") -> None:
-    """Declares what takes the scans' intensities to the unit of the methods.
+    """Declares the factor from the scans' intensities to the unit of the methods.
 
     Args:
         parser: The command's parser.
@@ -49,7 +49,7 @@ def add_intensity_scale(parser: argparse.ArgumentParser, of: str = "") -> None:
         type=factor,
         default=1.0,
         metavar="FACTOR",
-        help=f"what takes the {of}scans' intensities to the method's unit, e.g. 255 (default: 1)",
+        help=f"multiply the {of}scans' intensities by FACTOR, e.g. 255 (default: 1)",
     )
 
 

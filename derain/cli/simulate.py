@@ -15,8 +15,8 @@ from derain.system.extras import MATPLOTLIB, OPEN3D, require
 
 DESCRIPTION = """\
 Simulates a rain facility in the layout of REHEARSE-3D: LiDAR, radar, both merged, labels, weather.
-Every sequence is another track; 60 % of them are to train on, 20 % each to validate and to test.
-To train takes three or more; one is enough to look at.
+Every sequence is another track: 60 % for training, 20 % each for validation and test. Training
+needs three or more sequences; one is enough to look at.
 
   derain simulate --out facility
   derain simulate --out look --sequences 1 --scans 1 --rain 50
@@ -26,32 +26,32 @@ To train takes three or more; one is enough to look at.
   derain simulate --out country --layout country --sensor spinning_64 --no-radar
   derain simulate --out drive --layout street --speed 13 --traffic 8 --sensor spinning_64
 
-In the facility nothing but rain is near, and little else is as dim, as in the real one: a rule that
-learns places finds it, and so does one of intensity. In the streets there are boughs and bushes
-between the drops. The other layouts are full of what looks like drops and is none: windows, nets,
-twigs, grass, and people near the sensor. With --speed the sensor drives along a street, without a
-radar; with --traffic others move, whether it drives or stands. Beside such scans lies poses.txt,
-and the upper 16 bits of their labels number what moves.
+As in the real facility, only rain is near the sensor, and little else is as dim: rules of position
+or of intensity find it. The streets have boughs and bushes between the drops. The other layouts
+have many objects that look like drops: windows, nets, twigs, grass, and people near the sensor.
+With --speed the sensor drives along a street, without a radar; with --traffic cars and pedestrians
+move. derain then also writes poses.txt, and numbers moving objects in the upper 16 bits of the
+labels.
 
-The sequences take the rain rates in turn, 0 being clean. An interrupted run is taken up where it
-ended. To train on the data set:
+The sequences take the rain rates in turn; 0 is clean. A second call continues an interrupted run.
+To train on the data set:
 
   derain fit --config outdet_simulated.yaml --data.root facility --data.make false
 
-With --world every sequence is one scan of another place, sensor and weather, from drizzle to snow:
-what a model learns from that is to work anywhere. A YAML of one's own says what is drawn from
-(derain/simulation/worlds/world.yaml).
+With --world every sequence is one scan of another place, sensor and weather, from drizzle to snow,
+to train a model that works anywhere. A YAML file of your own sets what is drawn, as in
+derain/simulation/worlds/world.yaml.
 
   derain simulate --out worlds --world --sequences 500
   derain fit --config relative_outdet_worlds.yaml --data.root worlds --data.make false
 
-With --on, lets it rain on clean scans instead, in the file's own format with every column kept, and
-writes <stem>.label (1 = rain).
+With --on, derain adds rain to clean scans instead, in the format of the file with all its columns,
+and writes <stem>.label (1 = rain).
 
   derain simulate --on clean/ --rain 25 --out rainy
   derain simulate --on scan.pcd --rain 50 --out rainy --sensor spinning_128 --picture
 
-Simulated rain is easy: a score on it says nothing about real rain.
+Simulated rain is easy: a score on it does not predict the score on real rain.
 """
 
 # The names of derain.simulation.layouts, which takes too long to import where it is not used.
@@ -88,7 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sensor",
         help="name of a packaged sensor, or YAML file (default: mems_256, with --on spinning_64)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="random seed (default: %(default)s)")
     _add_those_of_data_sets(parser.add_argument_group("a data set"))
     _add_those_of_scans(parser.add_argument_group("rain on scans"))
 
@@ -115,12 +115,12 @@ def _add_those_of_data_sets(group: "argparse._ArgumentGroup") -> None:
         "--skew",
         action="store_true",
         default=None,
-        help="let them, and the sensor, move on while a scan is taken",
+        help="let cars, pedestrians and the sensor move during a scan",
     )
     group.add_argument(
         "--radar",
         action=argparse.BooleanOptionalAction,
-        help="with a 4D radar (default: yes, but not on a drive)",
+        help="simulate a 4D radar (default: yes, but not on a drive)",
     )
     group.add_argument("--workers", type=count, help="processes (default: one per core)")
     group.add_argument(
@@ -128,7 +128,8 @@ def _add_those_of_data_sets(group: "argparse._ArgumentGroup") -> None:
         nargs="?",
         const="world",
         metavar="YAML",
-        help="draw place, sensor and weather anew for each scan (default: the packaged world)",
+        help="draw place, sensor and weather of each scan at random, as YAML describes (default: "
+        "the packaged world)",
     )
 
 
@@ -139,7 +140,7 @@ def _add_those_of_scans(group: "argparse._ArgumentGroup") -> None:
         "--picture", action="store_true", default=None, help="draw <stem>.png of each scan"
     )
     group.add_argument(
-        "--json", action="store_true", default=None, help="print one JSON object a scan"
+        "--json", action="store_true", default=None, help="print one JSON object per scan"
     )
 
 

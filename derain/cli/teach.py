@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from derain.workflows.teaching import LabelledScan, TeachResults
 
 DESCRIPTION = """\
-Labels recordings by what a method says of them, for a network to learn from: 0 is not rain, 1 rain,
-and 255 not known, which is neither trained on nor measured.
+Labels recordings by a method, to train a network: 0 is not rain, 1 rain, and 255 not known.
+Training and measuring leave out points that are not known.
 
   derain teach persistence drive/ --out taught
   derain teach persistence drive/ --out taught --poses poses.txt
@@ -39,11 +39,11 @@ and 255 not known, which is neither trained on nor measured.
   derain fit --config outdet_taught.yaml --data.root taught
 
 METHOD is a method that sees several scans, a filter, the model that comes with derain (below), a
-model of your own (.onnx), or parameters that `derain tune` wrote (.yaml). The folder gets labels,
-their data card and a list of the scans, which stay where they are. The last fifth of each sequence
-is held out, as the validation part. A scan of which nothing is known is left out.
-With --card, which says what the scans' own labels mean, what is taught is measured beside them, for
-the record only: they change nothing.
+model of your own (.onnx), or parameters from `derain tune` (.yaml). derain writes the labels, their
+data card and a list of the scans; the scans stay in their place. The last fifth of each sequence is
+the validation part. Scans without any known point are left out.
+With --card, the meaning of the scans' own labels, derain also compares its labels with these, for
+the record only: they do not change the result.
 """
 
 
@@ -91,12 +91,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument(
         "--card",
-        help="data card of the scans, to measure by their own labels for the record: "
+        help="data card of the scans' own labels, to compare with for the record: "
         f"{', '.join(packaged_cards())}, or a YAML file",
     )
     add_threads(parser)
     add_runtime(parser, help="what runs a model")
-    parser.add_argument("--json", action="store_true", help="print one JSON object a scan")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per scan")
     add_columns(parser)
     add_topic(parser)
     add_intensity_scale(parser)

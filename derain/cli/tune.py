@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from derain.sources.frame import Frame
 
 DESCRIPTION = """\
-Finds the parameters of a filter, or the threshold of a model, that give the greatest IoU of rain on
+Finds the parameters of a filter, or the threshold of a model, with the greatest IoU of rain on
 labelled scans, and writes them for `derain run --parameters` and `derain bench --methods`.
 
   derain tune dsor --data scans/ --card wads --out dsor.yaml
@@ -48,11 +48,11 @@ labelled scans, and writes them for `derain run --parameters` and `derain bench 
   derain tune outdet.onnx --data REHEARSE3D_PUBLIC --out outdet.yaml
   derain tune default --data scans/ --card wads --out default.yaml
 
-A filter is searched by Optuna, from its default parameters on; each scan's neighbours are found
-once, and take some 150 bytes a point. With --storage, a second call goes on to --trials.
-With --candidates, it calls nothing rain outside bounds of range, height and intensity that hold a
-share of the scans' rain.
-A model's threshold is found exactly, from its probabilities, without trials.
+Optuna searches the parameters of a filter, starting at the defaults. The neighbours of each scan
+are found once, and take some 150 bytes per point. With --storage, a second call continues up to
+--trials. With --candidates, the filter looks for rain only within bounds of range, height and
+intensity that hold a share of the rain.
+The threshold of a model follows from its probabilities, without trials.
 """
 
 
@@ -65,21 +65,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", type=file_named(*PARAMETER_SUFFIXES), required=True, help="YAML file to write"
     )
     parser.add_argument(
-        "--scans", type=count, default=100, help="scans, drawn at random (default: %(default)s)"
+        "--scans", type=count, default=100, help="number of random scans (default: %(default)s)"
     )
     parser.add_argument(
-        "--trials", type=count, default=100, help="trials of a filter (default: %(default)s)"
+        "--trials", type=count, default=100, help="trials for a filter (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of what is drawn (default: 0)")
+    parser.add_argument("--seed", type=int, default=0, help="random seed (default: 0)")
     parser.add_argument(
         "--candidates",
         type=share,
         nargs="?",
         const=RAIN_INSIDE,
         metavar="SHARE",
-        help="bound a filter's rain, so that this share of it is inside (%(const)s if not said)",
+        help="limit a filter to bounds that hold SHARE of the rain (default SHARE: %(const)s)",
     )
-    parser.add_argument("--storage", type=Path, help="SQLite file that keeps a filter's study")
+    parser.add_argument("--storage", type=Path, help="SQLite file for the study of a filter")
     add_threads(parser)
 
 

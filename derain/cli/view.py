@@ -13,8 +13,8 @@ from derain.default import DEFAULT
 from derain.errors import InputError
 
 DESCRIPTION = """\
-Draws a scan, its truth where it has labels, and what each method makes of it, from above and as the
-sensor sees it; or writes a whole recording, to be looked at scan after scan in Rerun's viewer.
+Draws a scan, its labels if there are any, and the result of each method, from above and from the
+sensor; or writes a recording for Rerun's viewer.
 
   derain view scan.bin --out figure.png
   derain view scan.bin --methods default outdet.onnx dsor --out figure.png
@@ -25,24 +25,24 @@ sensor sees it; or writes a whole recording, to be looked at scan after scan in 
   derain view recording/ --methods persistence --poses odometry --frames 0:50 --rerun out.rrd
   derain view drive.mcap/velodyne_points/000012 --out figure.png
 
-A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), default or a filter
-(below); of one scan also all or none, of a recording also what sees several scans. --card says what
-the labels mean; without it there is no truth, and in a picture points whose label says that they
-are unknown are left out.
-Of a bag the first cloud is drawn, unless the path names another.
-It needs derain[view], and --window derain[scene], too.
---rerun writes the scans, and for each method what it keeps, what it removes and how probable it
-finds rain; range images; the share removed over time, and with --card the IoU of each scan. It says
-before how large that becomes. Where poses lie beside the scans, or --poses tells them, the scans
-lie in the world. Scans that cannot be read or judged are reported and shown empty; the exit code is
-then 2.
+A method is a model (.onnx), parameters from `derain tune` (.yaml), default or a filter (below); for
+one scan also all or none, for a recording also a method that sees several scans. --card gives the
+meaning of the labels, which are ignored without it. With it, pictures leave out points labelled as
+unknown.
+derain draws the first cloud of a bag, unless the path names another.
+It needs derain[view]; --window also needs derain[scene].
+--rerun writes the scans; for each method the points that it keeps and removes, and their
+probability of rain; range images; the share of removed points over time, and with --card the IoU of
+each scan. It first prints the expected size. With poses, from beside the scans or from --poses, the
+scans are placed in the world. It reports scans that it cannot read or judge, and shows them empty;
+the exit code is then 2.
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument(
-        "scans", nargs="+", type=Path, metavar="SCAN", help="a scan; with --rerun, recordings"
+        "scans", nargs="+", type=Path, metavar="SCAN", help="scan; with --rerun, recordings"
     )
     list_methods(parser)
     parser.add_argument(
@@ -50,22 +50,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[DEFAULT],
         metavar="[TITLE=]METHOD",
-        help="(default: default, the model that comes with derain)",
+        help="methods to compare (default: default, the model that comes with derain)",
     )
     parser.add_argument("--out", type=Path, help="PNG file to write")
     parser.add_argument("--window", action="store_true", help="open a window for each method")
     parser.add_argument(
-        "--rerun", type=Path, metavar="FILE", help="Rerun file to write (.rrd), of a recording"
+        "--rerun", type=Path, metavar="FILE", help="Rerun file to write (.rrd), for a recording"
     )
     parser.add_argument(
         "--frames",
         type=_numbers,
         default=slice(None),
         metavar="FROM:TO",
-        help="with --rerun, show these scans only, counted from 0, without TO (default: all)",
+        help="with --rerun, show scans FROM to TO - 1, counted from 0 (default: all)",
     )
     parser.add_argument(
-        "--every", type=count, default=1, help="with --rerun, show one scan of so many (default: 1)"
+        "--every", type=count, default=1, help="with --rerun, show every n-th scan (default: 1)"
     )
     parser.add_argument(
         "--card", help="data card of the scans' labels (beside them or in ../labels), such as wads"

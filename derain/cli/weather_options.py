@@ -41,14 +41,17 @@ def add_weather(parser: argparse.ArgumentParser) -> None:
     """Declares the table of the weather, and the levels of its visibility."""
     group = parser.add_argument_group("weather")
     group.add_argument(
-        "--weather", type=Path, metavar="CSV", help="write a table of the weather, a line a scan"
+        "--weather",
+        type=Path,
+        metavar="CSV",
+        help="write the weather of each scan to a table",
     )
     group.add_argument(
         "--dry",
         type=Path,
         metavar="REFERENCE",
-        help="dry scans of the same sensor in the same kind of place, a file, a folder or a bag: "
-        "what the sensor no longer reaches counts for the level too",
+        help="dry scans of the same sensor in the same kind of place (a file, folder or bag): the "
+        "level then also depends on the loss of range",
     )
     for name, level in (("warning", WARNING), ("error", ERROR)):
         group.add_argument(
@@ -57,7 +60,7 @@ def add_weather(parser: argparse.ArgumentParser) -> None:
             type=float,
             metavar=("BELOW", "ABOVE"),
             default=(level.below, level.above),
-            help=f"level of visibility: it begins below so many metres and ends at so many or more "
+            help=f"raise below BELOW m of visibility, clear at ABOVE m "
             f"(default: {level.below:g} {level.above:g})",
         )
     group.add_argument(
@@ -65,15 +68,14 @@ def add_weather(parser: argparse.ArgumentParser) -> None:
         type=count,
         default=HOLD,
         metavar="SCANS",
-        help="scans in a row of a recording that have to agree before its alarm changes (default: "
-        "%(default)s)",
+        help="consecutive scans that change the alarm of a recording (default: %(default)s)",
     )
     group.add_argument(
         "--fail-at",
         choices=[str(level) for level in Level if level],
         metavar="LEVEL",
-        help=f"after all scans, exit with code {BAD_WEATHER} if one was at this level or worse: "
-        "warning or error, by the alarm in a recording, else by the scan alone",
+        help=f"exit with code {BAD_WEATHER} if a scan is at LEVEL (warning or error) or worse: by "
+        "the alarm in a recording, otherwise by the scan alone",
     )
 
 

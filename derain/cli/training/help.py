@@ -39,18 +39,18 @@ Writes the labels that a checkpoint gives the test scans, which need none of the
 # The options that most runs need; `ALL` lists those that any run can have.
 OPTIONS = {
     "--config FILE": "configuration: a YAML file, or the name of a packaged one",
-    "--data.root FOLDER": "where the data set lies",
-    "--ckpt_path FILE": "checkpoint to go on from, to measure or to use",
-    "--start MODEL": "begin from a trained model's weights: a checkpoint, or default",
+    "--data.root FOLDER": "root folder of the data set",
+    "--ckpt_path FILE": "checkpoint to continue, to measure or to use",
+    "--start MODEL": "start with the weights of a trained model: a checkpoint, or default",
     "--trainer.max_epochs N": "passes over the training scans",
     "--trainer.devices N": "devices, or processes on a CPU",
     "--trainer.accelerator NAME": "cpu, gpu, ...",
     "--trainer.logger.name NAME": "name of the run's folder",
-    "--trainer.logger.save_dir FOLDER": "where runs are logged (runs)",
+    "--trainer.logger.save_dir FOLDER": "folder of the logs (default: runs)",
     "--data.loading.batch_size N": "scans in a batch",
     "--data.loading.workers N": "processes that read scans",
-    "--predictions.folder FOLDER": "where `predict` writes labels",
-    "--seed_everything N": "of everything drawn (0)",
+    "--predictions.folder FOLDER": "folder for the labels of `predict`",
+    "--seed_everything N": "random seed (default: 0)",
 }
 
 
