@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.system.waiting import sleeping_threads
+from derain.system.cores import sleeping_threads
 
 with sleeping_threads():
     import small_gicp
