@@ -1,4 +1,4 @@
-"""``derain view``: scans as several methods clean them, in a picture, a window or over time."""
+"""``derain view``: shows scans as several methods clean them."""
 
 import argparse
 from pathlib import Path
@@ -15,8 +15,8 @@ from derain.errors import InputError
 SUMMARY = "look at a scan, or a recording, as several methods clean it"
 
 DESCRIPTION = """\
-Draws a scan, its truth where it has labels, and what each method makes of it, from above and as the
-sensor sees it; or writes a whole recording, to be looked at scan after scan in Rerun's viewer.
+Draws a scan, its labels and the result of each method, from above and as the sensor sees it; or
+writes a recording for Rerun's viewer.
 
   derain view scan.bin --out figure.png
   derain view scan.bin --methods default outdet.onnx dsor --out figure.png
@@ -27,17 +27,16 @@ sensor sees it; or writes a whole recording, to be looked at scan after scan in 
   derain view recording/ --methods persistence --poses odometry --frames 0:50 --rerun out.rrd
   derain view drive.mcap/velodyne_points/000012 --out figure.png
 
-A method is a model (.onnx), parameters that `derain tune` wrote (.yaml), default or a filter
-(below); of one scan also all or none, of a recording also what sees several scans. --card says what
-the labels mean; without it there is no truth, and in a picture points whose label says that they
-are unknown are left out.
-Of a bag the first cloud is drawn, unless the path names another.
-It needs derain[view], and --window derain[scene], too.
---rerun writes the scans, and for each method what it keeps, what it removes and how probable it
-finds rain; range images; the share removed over time, and with --card the IoU of each scan. It says
-before how large that becomes. Where poses lie beside the scans, or --poses tells them, the scans
-lie in the world. Scans that cannot be read or judged are reported and shown empty; the exit code is
-then 2.
+A method is a model (.onnx), parameters written by `derain tune` (.yaml), default or a filter
+(below); for one scan also all or none, for a recording also methods of several scans. --card names
+the data card of the labels; without it no truth is shown. Pictures leave out points whose label is
+unknown.
+Of a bag, the first cloud is drawn unless the path names another.
+It needs derain[view]; --window also needs derain[scene].
+--rerun writes the scans, and for each method the points it keeps, the points it removes and the
+probability of rain; range images; the share removed from each scan, and with --card its IoU. With
+poses, from files beside the scans or by --poses, the scans are placed in the world. Scans that
+cannot be read or judged are reported and shown empty; the exit code is then 2.
 """
 
 
@@ -64,10 +63,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_numbers,
         default=slice(None),
         metavar="FROM:TO",
-        help="with --rerun, show these scans only, counted from 0, without TO (default: all)",
+        help="with --rerun, show only scans FROM up to but not including TO, from 0 (default: all)",
     )
     parser.add_argument(
-        "--every", type=count, default=1, help="with --rerun, show one scan of so many (default: 1)"
+        "--every",
+        type=count,
+        default=1,
+        metavar="N",
+        help="with --rerun, show every Nth scan (default: 1)",
     )
     parser.add_argument(
         "--card", help="data card of the scans' labels (beside them or in ../labels), such as wads"
@@ -85,9 +88,7 @@ def main(arguments: argparse.Namespace) -> int:
         from derain.cli.view_recording import view_recording
 
         if arguments.out or arguments.window:
-            raise InputError(
-                "--rerun", "a recording is shown in no picture", "Leave out --out and --window."
-            )
+            raise InputError("--rerun", "excludes --out and --window", "Leave them out.")
         return view_recording(arguments)
     from derain.cli.view_scan import view_scan
 
@@ -95,8 +96,8 @@ def main(arguments: argparse.Namespace) -> int:
     if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):
         raise InputError(
             path,
-            "is more than one scan, which no picture shows",
-            "Name one, or give --rerun out.rrd to look at all of them.",
+            "is more than one scan; a picture shows one",
+            "Name one, or give --rerun out.rrd to see all of them.",
         )
     view_scan(arguments)
     return 0
