@@ -13,7 +13,7 @@ from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
-from derain.system.parameters import made_of
+from derain.system.registry import made_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.oddities import Oddity
 from derain.views.window import PlacedScan, Window

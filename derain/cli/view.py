@@ -1,4 +1,4 @@
-"""``derain view``: scans as several methods clean them, in a picture, a window or over time."""
+"""``derain view``: shows scans as several methods clean them."""
 
 import argparse
 from pathlib import Path
@@ -25,17 +25,16 @@ sensor; or writes a recording for Rerun's viewer.
   derain view recording/ --methods persistence --poses odometry --frames 0:50 --rerun out.rrd
   derain view drive.mcap/velodyne_points/000012 --out figure.png
 
-A method is a model (.onnx), parameters from `derain tune` (.yaml), default or a filter (below); for
-one scan also all or none, for a recording also a method that sees several scans. --card gives the
-meaning of the labels, which are ignored without it. With it, pictures leave out points labelled as
+A method is a model (.onnx), parameters written by `derain tune` (.yaml), default or a filter
+(below); for one scan also all or none, for a recording also methods of several scans. --card names
+the data card of the labels; without it no truth is shown. Pictures leave out points whose label is
 unknown.
-derain draws the first cloud of a bag, unless the path names another.
+Of a bag, the first cloud is drawn unless the path names another.
 It needs derain[view]; --window also needs derain[scene].
---rerun writes the scans; for each method the points that it keeps and removes, and their
-probability of rain; range images; the share of removed points over time, and with --card the IoU of
-each scan. It first prints the expected size. With poses, from beside the scans or from --poses, the
-scans are placed in the world. It reports scans that it cannot read or judge, and shows them empty;
-the exit code is then 2.
+--rerun writes the scans, and for each method the points it keeps, the points it removes and the
+probability of rain; range images; the share removed from each scan, and with --card its IoU. With
+poses, from files beside the scans or by --poses, the scans are placed in the world. Scans that
+cannot be read or judged are reported and shown empty; the exit code is then 2.
 """
 
 
@@ -62,10 +61,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_numbers,
         default=slice(None),
         metavar="FROM:TO",
-        help="with --rerun, show scans FROM to TO - 1, counted from 0 (default: all)",
+        help="with --rerun, show only scans FROM up to but not including TO, from 0 (default: all)",
     )
     parser.add_argument(
-        "--every", type=count, default=1, help="with --rerun, show every n-th scan (default: 1)"
+        "--every",
+        type=count,
+        default=1,
+        metavar="N",
+        help="with --rerun, show every Nth scan (default: 1)",
     )
     parser.add_argument(
         "--card", help="data card of the scans' labels (beside them or in ../labels), such as wads"
@@ -83,9 +86,7 @@ def main(arguments: argparse.Namespace) -> int:
         from derain.cli.view_recording import view_recording
 
         if arguments.out or arguments.window:
-            raise InputError(
-                "--rerun", "a recording is shown in no picture", "Leave out --out and --window."
-            )
+            raise InputError("--rerun", "excludes --out and --window", "Leave them out.")
         return view_recording(arguments)
     from derain.cli.view_scan import view_scan
 
@@ -93,8 +94,8 @@ def main(arguments: argparse.Namespace) -> int:
     if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):
         raise InputError(
             path,
-            "is more than one scan, which no picture shows",
-            "Name one, or give --rerun out.rrd to look at all of them.",
+            "is more than one scan; a picture shows one",
+            "Name one, or give --rerun out.rrd to see all of them.",
         )
     view_scan(arguments)
     return 0

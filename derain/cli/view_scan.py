@@ -28,14 +28,14 @@ def view_scan(arguments: argparse.Namespace) -> None:
     """Draws the scan.
 
     Raises:
-        InputError: A scan or labels that cannot be read, a method that there is not, or an output
-            that cannot be written.
+        InputError: A scan or labels that cannot be read, an unknown method, or an output that
+            cannot be written.
     """
     from derain.export.bench.contestants import contestants
 
     path = in_topic(arguments.scans, arguments)[0]
     if not (arguments.out or arguments.window):
-        raise InputError(path, "nothing is to be done with it", "Give --out, --window or --rerun.")
+        raise InputError(path, "no output is named", "Give --out, --window or --rerun.")
     require("view", MATPLOTLIB, *((OPEN3D,) if arguments.window else ()))
     methods = contestants(arguments.methods)
     card = None if arguments.card is None else load_card(arguments.card)
@@ -61,13 +61,13 @@ def view_scan(arguments: argparse.Namespace) -> None:
         save(comparison_figure(scan, predicted, rain, title), arguments.out)
         say(str(arguments.out))
     if arguments.window:
-        from derain.pictures.comparison_window import show_comparison
+        from derain.pictures.comparison import show_comparison
 
         show_comparison(scan, predicted, rain)
 
 
 def _shown(frame: "Frame", path: Path) -> str:
-    """What the title calls a scan; of a bag, the cloud is said that is drawn."""
+    """Name of a scan in the title; prints which cloud of a bag is drawn."""
     if not isinstance(frame, BagFrame):
         return path.name
     if NUMBER.fullmatch(path.name) is None:
@@ -78,7 +78,7 @@ def _shown(frame: "Frame", path: Path) -> str:
 def _rain(
     scan: "Scan", method: "Contestant", threads: int, notices: Notices
 ) -> "NDArray[np.bool_]":
-    """Which points a method calls rain, bool (N,); warns where a model cannot see much of them."""
+    """Points that a method calls rain, bool (N,); warns of many points outside a model's view."""
     from derain.export.runtime import Derainer
     from derain.system.stopwatch import Stopwatch
 
@@ -94,6 +94,6 @@ def _rain(
 def _truth(
     scan: "Scan", frame: "Frame", card: DataCard
 ) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]]":
-    """Which points are rain, and of which it is known."""
+    """Points that are rain, and points whose label is known, each bool (N,)."""
     labelled = scan.with_label(frame.read_label(len(scan)))
     return card.rain_of(labelled), ~card.unknown_of(labelled)

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from derain.errors import InputError, did_you_mean
 from derain.files.documents import short
-from derain.system.parameters import made_of
-from derain.system.registry import Registry
+from derain.system.registry import Registry, made_of
 
 if TYPE_CHECKING:
     from derain.filters.point_filter import PointFilter

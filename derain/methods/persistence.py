@@ -23,7 +23,7 @@ from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
 from derain.system.cores import threads_of
-from derain.system.parameters import made_of
+from derain.system.registry import made_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.oddities import Oddity
 from derain.views.one_viewpoint import unlike_one_viewpoint

@@ -36,5 +36,5 @@ class RecordingMethod(Method):
 
         Raises:
             InputError: A parameter that it does not have, or a value that it cannot have:
-                :func:`derain.system.parameters.made_of` says so of a dataclass.
+                :func:`derain.system.registry.made_of` raises it for a dataclass.
         """

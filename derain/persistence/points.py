@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import Scan
-from derain.system.waiting import sleeping_threads
+from derain.system.cores import sleeping_threads
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
 

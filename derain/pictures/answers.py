@@ -1,4 +1,4 @@
-"""Pictures of what a teacher says of points, and of what its student removes."""
+"""Pictures of a teacher's labels, and of what its student removes."""
 
 from collections.abc import Sequence
 
@@ -26,28 +26,28 @@ from derain.pictures.palette import OUTCOMES
 from derain.pictures.scan_pictures import draw_from_above, explain_colours
 from derain.scan import Scan
 
-# Told apart by colour-blind eyes and in grey.
+# Distinct to colour-blind eyes and in grey.
 OF_ANSWERS = {RAIN: "#1f77b4", NOT_KNOWN: "#f2c14e"}
 STUDENT = "#111827"
 
-# How far from the sensor a picture shows what rain there is, at least, and where there is none.
+# Half the height of a picture, metres: at least, and without rain.
 LEAST_REACH, FAR = 10.0, 40.0
 
-# Shares are drawn on an axis that reaches so far, at least.
+# Least upper limit of an axis of shares.
 LEAST_TOP = 0.01
 
-# Where the last band, which is open, is drawn to, metres.
+# Upper edge that the last, open band is drawn to, metres.
 LAST_EDGE = FINE_EDGES[-1] + FINE_EDGES[1]
 
 # Colours of the pictures of scans, as numbers of ``OUTCOMES``.
 KEPT, REMOVED, LEFT, LOST = range(len(OUTCOMES))
 
-# Points in a band of range from which a share is drawn: of fewer it is a matter of chance.
+# Fewest points in a band of range that a share is drawn for: with fewer it is chance.
 FEWEST_POINTS = 100
 
 
 def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
-    """How sure the teacher was: what it calls rain and does not know, by scan and by range.
+    """Shares of rain and of unknown points in a teacher's labels, by scan and by range.
 
     Args:
         scans: The scans, in time order, one or more.
@@ -73,7 +73,7 @@ def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
 
 
 def removed_figure(held_out: Answers, title: str) -> Figure:
-    """Share removed by range on the held-out scans, beside what the teacher says there.
+    """Share removed from the held-out scans by range, beside the teacher's labels.
 
     Args:
         held_out: The answers of all held-out scans.
@@ -116,7 +116,7 @@ def removed_figure(held_out: Answers, title: str) -> Figure:
 def answers_figure(
     scan: Scan, card: DataCard, called_rain: NDArray[np.bool_], title: str
 ) -> Figure:
-    """What a teacher says of a scan, what its student does, and where they differ; from above.
+    """A scan from above by its teacher's labels, by its student, and where they differ.
 
     Args:
         scan: A scan with the teacher's labels.
@@ -159,13 +159,13 @@ def answers_figure(
 
 
 def _reach(scan: Scan, rain: NDArray[np.bool_]) -> float:
-    """How far from the sensor most of the rain is, metres, with something around it."""
+    """Half the height of a picture that shows most of the rain, metres."""
     ranges = scan.range[rain & scan.valid]
     return max(LEAST_REACH, 1.3 * float(np.percentile(ranges, 95))) if len(ranges) else FAR
 
 
 def _draw_by_scan(axes: Axes, scans: Sequence[AnswersOfScan]) -> None:
-    """Bars in time order, those of held-out scans on a ground of their own."""
+    """Bars in time order; a line marks the first held-out scan."""
     _draw_shares(axes, np.arange(len(scans)), [scan.answers for scan in scans], width=1.0)
     kept_back = [place for place, scan in enumerate(scans) if scan.held_out]
     if kept_back:
@@ -190,9 +190,9 @@ def _draw_by_scan(axes: Axes, scans: Sequence[AnswersOfScan]) -> None:
 def _draw_shares(
     axes: Axes, places: NDArray[np.int64], answers: Sequence[Answers], width: float
 ) -> None:
-    """Stacked bars: rain, and on it what is not known; what is left to 1 is not rain."""
+    """Stacked bars: rain, and above it what is not known; the rest is not rain."""
     shares = np.array([one.shares for one in answers]).reshape(-1, len(TEACHERS_ANSWERS))
-    shares = np.nan_to_num(shares)  # of no points there is no bar
+    shares = np.nan_to_num(shares)  # no bar where there are no points
     bottom = np.zeros(len(answers))
     for answer in (RAIN, NOT_KNOWN):
         axes.bar(
@@ -208,7 +208,7 @@ def _draw_shares(
 
 
 def _scale(axes: Axes, largest: float) -> None:
-    """Shares from 0 to a little above the largest, as per cent."""
+    """Scales an axis of shares, in per cent, from 0 to a little above the largest."""
     axes.set_ylim(0, min(1.0, max(1.15 * largest, LEAST_TOP)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:.3g} %"))
     axes.spines[["top", "right"]].set_visible(False)
@@ -217,5 +217,5 @@ def _scale(axes: Axes, largest: float) -> None:
 def _shares(
     part: NDArray[np.int64], whole: NDArray[np.int64], drawn: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """What each part is of its whole; NaN where it is not drawn."""
+    """Each part divided by its whole; NaN where it is not drawn."""
     return np.where(drawn, ratio(part, whole), np.nan)

@@ -1,4 +1,4 @@
-"""Pictures of what a data set holds: how often it rains how hard, and points by class."""
+"""Pictures of a data set: its rain rates, and its points by class."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from derain.evaluation.contents import Contents, class_name, rate_name
 
-# Clean air, then ever more rain; grey where it is not known.
+# Without rain, and where the rate is unknown; rates have shades between the next two.
 CLEAN, UNKNOWN = "#c9b458", "#9aa3ad"
 LIGHTEST, HEAVIEST = 0.35, 0.95
 
@@ -20,7 +20,7 @@ def statistics_figure(
     """Share of the sequences, and points of each class on a logarithmic axis, by rain rate.
 
     Args:
-        contents: What was counted at each rain rate in mm/h; None where it is not known.
+        contents: Counts by rain rate in mm/h; None for an unknown rate.
         classes: Names of the classes, by id.
         title: Heading.
 

@@ -1,4 +1,4 @@
-"""Pictures of where a derainer errs: by class and range, and at which threshold."""
+"""Pictures of a derainer's errors: by class and range, and over the threshold."""
 
 from collections.abc import Mapping, Sequence
 
@@ -13,20 +13,20 @@ from derain.evaluation.rain_counts import ClassCounts
 from derain.evaluation.text_tables import number_text
 from derain.pictures.palette import LOST, MISSED
 
-# Classes that a table has rows for; what is left of the others stands in one row.
+# Most rows of a table of classes; the last sums up all further classes.
 MOST_CLASSES = 14
 
-# Shares that are drawn as darkly as can be, and as lightly: errors of a class span decades.
+# Shares with the darkest and the lightest colour: errors span decades.
 DARKEST, LIGHTEST = 1.0, 1e-4
 
-# Of the cells: rain that is left, and others that are removed. As in the pictures of scans.
+# Colours of cells, as in the pictures of scans: rain that is kept, and others that are removed.
 LEFT = LinearSegmentedColormap.from_list("left", ["#fffdf3", MISSED])
 LOST_SHADES = LinearSegmentedColormap.from_list("lost", ["#fff8f8", LOST])
 
 PRECISION, RECALL, IOU = "#d98200", "#1f77b4", "#111827"
 FAINT_TEXT = "#9ca3af"
 
-# IoU of the lines in the background of a precision-recall curve.
+# IoU of the background lines of a precision-recall curve.
 LINES_OF_IOU = (0.2, 0.4, 0.6, 0.8, 0.9)
 
 
@@ -35,10 +35,10 @@ def errors_figure(
 ) -> Figure:
     """A table of the share of each class that is judged wrongly, by range.
 
-    Rain comes first, then what has most points judged wrongly.
+    Rain comes first, then the class with most points judged wrongly.
 
     Args:
-        counts: What became of the points of each class in each band, by the class's name.
+        counts: Counts of each class by band, by the class's name.
         bands: Names of the bands.
         title: Heading.
     """
@@ -73,11 +73,11 @@ def errors_figure(
 
 
 def operating_points_figure(points: OperatingPoints, threshold: float, title: str) -> Figure:
-    """Precision over recall with the chosen threshold marked, and both over the threshold.
+    """Precision over recall with the chosen threshold, and both over the threshold.
 
     Args:
-        points: Counts at many thresholds, of data with rain in them.
-        threshold: The one that is chosen.
+        points: Counts at many thresholds, of data with rain.
+        threshold: The chosen threshold.
         title: Heading.
     """
     figure = Figure(figsize=(12, 4.8), layout="constrained")
@@ -90,7 +90,7 @@ def operating_points_figure(points: OperatingPoints, threshold: float, title: st
 
 
 def _rows(counts: Mapping[str, Sequence[ClassCounts]]) -> dict[str, list[ClassCounts]]:
-    """The rows of the table, each with its total at the end; classes without points have none."""
+    """The rows of the table, each with its total at the end; only classes with points."""
     rows = {name: [*cells, _total(cells)] for name, cells in counts.items()}
     filled = {name: row for name, row in rows.items() if row[-1].points}
     order = sorted(filled, key=lambda name: (not filled[name][-1].rain, -filled[name][-1].wrong))

@@ -1,19 +1,16 @@
-"""The colours of everything that shows scans: pictures, windows and recordings to look at.
-
-It loads nothing that draws.
-"""
+"""The colours of scans in pictures, windows and the viewer; it needs no drawing library."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Bright on dark, and told apart by colour-blind eyes.
+# Bright on dark, and distinct to colour-blind eyes.
 BACKGROUND = "#10151c"
 SOLID = "#7d8a99"
 RAIN = "#39c5ff"
 MISSED = "#ffd23f"
 LOST = "#ff5d5d"
 
-# What a point is and what it was called, as a number and a colour.
+# Colours by what a point is and what became of it; outcomes are numbers in this order.
 OUTCOMES = {
     "solid, kept": SOLID,
     "rain, removed": RAIN,
@@ -21,20 +18,20 @@ OUTCOMES = {
     "solid, lost": LOST,
 }
 
-# The same where it is not known which points are rain.
+# The same where the rain is not known.
 WITHOUT_LABELS = {"kept": SOLID, "removed": RAIN}
 
-# A probability from 0 to 1: dark, the colour of rain, white, ever brighter.
+# Probabilities from 0 to 1: dark, the colour of rain, white.
 PROBABILITY = ("#2b3440", RAIN, "#ffffff")
 
-# Lines of several methods in one plot, told apart by colour-blind eyes; after the last, again.
+# Lines of several methods in one plot, distinct to colour-blind eyes; reused after the last.
 # Source: M. Okabe and K. Ito, "Color Universal Design", 2008; without its black and yellow, which
 # do not show on dark and on light ground alike.
 LINES = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#0072b2", "#d55e00")
 
 
 def outcomes(predicted: NDArray[np.bool_], rain: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """What became of each point, as a number of ``OUTCOMES``, int64 (N,).
+    """Outcome of each point as a number of ``OUTCOMES``, int64 (N,).
 
     Args:
         predicted: Points called rain, bool (N,).
@@ -50,12 +47,11 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 
 def shades(colours: tuple[str, ...], share: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Colours between some, uint8 (N, 3).
+    """Interpolates colours, uint8 (N, 3).
 
     Args:
-        colours: Two or more, evenly spread from 0 to 1.
-        share: Where each point lies between the first and the last, (N,); beyond them counts as at
-            them.
+        colours: Two or more, evenly spaced from 0 to 1.
+        share: Position of each point from 0 to 1, (N,); values beyond are clipped.
     """
     places = np.linspace(0, 1, len(colours))
     table = np.array([rgb(colour) for colour in colours])

@@ -1,4 +1,4 @@
-"""Pictures of scans: from above, as the sensor sees them, and what a derainer made of them."""
+"""Pictures of scans from above and as the sensor sees them, with the result of a derainer."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,15 +15,16 @@ from derain.errors import InputError, printable
 from derain.files.atomic import replacing
 from derain.pictures.palette import BACKGROUND, OUTCOMES, SOLID, outcomes
 from derain.scan import Scan
+from derain.views.directions import directions
 
-# Steps of brightness that intensity is shown in.
+# Shades of grey for intensities.
 SHADES = 64
 
 # Colours whose channels differ by less are grey.
 GREY = 0.2
 
-# Area of a coloured point, in points of print squared: the first over the root of how many there
-# are of its colour, and at most the second.
+# Area of a coloured point, in points of print squared: the first, divided by the root of the number
+# of points in its colour, but at most the second.
 ALONE, LARGEST = 60, 16
 
 
@@ -47,17 +48,16 @@ def judgement_figure(
         "prediction": predicted.astype(int),
         "error": outcomes(predicted, rain),
     }
-    for (above, ahead), (name, outcome) in zip(columns, colourings.items(), strict=True):
-        above.set_title(name)
-        draw_from_above(above, scan, outcome)
-        draw_as_seen(ahead, scan, outcome)
+    for column, (name, outcome) in zip(columns, colourings.items(), strict=True):
+        column[0].set_title(name)
+        draw_pair(column, scan, outcome)
     label_once(columns[0])
     explain_colours(figure)
     return figure
 
 
 def before_after_figure(scan: Scan, predicted: NDArray[np.bool_], title: str) -> Figure:
-    """One scan as it came, with what was found in it, and what is left.
+    """One scan with the rain found in it, and without that rain.
 
     Args:
         scan: The scan.
@@ -72,10 +72,9 @@ def before_after_figure(scan: Scan, predicted: NDArray[np.bool_], title: str) ->
         f"before: {scan.valid.sum():,} points, {predicted.sum():,} of them rain": (scan, predicted),
         f"after: {kept.valid.sum():,} points": (kept, np.zeros(len(kept), bool)),
     }
-    for (above, ahead), (name, (part, rain)) in zip(columns, parts.items(), strict=True):
-        above.set_title(name)
-        draw_from_above(above, part, rain.astype(int))
-        draw_as_seen(ahead, part, rain.astype(int))
+    for column, (name, (part, rain)) in zip(columns, parts.items(), strict=True):
+        column[0].set_title(name)
+        draw_pair(column, part, rain.astype(int))
     label_once(columns[0])
     return figure
 
@@ -84,12 +83,12 @@ def save(figure: Figure, path: Path) -> None:
     """Writes a figure in the format that the suffix names, such as PNG.
 
     Raises:
-        InputError: An output that cannot be written, or the suffix of no picture.
+        InputError: An output that cannot be written, or a suffix of no known picture format.
     """
     if path.suffix[1:].lower() not in figure.canvas.get_supported_filetypes():
-        raise InputError(path, f"'{path.suffix}' is not the suffix of a picture", "Name it .png.")
+        raise InputError(path, f"'{path.suffix}' is no format of pictures", "Name it .png.")
     for text in figure.findobj(Text):
-        # Names of files may stand in it: what is no text, control sequences, $ of mathematics.
+        # Names of files may hold control sequences, or $, which begins mathematics.
         text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
         text.set_parse_math(False)
     with replacing(path) as temporary:
@@ -112,16 +111,28 @@ def explain_colours(figure: Figure, colours: Mapping[str, str] = OUTCOMES) -> No
 
 
 def input_title(scan: Scan) -> str:
-    """The heading of a panel that shows a scan as it came."""
+    """Title of the panel that shows the scan before cleaning."""
     return "input" if scan.intensity is None else "input: intensity"
 
 
+def draw_pair(pair: NDArray[np.object_], scan: Scan, outcome: NDArray[np.int64] | None) -> None:
+    """Draws a scan from above on the first of two panels, and as the sensor sees it on the second.
+
+    Args:
+        pair: The axes of the panels, (2,).
+        scan: The scan; invalid points are not drawn.
+        outcome: As for :func:`draw_from_above`.
+    """
+    draw_from_above(pair[0], scan, outcome)
+    draw_as_seen(pair[1], scan, outcome)
+
+
 def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
-    """Draws x forward and y to the left, in metres, as far as most points reach.
+    """Draws a scan from above, in metres, forward being up; most points are within the limits.
 
     Args:
         axes: Where to draw.
-        scan: The scan; points that cannot be judged are not drawn.
+        scan: The scan; invalid points are not drawn.
         outcome: What became of each point, as a number of ``OUTCOMES``, int64 (N,); None shows
             intensity.
     """
@@ -138,19 +149,17 @@ def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -
 
 
 def draw_as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
-    """Draws azimuth, left being left, and inclination, in degrees.
+    """Draws inclination over azimuth, in degrees, left being left.
 
     Args:
         axes: Where to draw.
-        scan: The scan; points that cannot be judged are not drawn.
+        scan: The scan; invalid points are not drawn.
         outcome: As for :func:`draw_from_above`.
     """
     seen = scan.valid
-    x, y, z = scan.xyz[seen].astype(np.float64).T
-    azimuth = np.degrees(np.arctan2(y, x))
-    inclination = np.degrees(np.arctan2(z, np.hypot(x, y)))
+    azimuth, inclination = directions(scan.xyz[seen])
     _scatter(axes, -azimuth, inclination, *_colours(scan, outcome, seen))
-    # Points in one direction leave the limits to matplotlib.
+    # Where all points have one direction, matplotlib chooses the limits.
     if len(azimuth) and np.ptp(azimuth) and np.ptp(inclination):
         axes.set_xlim(*np.percentile(-azimuth, [0, 100]))
         axes.set_ylim(*np.percentile(inclination, [0.1, 99.9]))
@@ -159,7 +168,7 @@ def draw_as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> N
 def _colours(
     scan: Scan, outcome: NDArray[np.int64] | None, rows: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Colours, RGBA (K, 4), and the number of each row's own: its outcome, or its intensity."""
+    """Colours, RGBA (K, 4), and the number of each point's colour, by its outcome or intensity."""
     if outcome is not None:
         return to_rgba_array(list(OUTCOMES.values())), outcome[rows]
     if scan.intensity is None or not rows.any():
@@ -181,8 +190,8 @@ def _scatter(
     size = np.clip(60_000 / max(len(x), 1), 0.3, 3)  # small where there are many
     points = np.bincount(number, minlength=len(colours))
     is_grey = np.ptp(colours[:, :3], axis=1) < GREY
-    # Colour by colour, which matplotlib draws several times as fast; grey first, and of the others
-    # the rarest last, so that it lies on top.
+    # Colour by colour, which is several times as fast; grey first and the rarest colour last, on
+    # top.
     for chosen in np.lexsort([-points, ~is_grey]):
         rows = number == chosen
         if not rows.any():
@@ -195,7 +204,7 @@ def _scatter(
 
 
 def label_once(column: NDArray[np.object_]) -> None:
-    """Names the axes of one pair of panels, from above and as seen, for all."""
+    """Labels the axes of one pair of panels, from above and as seen."""
     above, ahead = column
     above.set_ylabel("forward / m")
     above.set_xlabel("right / m")

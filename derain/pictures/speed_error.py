@@ -1,4 +1,4 @@
-"""The picture of error against time, by which to choose a method."""
+"""The picture of error against time, from which to choose a method."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,24 +19,24 @@ LEAST_ERROR = 1e-4
 COLOURS = {"network": "#1f77b4", "filter": "#d98200", "baseline": "#6b7280"}
 MARKERS = {"network": "o", "filter": "s", "baseline": "D"}
 
-# Where a label may stand, in points from its marker: near ones first, and those to the right.
+# Places of a label around its marker, in points from it, by preference.
 DIRECTIONS = np.radians([0, 180, 45, -45, 135, -135, 90, -90])
 DISTANCES = (8, 16, 28, 42, 60, 84)
 
-# A label may be so many distances farther off where it does not cover the line of the front.
+# Covering the line of the front counts as much as being so many distances farther off.
 STEPS_TO_AVOID_FRONT = 2
 
 
 @dataclass(frozen=True)
 class Standing:
-    """What the picture shows of one method.
+    """A method in the picture.
 
     Attributes:
-        title: What it is called.
+        title: Its title.
         error: 1 - IoU.
         milliseconds: Time from file to mask, above 0.
         group: ``network``, ``filter`` or ``baseline``.
-        size: Bytes of its file; None where it has none.
+        size: Size of its file, bytes; None where it has none.
     """
 
     title: str
@@ -47,7 +47,7 @@ class Standing:
 
     @property
     def label(self) -> str:
-        """What stands beside its marker: what it is called, and how large its file is."""
+        """Text beside its marker: its title and the size of its file."""
         return self.title if self.size is None else f"{self.title} · {readable_size(self.size)}"
 
 
@@ -98,7 +98,7 @@ def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(FuncFormatter(_few_digits))
     axes.legend(loc="best", frameon=False)
-    figure.draw_without_rendering()  # now it is known where things are
+    figure.draw_without_rendering()  # so that extents are known
     _label(axes, standings)
     return figure
 
@@ -153,18 +153,18 @@ def _label(axes: Axes, standings: Sequence[Standing]) -> None:
 
 
 def _on_screen(axes: Axes, standings: Sequence[Standing]) -> NDArray[np.float64]:
-    """Where the markers of some methods are, float64 (n, 2), pixels."""
+    """Markers of some methods, float64 (n, 2), pixels."""
     places = [(standing.milliseconds, _drawn(standing.error)) for standing in standings]
     return axes.transData.transform(places)
 
 
 def _meets(line: NDArray[np.float64], box: Bbox) -> bool:
-    """Whether a line through some places, (n, 2), meets a box."""
+    """Whether a line through places, (n, 2), meets a box."""
     return len(line) > 1 and bool(Path(line).intersects_bbox(box, filled=False))
 
 
 def _candidates(axes: Axes, standing: Standing) -> Iterator[tuple[int, Annotation]]:
-    """Labels to choose from, the nearest first, each with its place among the distances."""
+    """Labels to choose from, the nearest first, each with the number of its distance."""
     for step, distance in enumerate(DISTANCES):
         for x, y in zip(np.cos(DIRECTIONS), np.sin(DIRECTIONS), strict=True):
             right, up = (0 if abs(part) < 0.1 else int(np.sign(part)) for part in (x, y))
@@ -191,13 +191,13 @@ def _candidates(axes: Axes, standing: Standing) -> Iterator[tuple[int, Annotatio
 
 
 def _letters(annotation: Annotation) -> Bbox:
-    """Where a label's letters are, without the line that leads to them."""
-    annotation.get_window_extent()  # puts the label into its place first
+    """Extent of a label's letters, without the line that leads to them."""
+    annotation.get_window_extent()  # positions the label first
     return Text.get_window_extent(annotation)
 
 
 def _gaps(box: Bbox, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far each place, (n, 2), is from a box; float64 (n,), in its unit."""
+    """Distance of each place, (n, 2), from a box, float64 (n,), in the box's unit."""
     beyond = np.maximum(np.maximum(box.min - places, places - box.max), 0)
     gaps: NDArray[np.float64] = np.hypot(*beyond.T)
     return gaps
@@ -208,6 +208,6 @@ def _drawn(error: float) -> float:
 
 
 def _few_digits(value: float, _: object) -> str:
-    """Names 2, 3 and 5 between the powers of ten."""
+    """Labels 2, 3 and 5 between the powers of ten."""
     digit = value / 10 ** np.floor(np.log10(value))
     return f"{value:g}" if round(digit) in (2, 3, 5) else ""

@@ -1,24 +1,28 @@
-"""How many cores this process may use."""
+"""Cores that this process may use, and threads that share them."""
 
 import os
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from numbers import Integral
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from derain.errors import InputError
 
-# Where Linux says which control groups a process is in, and where it keeps them.
+# Where Linux lists the control groups of a process, and where they are mounted.
 MEMBERSHIP = Path("/proc/self/cgroup")
 GROUPS = Path("/sys/fs/cgroup")
+
+# How OpenMP's threads wait, which it reads once, when it is loaded.
+# Source: OpenMP 5.2, 21.7, OMP_WAIT_POLICY.
+WAIT_POLICY = "OMP_WAIT_POLICY"
 
 
 def usable_cores(membership: Path = MEMBERSHIP, groups: Path = GROUPS) -> int:
     """Cores this process may use, at least one.
 
-    They are the cores that it may run on. In a container whose processor time is limited they are
-    no more than that time keeps busy, rounded up: further threads would only wait.
+    They are the cores that it may run on, and in a container with limited processor time no more
+    than that time keeps busy, rounded up: further threads would only wait.
 
     Args:
         membership: File that names the control groups of the process, of version 1 or 2.
@@ -28,7 +32,7 @@ def usable_cores(membership: Path = MEMBERSHIP, groups: Path = GROUPS) -> int:
 
 
 def threads_of(threads: Any) -> int:
-    """The number of threads that a user means by a number, 0 being one per core.
+    """Number of threads for a user's option, in which 0 means one per core.
 
     Raises:
         InputError: Anything but a whole number from 0 on.
@@ -40,12 +44,30 @@ def threads_of(threads: Any) -> int:
     return int(threads) or usable_cores()
 
 
+@contextmanager
+def sleeping_threads() -> Iterator[None]:
+    """Makes the OpenMP threads of libraries imported inside sleep while they wait.
+
+    By default they spin for milliseconds after each search, on the cores that a network needs.
+    Libraries imported before or after are not affected, and a value that the user has set in the
+    environment is kept.
+    """
+    if WAIT_POLICY in os.environ:
+        yield
+        return
+    os.environ[WAIT_POLICY] = "passive"
+    try:
+        yield
+    finally:
+        del os.environ[WAIT_POLICY]
+
+
 def _allowed_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _quotas(membership: Path, groups: Path) -> Iterator[int]:
-    """Cores that each group's quota keeps busy; a file that is absent or odd sets none."""
+    """Cores that each group's quota keeps busy; a missing or malformed file sets none."""
     for group in _groups(membership, groups):
         for read in (_version_1, _version_2):
             with suppress(OSError, ValueError):

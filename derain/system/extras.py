@@ -1,6 +1,6 @@
-"""Libraries that derain works without: what needs one says which of derain's extras brings it.
+"""Optional libraries, and the extras of derain that install them.
 
-Plain ``pip install derain`` brings what a robot needs. Everything else is in an extra, such as
+Plain ``pip install derain`` installs what a robot needs. Everything else is in an extra, such as
 ``pip install 'derain[train]'``, and is imported where it is used.
 """
 
@@ -17,8 +17,8 @@ from derain.errors import InputError, reason_of
 class MissingExtraError(InputError, ModuleNotFoundError):
     """A library of one of derain's extras is not installed.
 
-    To the command line it is what the user can mend; in Python it is also what an ``import`` of
-    something missing raises.
+    The command line reports it as a user's error; Python code can catch it as the error of a failed
+    ``import``.
     """
 
 
@@ -27,9 +27,9 @@ class Extra:
     """A library of one of derain's extras, as in ``pip install 'derain[las]'``.
 
     Attributes:
-        name: Name of the extra, the smallest one that brings the library.
+        name: Name of the smallest extra that installs the library.
         library: Name of the module that it installs.
-        also: Names of larger extras that bring it, too.
+        also: Names of larger extras that install it, too.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Extra:
 
     @property
     def installed(self) -> bool:
-        """Whether the library is there; it is not imported."""
+        """Whether the library is installed; it is not imported."""
         return find_spec(self.library) is not None
 
     def load(self, subject: str | Path, submodule: str = "") -> ModuleType:
@@ -46,7 +46,7 @@ class Extra:
 
         Args:
             subject: What needs it, for the message: a file, a command.
-            submodule: Name of a module within it, where that is wanted.
+            submodule: Name of a module within it to import instead.
 
         Raises:
             MissingExtraError: It is not installed.
@@ -88,19 +88,8 @@ RERUN = Extra("view", "rerun")
 
 EXTRAS = (
     *(TORCH, LIGHTNING, TORCHMETRICS, JSONARGPARSE, TENSORBOARD, MATPLOTLIB),
-    *(
-        ONNX,
-        ONNXSCRIPT,
-        OPTUNA,
-        OPEN3D,
-        PYARROW,
-        FLATBUFFERS,
-        LASPY,
-        OPENVINO,
-        ROSBAGS,
-        MCAP,
-        RERUN,
-    ),
+    *(ONNX, ONNXSCRIPT, OPTUNA, OPEN3D, PYARROW, FLATBUFFERS, LASPY),
+    *(OPENVINO, ROSBAGS, MCAP, RERUN),
 )
 
 # What is needed to read a checkpoint, to make an ONNX file of it, and to train it.
@@ -110,7 +99,7 @@ OF_TRAINING = (*OF_CHECKPOINTS, JSONARGPARSE, TENSORBOARD, MATPLOTLIB)
 
 
 def require(subject: str | Path, *extras: Extra) -> None:
-    """Refuses work, before any is done, where libraries that it needs are not installed.
+    """Refuses work, before it begins, where libraries that it needs are not installed.
 
     Args:
         subject: What needs them, for the message: a command, an option, a file.
@@ -125,7 +114,7 @@ def require(subject: str | Path, *extras: Extra) -> None:
 
 
 def missing_extra(subject: str | Path, error: ModuleNotFoundError) -> MissingExtraError | None:
-    """What to tell of an import that has failed; None where no extra of derain's would mend it."""
+    """The error for a failed import; None where no extra of derain installs the library."""
     library = (error.name or "").partition(".")[0]
     found = [extra for extra in EXTRAS if extra.library == library and not extra.installed]
     return _missing(subject, found) if found else None
@@ -147,7 +136,7 @@ def _missing(subject: str | Path, extras: Sequence[Extra]) -> MissingExtraError:
 
 
 def _fewest_names(extras: Sequence[Extra]) -> list[str]:
-    """The extras that bring all of the libraries, without one whose library another brings."""
+    """Extras that install all of the libraries, without those that a larger one includes."""
     names = {extra.name for extra in extras}
     chosen = dict.fromkeys(extra.name for extra in extras if names.isdisjoint(extra.also))
     return list(chosen)

@@ -1,4 +1,4 @@
-"""Telling of what is odd about scans: each kind once, and how many more have it."""
+"""Warnings about scans: each kind once in detail, then the number of further scans."""
 
 import sys
 from collections import Counter
@@ -13,22 +13,22 @@ from derain.errors import printable
 
 
 class Notice(Protocol):
-    """Something that a user is told of a scan, such as a :class:`derain.views.oddities.Oddity`."""
+    """A finding about a scan, such as a :class:`derain.views.oddities.Oddity`."""
 
     @property
     def kind(self) -> str:
-        """What it is, in the same words for every scan that has it."""
+        """Its kind, in the same words for every scan."""
 
     @property
     def detail(self) -> str:
-        """How it shows in this scan."""
+        """Its details in this scan."""
 
 
 class Notices:
-    """Warns on stderr of what is odd, each kind with the first scan that has it.
+    """Warns on stderr of findings about scans.
 
-    The scans of a folder mostly have the same fault, with other numbers. So of each kind the first
-    scan is told in detail; of those after it, only their number is told, at the end.
+    The scans of a folder mostly have the same fault, with other numbers. So the first scan of each
+    kind is reported in detail, and at the end the number of further ones.
     """
 
     def __init__(self) -> None:
@@ -39,8 +39,8 @@ class Notices:
 
         Args:
             scan: Its name.
-            notices: What is odd about it.
-            method: Title of the method that finds it so, where there are several.
+            notices: Findings about it.
+            method: Title of the method that has them, where there are several.
         """
         prefix = f"{method}: " if method else ""
         for notice in notices:
@@ -49,7 +49,7 @@ class Notices:
                 warn(f"{scan}: {prefix}{notice.detail}")
 
     def tell_how_many_more(self) -> None:
-        """Says of each kind how many more scans had it."""
+        """Prints the number of further scans of each kind."""
         for kind, scans in self._seen.items():
             if scans > 1:
                 more = "1 more scan" if scans == 2 else f"{scans - 1:,} more scans"
@@ -60,11 +60,11 @@ def warn(text: str) -> None:
     """Warns on stderr, in one line.
 
     Args:
-        text: What of.
+        text: The warning.
     """
     for record in _records:
         record.append(text)
-    # Not print: a progress bar may stand in the line.
+    # Not print: a progress bar may be in the line.
     tqdm.write(f"derain: warning: {printable(text)}", sys.stderr)
 
 
@@ -85,5 +85,5 @@ def recorded_warnings() -> Iterator[list[str]]:
 
 @cache
 def warn_once(text: str) -> None:
-    """Warns as :func:`warn` does, of each text once in the life of this process."""
+    """Warns as :func:`warn` does, once for each text in this process."""
     warn(text)

@@ -7,7 +7,7 @@ Open3D's own libraries, which look there first. No command writes into installed
 
     python -m derain.system.open3d_import
 
-makes the link, and prints where it is.
+makes the link, and prints its path.
 """
 
 import contextlib
@@ -22,7 +22,7 @@ from derain.errors import InputError
 from derain.system.extras import OPEN3D
 from derain.system.notices import warn
 
-# What Open3D links against, as the dynamic linker calls it.
+# The library that Open3D links against, by its name for the dynamic linker.
 LIBUSB = "libusb-1.0.so.0"
 
 SET_UP = "python -m derain.system.open3d_import"

@@ -1,45 +1,48 @@
-"""What there is of one kind, by name: a file enters by being there."""
+"""Members of one kind by name, such as filters, and what a user's parameters make of them."""
 
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields
 from importlib import import_module
 from inspect import isabstract
 from pkgutil import iter_modules
 from threading import RLock
-from typing import TYPE_CHECKING, Generic, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
-from derain.errors import InputError
+from derain.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
+    from _typeshed import DataclassInstance
+
 Kind = TypeVar("Kind")
 Member = TypeVar("Member")
+Made = TypeVar("Made", bound="DataclassInstance")
 
 
 class Registry(Mapping[str, Kind], Generic[Kind]):
-    """Everything of one kind: what the files of a package bring, and what other packages bring.
+    """Members of one kind: those in the modules of a package, and those of other packages.
 
-    A file adds to it by a decorator::
+    A module adds a member by a decorator::
 
         @FILTERS.add("dror")
         class DROR(RadiusFilter): ...
 
-    The files are imported when somebody asks for a name that is not known yet, or what there is. A
-    package outside derain names the module of its own among the entry points of the same name::
+    The modules are imported when an unknown name is looked up, or the names are listed. A package
+    outside derain names its module among the entry points of the same name::
 
         [project.entry-points."derain.filters"]
         mine = "my_package.my_filter"
 
-    That module is imported when derain's own files do not have the name that is asked for, or when
-    somebody asks what there is. One that cannot be imported is warned of and brings nothing, and
-    the others stay usable. The names come in alphabetical order, whatever was imported first.
+    That module is imported when derain's own modules do not have a name, or when the names are
+    listed. One that cannot be imported causes a warning and adds nothing; the others stay usable.
+    The names are in alphabetical order.
 
     Args:
-        package: Package whose modules bring members, such as ``derain.filters``.
+        package: Package whose modules add members, such as ``derain.filters``.
         group: Name of the entry points of other packages; by default the package's.
-        attribute: Attribute of a member that is set to the first of its names, so that it knows
-            what it is called; by default none is.
+        attribute: Attribute of a member that is set to the first of its names; by default none.
     """
 
     def __init__(
@@ -51,15 +54,15 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         self._members: dict[str, Kind] = {}
         self._has_own = False
         self._has_others = False
-        # Re-entrant, for a module of another package may ask what there is while it is imported.
+        # Re-entrant: a module of another package may list the names while it is imported.
         self._importing_others = RLock()
 
     def add(self, *names: str) -> Callable[[Member], Member]:
-        """Decorates a member, which is then found by these names.
+        """Decorates a member, which gets these names.
 
         Raises:
-            InputError: A name that another member has, or a class that leaves out a method which
-                its base class asks for.
+            InputError: A name that another member has, or a class without a method that its base
+                class requires.
         """
 
         def added(member: Member) -> Member:
@@ -68,17 +71,17 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
                 raise InputError(
                     f"{self.group}: {names[0]}",
                     f"{_origin(member)} is without {missing}",
-                    "Its base class says what every method does: define it.",
+                    "Define it as the base class describes.",
                 )
             for name in names:
                 former = _origin(self._members.get(name, member))
                 if former != _origin(member):
                     raise InputError(
                         f"{self.group}: {name}",
-                        f"two are called so, {former} and {_origin(member)}",
+                        f"is the name of two, {former} and {_origin(member)}",
                         "Remove or rename one.",
                     )
-            # Where a module was imported anew, its members take the place of the former ones.
+            # Members of a module that was imported again replace the former ones.
             self._members.update(dict.fromkeys(names, cast(Kind, member)))
             if self.attribute:
                 setattr(member, self.attribute, names[0])
@@ -87,11 +90,11 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         return added
 
     def name_of(self, member: object) -> str | None:
-        """The first of the names that a member was added by; None for what was not added."""
+        """First name of a member; None for anything else."""
         return next((name for name, added in self._members.items() if added is member), None)
 
     def __getitem__(self, name: str) -> Kind:
-        # Other packages come last: to look for them takes longer than to import derain's files.
+        # Other packages come last: to look for them takes longer than to import derain's modules.
         for import_more in (self._import_own, self._import_others):
             if name not in self._members:
                 import_more()
@@ -115,15 +118,15 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         self._has_own = True
 
     def _import_others(self) -> None:
-        """Imports what other packages bring, once; warns of what cannot be imported.
+        """Imports the modules of other packages, once; warns of those that cannot be imported.
 
-        A thread that asks while another imports waits for it, and finds all that there is.
+        A thread waits while another one imports them.
         """
         with self._importing_others:
             if self._has_others:
                 return
-            self._has_others = True  # before, for one of them may ask what there is
-            # Imported here, for most commands never ask other packages.
+            self._has_others = True  # first, because one of them may list the names
+            # Imported here, because most commands never need other packages.
             from importlib.metadata import entry_points
 
             for entry in sorted(entry_points(group=self.group), key=lambda entry: entry.name):
@@ -134,18 +137,39 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
                     _warn_of_broken(entry, error)
 
     def _forget_unfinished(self) -> None:
-        """Lets go of what a module has added before it failed, which no other process could load.
+        """Removes members that a module added before it failed, which no other process could load.
 
-        Python takes a module that fails from those that are imported.
+        Python removes a failed module from the imported ones.
         """
         for name, member in list(self._members.items()):
             if getattr(member, "__module__", None) not in (None, *sys.modules):
                 del self._members[name]
 
 
+def made_of(kind: type[Made], name: str, parameters: Mapping[str, Any]) -> Made:
+    """Makes a dataclass from parameters that a user names.
+
+    Args:
+        kind: The dataclass, which checks the values itself.
+        name: The user's name for it.
+        parameters: Some of its fields.
+
+    Raises:
+        InputError: A parameter that is no field of it, or a value that it refuses.
+    """
+    known = [field.name for field in fields(kind)]
+    if unknown := sorted(set(parameters) - set(known)):
+        raise InputError(
+            name,
+            f"it has no parameter {', '.join(unknown)}",
+            f"{did_you_mean(unknown[0], known)}It has {', '.join(known)}.",
+        )
+    return kind(**parameters)
+
+
 def _warn_of_broken(entry: "EntryPoint", error: Exception) -> None:
-    """Says of another package that what it brings cannot be imported."""
-    from derain.system.notices import warn  # here: it brings progress bars with it
+    """Warns that a module of another package cannot be imported."""
+    from derain.system.notices import warn  # here, because it imports tqdm
 
     package = entry.dist.name if entry.dist else "that brings it"
     problem = InputError(
@@ -157,6 +181,6 @@ def _warn_of_broken(entry: "EntryPoint", error: Exception) -> None:
 
 
 def _origin(member: object) -> str:
-    """Where a member is defined: the same when its module is imported anew."""
+    """Where a member is defined, which stays the same when its module is imported again."""
     name = getattr(member, "__qualname__", None)
     return repr(member) if name is None else f"{member.__module__}.{name}"

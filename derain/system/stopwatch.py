@@ -6,10 +6,10 @@ from contextlib import contextmanager
 
 
 class Stopwatch:
-    """Adds up the wall time of named stages; that of a stage within a stage is the inner one's.
+    """Adds up the wall time of named stages; time in a nested stage counts for that stage alone.
 
     Attributes:
-        milliseconds: Time spent so far, by stage, in the order the stages first came to an end.
+        milliseconds: Time spent so far, by stage, in the order in which the stages first ended.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Processes that work for this one, and end with it however it ends."""
+"""Worker processes, which end with this one however it ends."""
 
 import multiprocessing
 import os
@@ -10,24 +10,23 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from types import ModuleType
 
-# Environment variable with the id of the process that began a run on several devices. It tells the
-# further processes that Lightning starts for the run whom to watch.
+# Environment variable with the id of the process that began a run on several devices, which the
+# further processes that Lightning starts for the run watch.
 LAUNCHER = "DERAIN_LAUNCHER"
 
 
 @contextmanager
 def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Lends processes that share work.
+    """Starts a pool of processes.
 
-    When the block ends with an error or by a signal they are killed, whatever they are doing. When
-    this process is killed they end as well, instead of waiting for work for ever.
+    An error or a signal in the block kills them. When this process is killed they end as well,
+    instead of waiting for work for ever.
 
     Args:
         workers: How many.
     """
     others = set(multiprocessing.active_children())
-    # Not forked: a fork has the memory and the locks of this process, but none of the threads that
-    # would release them.
+    # Not forked: a fork has the locks of this process, but not the threads that would release them.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, context, _end_with_parent) as pool:
         try:
@@ -40,11 +39,11 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 @contextmanager
 def main_left_out() -> Iterator[None]:
-    """Keeps processes that are started here from running the user's script once more.
+    """Keeps processes that are started here from running the user's script again.
 
-    A new process loads the module that the program began with, for what may be defined there.
-    Where nothing of it is needed, that would only take time and memory; and a script that does not
-    guard its work by ``if __name__ == "__main__"`` would do all of it again.
+    A new process imports the module that the program began with, in case it defines what the
+    process needs. Where it does not, that would only take time and memory; and a script that does
+    not guard its work by ``if __name__ == "__main__"`` would do all of it again.
     """
     main = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
@@ -57,8 +56,8 @@ def main_left_out() -> Iterator[None]:
 def end_with_launcher() -> None:
     """Ends this process when the one that began its run is gone, if that is another process.
 
-    Lightning runs the command again for each further device. Where its first process is killed the
-    others would wait for it. Windows does not tell when a parent is gone.
+    Lightning runs the command again for each further device. If the first process is killed, the
+    others would wait for it. On Windows a lost parent is not detected.
     """
     if "LOCAL_RANK" not in os.environ:
         os.environ[LAUNCHER] = str(os.getpid())

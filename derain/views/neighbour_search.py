@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.system.cores import threads_of
-from derain.system.waiting import sleeping_threads
+from derain.system.cores import sleeping_threads, threads_of
 
 with sleeping_threads():
     import small_gicp

@@ -124,7 +124,7 @@ def test_a_format_that_cannot_be_imported_is_named(
 
 
 def test_a_suffix_is_taken_once() -> None:
-    with pytest.raises(InputError, match=r"derain\.formats: \.pcd: two are called so"):
+    with pytest.raises(InputError, match=r"derain\.formats: \.pcd: is the name of two"):
 
         @FORMATS.add(".pcd")
         class Another(FORMATS[".ply"]):

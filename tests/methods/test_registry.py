@@ -7,7 +7,7 @@ from derain.errors import InputError
 from derain.export.methods import load_method, load_method_of_one_scan
 from derain.export.runtimes.registry import Runtime
 from derain.methods.registry import METHODS
-from derain.system.parameters import made_of
+from derain.system.registry import made_of
 
 
 @pytest.fixture

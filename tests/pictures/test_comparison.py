@@ -11,8 +11,11 @@ from matplotlib.figure import Figure
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.pictures.comparison import MOST_PANELS_IN_A_ROW, comparison_figure
-from derain.pictures.comparison_window import show_comparison
+from derain.pictures.comparison import (
+    MOST_PANELS_IN_A_ROW,
+    comparison_figure,
+    show_comparison,
+)
 from derain.pictures.palette import OUTCOMES
 from derain.pictures.scan_pictures import judgement_figure
 from derain.scan import Scan

@@ -165,7 +165,7 @@ def test_a_picture_is_saved_as_png(
 
 @pytest.mark.parametrize("name", ["picture", "picture.xyz"])
 def test_a_picture_of_no_known_format_is_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match=r"is not the suffix of a picture\. Name it \.png\."):
+    with pytest.raises(InputError, match=r"no format of pictures\. Name it"):
         save(Figure(), tmp_path / name)
     assert not list(tmp_path.iterdir())
 

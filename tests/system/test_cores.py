@@ -9,7 +9,7 @@ import pytest
 
 from derain.errors import InputError
 from derain.system import cores
-from derain.system.cores import threads_of, usable_cores
+from derain.system.cores import WAIT_POLICY, sleeping_threads, threads_of, usable_cores
 
 CoresIn = Callable[[str, Mapping[str, str]], int]
 
@@ -90,3 +90,19 @@ def test_no_threads_are_one_for_each_core() -> None:
 def test_what_is_no_number_of_threads_is_refused(threads: Any) -> None:
     with pytest.raises(InputError, match="threads: "):
         threads_of(threads)
+
+
+def test_what_is_imported_inside_is_told_to_sleep_and_nothing_else(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv(WAIT_POLICY, raising=False)
+    with pytest.raises(ModuleNotFoundError, match="passive"), sleeping_threads():
+        raise ModuleNotFoundError(os.environ[WAIT_POLICY])
+    assert WAIT_POLICY not in os.environ
+
+
+def test_what_the_user_has_said_holds(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(WAIT_POLICY, "active")
+    with sleeping_threads():
+        assert os.environ[WAIT_POLICY] == "active"
+    assert os.environ[WAIT_POLICY] == "active"

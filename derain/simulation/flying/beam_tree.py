@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.simulation.columns import Columns
-from derain.system.waiting import sleeping_threads
+from derain.system.cores import sleeping_threads
 
 with sleeping_threads():
     import small_gicp
