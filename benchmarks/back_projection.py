@@ -97,7 +97,7 @@ def _print_table(grids: dict[str, SphericalGrid], scans: Sequence[Scan], repeats
     print("|---|---|---|---:|---:|---:|---:|---:|")
     for title, grid in grids.items():
         for name in BACK_PROJECTIONS:
-            view, counts = RangeView(grid, way_back=name), GridCounts()
+            view, counts = RangeView(grid, back_projection=name), GridCounts()
             for _ in range(repeats):
                 for scan, truth in zip(scans, rain, strict=True):
                     counts.add(view, scan, truth)

@@ -54,7 +54,7 @@ def _row(scan: Scan, snow: np.ndarray) -> list[str]:
         return f"{(some & of).sum() / max(of.sum(), 1):.1%}"
 
     return [
-        returns.told_by or "-",
+        returns.found_by or "-",
         f"{counts.rays:,}",
         f"{counts.dual_share:.1%}",
         share(snow, nearer),

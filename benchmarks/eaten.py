@@ -35,7 +35,7 @@ from derain.sources.judging import judgements
 from derain.sources.method import Method
 from derain.views.full_scale import full_scale
 from derain.views.morton import distinct_rows
-from derain.views.oddities import SCALE_OF_UNIT
+from derain.views.scan_issues import SCALE_OF_UNIT
 
 
 @dataclass

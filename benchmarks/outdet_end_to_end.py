@@ -24,7 +24,7 @@ from derain.cards.card import DataCard, load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import labelled_scans
 from derain.evaluation.counts import Counts
-from derain.export.candidates import candidates_of_findings
+from derain.export.candidates import fit_network_candidates
 from derain.export.machine import versions
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
@@ -60,7 +60,7 @@ def main() -> None:
         "derain": _deployed(model, arguments.threads),
     }
     if arguments.candidates:
-        fitted = candidates_of_findings(model, _labelled(arguments.candidates, card), card)
+        fitted = fit_network_candidates(model, _labelled(arguments.candidates, card), card)
         print(fitted)
         model.adopt(replace(model.spec, candidates=fitted.candidates))
         methods["candidates"] = _deployed(model, arguments.threads)

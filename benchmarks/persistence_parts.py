@@ -21,9 +21,9 @@ from derain.datamodules.base import Loading
 from derain.datamodules.labelled import NamedScans
 from derain.evaluation.counts import Counts
 from derain.odometry.posed import with_poses
-from derain.persistence.evidence import of_rays, of_surroundings, together
+from derain.persistence.evidence import combined_log_odds, ray_log_odds, surroundings_log_odds
 from derain.persistence.points import ScanPoints
-from derain.persistence.rays import RayEvidence, ask_rays, mean_evidence
+from derain.persistence.rays import RayEvidence, mean_evidence, ray_evidence
 from derain.persistence.vote import vote
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
@@ -68,7 +68,7 @@ def _seen(
     most = 2 if len(recording) > 6 else 1
     for place in range(most, len(recording) - most):
         told = {
-            step: ask_rays(
+            step: ray_evidence(
                 points[place],
                 points[place + step],
                 np.linalg.inv(_pose(recording[place + step])) @ _pose(recording[place]),
@@ -92,15 +92,15 @@ def _by_parts(
 ) -> Iterator[tuple[str, NDArray[np.float64]]]:
     """Log-odds of rain by each choice of parts, float64 (M,)."""
     both = windows["both"]
-    yield "surroundings in its own scan", of_surroundings(points)
-    yield "surroundings, and the vote", vote(points, of_surroundings(points))
-    yield "rays of the scans before and after", of_rays(both)
-    yield "rays, and the vote", vote(points, of_rays(both))
-    yield "surroundings and rays", together(points, both)
-    yield "… and the vote: persistence", vote(points, together(points, both))
-    yield "… with the scan before alone", vote(points, together(points, windows["before"]))
+    yield "surroundings in its own scan", surroundings_log_odds(points)
+    yield "surroundings, and the vote", vote(points, surroundings_log_odds(points))
+    yield "rays of the scans before and after", ray_log_odds(both)
+    yield "rays, and the vote", vote(points, ray_log_odds(both))
+    yield "surroundings and rays", combined_log_odds(points, both)
+    yield "… and the vote: persistence", vote(points, combined_log_odds(points, both))
+    yield "… with the scan before alone", vote(points, combined_log_odds(points, windows["before"]))
     if two := windows.get("two"):
-        yield "… with two before and two after", vote(points, together(points, two))
+        yield "… with two before and two after", vote(points, combined_log_odds(points, two))
 
 
 def _pose(frame: Frame) -> NDArray[np.float64]:

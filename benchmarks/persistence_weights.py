@@ -25,8 +25,8 @@ from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import NamedScans
 from derain.persistence.points import ScanPoints
-from derain.persistence.rays import ask_rays, mean_evidence
-from derain.persistence.surroundings import describe
+from derain.persistence.rays import mean_evidence, ray_evidence
+from derain.persistence.surroundings import surroundings_features
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
 from derain.system.cores import usable_cores
@@ -47,8 +47,8 @@ def main() -> None:
     weight *= len(rain) / len(truth)
     share = float(np.mean([each.mean() for each in truth]))
     print(f"{len(truth)} scans, {share:.2%} rain")
-    print("OF_RAYS =", _fitted(np.concatenate(rays), rain, weight))
-    print("OF_SURROUNDINGS =", _fitted(np.concatenate(surroundings), rain, weight))
+    print("RAY_WEIGHTS =", _fitted(np.concatenate(rays), rain, weight))
+    print("SURROUNDINGS_WEIGHTS =", _fitted(np.concatenate(surroundings), rain, weight))
     print(f"PRIOR = {np.log(share / (1 - share)):.2f}")
 
 
@@ -72,14 +72,14 @@ def _told(
     own = points[place]
     evidence = mean_evidence(
         [
-            ask_rays(
+            ray_evidence(
                 own, points[other], np.linalg.inv(_pose(recording[other])) @ _pose(recording[place])
             )
             for other in (place - 1, place + 1)
         ]
     )
     rays = np.stack([np.ones(len(own)), evidence.ending, evidence.through], axis=1)
-    return rays, describe(own)
+    return rays, surroundings_features(own)
 
 
 def _pose(frame: Frame) -> NDArray[np.float64]:

@@ -2,11 +2,11 @@
 
     python benchmarks/ragged_places.py --seeds 3 ../shared/data/clean/*
 
-A point looks like a drop where ``derain.persistence.evidence.of_surroundings`` says so, which was
-fitted to simulated drives: by the distance of its neighbours in steps of the rays, by how they are
-scattered, and by its range, beyond 30 m hardly ever. Nothing in any of these scans is a drop. For
-every real scan, and for every place as sensors see it, between 0 and 10 m, 10 and 30, beyond, and
-in all: the share that looks like a drop, and the share whose neighbours are more than six steps
+A point looks like a drop where ``derain.persistence.evidence.surroundings_log_odds`` says so, which
+was fitted to simulated drives: by the distance of its neighbours in steps of the rays, by how they
+are scattered, and by its range, beyond 30 m hardly ever. Nothing in any of these scans is a drop.
+For every real scan, and for every place as sensors see it, between 0 and 10 m, 10 and 30, beyond,
+and in all: the share that looks like a drop, and the share whose neighbours are more than six steps
 away, both in per cent. Of places the share of each class that looks like a drop, too.
 """
 
@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.files import read_scan
-from derain.persistence.evidence import of_surroundings
+from derain.persistence.evidence import surroundings_log_odds
 from derain.persistence.points import ScanPoints
-from derain.persistence.surroundings import FEWEST_STEPS, USUAL_STEPS, describe
+from derain.persistence.surroundings import STEP_EPSILON, USUAL_STEPS, surroundings_features
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.layouts import LAYOUTS
@@ -58,8 +58,8 @@ class Look:
         label = np.zeros(len(points), np.int64)
         if scan.label is not None:
             label[points.inverse] = scan.label
-        apart = np.exp(describe(points)[:, 1] + USUAL_STEPS) - FEWEST_STEPS
-        return cls(of_surroundings(points) > 0, apart, points.range, label)
+        apart = np.exp(surroundings_features(points)[:, 1] + USUAL_STEPS) - STEP_EPSILON
+        return cls(surroundings_log_odds(points) > 0, apart, points.range, label)
 
     def __str__(self) -> str:
         """One row of the table."""

@@ -58,11 +58,11 @@ def main() -> None:
     print("|---|---:|---:|---:|")
     # A scan keeps the ranges that it was asked for once: each run has one of its own.
     row("view", arguments.rounds, lambda: view(replace(scan)), lambda: plain_view(view, scan))
-    for way_back, plain_back in PLAIN_WAYS_BACK.items():
-        seen = replace(image, way_back=way_back)
+    for back_projection, plain_back in PLAIN_BACK_PROJECTIONS.items():
+        seen = replace(image, back_projection_name=back_projection)
         row(
-            f"back: {way_back}",
-            arguments.rounds if way_back != "vote" else 3,
+            f"back: {back_projection}",
+            arguments.rounds if back_projection != "vote" else 3,
             lambda seen=seen: seen.back(score),
             lambda plain_back=plain_back: plain_back_to_rows(plain_back, image, score),
         )
@@ -103,7 +103,7 @@ def plain_view(view: RangeView, scan: Scan) -> dict[str, NDArray[np.generic]]:
     winner[pixel[rows[::-1]]] = rows[::-1]  # of equally near ones the lowest row is written last
     shown = np.flatnonzero(winner >= 0)
     image = np.zeros((len(view.channels), len(winner)), np.float32)
-    image[:, shown] = filled_values(scan, winner[shown], view.channels, view.stand_in).T
+    image[:, shown] = filled_values(scan, winner[shown], view.channels, view.fill_value).T
     return {"image": image, "pixel": pixel, "winner": winner, "range": scan.range}
 
 
@@ -195,7 +195,7 @@ def plain_vote(
     return result
 
 
-PLAIN_WAYS_BACK = dict(
+PLAIN_BACK_PROJECTIONS = dict(
     zip(BACK_PROJECTIONS, (plain_nearest_range, plain_copy, plain_vote), strict=True)
 )
 

@@ -17,12 +17,12 @@ from turns import milliseconds_in_turns
 
 from derain.errors import InputError
 from derain.export.machine import versions
-from derain.export.proof import beside
+from derain.export.proof import compare_runtimes
 from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import DEFAULT_RUNTIME
 from derain.files import read_scan
 from derain.scan import Scan
-from derain.views.view import SeenScan
+from derain.views.view import ViewedScan
 
 RUNTIMES = ((DEFAULT_RUNTIME, "float32"), ("openvino", "float32"), ("openvino", "bf16"))
 
@@ -55,7 +55,7 @@ def main() -> None:
     print(f"{arguments.model.name}: {view.size:,} points or pixels, {arguments.threads} threads")
     _report(milliseconds_in_turns(networks, arguments.rounds, runs=3), DEFAULT_RUNTIME)
     for name, derainer in derainers.items():
-        found = beside(usual, derainer, [(scan.name, scan)])
+        found = compare_runtimes(usual, derainer, [(scan.name, scan)])
         print(
             f"  {name:20} largest logit difference {found.worst.difference:.1e}, {found.flipped} "
             f"labels flipped, IoU of the rain {found.rain_iou:.4f}"
@@ -68,7 +68,7 @@ def main() -> None:
     print(versions(derainer.runtime.name for derainer in derainers.values()))
 
 
-def _network(derainer: Derainer, views: list[SeenScan]) -> Callable[[], object]:
+def _network(derainer: Derainer, views: list[ViewedScan]) -> Callable[[], object]:
     """Judges one view after the other, the first again after the last."""
     inputs = [view.inputs() for view in views]
     calls = iter(range(10**9))

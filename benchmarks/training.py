@@ -31,7 +31,7 @@ from derain.datamodules.base import ScanDataModule
 from derain.datamodules.order import Pick
 from derain.export.machine import versions
 from derain.learning.batch import Batch
-from derain.learning.task import agree
+from derain.learning.task import agree_on_task
 from derain.models.base import DerainingModule
 from derain.workflows.training import KEPT_IN_TRAINING, keep_freed_memory
 
@@ -59,7 +59,7 @@ class Training:
         described["data"]["init_args"]["root"] = str(root)
         described["data"]["init_args"].setdefault("loading", {})["workers"] = workers
         parts = {part: _made(described[part]) for part in ("model", "data")}
-        agree(parts["model"], parts["data"])
+        agree_on_task(parts["model"], parts["data"])
         return cls(**parts, precision=described["trainer"].get("precision", "32-true"))
 
 

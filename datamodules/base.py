@@ -10,7 +10,7 @@ from derain.datamodules.loader import scan_loader
 from derain.datamodules.loading import Loading, Part
 from derain.datamodules.order import Draws
 from derain.datamodules.scan_data import ScanData, with_needed_labels
-from derain.datamodules.statistics import measured
+from derain.datamodules.statistics import with_statistics
 from derain.errors import InputError
 from derain.learning.batch import Sample
 from derain.learning.task import Task
@@ -43,7 +43,7 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         ScanData.__init__(self, card, loading)
         self.task: Task | None = None
 
-    def shown(self, part: Part) -> Source:
+    def epoch_source(self, part: Part) -> Source:
         """The scans that a loader of a part passes through: by default, each of them once.
 
         Raises:
@@ -72,7 +72,7 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         extra = [name for name in columns if name not in self.card.extra]
         if extra or not self.card.has_statistics:
             scans = self.training_scans(MOST_MEASURED, columns, labelled)
-            self.card = measured(self.card, scans, extra)
+            self.card = with_statistics(self.card, scans, extra)
 
     def training_scans(
         self, most: int, columns: Sequence[str] | None = None, labelled: bool = True
@@ -114,7 +114,7 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         if self.trainer is not None:
             processes, process = self.trainer.world_size, self.trainer.global_rank
         draws = self.draws() if part == "train" else None
-        shown = self.shown(part)
+        shown = self.epoch_source(part)
         return scan_loader(shown, part, self.task, self.loading, processes, process, draws)
 
     @property

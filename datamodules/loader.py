@@ -11,7 +11,7 @@ from derain.datamodules.order import Draws, MeasuringOrder, Pick, TrainingOrder
 from derain.datamodules.scan_data import with_needed_labels
 from derain.datamodules.scan_dataset import MEGABYTE, ScanDataset
 from derain.errors import InputError
-from derain.learning.batch import VIEW, Batch, Sample, added_up
+from derain.learning.batch import VIEW, Batch, Sample, summed_times
 from derain.learning.seeds import run_seed
 from derain.learning.task import Task
 from derain.sources.reader import FrameReader
@@ -70,7 +70,7 @@ def scan_loader(
     once = loading.counts_once(task.card)
     augmented = part == "train" and loading.augmentation.changes_anything
     # Tests and predictions ask for each scan once.
-    room = loading.kept_megabytes * MEGABYTE if part in ("train", "validation") else 0
+    room = loading.cache_mb * MEGABYTE if part in ("train", "validation") else 0
     dataset = ScanDataset(
         # Frames to predict keep the path of their labels: predictions must not overwrite them.
         source if part == "predict" else with_needed_labels(source, part, task.reads_labels),
@@ -130,4 +130,4 @@ def packed(samples: Sequence[Sample | InputError]) -> Batch | InputError:
     stopwatch = Stopwatch()
     with stopwatch.stage(VIEW):
         batch = Batch.of([sample for sample in samples if isinstance(sample, Sample)])
-    return replace(batch, milliseconds=added_up([batch.milliseconds, stopwatch.milliseconds]))
+    return replace(batch, milliseconds=summed_times([batch.milliseconds, stopwatch.milliseconds]))

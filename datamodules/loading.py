@@ -23,7 +23,7 @@ class Loading:
         deduplicate: Whether points at one position are measured once; None follows the data card.
             Predictions cover every row in any case.
         augmentation: How training changes its scans.
-        kept_megabytes: Memory in which training scans are kept from epoch to epoch, so that they
+        cache_mb: Memory in which training scans are kept from epoch to epoch, so that they
             are not read again, and as much for validation scans. Workers divide it among them.
 
     Raises:
@@ -36,10 +36,10 @@ class Loading:
     intensity_scale: float = 1.0
     deduplicate: bool | None = None
     augmentation: Augmentation = field(default_factory=Augmentation)
-    kept_megabytes: int = 512
+    cache_mb: int = 512
 
     def __post_init__(self) -> None:
-        least = {"batch_size": 1, "workers": 0, "kept_megabytes": 0}
+        least = {"batch_size": 1, "workers": 0, "cache_mb": 0}
         for name, fewest in least.items():
             if getattr(self, name) < fewest:
                 raise InputError(

@@ -16,7 +16,7 @@ from derain.learning.batch import Sample
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.source import Frames, Source
-from derain.sources.training_record import by_parts
+from derain.sources.training_record import record_of_parts
 from derain.views.channels import channel_of
 
 # A name is a folder of predictions, a group of figures in a log and the beginning of classes.
@@ -142,7 +142,9 @@ class Mixture(ScanDataModule):
 
     def training_record(self) -> dict[str, tuple[str, ...]]:
         """The training scans, by the name of each part's data card."""
-        return by_parts((part.card.name, part.training_record()) for part in self.parts.values())
+        return record_of_parts(
+            (part.card.name, part.training_record()) for part in self.parts.values()
+        )
 
     def train_dataloader(self) -> DataLoader[Sample | InputError]:
         """Training scans, drawn by weight, in a new order and newly augmented every epoch.

@@ -60,9 +60,9 @@ class ScanCheck(lightning.Callback):
             return
         notices = Notices()
         for frame in evenly_spaced(data.frames(part), self.scans):
-            found = model.spec.oddities(data.read(frame))
-            notices.tell(frame.name, [replace(o, detail=_here(o.detail)) for o in found])
-        notices.tell_how_many_more()
+            found = model.spec.issues(data.read(frame))
+            notices.warn(frame.name, [replace(o, detail=_here(o.detail)) for o in found])
+        notices.warn_of_repeats()
 
 
 def _warn_without_rain(trainer: lightning.Trainer, model: Any) -> None:

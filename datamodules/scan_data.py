@@ -17,7 +17,7 @@ from derain.sources.folders import named_frames, sequence_frames
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
-from derain.sources.training_record import by_fingerprint, by_name
+from derain.sources.training_record import record_of_scans, record_of_sequences
 from derain.teaching.held_out import FEWEST_SCANS
 from derain.teaching.manifest import CARD, HELD_OUT_PART, TRAINING_PART, Manifest
 
@@ -73,7 +73,7 @@ class ScanData(ABC):
 
     def training_record(self) -> dict[str, tuple[str, ...]]:
         """The training scans, as the Spec of a model that is trained on them records them."""
-        return by_fingerprint(self.source("train"))
+        return record_of_scans(self.source("train"))
 
     @property
     def _reads_labels(self) -> bool:
@@ -155,7 +155,7 @@ class SequenceData(ScanData):
         """
         if self.card.simulated:
             return super().training_record()
-        return by_name(self.split.get("train", ()))
+        return record_of_sequences(self.split.get("train", ()))
 
     def _folder(self, name: str) -> Path:
         folder = self.root / self.layout.sequences / name

@@ -19,7 +19,7 @@ from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.spread import evenly_spaced
 from derain.system.stopwatch import Stopwatch
-from derain.views.view import SeenScan, View
+from derain.views.view import View, ViewedScan
 from derain.views.window import PlacedScan, Window, WindowOfScans
 
 Item = TypeVar("Item", Scan, Sample)
@@ -59,8 +59,8 @@ class ScanDataset(Dataset[Sample | InputError]):
         self.reader = reader
         self.augmentation = augmentation
         self.seed = seed
-        self._scans = Kept[Scan](room)
-        self._samples = Kept[Sample](room)
+        self._scans = Cache[Scan](room)
+        self._samples = Cache[Sample](room)
 
     @property
     def card(self) -> DataCard:
@@ -115,11 +115,11 @@ class ScanDataset(Dataset[Sample | InputError]):
             with stopwatch.stage(READ):
                 return self.reader.read_unlabelled(frame)
 
-        view = seen(self.view, scan, self.frames, number, read_around)
+        view = view_in_window(self.view, scan, self.frames, number, read_around)
         return Sample.of(scan, view, self.card, key=self.frames[number].key)
 
 
-class Kept(Generic[Item]):
+class Cache(Generic[Item]):
     """Items by number, as many as there is room for.
 
     The first items stay. Every epoch asks for each item once: a cache that evicted the oldest would
@@ -160,13 +160,13 @@ def bytes_of(item: object) -> int:
     return 0
 
 
-def seen(
+def view_in_window(
     view: View,
     scan: Scan,
     frames: Sequence[Frame],
     number: int,
     read: Callable[[Frame], Scan],
-) -> SeenScan:
+) -> ViewedScan:
     """What a network sees of a scan, with the scans around it where its view needs them.
 
     Args:

@@ -14,7 +14,7 @@ from derain.views.channels import USUAL_CHANNELS, channel_values
 ROUNDING = 1e-12
 
 
-def measured(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -> DataCard:
+def with_statistics(card: DataCard, scans: Iterable[Scan], extra: Sequence[str] = ()) -> DataCard:
     """Completes a data card with the statistics that it lacks.
 
     Mean and standard deviation of x, y, z and range in metres, of intensity and of extra channels,

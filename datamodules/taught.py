@@ -34,7 +34,7 @@ class Taught(TaughtData, ScanDataModule):
         InputError: No such folder, or one that is damaged or not complete.
     """
 
-    def shown(self, part: Part) -> Source:
+    def epoch_source(self, part: Part) -> Source:
         """The scans of a part; those of a short training recording several times an epoch.
 
         Augmentation changes each differently every time. Epochs of a few scans would be too short

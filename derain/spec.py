@@ -11,9 +11,9 @@ from derain.files.documents import Entry, shown
 from derain.scan import LARGEST_ID, Scan
 from derain.views.candidates import Candidates, bounded_channels, candidates_at
 from derain.views.channels import MOST_CHANNELS, channel_of
-from derain.views.oddities import Oddity, intensity_unlike_training, missing_channels
-from derain.views.one_viewpoint import unlike_one_viewpoint
+from derain.views.one_viewpoint import viewpoint_issues
 from derain.views.registry import VIEWS
+from derain.views.scan_issues import ScanIssue, intensity_unlike_training, missing_channels
 from derain.views.view import View
 
 SCHEMA = 1
@@ -101,13 +101,13 @@ class Spec:
         """Channels that a scan has not got, and the means that stand in for them, by name."""
         return {name: mean for name, mean in self.means.items() if channel_of(scan, name) is None}
 
-    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+    def issues(self, scan: Scan) -> Iterator[ScanIssue]:
         """What is odd about a scan for the network, before it is judged.
 
         Args:
             scan: The scan, its intensities in the unit of the training data.
         """
-        yield from unlike_one_viewpoint(scan)
+        yield from viewpoint_issues(scan)
         yield from missing_channels(scan, self.missing_channels(scan), self.data)
         yield from intensity_unlike_training(
             scan, self.mean_intensity, self.intensity_unit, self.data
@@ -136,7 +136,7 @@ def _view_of(entry: Entry, spec: Spec, threads: int = 0) -> View:
     if not isinstance(kind.value, str) or kind.value not in VIEWS:
         raise kind.fault(f"unknown view {shown(kind.value)}", "Upgrade derain.")
     view = VIEWS[kind.value].of(entry, spec.channels, spec.means, threads)
-    return view if spec.candidates is None else view.judging(spec.candidates)
+    return view if spec.candidates is None else view.with_candidates(spec.candidates)
 
 
 def _refuse_newer(entry: Entry) -> None:

@@ -258,14 +258,14 @@ def back_projection(
     spec: Spec,
 ) -> NDArray[np.float32]:
     """Scores of pixels as scores of rows, float32 (N,); of rows in no pixel it says nothing."""
-    of_rows, way_back = score[pixel], spec["view"]["way_back"]
+    of_rows, projection = score[pixel], spec["view"]["way_back"]
     distance = channel(points, "range")
     assert distance is not None
     shown = np.append(distance, np.float32(np.inf))[winner]
     for row in np.flatnonzero(pixel >= 0):
-        if way_back == "vote":
+        if projection == "vote":
             of_rows[row] = vote(pixel[row], distance[row], shown, score, spec["view"]["grid"])
-        elif way_back == "nearest range" and distance[row] > shown[pixel[row]]:
+        elif projection == "nearest range" and distance[row] > shown[pixel[row]]:
             around = window(pixel[row], spec["view"]["grid"])
             unlike = [abs(shown[one] - distance[row]) for _, one in around]
             of_rows[row] = score[around[int(np.argmin(unlike))][1]]

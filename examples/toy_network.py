@@ -61,7 +61,7 @@ class Toy(SupervisedModule):
         """The view that it sees a scan through: it needs no scans to be fitted to."""
         return NeighbourView(self.hparams["neighbours"], self.channels)
 
-    def sees_through(self, view: View) -> bool:
+    def accepts_view(self, view: View) -> bool:
         """Whether it can take what a Spec's view gives: as many neighbours as it has inputs for."""
         return isinstance(view, NeighbourView) and view.neighbours == self.hparams["neighbours"]
 

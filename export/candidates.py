@@ -46,7 +46,7 @@ class FittedCandidates:
         )
 
 
-def candidates_of_findings(
+def fit_network_candidates(
     model: DerainingModule,
     scans: Iterable[Scan],
     card: DataCard,
@@ -68,7 +68,7 @@ def candidates_of_findings(
         InputError: Scans without rain, or in which it finds none, or none that bounds would tell
             from the rest; a model that sees several scans at a time, or takes no candidates.
     """
-    _refuse_unable(model)
+    _require_candidates(model)
     with evaluation_on_cpu(model):
         judged = [_judged(model, scan, card) for scan in scans]
     require_rain(any(rain.any() for _, _, rain in judged), card, "--candidates")
@@ -99,7 +99,7 @@ def candidates_of_findings(
     return FittedCandidates(of_all_rain, len(judged), before, after)
 
 
-def _refuse_unable(model: DerainingModule) -> None:
+def _require_candidates(model: DerainingModule) -> None:
     """Refuses a model that cannot be given candidates, before any scan is judged."""
 
     def refusal(reason: str) -> InputError:
@@ -108,7 +108,7 @@ def _refuse_unable(model: DerainingModule) -> None:
     view = model.spec.make_view()
     if not view.window.is_one_scan:
         raise refusal("the network sees several scans at a time")
-    seen = view.judging(Candidates((Bound("range", most=1.0),)))(Scan.of(np.zeros((0, 4))))
+    seen = view.with_candidates(Candidates((Bound("range", most=1.0),)))(Scan.of(np.zeros((0, 4))))
     try:
         signature(model.forward).bind(**seen.inputs())
     except TypeError as error:

@@ -32,7 +32,7 @@ def named_method(text: str) -> tuple[str, dict[str, Any]]:
     return read_parameters(text) if Path(text).suffix in PARAMETER_SUFFIXES else (text, {})
 
 
-def titled(text: str) -> tuple[str, str]:
+def split_title(text: str) -> tuple[str, str]:
     """What a method is called, and its name or file.
 
     Args:
@@ -49,7 +49,7 @@ def method_names() -> list[str]:
     return [DEFAULT, *FILTERS, *METHODS]
 
 
-def what_to_give(name: str) -> str:
+def method_hint(name: str) -> str:
     """What a user is told to give in place of what is no method; no sentence's end.
 
     Args:
@@ -106,7 +106,7 @@ def _loaded(name: str, parameters: Mapping[str, Any], threads: int, runtime: Run
         raise InputError(
             name,
             "no such file",
-            f"{what_to_give(name)}.",
+            f"{method_hint(name)}.",
         )
     if Path(name).suffix == CHECKPOINT_SUFFIX:
         raise InputError(

@@ -50,7 +50,7 @@ METADATA_PROPS, PROP_KEY, PROP_VALUE = 14, 1, 2
 EXTERNAL_DATA, DATA_LOCATION = 13, 14
 
 # How files of torch.save begin: archives, and before PyTorch 1.6 pickles. No ONNX file does.
-OF_PYTORCH = (b"PK\x03\x04", b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
+PYTORCH_SIGNATURES = (b"PK\x03\x04", b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
 
 # Kinds of protobuf fields. Source: https://protobuf.dev/programming-guides/encoding.
 VARINT, COUNTED_BYTES = 0, 2
@@ -84,7 +84,7 @@ class ModelFile:
         """
         with reading(path), path.open("rb") as file:
             content = file.read(LARGEST_MODEL + 1)
-        if content.startswith(OF_PYTORCH):
+        if content.startswith(PYTORCH_SIGNATURES):
             raise InputError(
                 path,
                 "not an ONNX model, but an archive or a pickle, as PyTorch saves weights",
@@ -116,7 +116,7 @@ class ModelFile:
         return cls(path, content, metadata, Spec.from_dict(metadata["spec"], path))
 
 
-def sealed(content: bytes) -> bytes:
+def with_checksum(content: bytes) -> bytes:
     """The same file with its checksum where NO_CHECKSUM stands in its metadata."""
     place = content.rindex(NO_CHECKSUM.encode())
     digest = _checksum(content, place).encode()

@@ -18,7 +18,7 @@ import derain
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.evaluation_mode import evaluation_on_cpu
-from derain.export.model_file import CHECKSUM_KEY, METADATA_KEY, NO_CHECKSUM, sealed
+from derain.export.model_file import CHECKSUM_KEY, METADATA_KEY, NO_CHECKSUM, with_checksum
 from derain.export.proof import BF16, FINITE, FLOAT32, INT8, Proof, prove
 from derain.export.quantisation import quantised
 from derain.export.runtimes.registry import Runtime
@@ -29,7 +29,7 @@ from derain.scan import Scan
 from derain.spec import Spec
 from derain.views.candidates import Bound, Candidates
 from derain.views.channels import extra_channels
-from derain.views.view import SeenScan
+from derain.views.view import ViewedScan
 
 # The version of ONNX's operators, stated so that files do not change with torch's default. 18 is
 # the oldest that torch 2.13's exporter writes without converting.
@@ -64,7 +64,7 @@ def export(
     """
     with evaluation_on_cpu(model), replacing(path) as temporary:
         proto = _traced(model, model.spec)
-        flushed = flush(proto)
+        flushed = flush_to_zero(proto)
         if calibration:
             proto = quantised(proto, model.spec.make_view(), calibration, model.INTEGER_OPERATORS)
         temporary.write_bytes(_described(proto, model.spec, {}))
@@ -89,10 +89,10 @@ def with_metadata(proto: onnx.ModelProto, metadata: Mapping[str, Any], **texts: 
     """
     known = json.dumps({**metadata, CHECKSUM_KEY: NO_CHECKSUM})
     onnx.helper.set_model_props(proto, {METADATA_KEY: known, **texts})
-    return sealed(proto.SerializeToString())
+    return with_checksum(proto.SerializeToString())
 
 
-def flush(proto: onnx.ModelProto) -> int:
+def flush_to_zero(proto: onnx.ModelProto) -> int:
     """Sets the numbers of a graph that are smaller than NEGLIGIBLE to 0.
 
     Returns:
@@ -117,7 +117,7 @@ def _proof(
     if not calibration:
         bounds = FLOAT32 if runtime.precision == FLOAT32_PRECISION else BF16
         assert bounds.difference is not None
-        bounds = replace(bounds, difference=bounds.difference * model.AMPLIFIES)
+        bounds = replace(bounds, difference=bounds.difference * model.LOGIT_GAIN)
         return prove(model, path, _hard_cases(model.spec), bounds, runtime)
     # Mapped, for a loop would hold on to one scan while the next is read.
     seen = prove(model, path, map(_named, calibration), INT8, runtime)
@@ -178,7 +178,7 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
     return proto
 
 
-def _example(spec: Spec) -> SeenScan:
+def _example(spec: Spec) -> ViewedScan:
     """What the network sees of a small scan, for the exporter to follow through it.
 
     No length may be 0 or 1, which it would take for constants, or that of another axis.

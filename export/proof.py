@@ -18,7 +18,7 @@ from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
 from derain.scan import Scan
 from derain.views.probability import probability_of_rain
-from derain.views.view import SeenScan
+from derain.views.view import ViewedScan
 
 THREADS = (1, 2)
 
@@ -199,7 +199,7 @@ def prove(
         runtime: What runs the exported model.
     """
 
-    def expect(view: SeenScan) -> NDArray[np.float32]:
+    def expect(view: ViewedScan) -> NDArray[np.float32]:
         tensors = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
         with torch.inference_mode():
             return forward(**tensors).numpy()
@@ -208,7 +208,9 @@ def prove(
     return _proof(expect, derainers, scans, bounds)
 
 
-def beside(reference: Derainer, derainer: Derainer, scans: Iterable[tuple[str, Scan]]) -> Proof:
+def compare_runtimes(
+    reference: Derainer, derainer: Derainer, scans: Iterable[tuple[str, Scan]]
+) -> Proof:
     """Runs one exported model by two runtimes on the same scans; they may differ as they like.
 
     Args:
@@ -220,7 +222,7 @@ def beside(reference: Derainer, derainer: Derainer, scans: Iterable[tuple[str, S
 
 
 def _proof(
-    expect: Callable[[SeenScan], NDArray[np.float32]],
+    expect: Callable[[ViewedScan], NDArray[np.float32]],
     derainers: Sequence[Derainer],
     scans: Iterable[tuple[str, Scan]],
     bounds: Bounds,
@@ -231,7 +233,7 @@ def _proof(
 
 
 def _compared(
-    expect: Callable[[SeenScan], NDArray[np.float32]],
+    expect: Callable[[ViewedScan], NDArray[np.float32]],
     derainers: Sequence[Derainer],
     bounds: Bounds,
     named: tuple[str, Scan],
@@ -247,7 +249,7 @@ def _compared(
 
 def _case(
     name: str,
-    view: SeenScan,
+    view: ViewedScan,
     returned: NDArray[np.bool_],
     expected: NDArray[np.float32],
     derainer: Derainer,

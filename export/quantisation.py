@@ -18,7 +18,7 @@ from onnxruntime.quantization import (
 from derain.errors import InputError
 from derain.scan import Scan
 from derain.sources.frame import Frame
-from derain.views.view import SeenScan, View
+from derain.views.view import View, ViewedScan
 
 # Scans that the ranges of activations are taken from; they are held in memory one at a time.
 CALIBRATION_SCANS = 16
@@ -54,7 +54,7 @@ class CalibrationReader(CalibrationDataReader):  # type: ignore[misc]
 
     def __init__(self, view: View, scans: Iterable[Scan]) -> None:
         # Mapped, for a loop would hold on to one scan while the next is read.
-        self._views: Iterator[SeenScan] = map(view, scans)
+        self._views: Iterator[ViewedScan] = map(view, scans)
 
     def get_next(self) -> dict[str, NDArray[np.generic]] | None:
         """Inputs of the next scan; None after the last."""

@@ -21,9 +21,9 @@ from derain.sources.method import Method
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
 from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import Oddity, outside_view
 from derain.views.probability import probability_of_rain
-from derain.views.view import SeenScan, View
+from derain.views.scan_issues import ScanIssue, outside_view
+from derain.views.view import View, ViewedScan
 from derain.views.window import PlacedScan, Window
 from derain.weather.scan_weather import ScanWeather
 
@@ -161,9 +161,9 @@ class Derainer(Method):
         """How many frames were pushed and are not answered for: they wait for frames after them."""
         return self._recent.waiting
 
-    def starts_anew(self, frame: Frame) -> bool:
+    def starts_new_recording(self, frame: Frame) -> bool:
         """Whether pushing a frame would let go of those that wait: it does not follow them."""
-        return self._recent.waiting > 0 and self._recent.starts_anew(frame)
+        return self._recent.waiting > 0 and self._recent.starts_new_recording(frame)
 
     def push(
         self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
@@ -206,7 +206,7 @@ class Derainer(Method):
         if not isinstance(frame, Frame):
             number = self._recent.next_number
             frame = MemoryFrame(key=f"{number:06d}", number=number, scan=scan)
-        ready = self._recent.take(frame, PlacedScan(scan, frame.time, frame.pose))
+        ready = self._recent.push(frame, PlacedScan(scan, frame.time, frame.pose))
         return None if ready is None else self._judged_in_window(ready, stopwatch)
 
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
@@ -222,12 +222,12 @@ class Derainer(Method):
             InputError: A network that fails, or whose scores are not finite.
         """
         while self._recent.waiting:
-            yield self._judged_in_window(self._recent.give(), stopwatch or Stopwatch())
+            yield self._judged_in_window(self._recent.pop(), stopwatch or Stopwatch())
         self._recent = RecentFrames(self.view.window)
 
-    def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
+    def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """What is odd about a scan for the model, and whether much of it lies outside its grid."""
-        yield from self.spec.oddities(judgement.scan)
+        yield from self.spec.issues(judgement.scan)
         yield from outside_view(judgement.scan, judgement.judged, self.spec.data)
 
     def as_dict(self) -> dict[str, Any]:
@@ -240,7 +240,7 @@ class Derainer(Method):
         options = (self.name, self.threads, self.runtime.name, self.runtime.precision)
         return type(self), options, {"spec": self.spec, "warns": self.warns}
 
-    def logits(self, view: SeenScan) -> NDArray[np.float32]:
+    def logits(self, view: ViewedScan) -> NDArray[np.float32]:
         """Scores of "not rain" and "rain" of the M cells of a view, float32 (M, 2).
 
         Raises:
@@ -258,20 +258,20 @@ class Derainer(Method):
         judgement = self._judged(scans.scan, lambda: self.view.of_window(scans), stopwatch)
         return replace(judgement, frame=ready.frame)
 
-    def _judged(self, scan: Scan, see: Callable[[], SeenScan], stopwatch: Stopwatch) -> Judgement:
+    def _judged(self, scan: Scan, see: Callable[[], ViewedScan], stopwatch: Stopwatch) -> Judgement:
         """What the model says of a scan, once it sees it."""
         with stopwatch.stage("view"):
             view = see()
         with stopwatch.stage("network"):
             logits = self.logits(view)
-            self._refuse_senseless(logits, view, scan)
+            self._check_scores(logits, view, scan)
         with stopwatch.stage("back"):
             probability = view.back(probability_of_rain(logits))
             rain = probability > self.spec.threshold
             judgement = Judgement(probability, rain, view.judged, scan)
         return self.with_warnings(judgement)
 
-    def _refuse_senseless(self, logits: NDArray[np.float32], view: SeenScan, scan: Scan) -> None:
+    def _check_scores(self, logits: NDArray[np.float32], view: ViewedScan, scan: Scan) -> None:
         """Refuses scores that would count as "not rain" because nothing compares with them."""
         if logits.shape != (view.size, 2) or not np.isfinite(logits).all():
             raise InputError(

@@ -53,7 +53,7 @@ class Search:
     done: Callable[[], object]
 
 
-def space_of(name: str) -> Mapping[str, Span]:
+def search_space(name: str) -> Mapping[str, Span]:
     """Where the parameters of a filter are looked for.
 
     Args:
@@ -91,7 +91,7 @@ def neighbours_to_find(name: str) -> int:
         InputError: A filter that cannot be tuned.
     """
     default = filter_from(name, {}).neighbours
-    _, most = space_of(name).get("neighbours", (default, default))
+    _, most = search_space(name).get("neighbours", (default, default))
     return max(default, int(most))
 
 
@@ -119,7 +119,7 @@ def tune_filter(name: str, scans: Sequence[LabelledNeighbourhoods], search: Sear
     from sqlalchemy.exc import SQLAlchemyError
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    space, default = space_of(name), filter_from(name, {})
+    space, default = search_space(name), filter_from(name, {})
 
     def objective(parameters: Mapping[str, Any]) -> float:
         return pooled_iou(filter_from(name, parameters), scans)
@@ -210,7 +210,7 @@ def _stored(name: str, scans: Sequence[LabelledNeighbourhoods], search: Search) 
     facts: dict[str, Any] = {
         "scans": list(search.data),
         "rain_and_solid": [[int(s.rain.sum()), int(s.solid.sum())] for s in scans],
-        "bounds": {k: list(v) for k, v in space_of(name).items()},
+        "bounds": {k: list(v) for k, v in search_space(name).items()},
     }
     if not all(s.candidate.all() for s in scans):
         facts["candidates"] = [int(s.candidate.sum()) for s in scans]

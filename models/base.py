@@ -17,10 +17,10 @@ from derain.files.documents import Entry, shown
 from derain.learning.batch import Batch
 from derain.learning.seeds import Draw, generator_of, run_seed
 from derain.learning.start import Start
-from derain.learning.task import Task, TrainingData, agree
+from derain.learning.task import Task, TrainingData, agree_on_task
 from derain.models.callbacks.finite_loss import FiniteLoss
 from derain.models.callbacks.resumption import Resumption
-from derain.models.hyperparameters import enter
+from derain.models.hyperparameters import log_hyperparameters
 from derain.models.measured import MeasuredModule
 from derain.scan import Scan
 from derain.spec import Spec
@@ -43,7 +43,7 @@ class DerainingModule(MeasuredModule):
     Attributes:
         NAME: Name of the network in a Spec and on the command line; the decorator sets it.
         VIEW: Kind of the view that it sees a scan through.
-        AMPLIFIES: How many times more than other networks' its logits amplify rounding.
+        LOGIT_GAIN: How many times more than other networks' its logits amplify rounding.
         RECIPE: Names of the arguments that say how it is trained and what is called rain. One that
             starts from another model keeps its own, and has the other's in place of all the rest.
         INTEGER_OPERATORS: What computes in eight bits in a model that is exported so; ONNX names.
@@ -59,7 +59,7 @@ class DerainingModule(MeasuredModule):
 
     NAME: ClassVar[str]
     VIEW: ClassVar[type[View]]
-    AMPLIFIES: ClassVar[float] = 1.0
+    LOGIT_GAIN: ClassVar[float] = 1.0
     RECIPE: ClassVar[tuple[str, ...]] = (
         "learning_rate",
         "weight_decay",
@@ -120,7 +120,7 @@ class DerainingModule(MeasuredModule):
             InputError: A view that needs scans to be fitted to, and none given.
         """
 
-    def sees_through(self, view: View) -> bool:
+    def accepts_view(self, view: View) -> bool:
         """Whether the network can take what a Spec's view gives: by default, any of its kind."""
         return isinstance(view, self.VIEW)
 
@@ -183,7 +183,7 @@ class DerainingModule(MeasuredModule):
                 f"a model of {spec.network} on {', '.join(spec.channels)}",
                 f"Give one of {self.NAME} on {', '.join(self.channels)}.",
             )
-        if not self.sees_through(spec.make_view()):
+        if not self.accepts_view(spec.make_view()):
             raise InputError(
                 "checkpoint", f"its view is {shown(spec.view)}", f"Give a model of {self.NAME}."
             )
@@ -221,7 +221,7 @@ class DerainingModule(MeasuredModule):
             licence=card.licence,
         )
 
-    def take(self, task: Task) -> None:
+    def adopt_task(self, task: Task) -> None:
         """Takes over what was agreed with the data: how the network is used, what is counted.
 
         Raises:
@@ -246,10 +246,10 @@ class DerainingModule(MeasuredModule):
                 raise InputError(
                     self.NAME,
                     "is given batches by no data module, and told nothing of them",
-                    "Call derain.learning.task.agree(model, data) before.",
+                    "Call derain.learning.task.agree_on_task(model, data) before.",
                 )
         elif stage == "fit" or self.has_spec:
-            agree(self, data, training=stage == "fit")
+            agree_on_task(self, data, training=stage == "fit")
 
     def configure_callbacks(self) -> list[Callback]:
         """What guards a training of any network, whoever makes the trainer."""
@@ -269,7 +269,7 @@ class DerainingModule(MeasuredModule):
         self.adopt(spec)
         data = getattr(self._trainer, "datamodule", None)
         if isinstance(data, TrainingData):
-            agree(self, data, training=False)  # again: the checkpoint has the last word
+            agree_on_task(self, data, training=False)  # again: the checkpoint has the last word
         elif agreed is not None and self._trainer is not None and not _alike(self.spec, agreed):
             raise InputError(
                 "checkpoint",
@@ -279,7 +279,9 @@ class DerainingModule(MeasuredModule):
 
     def on_train_start(self) -> None:
         """Enters the run in TensorBoard's table of hyper-parameters, to be ranked by its IoU."""
-        enter(self.loggers, {"network": self.NAME, "data": self.card.name, **self.hparams})
+        log_hyperparameters(
+            self.loggers, {"network": self.NAME, "data": self.card.name, **self.hparams}
+        )
 
     def on_test_start(self) -> None:
         """Enters a tested model likewise: its training may have entered it elsewhere, or not."""

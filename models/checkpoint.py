@@ -14,14 +14,14 @@ from derain.errors import InputError, did_you_mean
 from derain.files.documents import Entry, shown
 from derain.models.base import DerainingModule
 from derain.models.callbacks.whole_checkpoints import refuse_not_finite, save_whole
-from derain.models.likeness import LARGEST_COUNT, REMEDY, like
+from derain.models.likeness import LARGEST_COUNT, REMEDY, matching_state
 from derain.models.limits import check_hyperparameters
-from derain.models.published import MISFITS, read_checkpoint, with_tensors
+from derain.models.published import LOAD_ERRORS, read_checkpoint, with_tensors
 from derain.models.registry import NETWORKS
 from derain.spec import Spec
 
 # What Lightning asks of a checkpoint that a training goes on from.
-STATE_OF_TRAINING = {"optimizer_states", "lr_schedulers", "loops", "callbacks"}
+TRAINING_STATE = {"optimizer_states", "lr_schedulers", "loops", "callbacks"}
 
 # Versions from 2.0 on: Lightning rewrites the checkpoints of those before, and none is derain's.
 # Source: PEP 440.
@@ -51,7 +51,7 @@ def check_resumable(path: Path) -> None:
     """
     content = read_checkpoint(path)
     _model_of(content, path)
-    if not content.keys() >= STATE_OF_TRAINING:
+    if not content.keys() >= TRAINING_STATE:
         raise InputError(
             path,
             "holds weights alone, no state of a training to go on from",
@@ -104,7 +104,7 @@ def _model_of(content: Mapping[str, Any], path: Path) -> DerainingModule:
         raise InputError(error.subject, error.reason, REMEDY) from error
     try:
         model = with_tensors(lambda: network(**arguments), weights)
-    except MISFITS as error:
+    except LOAD_ERRORS as error:
         raise InputError(
             path,
             f"its weights do not fit {spec.network} ({error})",
@@ -140,11 +140,11 @@ def _check_progress(content: Mapping[str, Any], path: Path) -> None:
 
 def _check_loops(loops: Entry) -> None:
     fresh = _fresh_loops()
-    like(loops, {name: {} for name in fresh})  # all of them are there
+    matching_state(loops, {name: {} for name in fresh})  # all of them are there
     for name, own in fresh.items():
         parts = loops.members()[name].members()
         for key in own.keys() & parts.keys():
-            if like(parts[key], own[key]) != parts[key].value:
+            if matching_state(parts[key], own[key]) != parts[key].value:
                 raise parts[key].fault("holds more than Lightning writes", REMEDY)
 
 

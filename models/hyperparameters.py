@@ -12,7 +12,7 @@ from derain.evaluation.counts import SCORES
 COLUMNS = ("hp_metric", *(f"test/{score}" for score in reversed(SCORES)), "test/average_precision")
 
 
-def enter(loggers: Iterable[object], parameters: Mapping[str, Any]) -> None:
+def log_hyperparameters(loggers: Iterable[object], parameters: Mapping[str, Any]) -> None:
     """Enters a run. What is not logged yet stays blank in the table, a test above all.
 
     Args:

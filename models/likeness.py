@@ -16,7 +16,7 @@ LARGEST_COUNT = 2**53
 REMEDY = "Give a checkpoint of the same network, as derain wrote it."
 
 
-def like(found: Entry, own: Any) -> Any:
+def matching_state(found: Entry, own: Any) -> Any:
     """What a checkpoint has in place of a state, reduced to what that state has.
 
     Lightning and torch enter whatever a checkpoint holds into their own objects.
@@ -37,7 +37,7 @@ def like(found: Entry, own: Any) -> Any:
     if isinstance(own, Mapping) and isinstance(value, Mapping):
         return _like_mapping(found, own)
     if isinstance(own, list | tuple) and isinstance(value, list | tuple) and len(own) == len(value):
-        parts = [like(_part(found, key), part) for key, part in enumerate(own)]
+        parts = [matching_state(_part(found, key), part) for key, part in enumerate(own)]
         return tuple(parts) if isinstance(value, tuple) else parts
     if isinstance(own, Tensor) and isinstance(value, Tensor):
         _refuse_another_tensor(found, own)
@@ -52,7 +52,7 @@ def _like_mapping(found: Entry, own: Mapping[Any, Any]) -> Any:
     public = {key for key in own if isinstance(key, str) and not key.startswith("_")}
     if missing := public - found.value.keys():
         raise found.fault(f"{min(missing)} is missing", REMEDY)
-    taken = {key: like(_part(found, key), own[key]) for key in found.value if key in own}
+    taken = {key: matching_state(_part(found, key), own[key]) for key in found.value if key in own}
     return type(own)(taken)  # type: ignore[call-arg]  # a dict or a Counter
 
 

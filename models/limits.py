@@ -25,13 +25,13 @@ def check_hyperparameters(
             or values of another kind than the defaults.
     """
     for name, entry in parameters.items():
-        _refuse_what_is_not_plain(entry)
+        _require_plain_values(entry)
         _refuse_another_kind(entry, defaults.get(name))
         if name in _LIMITS:
             _LIMITS[name](entry)
 
 
-def _refuse_what_is_not_plain(entry: Entry) -> None:
+def _require_plain_values(entry: Entry) -> None:
     left, seen = [entry.value], set[int]()
     while left:
         value = left.pop()

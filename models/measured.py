@@ -27,7 +27,7 @@ from derain.views.probability import probability_of_rain
 # The monitor, by which the best checkpoint of a run is chosen, the more the better: the IoU of the
 # validation scans where a network learns from labels and there is rain in them, else minus the
 # loss. Logs, checkpoints and configurations have it under this name.
-MONITOR = "val/merit"
+MONITOR = "val/score"
 
 
 class MeasuredModule(lightning.LightningModule, ABC):
@@ -118,9 +118,9 @@ class MeasuredModule(lightning.LightningModule, ABC):
     def on_validation_epoch_end(self) -> None:
         """Logs losses and scores of the epoch."""
         losses = self.mean_losses.compute()
-        self._log_alike({f"val/{name}": loss for name, loss in losses.items()})
+        self._log_identical({f"val/{name}": loss for name, loss in losses.items()})
         self._log_scores("val")
-        self._log_alike({MONITOR: self._merit(losses["loss"])})
+        self._log_identical({MONITOR: self._score(losses["loss"])})
 
     def on_test_epoch_start(self) -> None:
         """Forgets the scores of another test."""
@@ -130,7 +130,7 @@ class MeasuredModule(lightning.LightningModule, ABC):
     def on_test_epoch_end(self) -> None:
         """Logs the scores of the test; the metrics keep their counts for whoever reports them."""
         if self.trained_steps is not None and not self.trainer.global_step:
-            self._log_alike({"step": torch.tensor(float(self.trained_steps))})
+            self._log_identical({"step": torch.tensor(float(self.trained_steps))})
         self._log_scores("test")
 
     def probabilities(self, batch: Batch, logits: Tensor) -> list[NDArray[np.float32]]:
@@ -166,14 +166,14 @@ class MeasuredModule(lightning.LightningModule, ABC):
         if not counts.per_scan:  # scans without labels measure nothing
             return
         scores = self.metrics.compute() | self.threshold_counts.compute()
-        self._log_alike({f"{part}/{name}": score for name, score in scores.items()})
-        self._log_alike({f"{part}_iou": scores["iou"]}, prog_bar=True, logger=False)
+        self._log_identical({f"{part}/{name}": score for name, score in scores.items()})
+        self._log_identical({f"{part}_iou": scores["iou"]}, prog_bar=True, logger=False)
         for name, ids in self.card.parts.items():
             self._log_of_one(f"{part}/{name}", counts.pooled_over(ids))
         if part == "val":
-            self._log_alike({"hp_metric": scores["iou"]})
+            self._log_identical({"hp_metric": scores["iou"]})
 
-    def _merit(self, loss: Tensor) -> Tensor:
+    def _score(self, loss: Tensor) -> Tensor:
         """What the best checkpoint is chosen by, given the loss of the validation scans."""
         if not self.LEARNS_FROM_LABELS:
             return -loss
@@ -192,8 +192,8 @@ class MeasuredModule(lightning.LightningModule, ABC):
         """Logs the scores of one of several data sets, where any scan of it was measured."""
         if sum(astuple(counts)):
             scores = {f"{title}/{score}": getattr(counts, score) for score in SCORES}
-            self._log_alike({name: torch.tensor(score) for name, score in scores.items()})
+            self._log_identical({name: torch.tensor(score) for name, score in scores.items()})
 
-    def _log_alike(self, values: Mapping[str, Tensor], **options: Any) -> None:
+    def _log_identical(self, values: Mapping[str, Tensor], **options: Any) -> None:
         """Logs what all processes have computed alike; the largest of equal numbers is exact."""
         self.log_dict(values, sync_dist=True, reduce_fx="max", **options)

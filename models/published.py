@@ -15,11 +15,12 @@ from torch.serialization import safe_globals
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.files.reading import reading
+from derain.models.former_names import with_current_names
 
 Network = TypeVar("Network", bound=nn.Module)
 
 # What torch lets out where a network cannot be made with some arguments, or not with some tensors.
-MISFITS = (TypeError, ValueError, AttributeError, RuntimeError, ArithmeticError)
+LOAD_ERRORS = (TypeError, ValueError, AttributeError, RuntimeError, ArithmeticError)
 
 
 class Published(ABC):
@@ -42,7 +43,7 @@ class Published(ABC):
         """
 
 
-class Inert:
+class Placeholder:
     """Stands for what a checkpoint holds besides values: it is given anything and does nothing."""
 
     def __new__(cls, *_: object) -> Self:
@@ -87,7 +88,9 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     with reading(path), path.open("rb") as file:
         try:
             _refuse_compressed(file)
-            with safe_globals([dict, defaultdict, *((Inert, name) for name in TRAINER_STATE)]):
+            with safe_globals(
+                [dict, defaultdict, *((Placeholder, name) for name in TRAINER_STATE)]
+            ):
                 content = torch.load(file, map_location="cpu", weights_only=True)
         except Exception as error:  # torch.load raises what its parts raise, zip's own included
             # Not in torch's words, which advise to load it all the same.
@@ -98,7 +101,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
             ) from error
     if not isinstance(content, dict):
         raise InputError(path, f"holds a {type(content).__name__}", "Give a checkpoint.")
-    return content
+    return with_current_names(content)
 
 
 def published_tensors(
@@ -134,7 +137,7 @@ def with_tensors(make: Callable[[], Network], tensors: Mapping[str, Tensor]) -> 
         tensors: Its state_dict.
 
     Raises:
-        One of MISFITS: A network that cannot be made, or tensors that are not its own.
+        One of LOAD_ERRORS: A network that cannot be made, or tensors that are not its own.
     """
     with torch.device("meta"), warnings.catch_warnings():
         # Here tensors have a shape and no memory: none is taken for a network of another size.
@@ -163,7 +166,7 @@ def network_of(make: Callable[[], Network], tensors: Mapping[str, Tensor], name:
     """
     try:
         return with_tensors(make, tensors)
-    except MISFITS as error:
+    except LOAD_ERRORS as error:
         raise _of_another_network(name, str(error)) from error
 
 

@@ -16,7 +16,10 @@ FITTED = "fitted"
 
 
 def range_view(
-    grid: str | Mapping[str, Any], channels: Sequence[str], way_back: str, scans: Sequence[Scan]
+    grid: str | Mapping[str, Any],
+    channels: Sequence[str],
+    back_projection: str,
+    scans: Sequence[Scan],
 ) -> RangeView:
     """A view on a grid that is stated, or fitted to scans.
 
@@ -24,13 +27,13 @@ def range_view(
         grid: ``fitted`` for one that fits the scans; or the name of a published grid, or its
             bounds, as :func:`~derain.views.spherical_grid.grid_of` takes them.
         channels: What a pixel holds, in order.
-        way_back: Name of the back-projection, as :class:`RangeView` takes it.
+        back_projection: Name of the back-projection, as :class:`RangeView` takes it.
         scans: Training scans.
 
     Raises:
         InputError: An unknown grid or back-projection, or a grid to fit without scans.
     """
-    return RangeView(_chosen(grid, scans), tuple(channels), way_back)
+    return RangeView(_chosen(grid, scans), tuple(channels), back_projection)
 
 
 def _chosen(grid: str | Mapping[str, Any], scans: Sequence[Scan]) -> SphericalGrid:
@@ -41,7 +44,7 @@ def _chosen(grid: str | Mapping[str, Any], scans: Sequence[Scan]) -> SphericalGr
     return fit_grid(scans).grid
 
 
-def stated(grid: str | None, name: str) -> str:
+def require_grid(grid: str | None, name: str) -> str:
     """The grid of published weights, which has to be stated.
 
     Args:

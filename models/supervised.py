@@ -50,7 +50,7 @@ class SupervisedModule(DerainingModule):
         scans = data.training_scans(sys.maxsize, ())  # read one by one, to the first with rain
         return any(self.card.rain_of(scan).any() for scan in scans)
 
-    def take(self, task: Task) -> None:
+    def adopt_task(self, task: Task) -> None:
         """Takes over what was agreed with the data, and weighs the classes by their shares there.
 
         Of a network that judges candidates alone, they are the shares among them. How far the rarer
@@ -59,7 +59,7 @@ class SupervisedModule(DerainingModule):
         Raises:
             InputError: A Spec of another network.
         """
-        super().take(task)
+        super().adopt_task(task)
         candidates = self.spec.candidates
         share = self.card.rain_share if candidates is None else candidates.rain_share
         if share is not None:

@@ -13,9 +13,9 @@ from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
-from derain.system.registry import made_of
+from derain.system.registry import from_parameters
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import Oddity
+from derain.views.scan_issues import ScanIssue
 from derain.views.window import PlacedScan, Window
 
 
@@ -44,7 +44,7 @@ class Between(RecordingMethod):
 
     @classmethod
     def with_parameters(cls, parameters: Mapping[str, Any], threads: int) -> Self:
-        return cls(made_of(Dimmer, "between", parameters), threads)
+        return cls(from_parameters(Dimmer, "between", parameters), threads)
 
     @property
     def window(self) -> Window:
@@ -54,8 +54,8 @@ class Between(RecordingMethod):
     def waiting(self) -> int:
         return self._recent.waiting
 
-    def starts_anew(self, frame: Frame) -> bool:
-        return self.waiting > 0 and self._recent.starts_anew(frame)
+    def starts_new_recording(self, frame: Frame) -> bool:
+        return self.waiting > 0 and self._recent.starts_new_recording(frame)
 
     def push(
         self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
@@ -64,17 +64,17 @@ class Between(RecordingMethod):
         assert not frame.has_labels
         with (stopwatch or Stopwatch()).stage("read"):
             placed = PlacedScan(frame.read(), frame.time, frame.pose)
-            ready = self._recent.take(frame, placed)
+            ready = self._recent.push(frame, placed)
         return None if ready is None else self._judged(ready)
 
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
         while self.waiting:
-            yield self._judged(self._recent.give())
+            yield self._judged(self._recent.pop())
         self._recent = RecentFrames(self.window)
 
-    def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
+    def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         if judgement.known is not None and not judgement.known.any():
-            yield Oddity("nothing known", "no point of it is known")
+            yield ScanIssue("nothing known", "no point of it is known")
 
     def as_dict(self) -> dict[str, Any]:
         return {"method": "between", **asdict(self.dimmer)}

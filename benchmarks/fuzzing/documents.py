@@ -54,7 +54,7 @@ rain_share: 0.25
 simulated: true
 split: {train: ["00", "010"], validation: [], test: ["008"]}
 layout: {sequences: drives, scans: lidar, labels: truth, lidar: alone}
-folders_tell: classes
+auto_detect: classes
 """
 EXTRINSICS = (
     "{x: 0.5, y: 0.0, z: -0.7, roll: 0, pitch: 0, yaw: 1.5}",

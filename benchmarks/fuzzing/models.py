@@ -110,14 +110,14 @@ def _saying(path: Path, say: Callable[[dict[str, Any]], Any]) -> bytes:
     """A sound graph with odd metadata, whose checksum is right, so that its Spec is looked at."""
     import onnx
 
-    from derain.export.model_file import CHECKSUM_KEY, METADATA_KEY, NO_CHECKSUM, sealed
+    from derain.export.model_file import CHECKSUM_KEY, METADATA_KEY, NO_CHECKSUM, with_checksum
 
     proto = onnx.load(path)
     (entry,) = (entry for entry in proto.metadata_props if entry.key == METADATA_KEY)
     metadata = say(json.loads(entry.value) | {CHECKSUM_KEY: NO_CHECKSUM})
     entry.value = as_json(metadata).decode("utf-8", "replace")
     content = proto.SerializeToString()
-    return sealed(content) if NO_CHECKSUM.encode() in content else content
+    return with_checksum(content) if NO_CHECKSUM.encode() in content else content
 
 
 def _with_content(path: Path, generator: Random) -> bytes:

@@ -17,12 +17,12 @@ from derain.errors import reason_of
 from derain.evaluation.counts import ratio
 from derain.evaluation.scores import Scores, score
 from derain.export.bench.bench import scored_methods
-from derain.export.bench.contestants import Contestant, contestants
+from derain.export.bench.bench_entries import BenchEntry, bench_entries
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
-from derain.sources.training_record import overlap
+from derain.sources.training_record import training_overlap
 from derain.spec import Spec
 
 # Titles of the columns of what methods cost.
@@ -52,7 +52,7 @@ class Measurement:
     threads: int = 0
     repeats: int = 0
     left_out: LeftOut = field(default_factory=LeftOut)
-    rows: dict[str, Contestant] = field(default_factory=dict)
+    rows: dict[str, BenchEntry] = field(default_factory=dict)
 
     def columns(self) -> Iterator[Column]:
         """Every column that can be measured; labels measure alone."""
@@ -76,17 +76,17 @@ class Measurement:
 
     def _positions(
         self, title: str, data: LabelledData, finder: DataFinder
-    ) -> Iterator[Contestant]:
+    ) -> Iterator[BenchEntry]:
         """What has learnt places alone, of other scans of the same data."""
         for method, asked in self.plan.methods.items():
             if asked.is_position and not data.taken:
                 find = partial(finder.of_places, data)
                 others = self.left_out.unless_found(f"{method}: {title}", find)
                 if others is not None:
-                    yield from contestants({method: "position"}, others.truths)
+                    yield from bench_entries({method: "position"}, others.truths)
 
     def _of_labelled(
-        self, title: str, data: LabelledData, found: LabelledFrames, rows: Sequence[Contestant]
+        self, title: str, data: LabelledData, found: LabelledFrames, rows: Sequence[BenchEntry]
     ) -> Iterator[Column]:
         scans = map(found.read, tqdm(found.frames, desc=title, unit="scan", disable=None))
         of_rows = score(scored_methods(rows, self.threads), scans, found.card, found.distinct)
@@ -105,13 +105,15 @@ class Measurement:
         }
         yield Column(title, "IoU", cells, about)
 
-    def _learnt(self, row: Contestant, column: str, found: LabelledFrames) -> bool:
+    def _learnt(self, row: BenchEntry, column: str, found: LabelledFrames) -> bool:
         """Whether a method was trained on some of a column's scans: by its record, or as told."""
-        spec = row.judges_by
-        recorded = isinstance(spec, Spec) and overlap(row.title, spec, found.card, found.frames)
+        spec = row.spec_or_filter
+        recorded = isinstance(spec, Spec) and training_overlap(
+            row.title, spec, found.card, found.frames
+        )
         return bool(recorded) or column in self.plan.methods[row.title].learnt_from
 
-    def _of_clean(self, folder: str, rows: Sequence[Contestant]) -> Iterator[Column]:
+    def _of_clean(self, folder: str, rows: Sequence[BenchEntry]) -> Iterator[Column]:
         frames = self.left_out.unless_found(
             folder, lambda: named_frames([require(self.shared / folder)])
         )
@@ -120,11 +122,11 @@ class Measurement:
             if column := self.left_out.unless_found(frame.name, find):
                 yield column
 
-    def _of_clean_scan(self, frame: Frame, rows: Sequence[Contestant]) -> Column:
+    def _of_clean_scan(self, frame: Frame, rows: Sequence[BenchEntry]) -> Column:
         """The share of a scan's points that each method calls rain, of those that can be judged."""
         scan, cells = frame.read(), {}
         points = int(scan.valid.sum())
-        factors = [factor_for(row.judges_by, scan) for row in rows]
+        factors = [factor_for(row.spec_or_filter, scan) for row in rows]
         # One scan for each unit: filters share what they see of it.
         in_unit = {factor: scan.with_intensity_times(factor) for factor in factors}
         methods = scored_methods(rows, self.threads)
@@ -137,7 +139,7 @@ class Measurement:
                 cells[row.title] = _share(called, points)
         return Column(Path(frame.name).stem, "%", cells, {"scan": Path(frame.name).name})
 
-    def _times(self, found: LabelledFrames, rows: Sequence[Contestant]) -> Column:
+    def _times(self, found: LabelledFrames, rows: Sequence[BenchEntry]) -> Column:
         """Median milliseconds from the file to the mask, each method in a process of its own."""
         timing, cells = Timing(found.frames[:1], self.threads, self.repeats), {}
         for row in tqdm(rows, desc="timing", unit="method", disable=None):

@@ -9,7 +9,7 @@ from typing import TypeVar
 from benchmarks.sensor_table.plan import Asked
 from derain.cards.card import load_card
 from derain.errors import InputError
-from derain.export.bench.contestants import Contestant, GivenMethod, contestants
+from derain.export.bench.bench_entries import BenchEntry, GivenMethod, bench_entries
 from derain.export.methods import load_method_of_one_scan
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
@@ -40,7 +40,7 @@ class LeftOut:
 
 def rows_of(
     methods: Mapping[str, Asked], shared: Path, exported: Path, left_out: LeftOut
-) -> list[Contestant]:
+) -> list[BenchEntry]:
     """The methods that are the same for every column.
 
     Args:
@@ -50,20 +50,20 @@ def rows_of(
         left_out: Is told of methods that there are not.
     """
     asked_for = [
-        left_out.unless_found(title, partial(_contestant, title, asked, shared, exported))
+        left_out.unless_found(title, partial(_bench_entry, title, asked, shared, exported))
         for title, asked in methods.items()
         if not asked.is_position
     ]
     return [row for row in asked_for if row is not None]
 
 
-def _contestant(title: str, asked: Asked, shared: Path, exported: Path) -> Contestant:
+def _bench_entry(title: str, asked: Asked, shared: Path, exported: Path) -> BenchEntry:
     given: GivenMethod = asked.method
     if asked.weights:
         given = _published(asked, shared, exported)
     elif asked.set:
         given = load_method_of_one_scan(asked.method, asked.set)
-    (row,) = contestants({title: given})
+    (row,) = bench_entries({title: given})
     return row
 
 
@@ -77,7 +77,7 @@ def _published(asked: Asked, shared: Path, exported: Path) -> Path:
     return path
 
 
-def file_sizes(rows: Iterable[Contestant]) -> Iterator[tuple[str, int]]:
+def file_sizes(rows: Iterable[BenchEntry]) -> Iterator[tuple[str, int]]:
     """Title and bytes of the rows that are a file."""
     for row in rows:
         method = row.ready(1)

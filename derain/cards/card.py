@@ -19,7 +19,7 @@ Parsed = TypeVar("Parsed")
 
 # What the names of a data set's folders tell of scans that lie in such: nothing, what their classes
 # are called, or also which of the classes are rain.
-FoldersTell = Literal["nothing", "classes", "rain"]
+AutoDetect = Literal["nothing", "classes", "rain"]
 
 # What mean and std are of, in their order.
 CHANNELS_OF_STATISTICS = ("x", "y", "z", "intensity")
@@ -53,7 +53,7 @@ class DataCard:
             that writes many points twice are published.
         split: Sequences of ``train``, ``validation`` and ``test``; empty without an official split.
         layout: Where its scans and labels lie.
-        folders_tell: What may be concluded where folders are called as ``layout`` says and nobody
+        auto_detect: What may be concluded where folders are called as ``layout`` says and nobody
             names a card: ``nothing``; ``classes``, the names of the classes; or ``rain``, all that
             the card says.
         parts: Ids of the classes of each of several data sets that it is the card of, by name; no
@@ -75,7 +75,7 @@ class DataCard:
     deduplicate: bool = False
     split: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     layout: Layout = field(default_factory=Layout)
-    folders_tell: FoldersTell = "nothing"
+    auto_detect: AutoDetect = "nothing"
     parts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     @property
@@ -210,9 +210,13 @@ def _card(document: Entry) -> DataCard:
         "deduplicate": Entry.truth,
         "split": lambda entry: _each(entry, Entry.texts),
         "layout": Layout.of,
-        "folders_tell": _folders_tell,
+        "auto_detect": _auto_detect,
+        "folders_tell": _auto_detect,  # its name in earlier versions
     }
-    card = DataCard(**document.record(parsers, required=["name", "classes", "rain"]))
+    found = document.record(parsers, required=["name", "classes", "rain"])
+    if "folders_tell" in found:
+        found["auto_detect"] = found.pop("folders_tell")
+    card = DataCard(**found)
     members = document.members()
     if len(set(card.classes.values())) < len(card.classes):
         raise members["classes"].fault("two classes have the same name", "Give each its own.")
@@ -253,11 +257,11 @@ def _if_known(parser: Callable[[Entry], Parsed]) -> Callable[[Entry], Parsed | N
     return lambda entry: None if entry.value is None else parser(entry)
 
 
-def _folders_tell(entry: Entry) -> FoldersTell:
-    if entry.value not in get_args(FoldersTell):
-        raise entry.fault(f"is {shown(entry.value)}", f"Give {', '.join(get_args(FoldersTell))}.")
-    told: FoldersTell = entry.value
-    return told
+def _auto_detect(entry: Entry) -> AutoDetect:
+    if entry.value not in get_args(AutoDetect):
+        raise entry.fault(f"is {shown(entry.value)}", f"Give {', '.join(get_args(AutoDetect))}.")
+    detected: AutoDetect = entry.value
+    return detected
 
 
 def _each(entry: Entry, parser: Callable[[Entry], Parsed]) -> dict[str, Parsed]:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
-from derain.cards.card import DataCard, FoldersTell, load_card, packaged_cards
+from derain.cards.card import AutoDetect, DataCard, load_card, packaged_cards
 from derain.cards.layout import Layout
 from derain.files.labels import LABEL, label_beside
 from derain.files.names import scan_stem
@@ -16,16 +16,18 @@ USUAL_LABELS = Layout().labels
 @cache
 def known_layouts() -> tuple[Layout, ...]:
     """The layouts of the packaged data cards, those first whose folders tell most."""
-    cards = sorted(_packaged(), key=lambda card: _TOLD.index(card.folders_tell), reverse=True)
+    cards = sorted(
+        _packaged(), key=lambda card: _DETECTION_ORDER.index(card.auto_detect), reverse=True
+    )
     return tuple(dict.fromkeys(card.layout for card in cards))
 
 
-def card_by_folders(layout: Layout, tell: FoldersTell) -> DataCard | None:
+def card_by_folders(layout: Layout, least: AutoDetect) -> DataCard | None:
     """The packaged data card that may be concluded from folders called as a layout says.
 
     Args:
         layout: What the folders are called.
-        tell: What is asked of the card: ``classes`` or ``rain``.
+        least: What is asked of the card: ``classes`` or ``rain``.
 
     Returns:
         The card whose folders tell so much; None where none does.
@@ -35,7 +37,7 @@ def card_by_folders(layout: Layout, tell: FoldersTell) -> DataCard | None:
             card
             for card in _packaged()
             if card.layout.scans == layout.scans
-            and _TOLD.index(card.folders_tell) >= _TOLD.index(tell)
+            and _DETECTION_ORDER.index(card.auto_detect) >= _DETECTION_ORDER.index(least)
         ),
         None,
     )
@@ -82,4 +84,4 @@ def _packaged() -> tuple[DataCard, ...]:
 
 
 # From the least to the most that folders tell.
-_TOLD: tuple[FoldersTell, ...] = ("nothing", "classes", "rain")
+_DETECTION_ORDER: tuple[AutoDetect, ...] = ("nothing", "classes", "rain")

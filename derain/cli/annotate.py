@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from derain.cards.known import lidar_folders
 from derain.cli.arguments import factor
-from derain.cli.outputs import folder_sink, say
+from derain.cli.outputs import folder_sink, print_lines
 from derain.cli.scan_options import add_columns
 from derain.errors import InputError
 from derain.fusion.label_transfer import LABEL_WITHIN, UNKNOWN, transfer_labels
@@ -117,7 +117,7 @@ def main(arguments: argparse.Namespace) -> int:
         picture = arguments.out / f"{sequence}.png"
         _draw(source[len(source) // 2].read(), scene, plane, sequence, picture)
         report["picture"] = str(picture)
-    say(json.dumps(report) if arguments.json else _as_text(report))
+    print_lines(json.dumps(report) if arguments.json else _as_text(report))
     return 0
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from derain.cli.arguments import add_threads, command_line, count
 from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
-from derain.cli.outputs import say
+from derain.cli.outputs import print_lines
 from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.errors import InputError
 from derain.evaluation.published_tables import (
@@ -18,13 +18,13 @@ from derain.evaluation.published_tables import (
     paper_table,
     scans_by_group,
 )
-from derain.files.atomic import refuse_unwritable, replacing
+from derain.files.atomic import replacing, require_writable
 
 if TYPE_CHECKING:
     from derain.datamodules.loading import Part
     from derain.datamodules.scan_data import ScanData
     from derain.export.bench.bench import Bench
-    from derain.export.bench.contestants import Contestant, LearnFrom
+    from derain.export.bench.bench_entries import BenchEntry, LearnFrom
     from derain.export.bench.labelled_frames import LabelledFrames
     from derain.sources.frame import Frame
     from derain.sources.source import Frames
@@ -95,20 +95,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     from derain.datamodules.labelled import rain_rates
-    from derain.export.bench.contestants import contestants
-    from derain.export.bench.report import beside_published
+    from derain.export.bench.bench_entries import bench_entries
+    from derain.export.bench.report import with_published_rows
 
     data = labelled(arguments, arguments.data)
     rates = rain_rates(arguments.data, arguments.rain_rates)
-    methods = contestants(
+    methods = bench_entries(
         arguments.methods,
         _learn_from(arguments, data),
         runtime_of(arguments.runtime, arguments.precision),
     )
-    refuse_unwritable(arguments.out / "bench.json")
+    require_writable(arguments.out / "bench.json")
     if arguments.paper is None:
         scans = _labelled_frames(data, _frames(data, arguments.part), rates)
-        say(str(_bench(arguments, methods, scans, arguments.out)))
+        print_lines(str(_bench(arguments, methods, scans, arguments.out)))
         return 0
     _require_split(arguments, data)
     table = paper_table(arguments.paper)
@@ -117,16 +117,16 @@ def main(arguments: argparse.Namespace) -> int:
     for group, frames in groups.items():
         scans = _labelled_frames(data, frames, rates)
         ours[group] = _bench(arguments, methods, scans, arguments.out / group).rows
-    text = beside_published(table, ours, data.card)
+    text = with_published_rows(table, ours, data.card)
     with replacing(arguments.out / f"{arguments.paper}.md") as temporary:
         temporary.write_text(text + "\n", "utf-8")
-    say(text)
+    print_lines(text)
     return 0
 
 
 def _bench(
     arguments: argparse.Namespace,
-    methods: Sequence["Contestant"],
+    methods: Sequence["BenchEntry"],
     scans: "LabelledFrames",
     out: Path,
 ) -> "Bench":

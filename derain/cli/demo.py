@@ -4,10 +4,10 @@ import argparse
 from pathlib import Path
 
 from derain.cli.arguments import count
-from derain.cli.outputs import say
+from derain.cli.outputs import print_lines
 from derain.cli.scan_options import add_columns
 from derain.sources.folders import named_frames
-from derain.system.extras import OF_EXPORT, OF_TRAINING, OPEN3D, OPTUNA, require
+from derain.system.extras import EXPORT_LIBRARIES, OPEN3D, OPTUNA, TRAINING_LIBRARIES, require
 
 SUMMARY = "the whole story on simulated rain, in about six minutes"
 
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    require("demo", *OF_TRAINING, *OF_EXPORT, OPTUNA, OPEN3D)
+    require("demo", *TRAINING_LIBRARIES, *EXPORT_LIBRARIES, OPTUNA, OPEN3D)
     from derain.workflows.demo import DemoConfig, run_demo
 
     out, epochs = arguments.out, arguments.epochs
@@ -45,8 +45,9 @@ def main(arguments: argparse.Namespace) -> int:
     settings = {} if epochs is None else {"trainer.max_epochs": epochs}
     print(f"Simulated rain, from streets to a table. Everything goes to {out}/\n")
     run_demo(
-        DemoConfig(out, settings=settings, scan=arguments.scan, columns=arguments.columns), say
+        DemoConfig(out, settings=settings, scan=arguments.scan, columns=arguments.columns),
+        print_lines,
     )
-    say(f"Pictures: {out}/filters.png, before_after.png, bench/speed_error.png")
-    say(f"Training: tensorboard --logdir {out / 'runs'}")
+    print_lines(f"Pictures: {out}/filters.png, before_after.png, bench/speed_error.png")
+    print_lines(f"Training: tensorboard --logdir {out / 'runs'}")
     return 0

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cli.arguments import count, file_named, share, threads
-from derain.cli.outputs import say
+from derain.cli.outputs import print_lines
 from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_options import add_columns, add_intensity_scale
-from derain.system.extras import OF_EXPORT, require
+from derain.system.extras import EXPORT_LIBRARIES, require
 from derain.system.notices import Notices
 from derain.views.candidate_fit import RAIN_INSIDE
 from derain.views.channels import extra_channels, with_columns
@@ -80,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    require("export", *OF_EXPORT)
+    require("export", *EXPORT_LIBRARIES)
     from derain.bags.names import split
     from derain.errors import InputError
     from derain.export.latency import measure_latency
@@ -95,12 +95,12 @@ def main(arguments: argparse.Namespace) -> int:
     runtime = runtime_of(arguments.runtime, arguments.precision)
     model = load_model(arguments.checkpoint)
     calibration = _calibration(arguments)
-    _warn_of_odd(calibration, model.spec)
+    _warn_of_issues(calibration, model.spec)
     if arguments.candidates:
         _fit_candidates(model, arguments)
     proof = export(model, arguments.out, calibration, runtime)
     print(proof)
-    say(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
+    print_lines(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
     print(
         measure_latency(
             arguments.out,
@@ -134,7 +134,7 @@ def _calibration(arguments: argparse.Namespace) -> Collection["Scan"]:
 def _fit_candidates(model: "DerainingModule", arguments: argparse.Namespace) -> None:
     """Lets a model judge candidates alone, and says what they are and what they cost."""
     from derain.cli.labelled_data import labelled
-    from derain.export.candidates import candidates_of_findings
+    from derain.export.candidates import fit_network_candidates
     from derain.learning.task import EXAMPLE_SCANS
     from derain.sources.spread import evenly_spaced
 
@@ -142,18 +142,18 @@ def _fit_candidates(model: "DerainingModule", arguments: argparse.Namespace) -> 
 
     def read(frame: "Frame") -> "Scan":
         scan = data.read_measured(frame)
-        notices.tell(frame.name, model.spec.oddities(scan))
+        notices.warn(frame.name, model.spec.issues(scan))
         return with_columns(scan, extra_channels(model.channels))
 
     scans = map(read, evenly_spaced(data.frames("train"), EXAMPLE_SCANS))
     inside = RAIN_INSIDE if arguments.inside is None else arguments.inside
-    fitted = candidates_of_findings(model, scans, data.card, inside)
-    notices.tell_how_many_more()
+    fitted = fit_network_candidates(model, scans, data.card, inside)
+    notices.warn_of_repeats()
     model.adopt(replace(model.spec, candidates=fitted.candidates))
     print(fitted)
 
 
-def _warn_of_odd(scans: Iterable["Scan"], spec: "Spec") -> None:
+def _warn_of_issues(scans: Iterable["Scan"], spec: "Spec") -> None:
     """Warns of scans that do not suit the model.
 
     The proof would not tell: it has both models judge the same scans, in whatever unit.
@@ -161,9 +161,9 @@ def _warn_of_odd(scans: Iterable["Scan"], spec: "Spec") -> None:
     notices = Notices()
 
     def tell(scan: "Scan") -> None:
-        notices.tell(scan.name, spec.oddities(scan))
+        notices.warn(scan.name, spec.issues(scan))
 
     # Mapped, for a loop would hold on to one scan while the next is read.
     for _ in map(tell, scans):
         pass
-    notices.tell_how_many_more()
+    notices.warn_of_repeats()

@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from derain.cards.card import load_card
 from derain.cli.arguments import factor
-from derain.cli.outputs import folder_sink, say
+from derain.cli.outputs import folder_sink, print_lines
 from derain.cli.scan_options import add_columns
 from derain.errors import InputError
 from derain.files import write_scan
@@ -115,7 +115,7 @@ def main(arguments: argparse.Namespace) -> int:
     _write_metadata(arguments.out / LAYOUT.scans / METADATA, lidar, times, partners)
     alone = partners.count(None)
     folder = arguments.out / LAYOUT.scans
-    say(f"{len(lidar)} scans in {folder}, {alone} of them without a radar frame")
+    print_lines(f"{len(lidar)} scans in {folder}, {alone} of them without a radar frame")
     return 0
 
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from derain.cli.arguments import file_named
-from derain.cli.outputs import say
+from derain.cli.outputs import print_lines
 from derain.errors import InputError, did_you_mean
-from derain.system.extras import OF_CHECKPOINTS, require
+from derain.system.extras import CHECKPOINT_LIBRARIES, require
 
 DESCRIPTION = """\
 Makes a checkpoint of derain from published weights.
@@ -47,12 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    require("import-weights", *OF_CHECKPOINTS)
+    require("import-weights", *CHECKPOINT_LIBRARIES)
     from derain.cards.card import load_card
     from derain.models.checkpoint import save_model
     from derain.models.published import Published, read_state_dict
     from derain.models.registry import NETWORKS
-    from derain.sources.training_record import by_name
+    from derain.sources.training_record import record_of_sequences
 
     network = NETWORKS.get(arguments.network)
     if network is None or not issubclass(network, Published):
@@ -66,9 +66,9 @@ def main(arguments: argparse.Namespace) -> int:
     model = network.from_published(
         read_state_dict(arguments.weights), data.normalised_as(stats), arguments.grid
     )
-    model.adopt(replace(model.spec, training=by_name(data.split.get("train", ()))))
+    model.adopt(replace(model.spec, training=record_of_sequences(data.split.get("train", ()))))
     save_model(model, arguments.out)
-    say(
+    print_lines(
         f"Wrote {arguments.out}: {model.NAME} trained on {data.name}, "
         f"with the statistics of {stats.name}"
     )

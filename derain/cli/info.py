@@ -19,7 +19,7 @@ from derain.cli.info_bag import facts_of_bag
 from derain.cli.info_default import card_as_text
 from derain.cli.info_folder import draw, facts_of_folder
 from derain.cli.info_returns import facts_of_returns
-from derain.cli.outputs import say
+from derain.cli.outputs import print_lines
 from derain.cli.scan_options import ListFormats, add_columns
 from derain.default import DEFAULT, default_model, model_card
 from derain.errors import InputError, printable
@@ -28,13 +28,13 @@ from derain.files.labels import read_labels, semantic
 from derain.files.reading import reading
 from derain.scan import Scan
 from derain.sources.folders import frame_of, named_frames
-from derain.system.extras import MATPLOTLIB, OF_CHECKPOINTS, require
+from derain.system.extras import CHECKPOINT_LIBRARIES, MATPLOTLIB, require
 from derain.system.notices import warn
 from derain.views.candidates import candidates_at
 from derain.views.directions import directions
 from derain.views.grid_fit import fit_grid
 from derain.views.morton import distinct_rows
-from derain.views.oddities import no_points
+from derain.views.scan_issues import no_points
 
 DESCRIPTION = """\
 Describes scans, label files, bags, exported models and checkpoints. For a scan it also prints the
@@ -120,7 +120,7 @@ def _describe(name: str, arguments: argparse.Namespace) -> None:
         print(json.dumps({"file": str(path), **facts}))
     else:
         print(printable(str(path)))
-        say(_indented(_in_brief(facts)))
+        print_lines(_indented(_in_brief(facts)))
 
 
 def _refuse_unclear_picture(arguments: argparse.Namespace) -> None:
@@ -145,12 +145,12 @@ def _describe_default(arguments: argparse.Namespace) -> None:
     if arguments.json:
         print(json.dumps({"file": str(model), **card.as_dict()}))
     else:
-        say(card_as_text(card, model.stat().st_size))
+        print_lines(card_as_text(card, model.stat().st_size))
 
 
 def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
     facts = facts_of_folder(folder, arguments)
-    say(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
+    print_lines(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
     if arguments.card is not None and not facts.total.labelled:
         warn(
             f"{folder}: no labels are beside its scans or in a folder that the card names. Name "
@@ -175,7 +175,7 @@ def _facts(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
 
             return Derainer(path, threads=1).metadata
         case ".ckpt":
-            require(path, *OF_CHECKPOINTS)
+            require(path, *CHECKPOINT_LIBRARIES)
             from derain.models.checkpoint import load_model
 
             model = load_model(path)
@@ -191,8 +191,8 @@ def _facts(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
             card = None if arguments.card is None else load_card(arguments.card)
             frame = frame_of(path, arguments.columns, layouts_for(card))
             scan = frame.read()
-            for oddity in no_points(scan):
-                warn(f"{path}: {oddity.detail}")
+            for issue in no_points(scan):
+                warn(f"{path}: {issue.detail}")
             return {**_of_scan(scan), "returns": facts_of_returns(scan, frame, card)}
 
 

@@ -102,7 +102,7 @@ class FolderFacts:
     def _card_explained(self) -> str:
         if self.card is None:
             return "no data card"
-        if self.card_rests_on != FOLDER_NAMES or self.card.folders_tell == "rain":
+        if self.card_rests_on != FOLDER_NAMES or self.card.auto_detect == "rain":
             return self.card.name
         text = f"{self.card.name}, guessed from the names of the folders alone"
         labelled = self.total.labelled

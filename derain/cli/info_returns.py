@@ -28,7 +28,7 @@ def facts_of_returns(scan: Scan, frame: Frame, card: DataCard | None) -> dict[st
         rain = card.rain_of(scan.with_label(frame.read_label(len(scan))))
     counts = RayCounts.of(scan, returns, rain)
     facts = {
-        "told by": returns.told_by,
+        "told by": returns.found_by,
         "rays": counts.rays,
         "with two returns": counts.dual,
         "share": round(counts.dual_share, 4),

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from derain.cli.arguments import count, file_named
 from derain.cli.bag_options import add_topic, in_topic
-from derain.cli.outputs import say
+from derain.cli.outputs import print_lines
 from derain.cli.pose_options import add_poses
 from derain.cli.scan_options import add_columns
 from derain.cli.view_recording import refuse_unusable, write_and_report
 from derain.sources.method import Method
-from derain.system.extras import OF_EXPORT, OF_TRAINING, require
+from derain.system.extras import EXPORT_LIBRARIES, TRAINING_LIBRARIES, require
 from derain.workflows.learn_config import PERSISTENCE, STUDENTS, LearnConfig
 from derain.workflows.start import START_HELP
 
@@ -85,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    require("learn", *OF_TRAINING, *OF_EXPORT)
+    require("learn", *TRAINING_LIBRARIES, *EXPORT_LIBRARIES)
     from derain.workflows.learn import learn
 
     if arguments.rerun is not None:
@@ -103,11 +103,11 @@ def main(arguments: argparse.Namespace) -> int:
         card=arguments.card,
         start=arguments.start,
     )
-    results = learn(config, say)
+    results = learn(config, print_lines)
     if arguments.rerun is not None:
         _write_playback(config, arguments.rerun)
-    say(f"\n{results}\n\nReport: {results.path}")
-    say(f"Clean other scans: derain run {results.model} SCANS --out cleaned")
+    print_lines(f"\n{results}\n\nReport: {results.path}")
+    print_lines(f"Clean other scans: derain run {results.model} SCANS --out cleaned")
     return 0
 
 

@@ -14,7 +14,7 @@ from derain import __version__
 from derain.cli.parser import Parser
 from derain.cli.signals import interrupting
 from derain.errors import InputError, ScanWarning
-from derain.system.extras import OF_TRAINING, missing_extra, require
+from derain.system.extras import TRAINING_LIBRARIES, missing_extra, require
 
 DESCRIPTION = """\
 Takes the rain out of LiDAR and fused LiDAR + 4D-radar scans.
@@ -163,7 +163,7 @@ def _run_training(arguments: list[str]) -> int:
         print(short_help(arguments[0]))
         return 0
     require_configuration(arguments)
-    require(arguments[0], *OF_TRAINING)
+    require(arguments[0], *TRAINING_LIBRARIES)
     from derain.cli.training.train import train
 
     train(arguments)

@@ -12,7 +12,7 @@ from derain.export.methods import (
     CHECKPOINT_SUFFIX,
     PARAMETER_SUFFIXES,
     is_method_name,
-    what_to_give,
+    method_hint,
 )
 from derain.files.format import FORMATS
 from derain.files.names import scan_suffix
@@ -61,7 +61,7 @@ def method_and_scans(first: str, others: list[Path], command: str) -> tuple[str,
         raise InputError(
             first,
             "no such file",
-            f"{what_to_give(first)}, and scans after it; or scans alone.",
+            f"{method_hint(first)}, and scans after it; or scans alone.",
         )
     if not named and (not others or _may_be_scans(first)):
         return DEFAULT, [Path(first), *others]

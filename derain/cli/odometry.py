@@ -11,7 +11,7 @@ from tqdm import tqdm
 from derain.bags.names import within
 from derain.cli.arguments import add_threads
 from derain.cli.bag_options import add_topic
-from derain.cli.outputs import say, tell
+from derain.cli.outputs import print_facts, print_lines
 from derain.cli.scan_by_scan import ScanByScan, exit_code
 from derain.cli.scan_options import add_columns
 from derain.errors import printable
@@ -107,7 +107,7 @@ def main(arguments: argparse.Namespace) -> int:
     scans = ScanByScan(source)
 
     def show(frame: Frame, registration: Registration, stopwatch: Stopwatch) -> None:
-        tell(_registered(frame, registration, stopwatch), arguments.json)
+        print_facts(_registered(frame, registration, stopwatch), arguments.json)
 
     recordings = find_poses(
         source,
@@ -115,12 +115,12 @@ def main(arguments: argparse.Namespace) -> int:
         form=arguments.format,
         replace=arguments.replace,
         threads=arguments.threads,
-        guard=scans.passing_over,
+        guard=scans.skipping_failures,
         watch=show,
     )
     for found in recordings:
         if found.fault is None:
-            say(str(found), sys.stderr if arguments.json else None)
+            print_lines(str(found), sys.stderr if arguments.json else None)
         else:
             tqdm.write(f"derain: {found.fault}", sys.stderr)
     untrusted = sum(found.untrusted for found in recordings)

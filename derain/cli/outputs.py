@@ -35,13 +35,13 @@ def folder_sink(out: Path, source: Source, removed: Path | None = None) -> Folde
     return sink
 
 
-def tell(facts: "DataclassInstance", as_json: bool) -> None:
+def print_facts(facts: "DataclassInstance", as_json: bool) -> None:
     """Prints what was done to a scan, above a progress bar: a line of text, or an object."""
     tqdm.write(json.dumps(asdict(facts)) if as_json else str(facts), sys.stdout)
     sys.stdout.flush()  # whoever reads them through a pipe is told of each scan at once
 
 
-def say(text: str, stream: TextIO | None = None) -> None:
+def print_lines(text: str, stream: TextIO | None = None) -> None:
     """Prints lines, above a progress bar if there is one, with escapes for what no terminal shows.
 
     Args:
@@ -52,7 +52,7 @@ def say(text: str, stream: TextIO | None = None) -> None:
 
 
 @contextmanager
-def noting_what_is_written(so_far: Callable[[], str]) -> Iterator[None]:
+def noting_progress(so_far: Callable[[], str]) -> Iterator[None]:
     """Adds to the error of a closed pipe, as by ``| head``, what the command has written by then.
 
     Args:
@@ -65,7 +65,7 @@ def noting_what_is_written(so_far: Callable[[], str]) -> Iterator[None]:
         raise
 
 
-def refuse_taken(option: str, path: Path, written: Iterable[Path]) -> None:
+def require_free_path(option: str, path: Path, written: Iterable[Path]) -> None:
     """Refuses a file that would be in the way of what else a command writes.
 
     Args:

@@ -9,7 +9,7 @@ from derain.cli.arguments import number, whole
 from derain.errors import InputError, did_you_mean
 
 # Options of other programs that choose a GPU.
-OF_GPUS = {"--gpu", "--gpus", "--device", "--cuda", "--accelerator"}
+GPU_OPTIONS = {"--gpu", "--gpus", "--device", "--cuda", "--accelerator"}
 
 
 class Parser(argparse.ArgumentParser):
@@ -49,7 +49,7 @@ class Parser(argparse.ArgumentParser):
             if not name.startswith("--") or any(one.startswith(name) for one in options):
                 continue
             remedy = f"{did_you_mean(name, options)}`{self.prog} --help` lists its options."
-            if name in OF_GPUS:
+            if name in GPU_OPTIONS:
                 remedy = "Leave it out: derain runs models on the CPU."
             raise InputError(name, f"`{self.prog}` has no such option", remedy)
 

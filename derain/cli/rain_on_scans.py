@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.cli.outputs import noting_what_is_written, tell
+from derain.cli.outputs import noting_progress, print_facts
 from derain.cli.scan_by_scan import ScanByScan, exit_code
 from derain.errors import printable
 from derain.scan import Scan
@@ -20,7 +20,7 @@ from derain.sources.source import Source
 
 
 @dataclass(frozen=True)
-class Rained:
+class RainedScan:
     """What the rain did to one scan.
 
     Attributes:
@@ -68,13 +68,13 @@ def rain_on_scans(
         Exit code: 2 where a scan was passed over, else 0.
     """
     scans, written = ScanByScan(source), 0
-    with noting_what_is_written(lambda: f"{written:,} of {len(source):,} scans are written"):
+    with noting_progress(lambda: f"{written:,} of {len(source):,} scans are written"):
         for number, frame in enumerate(scans):
             generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
-            with scans.passing_over(frame):
+            with scans.skipping_failures(frame):
                 rained = _rain_on(frame, rain, sensor, generator, sink, picture)
                 written += 1
-                tell(rained, as_json)
+                print_facts(rained, as_json)
     return exit_code(len(scans.errors), len(source), "it could not rain on {scans}")
 
 
@@ -85,7 +85,7 @@ def _rain_on(
     generator: np.random.Generator,
     sink: FolderSink,
     picture: bool,
-) -> Rained:
+) -> RainedScan:
     clean = frame.read()
     rainy = rain_on_scan(clean, rain, sensor, generator)
     assert rainy.label is not None  # rain comes with labels
@@ -95,7 +95,7 @@ def _rain_on(
         path = sink.path(frame, ".png")
         _draw(path, rainy, drops, f"{Path(frame.key).name} in {rain.heaviest:g} mm/h")
     before, after, new = (int(rows.sum()) for rows in (clean.valid, rainy.valid, drops))
-    return Rained(frame.name, before, after, new, before - (after - new))
+    return RainedScan(frame.name, before, after, new, before - (after - new))
 
 
 def _draw(path: Path, rainy: Scan, drops: NDArray[np.bool_], what: str) -> None:

@@ -9,7 +9,7 @@ from derain.cli.arguments import add_threads, share
 from derain.cli.bag_options import add_cleaned_bags, add_topic, bag_options
 from derain.cli.method_options import add_parameters, method_of
 from derain.cli.method_or_scans import RULE, add_method_and_scans, method_and_scans
-from derain.cli.outputs import noting_what_is_written, refuse_taken, say, tell
+from derain.cli.outputs import noting_progress, print_facts, print_lines, require_free_path
 from derain.cli.pose_options import add_poses
 from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_by_scan import exit_code, print_error
@@ -22,7 +22,7 @@ from derain.cli.weather_options import (
 )
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError
-from derain.sources.clean_sink import CleanSink, refuse_improbable
+from derain.sources.clean_sink import CleanSink, require_probabilities
 from derain.sources.cleaned_bags import RAIN_PROBABILITY
 from derain.sources.cleaning import CleanedScan, CleaningObserver, CleanReport, clean
 from derain.sources.folders import named_frames
@@ -31,7 +31,7 @@ from derain.sources.recordings import irregularities
 from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
-from derain.views.oddities import MOST_RAIN, Oddity
+from derain.views.scan_issues import MOST_RAIN, ScanIssue
 from derain.workflows.odometry import placed
 
 DESCRIPTION = f"""\
@@ -112,17 +112,17 @@ def main(arguments: argparse.Namespace) -> int:
     method = method_of(name, arguments.parameters, settings, arguments.threads, runtime)
     source = _source(scans, arguments)
     if arguments.probability:
-        refuse_improbable(method, source)
+        require_probabilities(method, source)
     weather, table = weather_options(arguments), WeatherTable(arguments.weather)
     printer = _Printer(table, arguments.json)
     with _sink(source, arguments) as sink:
         if arguments.weather is not None:
-            refuse_taken("--weather", arguments.weather, sink.targets())
+            require_free_path("--weather", arguments.weather, sink.targets())
         if name == DEFAULT:
             printer.introduce_default()
         for sentence in irregularities(source, method.window):
             warn(sentence)
-        with table.open(), noting_what_is_written(sink.so_far):
+        with table.open(), noting_progress(sink.so_far):
             most_removed = arguments.most_removed
             report = clean(
                 source, method, sink, most_removed=most_removed, weather=weather, observer=printer
@@ -160,7 +160,7 @@ class _Printer(CleaningObserver):
 
     def introduce_default(self) -> None:
         """Prints which model cleans the scans where none is named."""
-        say(
+        print_lines(
             f"by the model that comes with derain: {model_card().title}; what it is, and when not "
             f"to use it: derain info {DEFAULT}",
             self._stream,
@@ -168,19 +168,19 @@ class _Printer(CleaningObserver):
 
     def summarise(self, report: CleanReport) -> None:
         """Prints what was done to all scans together."""
-        self._notices.tell_how_many_more()
+        self._notices.warn_of_repeats()
         if len(report.scans) > 1:
             print(report, file=self._stream, flush=True)
 
-    def judged(self, judgement: Judgement, odd: list[Oddity]) -> None:
+    def judged(self, judgement: Judgement, odd: list[ScanIssue]) -> None:
         """Warns of what is odd about a scan."""
         assert judgement.frame is not None
-        self._notices.tell(judgement.frame.name, odd)
+        self._notices.warn(judgement.frame.name, odd)
 
     def cleaned(self, judgement: Judgement, scan: CleanedScan) -> None:
         """Prints a line, and adds one to the table."""
         self._table.add(judgement, scan)
-        tell(scan, self._as_json)
+        print_facts(scan, self._as_json)
 
     def failed(self, error: InputError) -> None:
         """Prints why a scan is not cleaned."""

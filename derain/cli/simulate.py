@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from derain.cli.arguments import count
-from derain.cli.outputs import folder_sink, say
+from derain.cli.outputs import folder_sink, print_lines
 from derain.cli.scan_options import add_columns
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
@@ -60,7 +60,7 @@ LAYOUT_NAMES = (
 )
 
 # What only one of the three uses knows, and what it takes where nothing is said.
-OF_DATA_SETS = {
+DATA_SET_DEFAULTS = {
     "layout": "facility",
     "sequences": 10,
     "scans": 10,
@@ -70,8 +70,8 @@ OF_DATA_SETS = {
     "skew": False,
     "workers": usable_cores(),
 }
-OF_WORLDS = {"sequences": 10, "workers": usable_cores()}
-OF_SCANS = {"columns": DEFAULT_COLUMNS, "picture": False, "json": False}
+WORLD_DEFAULTS = {"sequences": 10, "workers": usable_cores()}
+SCAN_DEFAULTS = {"columns": DEFAULT_COLUMNS, "picture": False, "json": False}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -89,12 +89,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="name of a packaged sensor, or YAML file (default: mems_256, with --on spinning_64)",
     )
     parser.add_argument("--seed", type=int, default=0, help="random seed (default: %(default)s)")
-    _add_those_of_data_sets(parser.add_argument_group("a data set"))
-    _add_those_of_scans(parser.add_argument_group("rain on scans"))
+    _add_data_set_options(parser.add_argument_group("a data set"))
+    _add_scan_options(parser.add_argument_group("rain on scans"))
 
 
-def _add_those_of_data_sets(group: "argparse._ArgumentGroup") -> None:
-    default = {name: f"(default: {value})" for name, value in OF_DATA_SETS.items()}
+def _add_data_set_options(group: "argparse._ArgumentGroup") -> None:
+    default = {name: f"(default: {value})" for name, value in DATA_SET_DEFAULTS.items()}
     group.add_argument(
         "--layout",
         choices=LAYOUT_NAMES,
@@ -133,7 +133,7 @@ def _add_those_of_data_sets(group: "argparse._ArgumentGroup") -> None:
     )
 
 
-def _add_those_of_scans(group: "argparse._ArgumentGroup") -> None:
+def _add_scan_options(group: "argparse._ArgumentGroup") -> None:
     group.add_argument("--on", nargs="+", type=Path, metavar="SCAN_OR_DIR", help="clean scans")
     add_columns(group, default=None)
     group.add_argument(
@@ -149,21 +149,25 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.seed < 0:
         raise InputError("--seed", f"{arguments.seed} is negative", "Give 0 or more.")
     if arguments.on is not None:
-        _settle(arguments, OF_SCANS, foreign=[*OF_DATA_SETS, "world"], needs="without --on")
+        _apply_defaults(
+            arguments, SCAN_DEFAULTS, foreign=[*DATA_SET_DEFAULTS, "world"], needs="without --on"
+        )
         return _rain_on_scans(arguments)
     require("simulate", OPEN3D)
     if arguments.world is not None:
-        foreign = [name for name in (*OF_DATA_SETS, *OF_SCANS) if name not in OF_WORLDS]
+        foreign = [
+            name for name in (*DATA_SET_DEFAULTS, *SCAN_DEFAULTS) if name not in WORLD_DEFAULTS
+        ]
         foreign += ["rain", "sensor"]  # of which a world has its own
-        _settle(arguments, OF_WORLDS, foreign, needs="without --world")
+        _apply_defaults(arguments, WORLD_DEFAULTS, foreign, needs="without --world")
         return _simulate_worlds(arguments)
     if arguments.radar is None:
         arguments.radar = not (arguments.speed or arguments.traffic or arguments.skew)
-    _settle(arguments, OF_DATA_SETS, foreign=OF_SCANS, needs="with --on")
+    _apply_defaults(arguments, DATA_SET_DEFAULTS, foreign=SCAN_DEFAULTS, needs="with --on")
     return _simulate(arguments)
 
 
-def _settle(
+def _apply_defaults(
     arguments: argparse.Namespace, own: Mapping[str, Any], foreign: Collection[str], needs: str
 ) -> None:
     """Refuses the options of other uses, and fills in what was not said."""
@@ -210,7 +214,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
         drive=Drive(*moves) if any(moves) else None,
     )
     simulate_track(arguments.out, campaign, arguments.workers)
-    return _told(arguments.out, len(campaign.names), len(campaign.names) * campaign.scans)
+    return _print_result(arguments.out, len(campaign.names), len(campaign.names) * campaign.scans)
 
 
 def _simulate_worlds(arguments: argparse.Namespace) -> int:
@@ -221,9 +225,11 @@ def _simulate_worlds(arguments: argparse.Namespace) -> int:
     parts = partition(arguments.sequences)
     campaign = WorldCampaign(*parts, seed=arguments.seed, world=arguments.world)
     simulate_track(arguments.out, campaign, arguments.workers)
-    return _told(arguments.out, len(campaign.names), len(campaign.names))
+    return _print_result(arguments.out, len(campaign.names), len(campaign.names))
 
 
-def _told(out: Path, sequences: int, scans: int) -> int:
-    say(f"{out}: {sequences} sequences, {scans:,} scans. What is in them: derain info {out}")
+def _print_result(out: Path, sequences: int, scans: int) -> int:
+    print_lines(
+        f"{out}: {sequences} sequences, {scans:,} scans. What is in them: derain info {out}"
+    )
     return 0

@@ -12,7 +12,7 @@ from derain.cards.known import layouts_for
 from derain.cli.arguments import add_threads
 from derain.cli.bag_options import add_topic
 from derain.cli.method_options import add_method, add_parameters, method_of
-from derain.cli.outputs import say, tell
+from derain.cli.outputs import print_facts, print_lines
 from derain.cli.pose_options import add_poses
 from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_by_scan import ScanByScan, exit_code
@@ -131,8 +131,8 @@ def main(arguments: argparse.Namespace) -> int:
         source,
         arguments.out,
         card=card,
-        guard=scans.passing_over,
-        watch=lambda scan: tell(TaughtFacts.of(scan), arguments.json),
+        guard=scans.skipping_failures,
+        watch=lambda scan: print_facts(TaughtFacts.of(scan), arguments.json),
     )
     _show(results, sys.stderr if arguments.json else sys.stdout)
     failed = len(scans.errors)
@@ -141,10 +141,10 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _show(results: "TeachResults", stream: TextIO) -> None:
     """Prints the counts of all scans."""
-    say(f"{results.judged:,} scans\n{results.answers}", stream)
+    print_lines(f"{results.judged:,} scans\n{results.answers}", stream)
     record = results.record
     if record is not None and record.scans:
-        say(
+        print_lines(
             f"for the record only, beside {record.card.title}'s own labels of "
             f"{record.scans:,} scans, which changed nothing:\n{record}",
             stream,

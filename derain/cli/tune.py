@@ -18,19 +18,19 @@ from derain.cards.rain_found import require_rain
 from derain.cli.arguments import add_threads, command_line, count, file_named, share
 from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
-from derain.cli.outputs import say
+from derain.cli.outputs import print_lines
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.export.methods import PARAMETER_SUFFIXES
-from derain.files.atomic import refuse_unwritable, replacing
+from derain.files.atomic import replacing, require_writable
 from derain.filters import FILTERS, filter_from
 from derain.filters.parameters import CANDIDATES
-from derain.sources.training_record import overlap
+from derain.sources.training_record import training_overlap
 from derain.system.extras import OPTUNA, require
 from derain.system.notices import Notices
 from derain.views.candidate_fit import RAIN_INSIDE, fit_candidates
 from derain.views.candidates import Candidates
-from derain.views.oddities import Examiner, outside_view
+from derain.views.scan_issues import ScanChecker, outside_view
 
 if TYPE_CHECKING:
     from derain.datamodules.scan_data import ScanData
@@ -90,16 +90,16 @@ def main(arguments: argparse.Namespace) -> int:
     notices = Notices()
     data = labelled(arguments, arguments.data)
     frames = _drawn(data.frames(arguments.part), arguments.scans, arguments.seed)
-    refuse_unwritable(arguments.out)
+    require_writable(arguments.out)
     tune = _tuned_filter if arguments.method in FILTERS else _tuned_model
     tuned = tune(arguments, data, frames, notices)
-    notices.tell_how_many_more()
+    notices.warn_of_repeats()
     facts = (
         f"IoU {tuned.iou:.4f} on {len(frames)} scans of {data.card.name}, "
         f"{tuned.default_iou:.4f} with the defaults"
     )
     _write(arguments, tuned, facts)
-    say(f"{arguments.method}: {facts}")
+    print_lines(f"{arguments.method}: {facts}")
     for name, value in tuned.parameters.items():
         if name != CANDIDATES:  # they were said when they were found
             print(f"  {name}: {value}")
@@ -150,7 +150,7 @@ def _candidates(
             yield data.card.known_points(data.read_measured(frame))
 
     candidates = fit_candidates(known(), ("intensity",), arguments.candidates)
-    say(f"candidates: {candidates or 'every point, for no bounds tell rain from the rest'}")
+    print_lines(f"candidates: {candidates or 'every point, for no bounds tell rain from the rest'}")
     return candidates
 
 
@@ -175,10 +175,10 @@ def _tuned_model(
             known = scan.valid & ~data.card.unknown_of(scan)
             judgement = derainer.judge(scan)
             outside = outside_view(scan, judgement.judged, derainer.spec.data)
-            notices.tell(frame.name, outside)
+            notices.warn(frame.name, outside)
             yield judgement.probability[known], data.card.rain_of(scan)[known]
 
-    note = overlap(arguments.method, derainer.spec, data.card, frames)
+    note = training_overlap(arguments.method, derainer.spec, data.card, frames)
     if note is not None:
         tqdm.write(f"derain: warning: {note}", sys.stderr)
     scans = list(judged())
@@ -186,10 +186,10 @@ def _tuned_model(
     return tune_threshold(scans, derainer.spec.threshold)
 
 
-def _read(data: "ScanData", examiner: Examiner, notices: Notices, frame: "Frame") -> "Scan":
+def _read(data: "ScanData", checker: ScanChecker, notices: Notices, frame: "Frame") -> "Scan":
     """Reads a scan, and warns of what is odd about it for the method."""
     scan = data.read_measured(frame)
-    notices.tell(frame.name, examiner.oddities(scan))
+    notices.warn(frame.name, checker.issues(scan))
     return scan
 
 
@@ -201,7 +201,7 @@ def _drawn(frames: Sequence["Frame"], most: int, seed: int) -> list["Frame"]:
 
 
 def _write(arguments: argparse.Namespace, tuned: "Tuned", facts: str) -> None:
-    content = {"method": _seen_from(arguments.out.parent, arguments.method), **tuned.parameters}
+    content = {"method": _relative_to(arguments.out.parent, arguments.method), **tuned.parameters}
     with replacing(arguments.out) as temporary:
         temporary.write_text(
             f"# derain {__version__}: {command_line(arguments, 'method')}\n"
@@ -210,7 +210,7 @@ def _write(arguments: argparse.Namespace, tuned: "Tuned", facts: str) -> None:
         )
 
 
-def _seen_from(folder: Path, method: str) -> str:
+def _relative_to(folder: Path, method: str) -> str:
     """The method as a file in a folder names it: a model by the way from there to it."""
     if method == DEFAULT or method in FILTERS:
         return method

@@ -12,10 +12,10 @@ from tqdm import tqdm
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
 from derain.cli.bag_options import in_topic
-from derain.cli.outputs import say
+from derain.cli.outputs import print_lines
 from derain.errors import InputError
-from derain.export.methods import load_method, named_method, titled
-from derain.files.atomic import refuse_unwritable
+from derain.export.methods import load_method, named_method, split_title
+from derain.files.atomic import require_writable
 from derain.files.reading import reading
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
@@ -80,7 +80,7 @@ def refuse_unusable(out: Path) -> None:
     RERUN.load(out)
     if out.suffix.lower() != SUFFIX:
         raise InputError(out, f"must end in {SUFFIX}", "Rerun's viewer opens no other files.")
-    refuse_unwritable(out)
+    require_writable(out)
 
 
 def write_and_report(
@@ -100,7 +100,7 @@ def write_and_report(
     from derain.playback.playback import write_playback
 
     scans = len(selection.frames)
-    say(f"{scans:,} scans, methods: {', '.join(methods)}")
+    print_lines(f"{scans:,} scans, methods: {', '.join(methods)}")
     notices, errors = Notices(), set()
 
     @contextmanager
@@ -116,11 +116,11 @@ def write_and_report(
 
     def watch(title: str, judgement: Judgement) -> None:
         assert judgement.frame is not None
-        notices.tell(judgement.frame.name, methods[title].oddities(judgement), title)
+        notices.warn(judgement.frame.name, methods[title].issues(judgement), title)
 
     write_playback(out, selection, methods, labels, reporting, watch)
-    notices.tell_how_many_more()
-    say(f"{out}: {out.stat().st_size / 1e6:,.1f} MB. To view it: rerun {out}")
+    notices.warn_of_repeats()
+    print_lines(f"{out}: {out.stat().st_size / 1e6:,.1f} MB. To view it: rerun {out}")
     if errors:
         print(f"derain: not all of the {scans:,} scans could be shown", file=sys.stderr)
     return 2 if errors else 0
@@ -134,7 +134,7 @@ def _methods(names: Sequence[str], threads: int) -> dict[str, Method]:
     """
     methods: dict[str, Method] = {}
     for text in names:
-        title, name = titled(text)
+        title, name = split_title(text)
         if title in methods:
             raise InputError(
                 title, "is the title of two methods", "Give titles: `first=a.onnx second=dror`."

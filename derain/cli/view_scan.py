@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import layouts_for
 from derain.cli.bag_options import in_topic
-from derain.cli.outputs import say
+from derain.cli.outputs import print_lines
 from derain.errors import InputError
 from derain.sources.bag_frame import NUMBER, BagFrame
 from derain.sources.folders import frame_of
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
 from derain.system.notices import Notices
-from derain.views.oddities import outside_view
+from derain.views.scan_issues import outside_view
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from derain.export.bench.contestants import Contestant
+    from derain.export.bench.bench_entries import BenchEntry
     from derain.scan import Scan
     from derain.sources.frame import Frame
 
@@ -31,20 +31,20 @@ def view_scan(arguments: argparse.Namespace) -> None:
         InputError: A scan or labels that cannot be read, an unknown method, or an output that
             cannot be written.
     """
-    from derain.export.bench.contestants import contestants
+    from derain.export.bench.bench_entries import bench_entries
 
     path = in_topic(arguments.scans, arguments)[0]
     if not (arguments.out or arguments.window):
         raise InputError(path, "no output is named", "Give --out, --window or --rerun.")
     require("view", MATPLOTLIB, *((OPEN3D,) if arguments.window else ()))
-    methods = contestants(arguments.methods)
+    methods = bench_entries(arguments.methods)
     card = None if arguments.card is None else load_card(arguments.card)
     frame = frame_of(path, arguments.columns, layouts_for(card))
     scan = frame.with_intensity_times(arguments.intensity_scale).read()
     notices = Notices()
     for method in methods:
-        if method.judges_by is not None:
-            notices.tell(frame.name, method.judges_by.oddities(scan), method.title)
+        if method.spec_or_filter is not None:
+            notices.warn(frame.name, method.spec_or_filter.issues(scan), method.title)
     truth = None if card is None else _truth(scan, frame, card)
     predicted = {
         method.title: _rain(scan, method, arguments.threads, notices) for method in methods
@@ -59,7 +59,7 @@ def view_scan(arguments: argparse.Namespace) -> None:
         from derain.pictures.scan_pictures import save
 
         save(comparison_figure(scan, predicted, rain, title), arguments.out)
-        say(str(arguments.out))
+        print_lines(str(arguments.out))
     if arguments.window:
         from derain.pictures.comparison import show_comparison
 
@@ -71,12 +71,12 @@ def _shown(frame: "Frame", path: Path) -> str:
     if not isinstance(frame, BagFrame):
         return path.name
     if NUMBER.fullmatch(path.name) is None:
-        say(f"{frame.name} is drawn, the first of {len(frame.clouds):,} clouds")
+        print_lines(f"{frame.name} is drawn, the first of {len(frame.clouds):,} clouds")
     return str(frame.path.relative_to(frame.clouds.bag.path.parent))
 
 
 def _rain(
-    scan: "Scan", method: "Contestant", threads: int, notices: Notices
+    scan: "Scan", method: "BenchEntry", threads: int, notices: Notices
 ) -> "NDArray[np.bool_]":
     """Points that a method calls rain, bool (N,); warns of many points outside a model's view."""
     from derain.export.runtime import Derainer
@@ -87,7 +87,7 @@ def _rain(
         return judge(scan, Stopwatch())
     judgement = judge.judge(scan)
     outside = outside_view(scan, judgement.judged, judge.spec.data)
-    notices.tell(scan.name, outside, method.title)
+    notices.warn(scan.name, outside, method.title)
     return judgement.rain
 
 

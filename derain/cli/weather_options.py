@@ -12,7 +12,7 @@ import numpy as np
 
 from derain.cli.arguments import count
 from derain.errors import InputError
-from derain.files.atomic import refuse_unwritable, replacing
+from derain.files.atomic import replacing, require_writable
 from derain.files.reading import is_file, reading
 from derain.sources.cleaning import CleanedScan
 from derain.sources.folders import named_frames
@@ -21,7 +21,7 @@ from derain.sources.spread import evenly_spaced
 from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions, time_of
 from derain.system.notices import warn
 from derain.weather.alarm import ERROR, HOLD, WARNING, Level, Threshold
-from derain.weather.record import WEATHER_COLUMNS, row_of
+from derain.weather.record import WEATHER_COLUMNS, weather_row
 from derain.weather.scan_weather import ScanWeather, dry_reach
 from derain.weather.visibility import Visibility
 
@@ -141,7 +141,7 @@ class WeatherTable:
         if self.path is None:
             yield
             return
-        refuse_unwritable(self.path)
+        require_writable(self.path)
         self._add(TABLE_HEAD)
         try:
             yield
@@ -154,7 +154,7 @@ class WeatherTable:
         if self.path is None or scan.weather is None:
             return
         assert judgement.frame is not None
-        row = row_of(scan.weather, judgement.weather)
+        row = weather_row(scan.weather, judgement.weather)
         self._add([scan.scan, time_of(judgement.frame), *row])
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from derain.evaluation.counts import intersection_over_union
 from derain.scan import Scan
-from derain.views.oddities import Oddity, missing_intensity
+from derain.views.scan_issues import ScanIssue, missing_intensity
 
 # Most limits of intensity, and of range, that are tried.
 MOST_LIMITS = 200
@@ -38,7 +38,7 @@ class IntensityRule:
         dim: NDArray[np.bool_] = intensity <= self.intensity
         return dim & (scan.range <= self.range) & scan.valid
 
-    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+    def issues(self, scan: Scan) -> Iterator[ScanIssue]:
         """Warns of a scan without intensity. Its unit is not checked."""
         yield from missing_intensity(scan)
 

@@ -52,7 +52,7 @@ def replacing(path: Path) -> Iterator[Path]:
         ) from error
 
 
-def refuse_unwritable(path: Path) -> None:
+def require_writable(path: Path) -> None:
     """Refuses, before long work, a file that could not be written after it.
 
     Its folder is made if missing; an existing file stays as it is.

@@ -1,7 +1,7 @@
 """The content of a scan file, and the one bound on what it may expand to.
 
 A small file can claim or hold far more than any scan: counts in a header, zeros that compress a
-thousandfold. Whatever a reader makes room for, it takes from the file's `Room` first.
+thousandfold. Whatever a reader makes room for, it takes from the file's `MemoryBudget` first.
 """
 
 import gzip
@@ -18,7 +18,7 @@ LARGEST_SCAN = 2**30
 
 # Bytes that every file may expand to: 400,000 points of twenty columns. A frame that is nearly
 # empty, or constant in most of its columns, compresses to next to nothing.
-ALWAYS_ROOM = 2**26
+SMALLEST_BUDGET = 2**26
 
 # Any further expansion is bounded by the file's own size. Real scans compress to a half or a tenth.
 LARGEST_EXPANSION = 32
@@ -27,7 +27,7 @@ LARGEST_EXPANSION = 32
 MOST_COLUMNS = 1024
 
 
-class Room:
+class MemoryBudget:
     """Bytes that a file may still expand to.
 
     Args:
@@ -35,9 +35,9 @@ class Room:
     """
 
     def __init__(self, size: int) -> None:
-        self.left = min(LARGEST_SCAN, max(ALWAYS_ROOM, LARGEST_EXPANSION * size))
+        self.left = min(LARGEST_SCAN, max(SMALLEST_BUDGET, LARGEST_EXPANSION * size))
 
-    def take(self, size: int) -> None:
+    def reserve(self, size: int) -> None:
         """Sets bytes aside, before they are allocated.
 
         Raises:
@@ -55,12 +55,12 @@ class Content:
     Attributes:
         path: The file.
         data: Its bytes, decompressed where the file is compressed as a whole.
-        room: What they may expand to.
+        budget: What they may expand to.
     """
 
     path: Path
     data: bytes
-    room: Room
+    budget: MemoryBudget
 
 
 def read_content(path: Path) -> Content:
@@ -72,10 +72,10 @@ def read_content(path: Path) -> Content:
     """
     with reading(path, gzip.BadGzipFile, EOFError, zlib.error, ValueError):
         data = read_bytes(path, LARGEST_SCAN)
-        room = Room(len(data))
+        budget = MemoryBudget(len(data))
         if is_compressed(path):
-            data = _decompressed(data, room)
-        return Content(path, data, room)
+            data = _decompressed(data, budget)
+        return Content(path, data, budget)
 
 
 def compressed(data: bytes) -> bytes:
@@ -93,8 +93,8 @@ def check_columns(count: int) -> None:
         raise ValueError(f"{count:,} columns, more than {MOST_COLUMNS:,}")
 
 
-def _decompressed(data: bytes, room: Room) -> bytes:
+def _decompressed(data: bytes, budget: MemoryBudget) -> bytes:
     with gzip.GzipFile(fileobj=io.BytesIO(data)) as file:
-        plain = file.read(room.left + 1)
-    room.take(len(plain))
+        plain = file.read(budget.left + 1)
+    budget.reserve(len(plain))
     return plain

@@ -308,11 +308,11 @@ def parsed_yaml(text: str, largest: int = LARGEST_DOCUMENT, aliases: bool = Fals
     """
     if len(text) > largest:
         raise ValueError(f"more than {largest:,} characters")
-    _refuse_what_unfolds(text, largest // BYTES_PER_VALUE, aliases)
+    _refuse_expanding_aliases(text, largest // BYTES_PER_VALUE, aliases)
     return yaml.load(text, _Loader)
 
 
-def _refuse_what_unfolds(text: str, most: int, aliases: bool) -> None:
+def _refuse_expanding_aliases(text: str, most: int, aliases: bool) -> None:
     """Refuses a text whose values would take far more memory than it, before any are made."""
     depth = 0
     for number, event in enumerate(yaml.parse(text, _Loader)):

@@ -45,7 +45,7 @@ class Format(ABC):
         """Makes a scan of a file's content, one point per row of the file, in its order.
 
         Args:
-            content: The file. What is made of it beyond its own size takes its ``room`` first.
+            content: The file. What it expands to is reserved in its ``budget`` first.
             columns: Names of its columns, which count where the file does not name them itself.
 
         Raises:

@@ -14,7 +14,7 @@ from derain.filters.airborne import Around, fit_rain_bounds
 from derain.filters.filter_view import filter_view, rows_of
 from derain.filters.ground import find_ground
 from derain.filters.point_filter import PointFilter, RainAndJudged, Span
-from derain.filters.random_field import decide_in_turn
+from derain.filters.random_field import decide_sequentially
 from derain.filters.registry import FILTERS
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
@@ -23,7 +23,7 @@ from derain.views.channels import filled_values
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
 from derain.views.neighbours import Neighbourhoods
-from derain.views.oddities import Oddity, intensity_of_another_scale, missing_intensity
+from derain.views.scan_issues import ScanIssue, intensity_of_another_scale, missing_intensity
 from derain.views.scatter import scatter_through_space
 
 Variant = Literal["fitted", "published"]
@@ -54,10 +54,10 @@ class CRF(PointFilter):
     a plane and 1/3 where they are scattered alike in all directions
     (:func:`derain.views.scatter.scatter_through_space`). F is scaled to -1..1; above 0.6 the
     point is rain, up to -0.4 it is not, and between them
-    :func:`derain.filters.random_field.decide_in_turn` says, in the order of azimuth from behind the
-    sensor once around it. That is the order of files which a spinning sensor wrote, by which the
-    authors' program goes; but it does not depend on the file, save that of equally near neighbours
-    the one of the lower row comes first.
+    :func:`derain.filters.random_field.decide_sequentially` says, in the order of azimuth from
+    behind the sensor once around it. That is the order of files which a spinning sensor wrote, by
+    which the authors' program goes; but it does not depend on the file, save that of equally near
+    neighbours the one of the lower row comes first.
 
     Variant ``published`` has its authors' bounds, which are for one sensor on one car and its unit
     of intensity: ``intensity``, ``range`` and ``sensor_height`` above the ground. It scales F from
@@ -149,7 +149,7 @@ class CRF(PointFilter):
         with stopwatch.stage("view"):
             first, inverse = distinct_rows(scan)
             view = filter_view(self.neighbours, threads)
-            points = filled_values(scan, first, view.channels, view.stand_in)
+            points = filled_values(scan, first, view.channels, view.fill_value)
             search = NeighbourSearch(points[:, :3], rank=first, threads=threads)
         with stopwatch.stage("network"):
             rain = self._rain(points, partial(search, self.neighbours))
@@ -158,7 +158,7 @@ class CRF(PointFilter):
         with stopwatch.stage("back"):
             return rows_of(rain, inverse), inverse >= 0
 
-    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+    def issues(self, scan: Scan) -> Iterator[ScanIssue]:
         """What is odd about a scan: no intensity, or another unit than the published bound's."""
         yield from missing_intensity(scan)
         if self.variant == "published":
@@ -190,7 +190,7 @@ class CRF(PointFilter):
         feature = np.full(len(points), -1.0)
         feature[rows] = self._feature(scatter, spacing, intensity[rows].astype(np.float64))
         place = _along_the_sweep(xyz.take(rows, axis=0))
-        return decide_in_turn(feature, rows, place, neighbours, distances, self.vote)
+        return decide_sequentially(feature, rows, place, neighbours, distances, self.vote)
 
     def _is_candidate(
         self,
@@ -204,7 +204,7 @@ class CRF(PointFilter):
             is_near = (distance <= self.range) & (xyz[:, 2] >= -self.sensor_height)
             return is_near & (intensity <= self.intensity)
         ground = find_ground(xyz)
-        above = np.ones(len(xyz), bool) if ground is None else ground.stands_out(xyz)
+        above = np.ones(len(xyz), bool) if ground is None else ground.is_above(xyz)
         bounds = fit_rain_bounds(xyz, intensity, above, around, self.sparseness, self.reach)
         if bounds is None:
             return np.zeros(len(xyz), bool)

@@ -17,8 +17,8 @@ from derain.sources.method import Method
 from derain.system.cores import threads_of
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
-from derain.views.oddities import Oddity
-from derain.views.one_viewpoint import unlike_one_viewpoint
+from derain.views.one_viewpoint import viewpoint_issues
+from derain.views.scan_issues import ScanIssue
 from derain.views.window import Window
 from derain.weather.scan_weather import ScanWeather
 
@@ -104,7 +104,7 @@ class FilterDerainer(Method):
         """How many frames were pushed and not answered for: none, a filter sees one at a time."""
         return 0
 
-    def starts_anew(self, frame: Frame) -> bool:
+    def starts_new_recording(self, frame: Frame) -> bool:
         """Whether pushing a frame would let go of those that wait: none do."""
         return False
 
@@ -131,10 +131,10 @@ class FilterDerainer(Method):
         """Answers for the frames that wait for others after them: none do."""
         return iter(())
 
-    def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
+    def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """What is odd about a scan for the filter, or for whatever looks at places."""
-        yield from unlike_one_viewpoint(judgement.scan)
-        yield from self.filter.oddities(judgement.scan)
+        yield from viewpoint_issues(judgement.scan)
+        yield from self.filter.issues(judgement.scan)
 
     def as_dict(self) -> dict[str, Any]:
         """The filter's name and parameters, and its candidates if it has any."""

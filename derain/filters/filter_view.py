@@ -26,7 +26,7 @@ def filter_view(neighbours: int, threads: int = 0) -> NeighbourView:
     """
     # In a scan without intensity every point has NaN for it, and no comparison with NaN is true: a
     # filter that judges by intensity finds nothing there.
-    return NeighbourView(neighbours, stand_in={"intensity": math.nan}, threads=threads)
+    return NeighbourView(neighbours, fill_value={"intensity": math.nan}, threads=threads)
 
 
 def rain_among(

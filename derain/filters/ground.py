@@ -69,7 +69,7 @@ class Ground:
         height: NDArray[np.float64] = z - (self.slope_x * x + self.slope_y * y + self.offset)
         return height
 
-    def stands_out(self, xyz: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
+    def is_above(self, xyz: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
         """True for points that stand out of the ground, bool (M,).
 
         Args:

@@ -18,7 +18,7 @@ from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.neighbours import Neighbourhoods
-from derain.views.oddities import Oddity
+from derain.views.scan_issues import ScanIssue
 
 # The most that a filter may look at. No published one looks at more than 51, and a search for
 # thousands would fill the memory.
@@ -123,7 +123,7 @@ class PointFilter(ABC):
         with stopwatch.stage("back"):
             return view.back(rain.astype(np.float32)) > 0, view.judged
 
-    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+    def issues(self, scan: Scan) -> Iterator[ScanIssue]:
         """What is odd about a scan for this filter; nothing, for one that looks at places alone.
 
         Args:

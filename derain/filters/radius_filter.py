@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.filters.crowding import few_around
 from derain.filters.filter_view import rows_of
+from derain.filters.neighbour_counts import has_few_neighbours
 from derain.filters.point_filter import PointFilter, RainAndJudged
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
@@ -55,11 +55,11 @@ class RadiusFilter(PointFilter):
             xyz = scan.xyz.take(first, axis=0)
         with stopwatch.stage("network"):
             among = None if candidates is None else candidates.among(scan)[first]
-            few = self.judge_alone(xyz, threads, among)
+            few = self.judge_without_neighbours(xyz, threads, among)
         with stopwatch.stage("back"):
             return rows_of(few, inverse), inverse >= 0
 
-    def judge_alone(
+    def judge_without_neighbours(
         self, xyz: NDArray[np.float32], threads: int, candidate: NDArray[np.bool_] | None = None
     ) -> NDArray[np.bool_]:
         """Says the same without the neighbours of every point, which is faster.
@@ -72,4 +72,4 @@ class RadiusFilter(PointFilter):
         Returns:
             True for rain, bool (M,).
         """
-        return few_around(xyz, self.radius_at(xyz), self.neighbours, threads, candidate)
+        return has_few_neighbours(xyz, self.radius_at(xyz), self.neighbours, threads, candidate)

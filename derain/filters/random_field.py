@@ -10,10 +10,10 @@ CERTAIN, RULED_OUT = 0.6, -0.4
 
 # What a neighbour says is divided by its distance and this, metres.
 # Source: CRFOR.
-AT_LEAST_APART = 0.01
+DISTANCE_FLOOR = 0.01
 
 
-def decide_in_turn(
+def decide_sequentially(
     feature: NDArray[np.float64],
     rows: NDArray[np.int64],
     place: NDArray[np.int64],
@@ -49,17 +49,17 @@ def decide_in_turn(
     # A row for the nearest neighbours of all points, one for the next, and so on.
     others = np.ascontiguousarray(neighbours.take(uncertain, axis=0)[:, 1:].T)
     apart = np.array(distances.take(uncertain, axis=0)[:, 1:].T, np.float64, order="C")
-    weights = 1 / (AT_LEAST_APART + apart)
+    weights = 1 / (DISTANCE_FLOOR + apart)
     is_earlier = _by_point(len(feature), rows, place)[others] < place
-    feature_said = np.where(rain, vote, np.where(feature < RULED_OUT, -vote, feature))[others]
-    at_most = np.where(is_earlier, vote, feature_said) * weights
-    at_least = np.where(is_earlier, -vote, feature_said) * weights
+    feature_votes = np.where(rain, vote, np.where(feature < RULED_OUT, -vote, feature))[others]
+    at_most = np.where(is_earlier, vote, feature_votes) * weights
+    at_least = np.where(is_earlier, -vote, feature_votes) * weights
     own = feature[rows]
     is_rain = _total(own, at_most) > 0
     open_ = np.flatnonzero(is_rain & (_total(own, at_least) <= 0))
     number = _by_point(len(feature), rows, np.arange(len(rows)))[others[:, open_]]
-    hearing = _Hearing(number, is_earlier[:, open_], len(rows))
-    _turn_in_waves(is_rain, open_, own[open_], at_most[:, open_], at_least[:, open_], hearing)
+    dependents = _Dependents(number, is_earlier[:, open_], len(rows))
+    _turn_in_waves(is_rain, open_, own[open_], at_most[:, open_], at_least[:, open_], dependents)
     rain[rows] = is_rain
     return rain
 
@@ -68,9 +68,9 @@ def _turn_in_waves(
     is_rain: NDArray[np.bool_],
     open_: NDArray[np.int64],
     own: NDArray[np.float64],
-    said: NDArray[np.float64],
+    votes: NDArray[np.float64],
     at_least: NDArray[np.float64],
-    hearing: "_Hearing",
+    dependents: "_Dependents",
 ) -> None:
     """Turns what is taken for rain and is none, until nothing turns any more.
 
@@ -78,17 +78,17 @@ def _turn_in_waves(
         is_rain: What the U uncertain points are taken for, bool (U,); decided in place.
         open_: Numbers of the H points whose verdicts are open, int64 (H,).
         own: Their features, float64 (H,).
-        said: What is said to them while all before them are rain, float64 (k - 1, H); changed in
+        votes: What is said to them while all before them are rain, float64 (k - 1, H); changed in
             place.
         at_least: What is said to them where none before them is, float64 (k - 1, H).
-        hearing: Which of them hear of whose decision.
+        dependents: Which of them hear of whose decision.
     """
     turned = np.flatnonzero(~is_rain)
     while len(turned):
-        column, hearer = hearing.of(turned)
-        said[column, hearer] = at_least[column, hearer]
-        asked = np.unique(hearer[is_rain[open_[hearer]]])
-        turned = open_[asked[_total(own[asked], said[:, asked]) <= 0]]
+        column, dependent = dependents.of(turned)
+        votes[column, dependent] = at_least[column, dependent]
+        asked = np.unique(dependent[is_rain[open_[dependent]]])
+        turned = open_[asked[_total(own[asked], votes[:, asked]) <= 0]]
         is_rain[turned] = False
 
 
@@ -99,7 +99,7 @@ def _by_point(points: int, rows: NDArray[np.int64], values: NDArray[np.int64]) -
     return by_point
 
 
-def _total(own: NDArray[np.float64], said: NDArray[np.float64]) -> NDArray[np.float64]:
+def _total(own: NDArray[np.float64], votes: NDArray[np.float64]) -> NDArray[np.float64]:
     """What points have of themselves and what is said to each, from the nearest neighbour on.
 
     Sums that are rounded in one order keep the order of their terms: where less is said, the total
@@ -107,15 +107,15 @@ def _total(own: NDArray[np.float64], said: NDArray[np.float64]) -> NDArray[np.fl
 
     Args:
         own: float64 (U,).
-        said: float64 (k - 1, U).
+        votes: float64 (k - 1, U).
     """
     total = own.copy()
-    for heard in said:
-        total += heard
+    for vote in votes:
+        total += vote
     return total
 
 
-class _Hearing:
+class _Dependents:
     """Who hears of the decision on each of U uncertain points.
 
     Args:
@@ -129,7 +129,7 @@ class _Hearing:
     ) -> None:
         of = neighbours[is_earlier]
         order = np.argsort(of, kind="stable")
-        self._column, self._hearer = (place[order] for place in np.nonzero(is_earlier))
+        self._column, self._dependent = (place[order] for place in np.nonzero(is_earlier))
         count = np.bincount(of, minlength=uncertain)
         self._end = np.cumsum(count)
         self._start = self._end - count
@@ -147,4 +147,4 @@ class _Hearing:
         count = end - start
         before = np.cumsum(count) - count
         listed = np.repeat(start - before, count) + np.arange(count.sum())
-        return self._column[listed], self._hearer[listed]
+        return self._column[listed], self._dependent[listed]

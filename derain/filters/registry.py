@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from derain.errors import InputError, did_you_mean
 from derain.files.documents import short
-from derain.system.registry import Registry, made_of
+from derain.system.registry import Registry, from_parameters
 
 if TYPE_CHECKING:
     from derain.filters.point_filter import PointFilter
@@ -26,4 +26,4 @@ def filter_from(name: str, parameters: Mapping[str, Any]) -> "PointFilter":
     if name not in FILTERS:
         remedy = f"{did_you_mean(name, FILTERS)}Give one of {', '.join(FILTERS)}."
         raise InputError(short(name), "no such filter", remedy)
-    return made_of(FILTERS[name], name, parameters)
+    return from_parameters(FILTERS[name], name, parameters)

@@ -12,7 +12,7 @@ from derain.filters.point_filter import TUNED_NEIGHBOURS, PointFilter, Span
 from derain.filters.registry import FILTERS
 from derain.scan import Scan
 from derain.views.neighbours import Neighbourhoods
-from derain.views.oddities import Oddity, intensity_of_another_scale, missing_intensity
+from derain.views.scan_issues import ScanIssue, intensity_of_another_scale, missing_intensity
 
 
 @FILTERS.add("ssr")
@@ -65,7 +65,7 @@ class SSR(PointFilter):
             energy += np.square(intensity[neighbour] * np.square(distance + 1))
         return math.sqrt(k) * np.sqrt(energy) < self.threshold
 
-    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+    def issues(self, scan: Scan) -> Iterator[ScanIssue]:
         """What is odd about a scan: no intensity, or one in another unit than the threshold's."""
         yield from missing_intensity(scan)
         yield from intensity_of_another_scale(scan, self.FULL_SCALE, self.name)

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from derain.cards.card import DataCard
 from derain.scan import Scan
-from derain.views.view import IGNORED, BackProjection, SeenScan
+from derain.views.view import IGNORED, BackProjection, ViewedScan
 
 # What is timed of the making of a batch: reading files, and viewing what was read, its augmentation
 # and packing included.
@@ -30,7 +30,7 @@ class Sample:
     """
 
     scan: Scan
-    view: SeenScan
+    view: ViewedScan
     target: Tensor | None
     measured: bool = True
     key: str = ""
@@ -38,7 +38,7 @@ class Sample:
 
     @classmethod
     def of(
-        cls, scan: Scan, view: SeenScan, card: DataCard, measured: bool = True, key: str = ""
+        cls, scan: Scan, view: ViewedScan, card: DataCard, measured: bool = True, key: str = ""
     ) -> "Sample":
         """Gives a view its target, by the labels of its scan if there are any.
 
@@ -103,7 +103,7 @@ class Batch:
                 for sample in samples
                 if sample.measured
             ],
-            milliseconds=added_up([sample.milliseconds for sample in samples]),
+            milliseconds=summed_times([sample.milliseconds for sample in samples]),
         )
 
     def to(self, device: torch.device, non_blocking: bool = False) -> "Batch":
@@ -122,7 +122,7 @@ class Batch:
         return list(torch.split(scores, list(self.cells)))
 
 
-def added_up(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:
+def summed_times(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Adds up how long several things took, by the names of what is timed of them."""
     return {
         name: sum(part.get(name, 0.0) for part in parts)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from derain.sources.training_record import by_parts
+from derain.sources.training_record import record_of_parts
 from derain.spec import Spec
 
 # What a Spec's record of training has the models under that it began from, the first one first.
@@ -21,7 +21,7 @@ class Start:
     name: str
     spec: Spec
 
-    def passed_on(self, spec: Spec) -> Spec:
+    def inherited_spec(self, spec: Spec) -> Spec:
         """The Spec of a model that begins from it, on data of its own.
 
         View, units, normalisation and rule are the start's, to which its weights belong. The record
@@ -31,7 +31,7 @@ class Start:
             spec: What the model's Spec would be without a start.
         """
         records = [(self.spec.data, self.spec.training), (spec.data, spec.training)]
-        together = by_parts(
+        together = record_of_parts(
             (data, {kind: names for kind, names in record.items() if kind != STARTED_FROM})
             for data, record in records
         )

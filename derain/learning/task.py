@@ -67,7 +67,7 @@ class Learner(Protocol):
     def spec_for(self, card: DataCard, scans: Sequence[Scan]) -> Spec:
         """How it is used on a data set, fitted to some training scans."""
 
-    def take(self, task: Task) -> None:
+    def adopt_task(self, task: Task) -> None:
         """Takes over what was agreed."""
 
 
@@ -100,7 +100,7 @@ class ReadableScans(Protocol):
         """Some of them, spread over all."""
 
 
-def agree(model: Learner, data: TrainingData, training: bool = True) -> Task:
+def agree_on_task(model: Learner, data: TrainingData, training: bool = True) -> Task:
     """Settles how a model and its data work together, and gives it to both.
 
     Lightning's trainer has it done by the model's ``setup`` wherever there is a data module. It is
@@ -123,10 +123,10 @@ def agree(model: Learner, data: TrainingData, training: bool = True) -> Task:
         scans = list(data.training_scans(EXAMPLE_SCANS, columns, labelled))
         spec = replace(model.spec_for(data.card, scans), training=data.training_record())
         if model.start is not None:
-            spec = model.start.passed_on(spec)
+            spec = model.start.inherited_spec(spec)
     else:
         spec = model.spec
     task = Task(data.card, spec, labelled)
-    model.take(task)
+    model.adopt_task(task)
     data.task = task
     return task

@@ -14,19 +14,19 @@ from derain.files.documents import shown
 from derain.methods.recording_method import RecordingMethod
 from derain.methods.registry import METHODS
 from derain.odometry.recordings import FrameOdometry
-from derain.persistence.evidence import together
+from derain.persistence.evidence import combined_log_odds
 from derain.persistence.points import ScanPoints
-from derain.persistence.rays import RayEvidence, ask_rays, mean_evidence
+from derain.persistence.rays import RayEvidence, mean_evidence, ray_evidence
 from derain.persistence.vote import vote
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.judgement import Judgement
 from derain.sources.recent_frames import FrameInWindow, RecentFrames
 from derain.system.cores import threads_of
-from derain.system.registry import made_of
+from derain.system.registry import from_parameters
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import Oddity
-from derain.views.one_viewpoint import unlike_one_viewpoint
+from derain.views.one_viewpoint import viewpoint_issues
+from derain.views.scan_issues import ScanIssue
 from derain.views.window import PlacedScan, Window, WindowOfScans
 
 # Scans kept at a time are bounded: each takes some 30 MB with its neighbours and rays.
@@ -110,7 +110,7 @@ class PersistenceDerainer(RecordingMethod):
     """
 
     HELP: ClassVar[str] = "rain is not where it was: rays of other scans went through its place"
-    EXAMINED_OF: ClassVar[int] = 1  # any scan may be one whose place is not known
+    EXAMINE_EVERY: ClassVar[int] = 1  # any scan may be one whose place is not known
 
     def __init__(self, persistence: Persistence = Persistence(), threads: int = 0) -> None:
         self.persistence = persistence
@@ -124,7 +124,7 @@ class PersistenceDerainer(RecordingMethod):
         Raises:
             InputError: A parameter that it does not have, or a value that it cannot have.
         """
-        return cls(made_of(Persistence, "persistence", parameters), threads)
+        return cls(from_parameters(Persistence, "persistence", parameters), threads)
 
     @property
     def window(self) -> Window:
@@ -136,9 +136,9 @@ class PersistenceDerainer(RecordingMethod):
         """How many frames were pushed and are not answered for."""
         return self._recent.waiting
 
-    def starts_anew(self, frame: Frame) -> bool:
+    def starts_new_recording(self, frame: Frame) -> bool:
         """Whether a frame does not follow those that wait."""
-        return self.waiting > 0 and self._recent.starts_anew(frame)
+        return self.waiting > 0 and self._recent.starts_new_recording(frame)
 
     def push(
         self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
@@ -157,7 +157,7 @@ class PersistenceDerainer(RecordingMethod):
             pose, stretch = self._place(frame, scan)
         with stopwatch.stage("view"):
             self._placed[scan] = _Placed(ScanPoints.of(scan, self.threads), pose, stretch)
-        ready = self._recent.take(frame, PlacedScan(scan))
+        ready = self._recent.push(frame, PlacedScan(scan))
         return None if ready is None else self._judged(ready, stopwatch)
 
     def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
@@ -167,15 +167,15 @@ class PersistenceDerainer(RecordingMethod):
             stopwatch: Takes the times of the stages network and back.
         """
         while self.waiting:
-            yield self._judged(self._recent.give(), stopwatch or Stopwatch())
+            yield self._judged(self._recent.pop(), stopwatch or Stopwatch())
         self._end_recording()
 
-    def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
+    def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """What is odd about a scan: its places, nothing known of it, or no pose to be trusted."""
-        yield from unlike_one_viewpoint(judgement.scan)
+        yield from viewpoint_issues(judgement.scan)
         yield from self._doubts.get(judgement.scan, ())
         if judgement.known is not None and not judgement.known.any() and judgement.judged.any():
-            yield Oddity(
+            yield ScanIssue(
                 "nothing is known for sure",
                 "no scan before or after it tells anything: it is judged by itself",
             )
@@ -192,32 +192,32 @@ class PersistenceDerainer(RecordingMethod):
         self._recent = RecentFrames(self.window)
         self._odometry = FrameOdometry(self.threads)
         self._placed: WeakKeyDictionary[Scan, _Placed] = WeakKeyDictionary()
-        self._doubts: WeakKeyDictionary[Scan, list[Oddity]] = WeakKeyDictionary()
+        self._doubts: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()
         self._stretch = 0
         self._poses_are_told: bool | None = None  # not before the first frame
 
     def _place(self, frame: Frame, scan: Scan) -> tuple[NDArray[np.float64], int]:
         """Where a frame was taken, and in which stretch of its recording."""
-        pose = self._told_pose(frame, scan)
+        pose = self._given_pose(frame, scan)
         told = pose is not None
-        if self._poses_are_told not in (None, told) or self._recent.starts_anew(frame):
+        if self._poses_are_told not in (None, told) or self._recent.starts_new_recording(frame):
             self._stretch += 1  # another world
         self._poses_are_told = told
         if pose is not None:
             return pose, self._stretch
-        registration = self._odometry.take(frame, scan)
-        self._doubts.setdefault(scan, []).extend(registration.oddities())
+        registration = self._odometry.register(frame, scan)
+        self._doubts.setdefault(scan, []).extend(registration.issues())
         if not registration.trusted:
             self._stretch += 1
         return registration.pose, self._stretch
 
-    def _told_pose(self, frame: Frame, scan: Scan) -> NDArray[np.float64] | None:
+    def _given_pose(self, frame: Frame, scan: Scan) -> NDArray[np.float64] | None:
         """The pose that is told with a frame; None without one, and of a record that is damaged."""
         try:
             return frame.pose
         except InputError as error:
             detail = f"its pose is not known, and is sought from the scans: {error}"
-            self._doubts[scan] = [Oddity("its pose is sought from the scans", detail)]
+            self._doubts[scan] = [ScanIssue("its pose is sought from the scans", detail)]
             return None
 
     def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
@@ -225,7 +225,7 @@ class PersistenceDerainer(RecordingMethod):
         points = self._placed[scan].points
         with stopwatch.stage("network"):
             evidence = self._evidence(ready.scans)
-            alone = together(points, evidence)
+            alone = combined_log_odds(points, evidence)
             agreed = vote(points, alone)
             sure = np.log(self.persistence.sure)
             known = (evidence is not None) & (np.minimum(agreed, alone) > sure)
@@ -239,7 +239,7 @@ class PersistenceDerainer(RecordingMethod):
         own = self._placed[scans.scan]
         others = [self._placed[each.scan] for each in (*scans.before, *scans.after)]
         told = [
-            ask_rays(own.points, other.points, np.linalg.inv(other.pose) @ own.pose)
+            ray_evidence(own.points, other.points, np.linalg.inv(other.pose) @ own.pose)
             for other in others
             if other.stretch == own.stretch and len(other.points)
         ]

@@ -36,5 +36,5 @@ class RecordingMethod(Method):
 
         Raises:
             InputError: A parameter that it does not have, or a value that it cannot have:
-                :func:`derain.system.registry.made_of` raises it for a dataclass.
+                :func:`derain.system.registry.from_parameters` raises it for a dataclass.
         """

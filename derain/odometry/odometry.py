@@ -23,8 +23,8 @@ class Odometry:
     Example:
         >>> odometry = Odometry()
         >>> wall = np.random.default_rng(0).uniform((10, -9, -2), (11, 9, 4), (4000, 3))
-        >>> standing = odometry.take(Scan.of(wall))
-        >>> moved = odometry.take(Scan.of(wall - [0.5, 0, 0]))  # the wall comes nearer
+        >>> standing = odometry.register(Scan.of(wall))
+        >>> moved = odometry.register(Scan.of(wall - [0.5, 0, 0]))  # the wall comes nearer
         >>> moved.trusted, round(moved.distance, 2)
         (True, 0.5)
 
@@ -47,7 +47,7 @@ class Odometry:
         self._pose = np.eye(4)
         self._trust = Trust()
 
-    def take(self, scan: Scan) -> Registration:
+    def register(self, scan: Scan) -> Registration:
         """Takes the next scan of the sequence.
 
         Args:

@@ -21,14 +21,14 @@ from derain.sources.trajectory import Trajectory, read_trajectory
 # What stands for poses that are in no file.
 STANDING, ODOMETRY = "standing", "odometry"
 
-Told = Callable[[Frame, Registration], None]
+OnRegistration = Callable[[Frame, Registration], None]
 
 
 def with_poses(
     source: Sequence[Frame],
     poses: str | Path | None = None,
     threads: int = 0,
-    told: Told | None = None,
+    on_registration: OnRegistration | None = None,
 ) -> Frames:
     """The same frames, each with its pose.
 
@@ -38,7 +38,7 @@ def with_poses(
             with one for each recording, ``<sequence>.txt``. None takes the poses that lie beside
             the scans, and odometry for a recording in which a scan has none.
         threads: Threads that odometry may use; 0 takes every core.
-        told: Is told each registration as soon as it is found.
+        on_registration: Called with each frame and its registration as soon as that is found.
 
     Returns:
         The frames. Where odometry cannot be trusted, the frame no longer follows the one before it:
@@ -48,30 +48,32 @@ def with_poses(
         InputError: A record that is damaged, or does not fit the scans.
     """
     if poses == STANDING:
-        return standing(source)
+        return with_identity_poses(source)
     if poses == ODOMETRY:
-        return by_odometry(source, threads, told)
+        return with_odometry_poses(source, threads, on_registration)
     if poses is not None:
-        return from_file(source, Path(poses))
+        return with_file_poses(source, Path(poses))
     found: list[Frame] = []
     for recording in recordings_of(source):
         known = all(frame.pose is not None for frame in recording)
-        found += recording if known else by_odometry(recording, threads, told)
+        found += recording if known else with_odometry_poses(recording, threads, on_registration)
     return Frames(found)
 
 
-def standing(source: Sequence[Frame]) -> Frames:
+def with_identity_poses(source: Sequence[Frame]) -> Frames:
     """The same frames of a sensor that stands still: each has the identity for its pose."""
     return Frames(frame.with_pose(np.eye(4)) for frame in source)
 
 
-def by_odometry(source: Sequence[Frame], threads: int = 0, told: Told | None = None) -> Frames:
+def with_odometry_poses(
+    source: Sequence[Frame], threads: int = 0, on_registration: OnRegistration | None = None
+) -> Frames:
     """The same frames with poses found from their scans, which are all read once.
 
     Args:
         source: The frames.
         threads: Threads to use; 0 takes every core.
-        told: Is told each registration as soon as it is found.
+        on_registration: Called with each frame and its registration as soon as that is found.
 
     Returns:
         The frames, those of each recording in the frame of its first scan. One that cannot be read
@@ -83,15 +85,15 @@ def by_odometry(source: Sequence[Frame], threads: int = 0, told: Told | None = N
     gaps = 0  # of all recordings: two parts of one must not close up to one another
     for recording in recordings_of(source):
         for frame in recording:
-            registration = odometry.take(frame, _scan_of(frame))
-            if told is not None:
-                told(frame, registration)
+            registration = odometry.register(frame, _scan_of(frame))
+            if on_registration is not None:
+                on_registration(frame, registration)
             gaps += not registration.trusted
             posed.append(replace(frame.with_pose(registration.pose), number=frame.number + gaps))
     return Frames(posed)
 
 
-def from_file(source: Sequence[Frame], path: Path) -> Frames:
+def with_file_poses(source: Sequence[Frame], path: Path) -> Frames:
     """The same frames with the poses of a file.
 
     Args:

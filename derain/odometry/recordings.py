@@ -24,7 +24,7 @@ class FrameOdometry:
         self._odometry = Odometry(threads)
         self._before: Frame | None = None
 
-    def take(self, frame: Frame, scan: Scan | None) -> Registration:
+    def register(self, frame: Frame, scan: Scan | None) -> Registration:
         """Takes the next frame.
 
         Args:
@@ -40,7 +40,7 @@ class FrameOdometry:
         if before is None or not frame.follows(before):
             self._odometry.restart()
             before = None
-        registration = self._odometry.take(NO_POINTS if scan is None else scan)
+        registration = self._odometry.register(NO_POINTS if scan is None else scan)
         if scan is None:
             return replace(registration, trusted=False, reason="it cannot be read")
         late = None if before is None else _too_late(frame, before)

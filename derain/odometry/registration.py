@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.views.oddities import Oddity
+from derain.views.scan_issues import ScanIssue
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +43,11 @@ class Registration:
         """By how much it turned, degrees, whatever about."""
         return turn_of(self.motion)
 
-    def oddities(self) -> Iterator[Oddity]:
+    def issues(self) -> Iterator[ScanIssue]:
         """Says so where it is not to be trusted."""
         if not self.trusted:
             detail = f"where it was taken is not known: {self.reason}"
-            yield Oddity("its place is not known", detail)
+            yield ScanIssue("its place is not known", detail)
 
 
 def shift_of(motion: NDArray[np.float64]) -> float:

@@ -10,36 +10,36 @@ from numpy.typing import NDArray
 
 from derain.persistence.points import ScanPoints
 from derain.persistence.rays import RayEvidence
-from derain.persistence.surroundings import describe
+from derain.persistence.surroundings import surroundings_features
 
 # Log-odds of rain: of any point; for each share of rays that end at it, and that went through.
-OF_RAYS = (-1.41, -9.29, 3.94)
+RAY_WEIGHTS = (-1.41, -9.29, 3.94)
 
-# Log-odds of rain for what ``describe`` says of its surroundings, in that order.
-OF_SURROUNDINGS = (-3.13, 7.13, 1.76, -1.27, -2.06, -0.31, -3.63, -0.79, -3.71, -1.97)
+# Log-odds of rain for what ``surroundings_features`` says of its surroundings, in that order.
+SURROUNDINGS_WEIGHTS = (-3.13, 7.13, 1.76, -1.27, -2.06, -0.31, -3.63, -0.79, -3.71, -1.97)
 
 # Log-odds of rain in the simulated drives, which both witnesses count, and the sum only once.
 PRIOR = -2.49
 
 
-def of_surroundings(points: ScanPoints) -> NDArray[np.float64]:
+def surroundings_log_odds(points: ScanPoints) -> NDArray[np.float64]:
     """Log-odds of rain by each point's surroundings alone, float64 (M,)."""
-    told: NDArray[np.float64] = describe(points) @ np.array(OF_SURROUNDINGS)
+    told: NDArray[np.float64] = surroundings_features(points) @ np.array(SURROUNDINGS_WEIGHTS)
     return told
 
 
-def of_rays(evidence: RayEvidence) -> NDArray[np.float64]:
+def ray_log_odds(evidence: RayEvidence) -> NDArray[np.float64]:
     """Log-odds of rain by what other scans' rays say alone, float64 (M,)."""
-    any_point, ending, through = OF_RAYS
+    any_point, ending, through = RAY_WEIGHTS
     return any_point + ending * evidence.ending + through * evidence.through
 
 
-def together(points: ScanPoints, evidence: RayEvidence | None) -> NDArray[np.float64]:
+def combined_log_odds(points: ScanPoints, evidence: RayEvidence | None) -> NDArray[np.float64]:
     """Log-odds of rain by all that is known of each point by itself, float64 (M,).
 
     Args:
         points: M points of a scan.
         evidence: What other scans' rays say; None where there is no other scan.
     """
-    alone = of_surroundings(points)
-    return alone if evidence is None else alone + of_rays(evidence) - PRIOR
+    alone = surroundings_log_odds(points)
+    return alone if evidence is None else alone + ray_log_odds(evidence) - PRIOR

@@ -26,7 +26,7 @@ MOST_RAYS = 5000
 
 # To its third nearest neighbour a ray has a step or two, whichever of the two axes steps finer; the
 # nearest may be the other return of the same ray.
-OF_STEP = 3
+STEP_NEIGHBOUR = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,10 +74,10 @@ class ScanPoints:
     def step(self) -> float:
         """Angle between neighbouring rays of the scan, radians; 0 of fewer rays than that takes."""
         some = slice(None, None, max(1, len(self) // MOST_RAYS))
-        if len(self) <= OF_STEP:
+        if len(self) <= STEP_NEIGHBOUR:
             return 0.0
-        _, chords = self.rays_near(self._directions[some], OF_STEP + 1)
-        return float(np.median(chords[:, OF_STEP]))
+        _, chords = self.rays_near(self._directions[some], STEP_NEIGHBOUR + 1)
+        return float(np.median(chords[:, STEP_NEIGHBOUR]))
 
     def rays_near(
         self, directions: NDArray[np.float64], count: int

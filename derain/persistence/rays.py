@@ -24,10 +24,10 @@ WENT_THROUGH = (0.5, 0.01)
 # A ray that passes the place by this angle, degrees, counts half as much as one that meets it: of a
 # sensor that stands the same ray comes back, and what it met tells more than all those around it.
 # No nearer do rays of a sensor that moves pass: its poses are true to a tenth of a degree.
-HALF_HEARD_AT = 0.1
+HALF_WEIGHT_AT = 0.1
 
 # Where no ray passes near, what all of them say counts the less.
-LEAST_HEARD = 0.2
+LEAST_WEIGHT = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,9 @@ class RayEvidence:
     through: NDArray[np.float64]
 
 
-def ask_rays(points: ScanPoints, other: ScanPoints, to_other: NDArray[np.float64]) -> RayEvidence:
+def ray_evidence(
+    points: ScanPoints, other: ScanPoints, to_other: NDArray[np.float64]
+) -> RayEvidence:
     """Asks the rays of another scan about the places of a scan's points.
 
     It does not matter how the sensor scans: its rays are where its returns are. Of a ray with two
@@ -66,11 +68,11 @@ def ask_rays(points: ScanPoints, other: ScanPoints, to_other: NDArray[np.float64
     asked = angles <= max(np.radians(WITHIN), WITHIN_STEPS * points.step)
     behind = other.range.take(rays) - reach[:, None]
     at, through = (offset + slope * reach[:, None] for offset, slope in (ENDS_AT, WENT_THROUGH))
-    heard = asked / (1 + np.square(angles / np.radians(HALF_HEARD_AT)))
-    all_heard = np.maximum(heard.sum(axis=1), LEAST_HEARD)
+    weight = asked / (1 + np.square(angles / np.radians(HALF_WEIGHT_AT)))
+    total_weight = np.maximum(weight.sum(axis=1), LEAST_WEIGHT)
     return RayEvidence(
-        (heard * (np.abs(behind) <= at)).sum(axis=1) / all_heard,
-        (heard * (behind > through)).sum(axis=1) / all_heard,
+        (weight * (np.abs(behind) <= at)).sum(axis=1) / total_weight,
+        (weight * (behind > through)).sum(axis=1) / total_weight,
     )
 
 

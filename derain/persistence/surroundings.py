@@ -7,7 +7,7 @@ from derain.persistence.points import ScanPoints
 from derain.views.scatter import scatter_through_space
 
 # What is added before a logarithm is taken, and what is then 0 in the middle of what scans hold.
-FEWEST_STEPS, USUAL_STEPS = 1e-3, 1.0
+STEP_EPSILON, USUAL_STEPS = 1e-3, 1.0
 FLATTEST, USUAL_SCATTER, SPREAD_OF_SCATTER = 1e-4, -4.5, 2.0
 USUAL_RANGE = 10.0
 
@@ -15,7 +15,7 @@ USUAL_RANGE = 10.0
 LEAST_STEP = 1e-5
 
 
-def describe(points: ScanPoints) -> NDArray[np.float64]:
+def surroundings_features(points: ScanPoints) -> NDArray[np.float64]:
     """Three numbers for each point, and their squares and products.
 
     The numbers are logarithms: of the mean distance of a point's neighbours in steps of the
@@ -31,7 +31,7 @@ def describe(points: ScanPoints) -> NDArray[np.float64]:
     step = max(points.step, LEAST_STEP)
     steps_apart = points.distances[:, 1:].mean(axis=1) / (points.range * step)
     scatter = scatter_through_space(points.xyz, points.neighbours)
-    apart = np.log(steps_apart + FEWEST_STEPS) - USUAL_STEPS
+    apart = np.log(steps_apart + STEP_EPSILON) - USUAL_STEPS
     rough = (np.log(scatter + FLATTEST) - USUAL_SCATTER) / SPREAD_OF_SCATTER
     far = np.log(points.range / USUAL_RANGE)
     return np.stack(

@@ -10,7 +10,7 @@ from derain.persistence.points import ScanPoints
 HALF_AT = (0.1, 0.01)
 
 # However sure a point is, it does not outvote more neighbours than this makes: log-odds.
-SUREST = 4.0
+LARGEST_LOG_ODDS = 4.0
 
 
 def vote(points: ScanPoints, log_odds: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -26,6 +26,6 @@ def vote(points: ScanPoints, log_odds: NDArray[np.float64]) -> NDArray[np.float6
     offset, slope = HALF_AT
     half_at = (offset + slope * points.range)[:, None]
     weight = 1 / (1 + np.square(points.distances / half_at))
-    voices = np.clip(log_odds, -SUREST, SUREST).take(points.neighbours)
-    total: NDArray[np.float64] = (weight * voices).sum(axis=1)
+    votes = np.clip(log_odds, -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS).take(points.neighbours)
+    total: NDArray[np.float64] = (weight * votes).sum(axis=1)
     return total

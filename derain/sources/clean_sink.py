@@ -108,7 +108,7 @@ class CleanSink:
         return f"{' and '.join(counts)} are written, each of them whole"
 
 
-def refuse_improbable(method: Method, source: Source) -> None:
+def require_probabilities(method: Method, source: Source) -> None:
     """Refuses a method without probabilities, and files that cannot name a column.
 
     It reads the first file of each format.

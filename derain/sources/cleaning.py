@@ -15,10 +15,10 @@ from derain.sources.judging import Failures, judgements
 from derain.sources.method import Method
 from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import (
+from derain.views.scan_issues import (
     HEAVIEST_RAIN,
     MOST_RAIN,
-    Oddity,
+    ScanIssue,
     left_out,
     much_removed,
     no_points,
@@ -101,7 +101,7 @@ class CleanReport:
 class CleaningObserver:
     """Follows a cleaning while it runs. A subclass prints or records; this one does nothing."""
 
-    def judged(self, judgement: Judgement, odd: list[Oddity]) -> None:
+    def judged(self, judgement: Judgement, odd: list[ScanIssue]) -> None:
         """Called for each judged scan, before it is written, with what is odd about it."""
 
     def cleaned(self, judgement: Judgement, scan: CleanedScan) -> None:
@@ -150,8 +150,8 @@ def clean(
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
         cleaner = _Cleaner(method, opened, monitor, most_removed, observer)
         frames = tqdm(source, unit="scan", disable=None)
-        for frame, judgement, stopwatch in judgements(method, frames, failures.passing_over):
-            with failures.passing_over(frame):
+        for frame, judgement, stopwatch in judgements(method, frames, failures.skipping_failures):
+            with failures.skipping_failures(frame):
                 scans.append(cleaner.clean(judgement, stopwatch))
     return CleanReport(scans, failures.errors, monitor)
 
@@ -173,7 +173,7 @@ class _Cleaner:
         self.observer.judged(judgement, odd)
         self._refuse_too_much_rain(frame, judgement.share_of_rain)
         with stopwatch.stage("weather"):
-            weather = judgement.weather if self.weather.wants(frame) else None
+            weather = judgement.weather if self.weather.is_due(frame) else None
         with stopwatch.stage("write"):
             self.sink.write(judgement)
         valid = scan.valid
@@ -185,15 +185,15 @@ class _Cleaner:
             share_removed=judgement.share_of_rain,
             not_known=None if judgement.known is None else int((valid & ~judgement.answered).sum()),
             milliseconds=dict(stopwatch.milliseconds),
-            warnings=[oddity.detail for oddity in odd],
+            warnings=[issue.detail for issue in odd],
             weather=None if weather is None else self.weather.add(frame, weather),
         )
         self.observer.cleaned(judgement, cleaned)
         return cleaned
 
-    def _oddities(self, judgement: Judgement) -> list[Oddity]:
+    def _oddities(self, judgement: Judgement) -> list[ScanIssue]:
         scan, share = judgement.scan, judgement.share_of_rain
-        odd = [*self.method.oddities(judgement), *left_out(scan), *no_points(scan)]
+        odd = [*self.method.issues(judgement), *left_out(scan), *no_points(scan)]
         return odd if share > self.most_removed else [*odd, *much_removed(share)]
 
     def _refuse_too_much_rain(self, frame: Frame, share: float) -> None:

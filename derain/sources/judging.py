@@ -39,7 +39,7 @@ class Failures:
         self._report = report
 
     @contextmanager
-    def passing_over(self, frame: Frame) -> Iterator[None]:
+    def skipping_failures(self, frame: Frame) -> Iterator[None]:
         """Reports and keeps the error of the block.
 
         Args:
@@ -71,18 +71,18 @@ def judgements(
     """
     last = None
     for frame in frames:
-        if last is not None and method.starts_anew(frame):
-            yield from _those_waiting(method, last, guard)
+        if last is not None and method.starts_new_recording(frame):
+            yield from _flushed(method, last, guard)
         last, judgement, stopwatch = frame, None, Stopwatch()
         with guard(frame):
             judgement = method.push(frame, stopwatch)
         if judgement is not None:
             yield _frame_of(judgement), judgement, stopwatch
     if last is not None:
-        yield from _those_waiting(method, last, guard)
+        yield from _flushed(method, last, guard)
 
 
-def _those_waiting(method: Method, last: Frame, guard: Guard) -> Iterator[Answer]:
+def _flushed(method: Method, last: Frame, guard: Guard) -> Iterator[Answer]:
     """What it says of frames that wait for others, where the last of a recording was pushed."""
     while method.waiting:  # where one fails, the others go on waiting
         with guard(last):

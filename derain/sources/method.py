@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
-from derain.sources.scan_warnings import EXAMINED_OF, ScanWarnings
+from derain.sources.scan_warnings import EXAMINE_EVERY, ScanWarnings
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import Oddity
+from derain.views.scan_issues import ScanIssue
 from derain.views.window import Window
 
 
@@ -24,7 +24,7 @@ class Method(ABC):
     for the last ones by :meth:`flush`. So whoever cleans a recording does the same for each::
 
         for frame in source:
-            if method.starts_anew(frame):
+            if method.starts_new_recording(frame):
                 answers += method.flush()
             answers += filter(None, [method.push(frame)])
         answers += method.flush()
@@ -32,12 +32,12 @@ class Method(ABC):
     :func:`derain.sources.judging.judgements` does it.
 
     Attributes:
-        EXAMINED_OF: One scan in so many is examined for what :meth:`oddities` gives.
+        EXAMINE_EVERY: One scan in so many is examined for what :meth:`issues` gives.
         warns: Whether it warns of that, by :class:`~derain.errors.ScanWarning`. What prints the
-            oddities itself sets it to False.
+            issues itself sets it to False.
     """
 
-    EXAMINED_OF: ClassVar[int] = EXAMINED_OF
+    EXAMINE_EVERY: ClassVar[int] = EXAMINE_EVERY
 
     warns: bool = True
 
@@ -57,7 +57,7 @@ class Method(ABC):
         """How many frames were pushed and are not answered for."""
 
     @abstractmethod
-    def starts_anew(self, frame: Frame) -> bool:
+    def starts_new_recording(self, frame: Frame) -> bool:
         """Whether pushing a frame would let go of those that wait: it does not follow them."""
 
     @abstractmethod
@@ -97,7 +97,7 @@ class Method(ABC):
         """
 
     @abstractmethod
-    def oddities(self, judgement: Judgement) -> Iterator[Oddity]:
+    def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
         """What is odd about a scan that it judged, as far as that matters to the method.
 
         Args:
@@ -107,12 +107,12 @@ class Method(ABC):
     def with_warnings(self, judgement: Judgement) -> Judgement:
         """Gives back what it said of a scan, after a warning where something is odd about it."""
         if self.warns:
-            self._warnings.look(judgement)
+            self._warnings.check(judgement)
         return judgement
 
     @cached_property
     def _warnings(self) -> ScanWarnings:
-        return ScanWarnings(self.oddities, self.EXAMINED_OF)
+        return ScanWarnings(self.issues, self.EXAMINE_EVERY)
 
     @abstractmethod
     def as_dict(self) -> dict[str, Any]:

@@ -28,7 +28,7 @@ def read_numbers(path: Path, *columns: int, comments: bool = False) -> NDArray[n
         InputError: A file that cannot be read, is too large, or has another line.
     """
     lines = enumerate(read_lines(path), 1)
-    filled = [(place, line.split()) for place, line in lines if _says_something(line, comments)]
+    filled = [(place, line.split()) for place, line in lines if _has_content(line, comments)]
     width = len(filled[0][1]) if filled and len(filled[0][1]) in columns else columns[-1]
     rows = [finite_numbers(path, place, words, width) for place, words in filled]
     return np.array(rows, np.float64).reshape(-1, width)
@@ -69,6 +69,6 @@ def finite_numbers(path: Path, place: int, words: Sequence[str], count: int) -> 
     return numbers
 
 
-def _says_something(line: str, comments: bool) -> bool:
+def _has_content(line: str, comments: bool) -> bool:
     words = line.strip()
     return bool(words) and not (comments and words.startswith("#"))

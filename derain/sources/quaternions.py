@@ -46,7 +46,7 @@ def quaternion_of(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
     return -quaternion if quaternion[3] < 0 else quaternion
 
 
-def between(
+def slerp(
     first: NDArray[np.float64], second: NDArray[np.float64], share: float
 ) -> NDArray[np.float64]:
     """A rotation on the shortest way from one to another.

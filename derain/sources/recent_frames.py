@@ -45,11 +45,11 @@ class RecentFrames:
         """Number of the frame that would follow."""
         return self._kept[-1][0].number + 1 if self._kept else 0
 
-    def starts_anew(self, frame: Frame) -> bool:
+    def starts_new_recording(self, frame: Frame) -> bool:
         """Whether a frame does not follow those that were taken."""
         return bool(self._kept) and not frame.follows(self._kept[-1][0])
 
-    def take(self, frame: Frame, placed: PlacedScan) -> FrameInWindow | None:
+    def push(self, frame: Frame, placed: PlacedScan) -> FrameInWindow | None:
         """Takes the next frame; where it starts anew, those still waiting are let go of.
 
         Args:
@@ -59,13 +59,13 @@ class RecentFrames:
         Returns:
             The frame that has all its window by now, if there is one.
         """
-        if self.starts_anew(frame):
+        if self.starts_new_recording(frame):
             self._kept.clear()
             self._given = 0
         self._kept.append((frame, placed))
-        return self.give() if self.waiting > self.window.after else None
+        return self.pop() if self.waiting > self.window.after else None
 
-    def give(self) -> FrameInWindow:
+    def pop(self) -> FrameInWindow:
         """Gives the oldest waiting frame with what there is of its window."""
         place = self._given
         frame, judged = self._kept[place]

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable
 
 from derain.errors import ScanWarning
 from derain.sources.judgement import Judgement
-from derain.views.oddities import Oddity, much_removed
+from derain.views.scan_issues import ScanIssue, much_removed
 
 # One scan in so many is examined, the first among them. It takes 3 to 7 milliseconds of 116,000
 # points, a tenth of what a filter takes; the scans of one sensor mostly have the same fault.
-EXAMINED_OF = 100
+EXAMINE_EVERY = 100
 
 
 class ScanWarnings:
@@ -22,23 +22,23 @@ class ScanWarnings:
     """
 
     def __init__(
-        self, examine: Callable[[Judgement], Iterable[Oddity]], examined_of: int = EXAMINED_OF
+        self, examine: Callable[[Judgement], Iterable[ScanIssue]], examined_of: int = EXAMINE_EVERY
     ) -> None:
         self._examine = examine
         self._examined_of = examined_of
         self._judged = 0
         self._kinds: set[str] = set()
 
-    def look(self, judgement: Judgement) -> None:
+    def check(self, judgement: Judgement) -> None:
         """Warns of a scan that was judged, if it is its turn."""
         odd = [*much_removed(judgement.share_of_rain)]
         if self._judged % self._examined_of == 0:
             odd += self._examine(judgement)
         self._judged += 1
-        for oddity in odd:
-            if oddity.kind not in self._kinds:
-                self._kinds.add(oddity.kind)
-                text = f"{judgement.scan.name}: {oddity.detail}"
+        for issue in odd:
+            if issue.kind not in self._kinds:
+                self._kinds.add(issue.kind)
+                text = f"{judgement.scan.name}: {issue.detail}"
                 warnings.warn(text, ScanWarning, stacklevel=_level_of_the_user())
 
 

@@ -18,13 +18,13 @@ SEQUENCES, SCANS = "sequences", "scans"
 MOST_NAMES = 2000
 
 
-def by_name(sequences: Iterable[str]) -> dict[str, tuple[str, ...]]:
+def record_of_sequences(sequences: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Record of a training on sequences of a published data set, as a Spec holds it."""
     names = tuple(sorted(sequences)[:MOST_NAMES])
     return {SEQUENCES: names} if names else {}
 
 
-def by_fingerprint(frames: Sequence[Frame]) -> dict[str, tuple[str, ...]]:
+def record_of_scans(frames: Sequence[Frame]) -> dict[str, tuple[str, ...]]:
     """Record of a training on some scans, as a Spec holds it.
 
     Args:
@@ -37,7 +37,7 @@ def by_fingerprint(frames: Sequence[Frame]) -> dict[str, tuple[str, ...]]:
     return {SCANS: prints} if prints else {}
 
 
-def by_parts(
+def record_of_parts(
     records: Iterable[tuple[str, Mapping[str, Sequence[str]]]],
 ) -> dict[str, tuple[str, ...]]:
     """Record of a training on several data sets, each of which has a record of its own.
@@ -57,7 +57,7 @@ def by_parts(
     }
 
 
-def overlap(title: str, spec: Spec, card: DataCard, frames: Sequence[Frame]) -> str | None:
+def training_overlap(title: str, spec: Spec, card: DataCard, frames: Sequence[Frame]) -> str | None:
     """What is to be said of a model that was trained on some of the scans it is measured on.
 
     Args:

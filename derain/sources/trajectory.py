@@ -22,7 +22,7 @@ from derain.files.atomic import replacing
 from derain.files.reading import is_file
 from derain.fusion.extrinsics import ROTATION_TOLERANCE, Extrinsics
 from derain.sources.number_lines import finite_numbers, read_lines, read_numbers
-from derain.sources.quaternions import between, quaternion_of, rotation_of
+from derain.sources.quaternions import quaternion_of, rotation_of, slerp
 
 CALIBRATION = "calib.txt"
 
@@ -98,7 +98,7 @@ class Trajectory:
             return one
         pose = np.eye(4)
         pose[:3, 3] = (1 - share) * one[:3, 3] + share * other[:3, 3]
-        turned = between(quaternion_of(one[:3, :3]), quaternion_of(other[:3, :3]), share)
+        turned = slerp(quaternion_of(one[:3, :3]), quaternion_of(other[:3, :3]), share)
         pose[:3, :3] = rotation_of(turned)
         return pose
 

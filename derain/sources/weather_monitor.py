@@ -66,7 +66,7 @@ class WeatherMonitor:
         self._sample = {frame.key for frame in evenly_spaced(source, sampled)}
         self._reaches: list[float] = []
 
-    def wants(self, frame: Frame) -> bool:
+    def is_due(self, frame: Frame) -> bool:
         """Whether the weather of a scan is measured."""
         return self._options.every_scan or frame.key in self._sample
 

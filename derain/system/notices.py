@@ -13,7 +13,7 @@ from derain.errors import printable
 
 
 class Notice(Protocol):
-    """A finding about a scan, such as a :class:`derain.views.oddities.Oddity`."""
+    """A finding about a scan, such as a :class:`derain.views.scan_issues.ScanIssue`."""
 
     @property
     def kind(self) -> str:
@@ -34,7 +34,7 @@ class Notices:
     def __init__(self) -> None:
         self._seen: Counter[str] = Counter()
 
-    def tell(self, scan: str, notices: Iterable[Notice], method: str = "") -> None:
+    def warn(self, scan: str, notices: Iterable[Notice], method: str = "") -> None:
         """Warns of a scan.
 
         Args:
@@ -48,7 +48,7 @@ class Notices:
             if self._seen[prefix + notice.kind] == 1:
                 warn(f"{scan}: {prefix}{notice.detail}")
 
-    def tell_how_many_more(self) -> None:
+    def warn_of_repeats(self) -> None:
         """Prints the number of further scans of each kind."""
         for kind, scans in self._seen.items():
             if scans > 1:

@@ -146,7 +146,7 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
                 del self._members[name]
 
 
-def made_of(kind: type[Made], name: str, parameters: Mapping[str, Any]) -> Made:
+def from_parameters(kind: type[Made], name: str, parameters: Mapping[str, Any]) -> Made:
     """Makes a dataclass from parameters that a user names.
 
     Args:

@@ -38,7 +38,7 @@ def worker_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 @contextmanager
-def main_left_out() -> Iterator[None]:
+def without_main_module() -> Iterator[None]:
     """Keeps processes that are started here from running the user's script again.
 
     A new process imports the module that the program began with, in case it defines what the
@@ -53,7 +53,7 @@ def main_left_out() -> Iterator[None]:
         sys.modules["__main__"] = main
 
 
-def end_with_launcher() -> None:
+def exit_with_launcher() -> None:
     """Ends this process when the one that began its run is gone, if that is another process.
 
     Lightning runs the command again for each further device. If the first process is killed, the

@@ -91,7 +91,7 @@ def nearest_range(points: ProjectedPoints, score: NDArray[np.float32]) -> NDArra
     window = _Window(points)
     for start in range(0, len(hidden), CHUNK):
         rows = hidden[start : start + CHUNK]
-        result[rows] = score.take(window.most_alike(points.pixel[rows], points.range[rows]))
+        result[rows] = score.take(window.closest_in_range(points.pixel[rows], points.range[rows]))
     return result
 
 
@@ -123,7 +123,7 @@ def vote(points: ProjectedPoints, score: NDArray[np.float32]) -> NDArray[np.floa
     return result
 
 
-# Every back-projection, by the name that the option `way_back` and a Spec have for it.
+# Every back-projection, by the name that an option and a Spec have for it.
 BACK_PROJECTIONS: Mapping[str, PixelsToPoints] = {
     "nearest range": nearest_range,
     "copy": copy,
@@ -158,7 +158,7 @@ class _Window:
             rows[:, -REACH:] = image.take(range(width, width + REACH), axis=1, mode="wrap")
         return padded.ravel()
 
-    def most_alike(
+    def closest_in_range(
         self, pixel: NDArray[np.int64], distance: NDArray[np.float32]
     ) -> NDArray[np.int64]:
         """The pixel around each pixel that shows the range most like a point's, int64 (N,)."""

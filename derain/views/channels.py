@@ -93,7 +93,7 @@ def filled_values(
     scan: Scan,
     rows: NDArray[np.int64],
     channels: Sequence[str],
-    stand_in: Mapping[str, float],
+    fill_value: Mapping[str, float],
 ) -> NDArray[np.float32]:
     """What some points of a scan measure, point by point, and a stand-in for what they lack.
 
@@ -101,7 +101,7 @@ def filled_values(
         scan: The scan.
         rows: Row numbers of points that are valid, int64 (M,).
         channels: Names of C channels.
-        stand_in: What stands in for a value that is missing, by channel; 0 if not named.
+        fill_value: What stands in for a value that is missing, by channel; 0 if not named.
 
     Returns:
         float32 (M, C), each channel in its own unit; finite where the stand-ins are.
@@ -113,7 +113,7 @@ def filled_values(
     # All of a point at once: four times faster than channel by channel.
     values = of_all.take(rows, axis=0)
     for of_channel, name in zip(values.T, channels, strict=True):
-        of_channel[np.isnan(of_channel)] = stand_in.get(name, 0.0)
+        of_channel[np.isnan(of_channel)] = fill_value.get(name, 0.0)
     return values
 
 
@@ -121,7 +121,7 @@ def channel_image(
     scan: Scan,
     winner: NDArray[np.int64],
     channels: Sequence[str],
-    stand_in: Mapping[str, float],
+    fill_value: Mapping[str, float],
 ) -> NDArray[np.float32]:
     """What the points in the pixels of an image measure, and a stand-in for what they lack.
 
@@ -129,7 +129,7 @@ def channel_image(
         scan: The scan.
         winner: Row of the point in each pixel, one that is valid, int64 (M,); -1 in empty pixels.
         channels: Names of C channels.
-        stand_in: What stands in for a value that is missing, by channel; 0 if not named.
+        fill_value: What stands in for a value that is missing, by channel; 0 if not named.
 
     Returns:
         float32 (C, M), finite; 0 in empty pixels.
@@ -141,5 +141,5 @@ def channel_image(
             column = np.full(len(scan), np.nan, np.float32)
         # The last value is what row -1 has, so that no pass over the empty pixels is needed.
         of_channel[:] = np.append(column, np.float32(0))[winner]
-        of_channel[np.isnan(of_channel)] = stand_in.get(name, 0.0)
+        of_channel[np.isnan(of_channel)] = fill_value.get(name, 0.0)
     return image

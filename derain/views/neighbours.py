@@ -16,7 +16,7 @@ from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
 from derain.views.registry import VIEWS
 from derain.views.spherical_grid import ALL_AROUND
-from derain.views.view import BackProjection, SeenScan, View
+from derain.views.view import BackProjection, View, ViewedScan
 
 # The most that the Spec of a network may ask for, seven times as many as 3D-OutDet looks at. A
 # hundred thousand points have 80 MB of them.
@@ -24,7 +24,7 @@ MOST_NETWORK_NEIGHBOURS = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Neighbourhoods(SeenScan):
+class Neighbourhoods(ViewedScan):
     """One or more scans as a point network sees them.
 
     The M points are the distinct valid positions of the scan, along a Morton curve. Of several rows
@@ -139,20 +139,20 @@ class NeighbourView(View):
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
         channels: What the network sees of a point, in order, as :func:`channel_of` names it.
-        stand_in: What stands in for a value that a scan lacks, by channel; 0 if not named.
+        fill_value: What stands in for a value that a scan lacks, by channel; 0 if not named.
         threads: Threads of the search; 0 takes every core this process may use.
         candidates: Which points are scored; None for all.
     """
 
     neighbours: int = 9
     channels: tuple[str, ...] = ("x", "y", "z", "intensity")
-    stand_in: Mapping[str, float] = field(default_factory=dict)
+    fill_value: Mapping[str, float] = field(default_factory=dict)
     threads: int = 0
     candidates: Candidates | None = None
 
     @classmethod
     def of(
-        cls, entry: Entry, channels: tuple[str, ...], stand_in: Mapping[str, float], threads: int
+        cls, entry: Entry, channels: tuple[str, ...], fill_value: Mapping[str, float], threads: int
     ) -> Self:
         """The view that a Spec describes by its ``kind`` and its ``neighbours``.
 
@@ -163,7 +163,7 @@ class NeighbourView(View):
             {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NETWORK_NEIGHBOURS)},
             required=("neighbours",),
         )
-        return cls(found["neighbours"], channels, stand_in, threads)
+        return cls(found["neighbours"], channels, fill_value, threads)
 
     def as_dict(self) -> dict[str, Any]:
         """Its part of a Spec: ``kind`` and ``neighbours``."""
@@ -174,7 +174,7 @@ class NeighbourView(View):
         """What it sees: everything around."""
         return ALL_AROUND
 
-    def judging(self, candidates: Candidates) -> Self:
+    def with_candidates(self, candidates: Candidates) -> Self:
         """The same view, that scores candidates alone."""
         return replace(self, candidates=candidates)
 
@@ -182,7 +182,7 @@ class NeighbourView(View):
         """Views a scan."""
         first, inverse = distinct_rows(scan)
         search = NeighbourSearch(scan.xyz.take(first, axis=0), rank=first, threads=self.threads)
-        points = filled_values(scan, first, self.channels, self.stand_in)
+        points = filled_values(scan, first, self.channels, self.fill_value)
         if self.candidates is None:
             neighbours, distances = search(self.neighbours)
             return Neighbourhoods(points, neighbours, distances, first, inverse)

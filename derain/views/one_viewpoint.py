@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import LARGEST_COORDINATE, Scan
-from derain.views.oddities import Oddity
+from derain.views.scan_issues import ScanIssue
 
 # Azimuth, inclination and range of points, float64 (3, M).
 Rays = NDArray[np.float64]
@@ -84,7 +84,7 @@ RANGE_STEP = 0.012
 FEWEST_ARMS = 4
 
 
-def unlike_one_viewpoint(scan: Scan) -> Iterator[Oddity]:
+def viewpoint_issues(scan: Scan) -> Iterator[ScanIssue]:
     """Says where a scan is not what one sensor sees from where it stands, in metres.
 
     Of a scan that is too far off or too small nothing else can be said.
@@ -96,7 +96,7 @@ def unlike_one_viewpoint(scan: Scan) -> Iterator[Oddity]:
     if len(rows) < LEAST_VALID * len(scan) or len(rows) < FEWEST_RETURNS:
         yield from _beyond_all_sensors(scan)
         if len(rows):
-            yield Oddity(
+            yield ScanIssue(
                 "almost empty",
                 f"{len(rows):,} of {len(scan):,} rows are points that can be judged: too few to "
                 "say anything of (is the sensor covered, or the file cut short?)",
@@ -109,25 +109,25 @@ def unlike_one_viewpoint(scan: Scan) -> Iterator[Oddity]:
         yield from [*_of_one_beam(sample)] or _of_many_viewpoints(scan)
 
 
-def _beyond_all_sensors(scan: Scan) -> Iterator[Oddity]:
+def _beyond_all_sensors(scan: Scan) -> Iterator[ScanIssue]:
     """Whether most of the rows are points, and too far off for any unit: those of a map."""
     finite = np.isfinite(scan.xyz).all(axis=1)
     beyond = (np.abs(scan.xyz[finite]) > LARGEST_COORDINATE).any(axis=1)
     if 2 * beyond.sum() > len(scan):
-        yield Oddity(
+        yield ScanIssue(
             "coordinates of a map",
             f"{beyond.sum():,} points are more than {LARGEST_COORDINATE:,.0f} m away and cannot be "
             "judged: subtract where the sensor was, as from coordinates of a map (UTM)",
         )
 
 
-def _elsewhere(sample: NDArray[np.float64]) -> Iterator[Oddity]:
+def _elsewhere(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
     """Whether points, float64 (M, 3), lie together, far from the origin."""
     centre = np.median(sample, axis=0)
     around = float(np.median(np.linalg.norm(sample - centre, axis=1)))
     away = float(np.linalg.norm(centre))
     if away > OFF_CENTRE * around > 0:
-        yield Oddity(
+        yield ScanIssue(
             "coordinates of a map",
             f"the points lie about {away:,.0f} m from the origin, and half of them within "
             f"{around:,.0f} m of one another: subtract where the sensor was, as from coordinates "
@@ -135,31 +135,31 @@ def _elsewhere(sample: NDArray[np.float64]) -> Iterator[Oddity]:
         )
 
 
-def _in_other_units(sample: NDArray[np.float64]) -> Iterator[Oddity]:
+def _in_other_units(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
     """Whether points, float64 (M, 3), are farther off or nearer than sensors see in metres."""
     range_ = np.linalg.norm(sample, axis=1)
     far, near = np.percentile(range_, [FAR_PERCENTILE, 99])
     height = _height(sample)
     if far > FAR_OFF:
-        yield Oddity(
+        yield ScanIssue(
             "points farther off than sensors see",
             f"one point in twenty is more than {far:,.0f} m away: coordinates have to be in "
             "metres, as seen from the sensor (divide millimetres by 1,000, centimetres by 100)",
         )
     elif near < NEAR_BY:
-        yield Oddity(
+        yield ScanIssue(
             "points nearer than sensors see",
             f"all but one point in a hundred are within {near:.2g} m: coordinates have to be in "
             "metres, neither in kilometres nor scaled to a unit",
         )
     elif height < LOWEST_SENSOR and near < ROOM:
-        yield Oddity(
+        yield ScanIssue(
             "ground nearer than below any vehicle's sensor",
             f"the ground is {height:.2g} m below the sensor, and all but one point in a hundred "
             f"are within {near:.2g} m: coordinates have to be in metres",
         )
     elif height > HIGHEST_SENSOR:
-        yield Oddity(
+        yield ScanIssue(
             "ground farther than below any vehicle's sensor",
             f"the ground is {height:.2g} m below the sensor: coordinates have to be in metres "
             "(multiply feet by 0.3048), unless the sensor is mounted above the road",
@@ -175,7 +175,7 @@ def _height(sample: NDArray[np.float64]) -> float:
     return -float(np.percentile(below, GROUND_PERCENTILE))
 
 
-def _of_one_beam(sample: NDArray[np.float64]) -> Iterator[Oddity]:
+def _of_one_beam(sample: NDArray[np.float64]) -> Iterator[ScanIssue]:
     """Whether points, float64 (M, 3), are all of one plane or cone of rays."""
     rays = sample / np.linalg.norm(sample, axis=1, keepdims=True)
     lowest, highest = np.degrees(np.arcsin(np.percentile(rays[:, 2], [1, 99]).clip(-1, 1)))
@@ -183,14 +183,14 @@ def _of_one_beam(sample: NDArray[np.float64]) -> Iterator[Oddity]:
     moments = np.einsum("ij,ik->jk", rays, rays) / len(rays)
     least = float(np.linalg.eigvalsh(moments)[0])
     if least < OUT_OF_PLANE**2 or highest - lowest < OPENING:
-        yield Oddity(
+        yield ScanIssue(
             "a single beam",
             "all points are of one beam, as those of a scanner of a plane are: models and filters "
             "were made for sensors of many beams, and may take what stays",
         )
 
 
-def _of_many_viewpoints(scan: Scan) -> Iterator[Oddity]:
+def _of_many_viewpoints(scan: Scan) -> Iterator[ScanIssue]:
     """Whether points are denser, or surfaces more often torn, than one sensor would see them."""
     rays = rays_near_axes(scan)
     crowding, step = crowding_far_off(rays), range_step(rays)
@@ -200,7 +200,7 @@ def _of_many_viewpoints(scan: Scan) -> Iterator[Oddity]:
         reason = f"the range changes by {step:.1%} (median) between neighbouring rays of a beam"
     else:
         return
-    yield Oddity(
+    yield ScanIssue(
         "points of several viewpoints",
         f"{reason}, which no sensor sees from one place: clean scans one by one, in the sensor's "
         "coordinates, before they are merged into a map",

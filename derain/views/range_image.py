@@ -17,7 +17,7 @@ from derain.views.candidates import Candidates
 from derain.views.channels import channel_image
 from derain.views.registry import VIEWS
 from derain.views.spherical_grid import SphericalGrid, grid_at
-from derain.views.view import IGNORED, BackProjection, SeenScan, View
+from derain.views.view import IGNORED, BackProjection, View, ViewedScan
 
 # What a pixel shows. Taken as one integer, what is nearer is less, and of equally near points the
 # lower row: the bits of ranges, none of which is negative, ascend as the ranges do.
@@ -26,7 +26,7 @@ NOTHING_SHOWN = np.array((-1, np.inf), SHOWN_POINT).view("<i8")[()]
 
 
 @dataclass(frozen=True, eq=False)
-class RangeImage(SeenScan):
+class RangeImage(ViewedScan):
     """One scan as a network on images sees it.
 
     Attributes:
@@ -40,7 +40,8 @@ class RangeImage(SeenScan):
             returned.
         range: Range of each row of the scan, float32 (N,), metres.
         wraps: True where the last column is the neighbour of the first.
-        way_back: Name of the back-projection, by which points that are not shown get a score.
+        back_projection_name: Name of the back-projection, by which points that are not shown get a
+            score.
         candidate: Rows of the scan that may be rain, bool (N,); None where all may be.
     """
 
@@ -51,7 +52,7 @@ class RangeImage(SeenScan):
     nearest: NDArray[np.float32]
     range: NDArray[np.float32]
     wraps: bool
-    way_back: str
+    back_projection_name: str
     candidate: NDArray[np.bool_] | None = None
 
     @property
@@ -89,7 +90,7 @@ class RangeImage(SeenScan):
         return result
 
     def back_projection(self) -> BackProjection:
-        """What gives points scores of pixels as ``way_back`` says.
+        """What gives points scores of pixels as ``back_projection_name`` says.
 
         Rows off the grid, and rows that are no candidates, have 0; a pixel that shows what is no
         candidate counts as scored 0, whatever the network says of it.
@@ -99,7 +100,7 @@ class RangeImage(SeenScan):
         else:
             rows, asked = np.flatnonzero(self.judged & self.candidate), self._shows_candidate()
         points = ProjectedPoints(self.pixel[rows], self.range[rows], self.nearest, self.wraps)
-        return partial(_to_rows, self.way_back, points, rows, len(self.pixel), asked)
+        return partial(_to_rows, self.back_projection_name, points, rows, len(self.pixel), asked)
 
     @staticmethod
     def pack(seen: Sequence["RangeImage"]) -> dict[str, NDArray[Any]]:
@@ -118,7 +119,7 @@ class RangeImage(SeenScan):
 
 
 def _to_rows(
-    way_back: str,
+    back_projection_name: str,
     points: ProjectedPoints,
     rows: NDArray[np.int64],
     count: int,
@@ -129,7 +130,7 @@ def _to_rows(
     if asked is not None:
         score = np.where(asked, score, np.float32(0))
     result = np.zeros(count, np.float32)
-    result[rows] = BACK_PROJECTIONS[way_back](points, score)
+    result[rows] = BACK_PROJECTIONS[back_projection_name](points, score)
     return result
 
 
@@ -143,10 +144,10 @@ class RangeView(View):
     Args:
         grid: Rows and columns of the image.
         channels: What a pixel holds, in order, as :func:`channel_of` names it.
-        way_back: Name of the back-projection, by which points that lost their pixel get a score:
-            ``nearest range``, ``copy`` or ``vote``. It is called so in options and in Specs, which
-            users type and files hold.
-        stand_in: What stands in for a value that a scan lacks, by channel; 0 if not named.
+        back_projection: Name of the back-projection, by which points that lost their pixel get a
+            score: ``nearest range``, ``copy`` or ``vote``. A Spec has it under the key
+                ``back_projection``.
+        fill_value: What stands in for a value that a scan lacks, by channel; 0 if not named.
         candidates: Which points are scored; None for all. The image shows the others all the same.
 
     Raises:
@@ -155,21 +156,21 @@ class RangeView(View):
 
     grid: SphericalGrid
     channels: tuple[str, ...] = ("range", "x", "y", "z", "intensity")
-    way_back: str = "nearest range"
-    stand_in: Mapping[str, float] = field(default_factory=dict)
+    back_projection: str = "nearest range"
+    fill_value: Mapping[str, float] = field(default_factory=dict)
     candidates: Candidates | None = None
 
     def __post_init__(self) -> None:
-        if self.way_back not in BACK_PROJECTIONS:
+        if self.back_projection not in BACK_PROJECTIONS:
             raise InputError(
-                "way_back",
-                f"no such back-projection: '{self.way_back}'",
+                "back_projection",
+                f"no such back-projection: '{self.back_projection}'",
                 f"Known are {', '.join(BACK_PROJECTIONS)}.",
             )
 
     @classmethod
     def of(
-        cls, entry: Entry, channels: tuple[str, ...], stand_in: Mapping[str, float], threads: int
+        cls, entry: Entry, channels: tuple[str, ...], fill_value: Mapping[str, float], threads: int
     ) -> Self:
         """The view that a Spec describes by its ``kind``, ``grid`` and ``way_back``.
 
@@ -182,18 +183,18 @@ class RangeView(View):
             {"kind": Entry.text, "grid": grid_at, "way_back": Entry.text},
             required=("grid", "way_back"),
         )
-        return cls(found["grid"], channels, found["way_back"], stand_in)
+        return cls(found["grid"], channels, found["way_back"], fill_value)
 
     def as_dict(self) -> dict[str, Any]:
         """Its part of a Spec: ``kind``, ``grid`` and ``way_back``."""
-        return {"kind": self.NAME, "grid": self.grid.as_dict(), "way_back": self.way_back}
+        return {"kind": self.NAME, "grid": self.grid.as_dict(), "way_back": self.back_projection}
 
     @property
     def azimuth(self) -> tuple[float, float]:
         """What it sees: the grid's right and left bound, degrees counter-clockwise from x."""
         return self.grid.azimuth
 
-    def judging(self, candidates: Candidates) -> Self:
+    def with_candidates(self, candidates: Candidates) -> Self:
         """The same view, that gives scores to candidates alone."""
         return replace(self, candidates=candidates)
 
@@ -204,14 +205,14 @@ class RangeView(View):
         shown = _shown(pixel, scan.range, math.prod(shape))
         winner = shown["row"].astype(np.int64)
         return RangeImage(
-            channel_image(scan, winner, self.channels, self.stand_in).reshape(-1, *shape),
+            channel_image(scan, winner, self.channels, self.fill_value).reshape(-1, *shape),
             (winner >= 0).reshape(shape),
             pixel,
             winner,
             np.ascontiguousarray(shown["range"]).reshape(shape),
             scan.range,
             self.grid.is_full_circle,
-            self.way_back,
+            self.back_projection,
             None if self.candidates is None else self.candidates.among(scan),
         )
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from derain.scan import Scan
 from derain.views.morton import distinct_rows
 from derain.views.return_columns import LEAST_APART, StatedReturns, stated_returns
-from derain.views.shared_directions import one_direction
+from derain.views.shared_directions import shared_direction_pairs
 
 # By what returns are told where no column says.
 BY_DIRECTIONS = "directions"
@@ -36,7 +36,7 @@ class RayReturns:
             -1 where there is none, or where it is no row of the scan.
         partner_range: Range of that return, whether or not it is a row, float32 (N,), metres; NaN
             where there is none or nobody knows.
-        told_by: Name of the column that says so, ``directions``, or empty where nothing shows that
+        found_by: Name of the column that says so, ``directions``, or empty where nothing shows that
             any ray has two returns.
     """
 
@@ -44,7 +44,7 @@ class RayReturns:
     farther: NDArray[np.bool_]
     partner: NDArray[np.int64]
     partner_range: NDArray[np.float32]
-    told_by: str
+    found_by: str
 
     @classmethod
     def single(cls, points: int) -> Self:
@@ -61,7 +61,7 @@ class RayReturns:
     @property
     def dual(self) -> bool:
         """Whether any ray is known to have two returns."""
-        return bool(self.told_by)
+        return bool(self.found_by)
 
 
 def pair_returns(scan: Scan) -> RayReturns:
@@ -100,7 +100,9 @@ def _pair(scan: Scan) -> RayReturns:
     if stated is not None:
         may &= stated.number[first] >= 0
     asked = np.flatnonzero(may)
-    pairs = asked[one_direction(scan.xyz.take(first[asked], axis=0), evident=stated is None)]
+    pairs = asked[
+        shared_direction_pairs(scan.xyz.take(first[asked], axis=0), evident=stated is None)
+    ]
     near, far = np.where(ranges[pairs[:, 0]] <= ranges[pairs[:, 1]], pairs.T, pairs.T[::-1])
     apart = ranges[far] - ranges[near] >= LEAST_APART
     if stated is not None:

@@ -25,7 +25,7 @@ FEWEST_PAIRS = 20
 CLEARLY_MORE = 5
 
 
-def one_direction(xyz: NDArray[np.float32], evident: bool = True) -> NDArray[np.int64]:
+def shared_direction_pairs(xyz: NDArray[np.float32], evident: bool = True) -> NDArray[np.int64]:
     """Pairs of points that lie in one direction from the sensor.
 
     Args:

@@ -20,7 +20,7 @@ IGNORED = -1
 BackProjection = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 
-class SeenScan(ABC):
+class ViewedScan(ABC):
     """One scan as a network sees it, in cells: points of a neighbour view, pixels of an image."""
 
     @property
@@ -98,14 +98,14 @@ class View(ABC):
     @classmethod
     @abstractmethod
     def of(
-        cls, entry: Entry, channels: tuple[str, ...], stand_in: Mapping[str, float], threads: int
+        cls, entry: Entry, channels: tuple[str, ...], fill_value: Mapping[str, float], threads: int
     ) -> Self:
         """Reads back what :meth:`as_dict` gave. It is not trusted.
 
         Args:
             entry: What stands under ``view`` in a Spec.
             channels: What the network sees of a point, in order, as :func:`channel_of` names it.
-            stand_in: What stands in for a value that a scan lacks, by channel.
+            fill_value: What stands in for a value that a scan lacks, by channel.
             threads: Threads that it may use; 0 takes every core this process may use.
 
         Raises:
@@ -126,7 +126,7 @@ class View(ABC):
         """The scans that it sees: by default the one that is judged, alone."""
         return Window()
 
-    def judging(self, candidates: Candidates) -> "View":
+    def with_candidates(self, candidates: Candidates) -> "View":
         """The same view with cells for candidates alone; all other points are given score 0.
 
         What the network says of a candidate must not change by it: whatever its score depends on
@@ -143,10 +143,10 @@ class View(ABC):
         )
 
     @abstractmethod
-    def __call__(self, scan: Scan) -> SeenScan:
+    def __call__(self, scan: Scan) -> ViewedScan:
         """Views a scan, alone."""
 
-    def of_window(self, scans: WindowOfScans) -> SeenScan:
+    def of_window(self, scans: WindowOfScans) -> ViewedScan:
         """Views a scan among those around it, as many as :attr:`window` asks for or fewer.
 
         Args:

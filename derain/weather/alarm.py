@@ -191,4 +191,4 @@ class Alarm:
         """The range that decides at a threshold."""
         if self._dry is None or self._dry.at_least < threshold.above:
             return visibility
-        return visibility.or_worse(reach)
+        return visibility.shorter_of(reach)

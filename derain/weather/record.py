@@ -87,7 +87,7 @@ BAND_TITLES = [f"share_from_{band}_m" for band in RANGE_BANDS]
 WEATHER_COLUMNS = [*FIGURES, *SECTOR_TITLES, *BAND_TITLES]
 
 
-def row_of(record: WeatherRecord, weather: ScanWeather) -> list[object]:
+def weather_row(record: WeatherRecord, weather: ScanWeather) -> list[object]:
     """The row of a table, in the order of WEATHER_COLUMNS."""
     figures = [getattr(record, name) for name in FIGURES]
     return [*figures, *_known(weather.shares_by_sector), *_known(weather.shares_by_range)]

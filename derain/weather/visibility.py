@@ -55,7 +55,7 @@ class Visibility:
         """The estimate, or else the near end, metres."""
         return self.at_least if self.metres is None else self.metres
 
-    def or_worse(self, other: "Visibility") -> "Visibility":
+    def shorter_of(self, other: "Visibility") -> "Visibility":
         """The shorter of two ranges, end by end; where one is not known, only its far end is."""
         metres = [each.metres for each in (self, other) if each.metres is not None]
         return Visibility(

@@ -15,14 +15,14 @@ from derain.datamodules.loading import Loading
 from derain.datamodules.scan_data import ScanData
 from derain.default import DEFAULT
 from derain.export.bench.bench import Bench, Effort, run_bench
-from derain.export.bench.contestants import contestants
+from derain.export.bench.bench_entries import bench_entries
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.report import SHORT, main_table
 from derain.export.labelled_neighbourhoods import LabelledNeighbourhoods
 from derain.export.methods import load_method
 from derain.export.tuning import Search, neighbours_to_find, tune_filter
 from derain.files import DEFAULT_COLUMNS
-from derain.files.atomic import refuse_unwritable, replacing
+from derain.files.atomic import replacing, require_writable
 from derain.pictures.comparison import comparison_figure
 from derain.pictures.scan_pictures import before_after_figure, save
 from derain.scan import Scan
@@ -37,7 +37,7 @@ from derain.sources.source import Source
 from derain.system.cores import usable_cores
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
-from derain.views.oddities import left_out, much_removed, no_points
+from derain.views.scan_issues import left_out, much_removed, no_points
 from derain.workflows.fit import fit
 from derain.workflows.learn import export_checkpoint
 from derain.workflows.steps import Show, Steps, show_nothing
@@ -162,7 +162,7 @@ def _draw_filters(config: DemoConfig, data: ScanData, frame: Frame, steps: Steps
     steps.begin("Picture: two filters on the scan with the most rain")
     scan = data.read(frame)
     known = ~data.card.unknown_of(scan)
-    methods = contestants(["dror", f"dsor, tuned={config.tuned}"])
+    methods = bench_entries(["dror", f"dsor, tuned={config.tuned}"])
     removed = {one.title: one.ready(0)(scan, Stopwatch())[known] for one in methods}
     title = f"{Path(frame.name).name}: {len(scan):,} points"
     rain = data.card.rain_of(scan)[known]
@@ -210,9 +210,9 @@ def _compare(config: DemoConfig, data: ScanData, steps: Steps) -> Bench:
     def labelled(frames: Source) -> LabelledFrames:
         return LabelledFrames(data.card, frames, 1.0, data.distinct, rates)
 
-    methods = contestants(names, lambda: labelled(data.frames("train")).truths())
+    methods = bench_entries(names, lambda: labelled(data.frames("train")).truths())
     out = config.out / "bench"
-    refuse_unwritable(out / "bench.json")
+    require_writable(out / "bench.json")
     quoted = " ".join(f"'{name}'" if " " in name else name for name in names)
     command = f"derain bench --data {config.data} --out {out} --methods {quoted}"
     found = run_bench(methods, labelled(data.frames("test")), config.effort, command)
@@ -302,8 +302,8 @@ def clean(method: Method, source: Source, out: Path, picture: Picture) -> Remove
     cleaned = 0
     for frame, judgement, _ in judgements(method, source):
         scan, rain = judgement.scan, judgement.rain
-        odd = [*method.oddities(judgement), *left_out(scan), *no_points(scan)]
-        notices.tell(frame.name, odd)
+        odd = [*method.issues(judgement), *left_out(scan), *no_points(scan)]
+        notices.warn(frame.name, odd)
         if frame.name == picture.scan:
             save(before_after_figure(scan, rain, picture.heading), picture.file)
         too_much = next(much_removed(judgement.share_of_rain), None)
@@ -313,7 +313,7 @@ def clean(method: Method, source: Source, out: Path, picture: Picture) -> Remove
         sink.write(frame, scan.take(~rain), rain, None)
         by_range += removed_by_range(scan, rain)
         cleaned += 1
-    notices.tell_how_many_more()
+    notices.warn_of_repeats()
     return Removed(by_range, cleaned)
 
 

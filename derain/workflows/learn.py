@@ -11,7 +11,7 @@ from derain.errors import InputError
 from derain.export.methods import load_method, named_method
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
-from derain.files.atomic import refuse_unwritable, replacing
+from derain.files.atomic import replacing, require_writable
 from derain.files.reading import reading
 from derain.models.checkpoint import load_model
 from derain.odometry.posed import ODOMETRY, STANDING
@@ -67,7 +67,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
     config = with_network(config)
     source = named_frames(config.recordings, config.columns)
     _refuse_too_few(config, source)
-    refuse_unwritable(config.out)
+    require_writable(config.out)
     _clear(config.work)
     keep_freed_memory()
     show(f"{len(source):,} scans to learn from. Everything but the model goes to {config.work}/")
@@ -145,7 +145,7 @@ def _clear(work: Path) -> None:
         raise InputError(
             work, "holds something other than what an earlier run left", "Give another --work."
         )
-    refuse_unwritable(mark)
+    require_writable(mark)
     for left in work.iterdir():
         shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
     with replacing(mark) as temporary:

@@ -16,7 +16,7 @@ from tqdm import tqdm
 from derain.cards.layout import folder_above
 from derain.errors import InputError
 from derain.files import RECORDS
-from derain.files.atomic import refuse_unwritable
+from derain.files.atomic import require_writable
 from derain.files.reading import is_file
 from derain.odometry.posed import ODOMETRY, with_poses
 from derain.odometry.recordings import FrameOdometry
@@ -150,11 +150,11 @@ def placed(source: Source, poses: str | None, threads: int = 0) -> Source:
     with tqdm(total=len(source), desc=ODOMETRY, unit="scan", disable=None) as bar:
 
         def watch(frame: Frame, registration: Registration) -> None:
-            notices.tell(frame.name, registration.oddities())
+            notices.warn(frame.name, registration.issues())
             bar.update()
 
         posed = with_poses(source, ODOMETRY, threads, watch)
-    notices.tell_how_many_more()
+    notices.warn_of_repeats()
     return posed
 
 
@@ -163,7 +163,7 @@ def _register(frame: Frame, odometry: FrameOdometry, guard: Guard, watch: Watch)
     with guard(frame), stopwatch.stage("read"):
         scan = frame.read()
     with stopwatch.stage("register"):
-        registration = odometry.take(frame, scan)
+        registration = odometry.register(frame, scan)
     if scan is not None and not registration.trusted:
         warn(f"{frame.name}: not to be trusted: {registration.reason}")
     watch(frame, registration, stopwatch)
@@ -217,7 +217,7 @@ def _files_of(recordings: Sequence[Sequence[Frame]], out: Path, replace: bool) -
                 "Take them in two runs, each to its --out.",
             )
         _refuse_to_overwrite(file, recording, replace)
-        refuse_unwritable(file)
+        require_writable(file)
     return files
 
 

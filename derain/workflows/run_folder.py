@@ -50,7 +50,7 @@ def folder_of_run(checkpoint: Path) -> Path | None:
 
 
 @contextmanager
-def writing_to_the_run_folder() -> Iterator[None]:
+def logging_to_run_folder() -> Iterator[None]:
     """Turns the system's refusal to write into an error that a user can act on."""
     try:
         yield

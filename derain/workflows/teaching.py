@@ -19,7 +19,7 @@ from derain.teaching.labels import TAUGHT_CARD
 from derain.teaching.manifest import HELD_OUT_PART, Manifest
 from derain.teaching.teach import teach
 from derain.teaching.truth import TruthRecord
-from derain.views.oddities import much_removed
+from derain.views.scan_issues import much_removed
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def teach_recordings(
         warn(sentence)
     counting = _Counting(method, source, card, watch)
     manifest = teach(method, source, out, card, guard, counting.add)
-    counting.notices.tell_how_many_more()
+    counting.notices.warn_of_repeats()
     results = TeachResults(manifest, counting.judged, counting.answers, counting.record)
     _warn_of_little(results)
     return results
@@ -112,8 +112,8 @@ class _Counting:
         """Counts one scan."""
         frame, judgement, stopwatch = answer
         self.judged += 1
-        odd = [*self.method.oddities(judgement), *much_removed(judgement.share_of_rain)]
-        self.notices.tell(frame.name, odd)
+        odd = [*self.method.issues(judgement), *much_removed(judgement.share_of_rain)]
+        self.notices.warn(frame.name, odd)
         answers = Answers.of(judgement.scan.with_label(labels), TAUGHT_CARD)
         self.answers += answers
         self.watch(LabelledScan(frame.name, answers, dict(stopwatch.milliseconds)))

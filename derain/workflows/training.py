@@ -46,13 +46,13 @@ from derain.models.start import started
 from derain.system.cores import usable_cores
 from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
 from derain.system.open3d_import import warn_where_tensorboard_cannot_start
-from derain.system.workers import end_with_launcher
+from derain.system.workers import exit_with_launcher
 from derain.workflows.configurations import own_configurations, with_packaged_configs
 from derain.workflows.lightning_silence import silence_advertisements
 from derain.workflows.run_folder import (
     WholeConfig,
     folder_of_run,
-    writing_to_the_run_folder,
+    logging_to_run_folder,
 )
 from derain.workflows.start import START_HELP, checkpoint_of
 from derain.workflows.training_errors import as_input_error, read_configuration
@@ -249,7 +249,7 @@ def run_trainer(
         "exit_on_error": False,  # faults become InputErrors
     }
     texts = descriptions or {}
-    with writing_to_the_run_folder(), naming_the_trainer():
+    with logging_to_run_folder(), naming_the_trainer():
         return DerainCLI(
             DerainingModule,
             ScanDataModule,
@@ -280,7 +280,7 @@ def _prepare_process(method: str) -> None:
     warnings.filterwarnings("ignore", message=".*LeafSpec")
     # The last checkpoint has nothing to lose by it, and of the best one BestCheckpoint takes care.
     warnings.filterwarnings("ignore", message="The dirpath has changed")
-    end_with_launcher()
+    exit_with_launcher()
     torch.set_num_threads(min(torch.get_num_threads(), usable_cores()))
     keep_freed_memory(KEPT_IN_TRAINING)
     # Deterministic training would write to every new array before anything computes it.

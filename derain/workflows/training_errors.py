@@ -8,6 +8,7 @@ from typing import Any
 
 from derain.errors import InputError
 from derain.files.documents import Entry
+from derain.models.former_names import FORMER_OPTIONS
 from derain.workflows.training_options import IMPLIED
 
 # How jsonargparse names an option that it does not know, on the command line and in a file.
@@ -70,7 +71,9 @@ def as_input_error(
 
 def _unknown(key: str, known: Collection[str], configurations: Sequence[Entry]) -> InputError:
     subject, dashes = _place(key, configurations)
-    near = difflib.get_close_matches(key, known, n=1)
+    section, dot, name = key.rpartition(".")
+    renamed = f"{section}{dot}{FORMER_OPTIONS.get(name, name)}"
+    near = [renamed] if renamed in known else difflib.get_close_matches(key, known, n=1)
     remedy = f"Did you mean {dashes}{near[0]}?" if near else HINT
     return InputError(subject, "no such option", remedy)
 

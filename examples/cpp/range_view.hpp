@@ -48,12 +48,12 @@ struct RangeView {
     in_parts(pixel.size(), threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t row = begin; row < end; ++row) {
         if (pixel[row] < 0 || !candidate[row]) continue;
-        switch (spec.way_back) {
-          case WayBack::copy: of_rows[row] = pixels.copy(pixel[row]); break;
-          case WayBack::nearest_range:
+        switch (spec.back_projection) {
+          case BackProjection::copy: of_rows[row] = pixels.copy(pixel[row]); break;
+          case BackProjection::nearest_range:
             of_rows[row] = pixels.nearest_range(pixel[row], range[row]);
             break;
-          case WayBack::vote: of_rows[row] = pixels.vote(pixel[row], range[row]); break;
+          case BackProjection::vote: of_rows[row] = pixels.vote(pixel[row], range[row]); break;
         }
       }
     });

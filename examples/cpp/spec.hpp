@@ -26,11 +26,11 @@ struct Bound {
 };
 
 // How points get a score that lost their pixel.
-enum class WayBack { copy, nearest_range, vote };
+enum class BackProjection { copy, nearest_range, vote };
 
 struct RangeSpec {
   Grid grid;
-  WayBack way_back = WayBack::copy;
+  BackProjection back_projection = BackProjection::copy;
 };
 
 struct Spec {
@@ -70,16 +70,16 @@ inline std::size_t neighbours_of(const Json& view) {
   return static_cast<std::size_t>(count);
 }
 
-inline WayBack way_back_of(const std::string& name) {
-  if (name == "copy") return WayBack::copy;
-  if (name == "nearest range") return WayBack::nearest_range;
-  if (name == "vote") return WayBack::vote;
+inline BackProjection back_projection_of(const std::string& name) {
+  if (name == "copy") return BackProjection::copy;
+  if (name == "nearest range") return BackProjection::nearest_range;
+  if (name == "vote") return BackProjection::vote;
   throw Unknown("its way_back is '" + name + "', which this program does not know");
 }
 
 inline RangeSpec range_spec_of(const Json& view) {
   RangeSpec range;
-  range.way_back = way_back_of(member(view, "way_back", Json::Kind::text).text);
+  range.back_projection = back_projection_of(member(view, "way_back", Json::Kind::text).text);
   const Json& grid = member(view, "grid", Json::Kind::object);
   const Json& azimuth = member(grid, "azimuth", Json::Kind::array);
   const double columns = member(grid, "columns", Json::Kind::number).number;

@@ -39,7 +39,7 @@ from derain.bags.point_cloud import PointCloud, PointField, scan_of_cloud
 from derain.errors import InputError
 from derain.export.runtime import Derainer, Judgement
 from derain.files import read_scan
-from derain.views.oddities import MOST_RAIN
+from derain.views.scan_issues import MOST_RAIN
 from derain.weather.alarm import Alarm, Level
 from derain.weather.scan_weather import ScanWeather
 from derain.weather.visibility import Visibility
@@ -192,7 +192,7 @@ class RainRemover:
 
     def news(self, judgement: Judgement) -> list[str]:
         """What is odd about a cloud for the model and was not about earlier ones."""
-        odd = [one for one in self.derainer.oddities(judgement) if one.kind not in self.told]
+        odd = [one for one in self.derainer.issues(judgement) if one.kind not in self.told]
         self.told |= {one.kind for one in odd}
         return [one.detail for one in odd]
 

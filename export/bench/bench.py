@@ -15,12 +15,12 @@ from tqdm import tqdm
 from derain.cards.card import DataCard, load_card
 from derain.cards.rain_found import warn_without_rain
 from derain.evaluation.scores import ScoredMethod, score
-from derain.export.bench.contestants import Contestant, GivenMethod, TimedMethod, contestants
+from derain.export.bench.bench_entries import BenchEntry, GivenMethod, TimedMethod, bench_entries
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.other_runtime import changes
 from derain.export.bench.report import draw_speed_error, main_table, runtimes_table, write_report
-from derain.export.bench.rows import Row, joined
+from derain.export.bench.rows import Row, bench_rows
 from derain.export.machine import processor, versions
 from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
 from derain.export.runtimes.session import FLOAT32_PRECISION
@@ -30,7 +30,7 @@ from derain.filters.filter_view import filter_view, rain_among
 from derain.scan import Scan
 from derain.sources.given import GivenScans, source_of
 from derain.sources.spread import evenly_spaced
-from derain.sources.training_record import overlap
+from derain.sources.training_record import training_overlap
 from derain.spec import Spec
 from derain.system.extras import MATPLOTLIB, MissingExtraError, require
 from derain.system.notices import Notices, warn
@@ -169,14 +169,14 @@ def bench(
         return LabelledFrames(card, frames, intensity_scale, asked, rain_rates or {})
 
     learn_from = None if train is None else labelled(train).truths
-    rows = contestants(methods, learn_from, Runtime(runtime, precision))
+    rows = bench_entries(methods, learn_from, Runtime(runtime, precision))
     titles = ", ".join(repr(row.title) for row in rows)
     effort = Effort(threads, timed, repeats, seed)
     return run_bench(rows, labelled(scans), effort, command=f"derain.bench([{titles}], ...)")
 
 
 def run_bench(
-    methods: Sequence[Contestant], data: LabelledFrames, effort: Effort, command: str
+    methods: Sequence[BenchEntry], data: LabelledFrames, effort: Effort, command: str
 ) -> Bench:
     """Scores every method on every scan, and measures what each costs alone.
 
@@ -205,26 +205,26 @@ def run_bench(
         measure_cost(method, timing)
         for method in tqdm(methods, desc="timing", unit="method", disable=None)
     ]
-    notices.tell_how_many_more()
-    rows = joined(methods, scores, costs, np.random.default_rng(effort.seed))
+    notices.warn_of_repeats()
+    rows = bench_rows(methods, scores, costs, np.random.default_rng(effort.seed))
     changed = changes(methods, timing, data.read)
     facts = _facts(command, data, timing, effort.seed, methods)
     return Bench(rows, {**facts, "notes": notes, "runtimes": changed})
 
 
-def scored_methods(contestants: Sequence[Contestant], threads: int) -> list[ScoredMethod]:
+def scored_methods(bench_entries: Sequence[BenchEntry], threads: int) -> list[ScoredMethod]:
     """The methods, ready to judge one scan after the other; filters share their search.
 
     Args:
-        contestants: The methods.
+        bench_entries: The methods.
         threads: Threads of views and networks; 0 takes every core this process may use.
     """
-    shared = SharedSearch([row.filter for row in contestants if row.filter], threads)
+    shared = SharedSearch([row.filter for row in bench_entries if row.filter], threads)
     return [
         partial(shared.judge, row.filter, row.candidates)
         if row.filter
         else partial(_untimed, row.ready(threads))
-        for row in contestants
+        for row in bench_entries
     ]
 
 
@@ -255,31 +255,31 @@ def _untimed(method: TimedMethod, scan: Scan) -> NDArray[np.bool_]:
     return method(scan, Stopwatch())
 
 
-def _notes(methods: Sequence[Contestant], data: LabelledFrames) -> list[str]:
+def _notes(methods: Sequence[BenchEntry], data: LabelledFrames) -> list[str]:
     """Prints and returns a note for each model that was trained on the scans it is measured on."""
     notes = [
         note
         for method in methods
-        if isinstance(method.judges_by, Spec)
-        and (note := overlap(method.title, method.judges_by, data.card, data.frames))
+        if isinstance(method.spec_or_filter, Spec)
+        and (note := training_overlap(method.title, method.spec_or_filter, data.card, data.frames))
     ]
     for note in notes:
         tqdm.write(f"derain: warning: {note}", sys.stderr)
     return notes
 
 
-def _scans(methods: Sequence[Contestant], data: LabelledFrames, notices: Notices) -> Iterator[Scan]:
+def _scans(methods: Sequence[BenchEntry], data: LabelledFrames, notices: Notices) -> Iterator[Scan]:
     """Reads the scans one by one, and warns where one does not suit a method."""
     for frame in tqdm(data.frames, desc="scoring", unit="scan", disable=None):
         scan = data.read(frame)
         for method in methods:
-            if method.judges_by is not None:
-                notices.tell(frame.name, method.judges_by.oddities(scan), method.title)
+            if method.spec_or_filter is not None:
+                notices.warn(frame.name, method.spec_or_filter.issues(scan), method.title)
         yield scan
 
 
 def _facts(
-    command: str, data: LabelledFrames, timing: Timing, seed: int, methods: Sequence[Contestant]
+    command: str, data: LabelledFrames, timing: Timing, seed: int, methods: Sequence[BenchEntry]
 ) -> dict[str, Any]:
     """Everything that a bench depends on besides its methods, as JSON-able primitives."""
     card, frames = data.card, data.frames

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import reason_of
-from derain.export.bench.contestants import Contestant
+from derain.export.bench.bench_entries import BenchEntry
 from derain.export.timing import RunTimes, timed_runs
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.system.stopwatch import Stopwatch
-from derain.system.workers import main_left_out, worker_pool
+from derain.system.workers import without_main_module, worker_pool
 
 
 @dataclass(frozen=True)
@@ -55,27 +55,27 @@ class Cost:
     alone: bool = True
 
 
-def measure_cost(contestant: Contestant, timing: Timing) -> Cost:
+def measure_cost(bench_entry: BenchEntry, timing: Timing) -> Cost:
     """Measures a method in a process of its own, or here where it cannot be sent to another.
 
     Args:
-        contestant: The method.
+        bench_entry: The method.
         timing: The scans to time it on, and how.
     """
     try:
-        if not contestant.can_be_sent:
-            return replace(timed_here(contestant, timing), peak_memory=None, alone=False)
+        if not bench_entry.is_picklable:
+            return replace(measure_in_process(bench_entry, timing), peak_memory=None, alone=False)
         with worker_pool(1) as pool:
-            with main_left_out():
-                measured = pool.submit(timed_here, contestant, timing)
+            with without_main_module():
+                measured = pool.submit(measure_in_process, bench_entry, timing)
             return measured.result()
     except Exception as error:  # its row states whatever a library raises
-        return Cost(RunTimes.of_no_runs(), None, reason_of(error), contestant.can_be_sent)
+        return Cost(RunTimes.of_no_runs(), None, reason_of(error), bench_entry.is_picklable)
 
 
-def timed_here(contestant: Contestant, timing: Timing) -> Cost:
+def measure_in_process(bench_entry: BenchEntry, timing: Timing) -> Cost:
     """Runs a method on every scan, in turns, in this process; see :func:`measure_cost`."""
-    method = contestant.ready(timing.threads)
+    method = bench_entry.ready(timing.threads)
 
     def judge(scan: Scan, stopwatch: Stopwatch) -> NDArray[np.bool_]:
         return method(scan.with_intensity_times(timing.intensity_scale), stopwatch)

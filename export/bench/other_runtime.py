@@ -12,7 +12,7 @@ from derain.scan import Scan
 from derain.spec import Spec
 
 if TYPE_CHECKING:
-    from derain.export.bench.contestants import Contestant, TimedMethod
+    from derain.export.bench.bench_entries import BenchEntry, TimedMethod
     from derain.export.bench.cost import Timing
     from derain.sources.frame import Frame
 
@@ -35,7 +35,7 @@ class OtherRuntime:
         return {"runtime": str(self.runtime)}  # one text, because precision is also a score
 
 
-def beside_themselves(rows: Sequence["Contestant"], runtime: Runtime) -> list["Contestant"]:
+def with_runtime_variants(rows: Sequence["BenchEntry"], runtime: Runtime) -> list["BenchEntry"]:
     """The methods, each model followed by the same in another runtime.
 
     Args:
@@ -50,14 +50,14 @@ def beside_themselves(rows: Sequence["Contestant"], runtime: Runtime) -> list["C
     beside = []
     for row in rows:
         beside.append(row)
-        if isinstance(row.judges_by, Spec) and row.by_other is None:
-            beside.append(replace(run_by(row, runtime), title=f"{row.title} ({runtime})"))
+        if isinstance(row.spec_or_filter, Spec) and row.by_other is None:
+            beside.append(replace(with_runtime(row, runtime), title=f"{row.title} ({runtime})"))
     if len(beside) == len(rows):
         raise InputError(f"runtime {runtime}", "none of the methods is a model", "Leave it out.")
     return beside
 
 
-def run_by(row: "Contestant", runtime: Runtime) -> "Contestant":
+def with_runtime(row: "BenchEntry", runtime: Runtime) -> "BenchEntry":
     """A model in another runtime.
 
     Args:
@@ -75,7 +75,7 @@ def run_by(row: "Contestant", runtime: Runtime) -> "Contestant":
 
 
 def changes(
-    methods: Sequence["Contestant"], timing: "Timing", read: Callable[["Frame"], Scan]
+    methods: Sequence["BenchEntry"], timing: "Timing", read: Callable[["Frame"], Scan]
 ) -> list[dict[str, Any]]:
     """Compares each model in another runtime with the same model in onnxruntime.
 
@@ -96,9 +96,11 @@ def changes(
 
 
 def _change(
-    method: "Contestant", timing: "Timing", read: Callable[["Frame"], Scan]
+    method: "BenchEntry", timing: "Timing", read: Callable[["Frame"], Scan]
 ) -> dict[str, Any]:
-    from derain.export.proof import beside  # here: it loads torch, whose memory is not measured
+    from derain.export.proof import (
+        compare_runtimes,  # here: it loads torch, whose memory is not measured
+    )
 
     assert method.by_other is not None
     try:
@@ -106,7 +108,7 @@ def _change(
         assert isinstance(usual, Derainer)
         assert isinstance(other, Derainer)
         # A map releases each scan before the next is read.
-        proof = beside(usual, other, map(_named(read), timing.frames))
+        proof = compare_runtimes(usual, other, map(_named(read), timing.frames))
     except Exception as error:  # its row states whatever a runtime raises
         return {"failure": reason_of(error)}
     numbers = proof.as_dict()

@@ -12,7 +12,7 @@ from derain.cards.card import DataCard
 from derain.evaluation.counts import SCORES, Counts, mean_over_scans
 from derain.evaluation.published_tables import PaperTable, PublishedRow
 from derain.evaluation.text_tables import markdown_table, number_text
-from derain.export.bench.contestants import FILE_SIZE, LEARNT, TRIVIAL, Contestant
+from derain.export.bench.bench_entries import FILE_SIZE, LEARNT, TRIVIAL, BenchEntry
 from derain.export.bench.rows import Row
 from derain.export.timing import STAGES
 from derain.files.atomic import replacing
@@ -154,8 +154,8 @@ def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) 
             row.title,
             1 - row.scores.pooled.iou,
             row.milliseconds,
-            group_of(row.contestant),
-            row.contestant.facts.get(FILE_SIZE),
+            group_of(row.bench_entry),
+            row.bench_entry.facts.get(FILE_SIZE),
         )
         for row in rows
         if row.cost.failure is None and not math.isnan(row.scores.pooled.iou)
@@ -164,14 +164,16 @@ def draw_speed_error(rows: Sequence[Row], facts: Mapping[str, Any], path: Path) 
     save(speed_error_figure(standings, title), path)
 
 
-def group_of(contestant: Contestant) -> str:
+def group_of(bench_entry: BenchEntry) -> str:
     """The kind of a method: ``network``, ``filter`` or ``baseline``."""
-    if contestant.filter is not None:
+    if bench_entry.filter is not None:
         return "filter"
-    return "baseline" if contestant.kind in (*LEARNT, *TRIVIAL) else "network"
+    return "baseline" if bench_entry.kind in (*LEARNT, *TRIVIAL) else "network"
 
 
-def beside_published(table: PaperTable, ours: Mapping[str, Sequence[Row]], card: DataCard) -> str:
+def with_published_rows(
+    table: PaperTable, ours: Mapping[str, Sequence[Row]], card: DataCard
+) -> str:
     """Our rows below the published rows of the same method, in Markdown.
 
     Args:

@@ -9,7 +9,7 @@ import numpy as np
 from derain.evaluation.bootstrap import Bootstrap, Interval, bootstrap
 from derain.evaluation.counts import SCORES, Counts, mean_over_scans, or_none
 from derain.evaluation.scores import Scores
-from derain.export.bench.contestants import Contestant
+from derain.export.bench.bench_entries import BenchEntry
 from derain.export.bench.cost import Cost
 from derain.export.timing import STAGES
 
@@ -19,7 +19,7 @@ class Row:
     """The results of one method.
 
     Attributes:
-        contestant: The method.
+        bench_entry: The method.
         scores: Its scores.
         cost: Its cost.
         iou_interval: 95 % interval of its IoU over scans; None for fewer than two scans, and where
@@ -27,7 +27,7 @@ class Row:
         behind_best: 95 % interval of the best method's IoU minus its own.
     """
 
-    contestant: Contestant
+    bench_entry: BenchEntry
     scores: Scores
     cost: Cost
     iou_interval: Interval | None
@@ -36,12 +36,12 @@ class Row:
     @property
     def title(self) -> str:
         """The method's title."""
-        return self.contestant.title
+        return self.bench_entry.title
 
     @property
     def kind(self) -> str:
         """Name of its network, filter or baseline."""
-        return self.contestant.kind
+        return self.bench_entry.kind
 
     @property
     def milliseconds(self) -> float:
@@ -76,12 +76,12 @@ class Row:
             "failed_scans": dict(scores.failures),
             "not_timed": self.cost.failure,
             **({} if self.cost.alone else {"timed_alone": False}),
-            **self.contestant.facts,
+            **self.bench_entry.facts,
         }
 
 
-def joined(
-    contestants: Sequence[Contestant],
+def bench_rows(
+    bench_entries: Sequence[BenchEntry],
     scores: Sequence[Scores],
     costs: Sequence[Cost],
     generator: np.random.Generator,
@@ -89,13 +89,13 @@ def joined(
     """The rows, in the order of the methods.
 
     Args:
-        contestants: The methods, one or more.
+        bench_entries: The methods, one or more.
         scores: The scores of each, on the same scans.
         costs: The cost of each.
         generator: Draws scans for the intervals.
     """
     intervals = _intervals(scores, generator)
-    return [Row(*row) for row in zip(contestants, scores, costs, *intervals, strict=True)]
+    return [Row(*row) for row in zip(bench_entries, scores, costs, *intervals, strict=True)]
 
 
 def _intervals(

@@ -17,6 +17,7 @@ from torch import Tensor
 from derain.errors import InputError
 from derain.files.atomic import replacing
 from derain.files.documents import shown
+from derain.models.former_names import current_monitor
 from derain.system.notices import warn
 
 
@@ -33,6 +34,12 @@ class BestCheckpoint(ModelCheckpoint):
     """
 
     _earlier: Mapping[str, Any] | None = None  # state of the run that this one goes on from
+
+    def setup(self, trainer: lightning.Trainer, pl_module: Any, stage: str) -> None:
+        """Takes the monitor's current name for the one in a configuration of an earlier version."""
+        if self.monitor is not None:
+            self.monitor = current_monitor(self.monitor)
+        super().setup(trainer, pl_module, stage)
 
     @property
     def state_key(self) -> str:

@@ -10,7 +10,7 @@ from torch.optim import Optimizer
 
 from derain.files.documents import Entry
 from derain.models.callbacks.best_checkpoint import BestCheckpoint
-from derain.models.likeness import REMEDY, like
+from derain.models.likeness import REMEDY, matching_state
 
 
 class Resumption(lightning.Callback):
@@ -42,7 +42,7 @@ class Resumption(lightning.Callback):
                 del states[key]
             else:
                 found = Entry(str(trainer.ckpt_path), f"callbacks.{key}", states[key])
-                states[key] = like(found, callback.state_dict())
+                states[key] = matching_state(found, callback.state_dict())
         self._checkpoint = checkpoint
 
     def on_fit_start(self, trainer: lightning.Trainer, pl_module: Any) -> None:
@@ -65,7 +65,7 @@ class Resumption(lightning.Callback):
         checkpoint.pop("native_amp_scaling_state", None)  # of Lightning before 1.6
         whole = {name: Entry(str(trainer.ckpt_path), name, checkpoint.get(name)) for name in own}
         for name in own.keys() & checkpoint.keys():
-            checkpoint[name] = like(whole[name], own[name])
+            checkpoint[name] = matching_state(whole[name], own[name])
         for found, state in zip(checkpoint["optimizer_states"], optimizers, strict=True):
             if _order(found) != _order(state):
                 raise whole["optimizer_states"].fault("orders parameters otherwise", REMEDY)

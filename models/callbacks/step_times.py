@@ -6,7 +6,7 @@ from typing import Any
 import lightning
 import torch
 
-from derain.learning.batch import READ, VIEW, Batch, added_up
+from derain.learning.batch import READ, VIEW, Batch, summed_times
 
 # Groups of scalars: milliseconds of a step by what they are spent on, and scans a second.
 STEP, SPEED = "milliseconds_per_step", "speed"
@@ -68,7 +68,7 @@ class StepTimes(lightning.Callback):
         self._steps += 1
         self._scans += len(batch.cells)
         self._seconds += now - self._asked
-        self._spent = added_up([self._spent, batch.milliseconds, {WAIT: 1e3 * self._waited}])
+        self._spent = summed_times([self._spent, batch.milliseconds, {WAIT: 1e3 * self._waited}])
         if self._timed:
             self._network.append(1e3 * (now - self._stepped_since))
         if due:

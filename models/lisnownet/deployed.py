@@ -30,7 +30,7 @@ class DeployedLiSnowNet(nn.Module):
     def forward(self, image: Tensor, valid: Tensor) -> Tensor:
         """Scores every pixel; arguments and result as for :class:`LiSnowNet`."""
         seen = cube_roots(image, self.rule)
-        return select(image, valid, seen, self.network(seen, valid), self.rule)
+        return rain_logits(image, valid, seen, self.network(seen, valid), self.rule)
 
 
 def cube_roots(image: Tensor, rule: SelectionRule) -> Tensor:
@@ -44,7 +44,7 @@ def cube_roots(image: Tensor, rule: SelectionRule) -> Tensor:
     return torch.cat([image[:, :1], share], dim=1) ** (1 / 3)
 
 
-def select(
+def rain_logits(
     image: Tensor, valid: Tensor, seen: Tensor, denoised: Tensor, rule: SelectionRule
 ) -> Tensor:
     """Logits of "not rain" and "rain" of every pixel, float (B · H · W, 2), row by row.
@@ -59,21 +59,21 @@ def select(
         denoised: What it made of that, float (B, 2, H, W).
         rule: The rule.
     """
-    excess = change(seen, denoised) / rule.residual - 1
+    excess = denoising_change(seen, denoised) / rule.residual - 1
     margin = (STEEPNESS * excess).clamp(-CERTAIN, CERTAIN)
-    margin = torch.where(possible(image, rule), margin, -CERTAIN)
+    margin = torch.where(may_be_rain(image, rule), margin, -CERTAIN)
     margin = torch.where(image[:, :1] < rule.near, CERTAIN, margin)
     margin = torch.where(valid, margin, -CERTAIN)
     return per_pixel(torch.cat([-margin, margin], dim=1) / 2)
 
 
-def change(seen: Tensor, denoised: Tensor) -> Tensor:
+def denoising_change(seen: Tensor, denoised: Tensor) -> Tensor:
     """What denoising changed: of range, times that of intensity cubed, float (B, 1, H, W)."""
     of_range, of_intensity = (denoised - seen).split(1, dim=1)
     return of_range * of_intensity**3
 
 
-def possible(image: Tensor, rule: SelectionRule) -> Tensor:
+def may_be_rain(image: Tensor, rule: SelectionRule) -> Tensor:
     """Which pixels may be rain by their height and intensity, bool (B, 1, H, W)."""
     _, height, intensity = image.split(1, dim=1)
     return (height > rule.ground) & (intensity < rule.intensity * rule.full_scale)

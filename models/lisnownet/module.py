@@ -26,16 +26,16 @@ from derain.learning.task import EXAMPLE_SCANS
 from derain.models.base import DerainingModule
 from derain.models.lisnownet.deployed import (
     DeployedLiSnowNet,
-    change,
     cube_roots,
-    possible,
-    select,
+    denoising_change,
+    may_be_rain,
+    rain_logits,
 )
 from derain.models.lisnownet.network import LiSnowNetwork
 from derain.models.lisnownet.selection_rule import SelectionRule
 from derain.models.lisnownet.sparsity import RESIDUALS, sparsity_loss
 from derain.models.published import Published
-from derain.models.range_module import FITTED, range_view, stated
+from derain.models.range_module import FITTED, range_view, require_grid
 from derain.models.registry import NETWORKS
 from derain.scan import Scan
 from derain.views.range_image import RangeView
@@ -56,8 +56,8 @@ class LiSnowNet(DerainingModule, Published):
     Args:
         grid: The range image's grid: ``fitted`` to the training scans, the name of a published
             one, or its bounds.
-        way_back: Name of the back-projection, by which points that lost their pixel to a nearer one
-            get a score: ``nearest range``, ``copy`` or ``vote``.
+        back_projection: Name of the back-projection, by which points that lost their pixel to a
+            nearer one get a score: ``nearest range``, ``copy`` or ``vote``.
         width: Channels of the features at full size, 8 as published.
         dropout: Share of feature maps dropped in training.
         alpha: How much sparsity counts against the residual: it weighs 1 - 2^-alpha.
@@ -82,14 +82,14 @@ class LiSnowNet(DerainingModule, Published):
     )
     CHANNELS: ClassVar[tuple[str, ...]] = ("range", "z", "intensity")
     # What denoising changed is divided by the rule's residual, some thousandths.
-    AMPLIFIES: ClassVar[float] = 100.0
+    LOGIT_GAIN: ClassVar[float] = 100.0
     LEARNS_FROM_LABELS: ClassVar[bool] = False
     network: LiSnowNetwork
 
     def __init__(
         self,
         grid: str | dict[str, Any] = FITTED,
-        way_back: str = "nearest range",
+        back_projection: str = "nearest range",
         width: int = 8,
         dropout: float = 0.5,
         alpha: float = 5.5,
@@ -135,15 +135,15 @@ class LiSnowNet(DerainingModule, Published):
                 f"the weights see {network.channels} channels",
                 "Give weights that see range and intensity.",
             )
-        model = cls(grid=stated(grid, cls.NAME), width=network.width)
+        model = cls(grid=require_grid(grid, cls.NAME), width=network.width)
         model.network = network
         model.adopt(model.spec_for(card))
         return model
 
     def view_for(self, scans: Sequence[Scan]) -> RangeView:
         """The view that the network sees a scan through, its grid fitted if it is not stated."""
-        grid, way_back = self.hparams["grid"], self.hparams["way_back"]
-        return range_view(grid, self.channels, way_back, scans)
+        grid, back_projection = self.hparams["grid"], self.hparams["back_projection"]
+        return range_view(grid, self.channels, back_projection, scans)
 
     def rule_for(self, scans: Sequence[Scan]) -> dict[str, float]:
         """Constants of the selection rule, fitted to training scans where they are not stated."""
@@ -183,7 +183,7 @@ class LiSnowNet(DerainingModule, Published):
             "wavelet": loss.wavelet,
             "fourier": loss.fourier,
             "residual": loss.residual,
-        }, select(image, valid, seen, denoised.detach(), self.selection)
+        }, rain_logits(image, valid, seen, denoised.detach(), self.selection)
 
     def on_validation_epoch_start(self) -> None:
         """Fits the rule's residual, where it is not stated, to what the network changes by now.
@@ -208,7 +208,7 @@ class LiSnowNet(DerainingModule, Published):
         rule = self.selection.with_residual_of(changes)
         # Several processes go on with one rule, however each has rounded.
         rule = replace(rule, residual=self.trainer.strategy.broadcast(rule.residual))
-        self._log_alike({"val/rule_residual": torch.tensor(rule.residual)})
+        self._log_identical({"val/rule_residual": torch.tensor(rule.residual)})
         self.adopt(replace(self.spec, rule=rule.as_dict()))
 
     def on_fit_start(self) -> None:
@@ -238,8 +238,8 @@ class LiSnowNet(DerainingModule, Published):
 
     def _changes(self, image: Tensor, valid: Tensor, denoised: Tensor) -> NDArray[np.float32]:
         """What the network changes of the returns that the rule's limits leave, float32 (M,)."""
-        changes = change(cube_roots(image, self.selection), denoised)
-        return changes[valid & possible(image, self.selection)].cpu().numpy()
+        changes = denoising_change(cube_roots(image, self.selection), denoised)
+        return changes[valid & may_be_rain(image, self.selection)].cpu().numpy()
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
         """Adam with a learning rate that falls after every epoch."""

@@ -102,7 +102,7 @@ class OutDet(SupervisedModule, Published):
         """The view that the network sees a scan through, whatever the scans."""
         return NeighbourView(self.hparams["neighbours"], self.channels)
 
-    def sees_through(self, view: View) -> bool:
+    def accepts_view(self, view: View) -> bool:
         """Whether the network can take what a Spec's view gives: as many neighbours as it has."""
         return isinstance(view, NeighbourView) and view.neighbours == self.hparams["neighbours"]
 

@@ -20,7 +20,7 @@ from derain.errors import InputError
 from derain.learning.batch import Batch
 from derain.models.registry import NETWORKS
 from derain.models.relative_outdet.network import RelativeOutDetNetwork
-from derain.models.relative_outdet.steps import OF_STEP
+from derain.models.relative_outdet.steps import STEP_NEIGHBOUR
 from derain.models.supervised import SupervisedModule
 from derain.scan import Scan
 from derain.views.neighbours import NeighbourView
@@ -76,8 +76,8 @@ class RelativeOutDet(SupervisedModule):
         spec: dict[str, Any] | None = None,
     ) -> None:
         super().__init__(CHANNELS)
-        if neighbours <= OF_STEP:
-            remedy = f"Give {OF_STEP + 1} or more."
+        if neighbours <= STEP_NEIGHBOUR:
+            remedy = f"Give {STEP_NEIGHBOUR + 1} or more."
             raise InputError("neighbours", f"{neighbours} are too few", remedy)
         self.save_hyperparameters()
         self.network = RelativeOutDetNetwork(neighbours, width, of_neighbour, opinion, context)
@@ -87,7 +87,7 @@ class RelativeOutDet(SupervisedModule):
         """The view that the network sees a scan through, whatever the scans."""
         return NeighbourView(self.hparams["neighbours"], self.channels)
 
-    def sees_through(self, view: View) -> bool:
+    def accepts_view(self, view: View) -> bool:
         """Whether the network can take what a Spec's view gives: all points, and its neighbours."""
         return (
             isinstance(view, NeighbourView)

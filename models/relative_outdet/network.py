@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from derain.models.relative_outdet.steps import HARDLY_ANY, NUMBERS, USUAL_RANGE, in_steps
+from derain.models.relative_outdet.steps import EPSILON, NUMBERS, USUAL_RANGE, in_steps
 
 # Slope of every activation below 0.
 NEGATIVE_SLOPE = 0.1
@@ -102,14 +102,14 @@ class RelativeOutDetNetwork(nn.Module):
     def _context(self, features: Tensor, far: Tensor) -> Tensor:
         """What the scan holds at the range of each point, and in all."""
         share = torch.softmax(-(((far[:, None] - self.centres) / SHELL_REACH) ** 2), dim=1)
-        said = _active(self.to_context(features))
+        context = _active(self.to_context(features))
         # In float64, for sums of float32 over a whole scan differ from one runtime to another, and
         # with them the logits in their third digit.
-        shares, all_said = share.double(), said.double()
-        of_shell = shares.T @ all_said / (shares.sum(dim=0)[:, None] + HARDLY_ANY)
-        of_all = all_said.sum(dim=0) / (said.shape[0] + HARDLY_ANY)
-        of_shell, of_all = of_shell.to(said.dtype), of_all.to(said.dtype)
-        of_all = of_all.expand(said.shape[0], -1)
+        shares, context_double = share.double(), context.double()
+        of_shell = shares.T @ context_double / (shares.sum(dim=0)[:, None] + EPSILON)
+        of_all = context_double.sum(dim=0) / (context.shape[0] + EPSILON)
+        of_shell, of_all = of_shell.to(context.dtype), of_all.to(context.dtype)
+        of_all = of_all.expand(context.shape[0], -1)
         result: Tensor = self.from_context(torch.cat([share @ of_shell, of_all], dim=1))
         return result
 

@@ -12,7 +12,7 @@ NEAREST_TO_AXIS = 0.01
 # A step is the angle to the third nearest beam among those of a point's neighbours. Two of the
 # nearest lie on either side, along the axis of finer resolution, and another return of the point's
 # own beam may be nearer still.
-OF_STEP = 3
+STEP_NEIGHBOUR = 3
 
 # The step of a scan is the median over so many of its points, evenly spread over its rows.
 SAMPLED_POINTS = 2049
@@ -21,8 +21,8 @@ SAMPLED_POINTS = 2049
 FINEST_ANGLE = 1e-4
 
 # Added to what logarithms are taken of, and to what is divided by: either may be 0.
-FEWEST_STEPS = 1e-2
-HARDLY_ANY = 1e-3
+STEP_EPSILON = 1e-2
+EPSILON = 1e-3
 
 # Ranges are logarithms over this one, metres.
 USUAL_RANGE = 10.0
@@ -67,7 +67,7 @@ def in_steps(points: Tensor, distances: Tensor, neighbours: Tensor) -> tuple[Ten
     length = (distance * step)[:, None]
     seen = torch.stack(
         [
-            torch.log(distances[:, 1:] / length + FEWEST_STEPS),
+            torch.log(distances[:, 1:] / length + STEP_EPSILON),
             _asinh(farther / length),
             _asinh(aside.abs() / length),
             _asinh(risen / length),
@@ -107,5 +107,5 @@ def _step(aside: Tensor, risen: Tensor, distance: Tensor) -> Tensor:
     # A row more, so that there is one to take the median of.
     angles = torch.cat([angles, angles.new_full((1, angles.shape[1]), 0.1)])
     some = torch.arange(SAMPLED_POINTS, device=angles.device) * distance.shape[0] // SAMPLED_POINTS
-    third = angles[some].topk(OF_STEP, dim=1, largest=False).values[:, -1]
+    third = angles[some].topk(STEP_NEIGHBOUR, dim=1, largest=False).values[:, -1]
     return third.topk(SAMPLED_POINTS // 2 + 1).values[-1].clamp_min(FINEST_ANGLE)

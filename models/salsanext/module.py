@@ -13,7 +13,7 @@ from torch import Tensor
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.models.published import Published
-from derain.models.range_module import stated
+from derain.models.range_module import require_grid
 from derain.models.registry import NETWORKS
 from derain.models.salsanext.network import SalsaNextNetwork
 from derain.models.salsanext.training import SalsaNextModule
@@ -51,7 +51,7 @@ class SalsaNext(SalsaNextModule, Published):
                 f"the weights tell {network.classes} classes from {network.channels} channels",
                 f"Give weights that tell rain from the rest, from {', '.join(cls.CHANNELS)}.",
             )
-        model = cls(grid=stated(grid, cls.NAME), width=network.width)
+        model = cls(grid=require_grid(grid, cls.NAME), width=network.width)
         model.network = network
         model.adopt(model.spec_for(card))
         return model

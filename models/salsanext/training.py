@@ -65,8 +65,8 @@ class SalsaNextModule(SupervisedModule):
     Args:
         grid: The range image's grid: ``fitted`` to the training scans, the name of a published
             one, or its bounds.
-        way_back: Name of the back-projection, by which points that lost their pixel to a nearer one
-            get a score: ``nearest range``, ``copy`` or ``vote``.
+        back_projection: Name of the back-projection, by which points that lost their pixel to a
+            nearer one get a score: ``nearest range``, ``copy`` or ``vote``.
         channels: What it sees of a point: ``range``, ``x``, ``y``, ``z``, ``intensity``, ``radar``,
             ``dual_return``, or other columns of the scans, such as ``doppler``.
         width: Channels of the first layers, 32 as published; all others are multiples of it.
@@ -99,7 +99,7 @@ class SalsaNextModule(SupervisedModule):
     def __init__(
         self,
         grid: str | dict[str, Any] = FITTED,
-        way_back: str = "nearest range",
+        back_projection: str = "nearest range",
         channels: tuple[str, ...] = CHANNELS,
         width: int = 32,
         dropout: float = 0.2,
@@ -125,8 +125,8 @@ class SalsaNextModule(SupervisedModule):
 
     def view_for(self, scans: Sequence[Scan]) -> RangeView:
         """The view that the network sees a scan through, its grid fitted if it is not stated."""
-        grid, way_back = self.hparams["grid"], self.hparams["way_back"]
-        return range_view(grid, self.channels, way_back, scans)
+        grid, back_projection = self.hparams["grid"], self.hparams["back_projection"]
+        return range_view(grid, self.channels, back_projection, scans)
 
     def forward(self, image: Tensor, valid: Tensor) -> Tensor:
         """Logits of every pixel, float (B · H · W, 2); arguments as for :func:`score_pixels`."""

@@ -84,6 +84,11 @@ def test_a_card_of_ones_own_holds_what_its_file_says(card_file: Path) -> None:
     )
 
 
+def test_a_card_of_an_earlier_version_keeps_its_automatic_detection(card_file: Path) -> None:
+    card_file.write_text(yaml.safe_dump({**OWN, "folders_tell": "rain"}))
+    assert load_card(card_file).auto_detect == "rain"
+
+
 def test_a_card_without_all_its_statistics_says_so(card_file: Path) -> None:
     for missing in ("mean", "std", "range", "rain_share"):
         card_file.write_text(yaml.safe_dump({k: v for k, v in OWN.items() if k != missing}))

@@ -9,8 +9,8 @@ import yaml
 from numpy.typing import NDArray
 
 from derain.export.bench import bench
-from derain.export.bench.contestants import Contestant
-from derain.export.bench.cost import Timing, timed_here
+from derain.export.bench.bench_entries import BenchEntry
+from derain.export.bench.cost import Timing, measure_in_process
 from derain.export.runtime import Derainer
 from derain.scan import Scan
 from derain.simulation.campaign import MAKER
@@ -23,7 +23,7 @@ FILES = ["bench.csv", "bench.json", "bench.md", "speed_error.png"]
 @pytest.fixture(autouse=True)
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Times methods in this process; that each has its own is tested by itself."""
-    monkeypatch.setattr(bench, "measure_cost", timed_here)
+    monkeypatch.setattr(bench, "measure_cost", measure_in_process)
 
 
 @pytest.fixture
@@ -108,7 +108,9 @@ def test_methods_are_timed_on_scaled_intensities(root: Path) -> None:
         seen.append(float(scan.intensity.max()))
         return scan.valid
 
-    timed_here(Contestant("t", "t", lambda threads: judge), Timing([frame], intensity_scale=2.0))
+    measure_in_process(
+        BenchEntry("t", "t", lambda threads: judge), Timing([frame], intensity_scale=2.0)
+    )
     assert set(seen) == {2 * np.fromfile(scan, np.float32).reshape(-1, 4)[:, 3].max()}
 
 

@@ -14,7 +14,7 @@ from derain.files import write_scan
 from derain.filters import FilterDerainer
 from derain.scan import Scan
 from derain.sources.judgement import Judgement
-from derain.views.oddities import MOST_RAIN
+from derain.views.scan_issues import MOST_RAIN
 from derain.views.spherical_grid import SphericalGrid
 
 

@@ -9,14 +9,14 @@ import yaml
 
 from derain.evaluation.hard_cases import scene
 from derain.export.bench import bench
-from derain.export.bench.cost import timed_here
+from derain.export.bench.cost import measure_in_process
 from derain.files.labels import write_labels
 
 
 @pytest.fixture(autouse=True)
 def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(bench, "measure_cost", timed_here)
+    monkeypatch.setattr(bench, "measure_cost", measure_in_process)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from derain.export.bench.contestants import contestants
+from derain.export.bench.bench_entries import bench_entries
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import read_labels
@@ -147,8 +147,8 @@ def test_a_tuned_model_is_found_from_any_folder(
     np.testing.assert_array_equal(rain, probability > parameters["threshold"])
     model = "../elsewhere/outdet.onnx"
     assert not run_derain("run", model, scan, "--out", "too", "--parameters", best).code
-    (contestant,) = contestants([best])
-    assert contestant.facts["threshold"] == parameters["threshold"]
+    (bench_entry,) = bench_entries([best])
+    assert bench_entry.facts["threshold"] == parameters["threshold"]
 
 
 def test_a_model_that_is_not_beside_its_parameters_is_sought_as_written(

@@ -11,7 +11,7 @@ from derain.datamodules.base import ScanDataModule
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
 from derain.files.labels import write_labels
-from derain.learning.task import agree
+from derain.learning.task import agree_on_task
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
 from derain.scan import Scan
@@ -42,7 +42,7 @@ def connect() -> Callable[..., ScanDataModule]:
     def connect(
         data: ScanDataModule, neighbours: int = 9, model: DerainingModule | None = None
     ) -> ScanDataModule:
-        agree(OutDet(neighbours=neighbours) if model is None else model, data)
+        agree_on_task(OutDet(neighbours=neighbours) if model is None else model, data)
         return data
 
     return connect

@@ -14,7 +14,7 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
 from derain.files.labels import write_labels
-from derain.learning.task import agree
+from derain.learning.task import agree_on_task
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 
@@ -60,7 +60,7 @@ def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(
 ) -> None:
     model = OutDet(channels=("x", "y", "z", "intensity", "rcs", "radar", "doppler"))
     data = folder()
-    agree(model, data)
+    agree_on_task(model, data)
     scans = [fused(number) for number in range(3)]
     for name in ("radar", "doppler", "rcs"):
         values = np.concatenate([scan.fields[name] for scan in scans])
@@ -81,7 +81,7 @@ def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(
 
 def test_a_model_that_names_none_is_given_none(folder: MakeFolder) -> None:
     data = folder()
-    agree(OutDet(), data)
+    agree_on_task(OutDet(), data)
     assert data.card.extra == {}
     assert data.read(data.frames("train")[0]).fields == {}
 
@@ -96,7 +96,7 @@ def test_columns_stay_with_their_points_where_training_drops_and_turns_points(
 ) -> None:
     model = OutDet(channels=("x", "y", "z", "intensity", "rcs"))
     data = folder(augmentation=Augmentation(dropping_probability=1, dropping=0.5))
-    agree(model, data)
+    agree_on_task(model, data)
     lost = 0
     loader = data.train_dataloader()
     for pick in loader.sampler:
@@ -115,12 +115,12 @@ def test_columns_stay_with_their_points_where_training_drops_and_turns_points(
 def test_a_channel_that_the_scans_have_not_is_one_error_before_training(folder: MakeFolder) -> None:
     model = OutDet(channels=("x", "y", "z", "dopler"))
     with pytest.raises(InputError, match="channel 'dopler': no training scan holds a number"):
-        agree(model, folder())
+        agree_on_task(model, folder())
 
 
 def test_what_the_card_says_of_a_channel_is_not_measured(folder: MakeFolder) -> None:
     data = folder()
     data.card = data.card.completed(extra={"rcs": (1.0, 2.0)})
-    agree(OutDet(channels=("x", "y", "z", "rcs", "doppler")), data)
+    agree_on_task(OutDet(channels=("x", "y", "z", "rcs", "doppler")), data)
     assert set(data.card.extra) == {"rcs", "doppler"}
     assert data.card.extra["rcs"] == (1, 2)

@@ -19,11 +19,11 @@ from derain.datamodules.mixture import Mixture
 from derain.errors import InputError
 from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import scene
-from derain.learning.task import agree
+from derain.learning.task import agree_on_task
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.sources.source import Frames
-from derain.sources.training_record import overlap
+from derain.sources.training_record import training_overlap
 
 STILL = Augmentation(rotation_probability=0, jitter_probability=0)
 # Of the same ids, one data set calls rain what the other is sure is none, or does not know.
@@ -64,7 +64,7 @@ def test_labels_mean_what_each_parts_own_card_says() -> None:
 
 def test_an_epoch_has_the_shares_that_the_weights_ask_for() -> None:
     data = mixture(weights={"snow": 3.0}, scans_per_epoch=20)
-    agree(OutDet(neighbours=3), data)
+    agree_on_task(OutDet(neighbours=3), data)
     loader = data.train_dataloader()
     for epoch in range(3):
         loader.sampler.set_epoch(epoch)
@@ -76,7 +76,7 @@ def test_an_epoch_has_the_shares_that_the_weights_ask_for() -> None:
 
 def test_a_scan_that_is_drawn_twice_is_augmented_in_two_ways() -> None:
     data = mixture(weights={"snow": 3.0}, scans_per_epoch=20, loading=Loading())
-    agree(OutDet(neighbours=3), data)
+    agree_on_task(OutDet(neighbours=3), data)
     loader = data.train_dataloader()
     seen = [(pick, loader.dataset[pick].scan.xyz.tobytes()) for pick in loader.sampler]
     assert max(Counter(pick.number for pick, _ in seen).values()) == 4
@@ -174,14 +174,14 @@ def test_the_record_holds_the_scans_of_all_parts(
         write(tmp_path / f"{number}.bin", tmp_path / f"{number}.label", [0, 110])
     files = Folder(str(tmp_path), "wads", train=["*.bin"])
     data = Mixture({"files": files, "memory": part(SNOW)}, measured=["memory"])
-    spec = agree(OutDet(neighbours=3, channels=("range",)), data).spec
+    spec = agree_on_task(OutDet(neighbours=3, channels=("range",)), data).spec
     assert len(spec.training["scans"]) == 7 - 2  # the three files hold the same points
     for source, card in ((files.source("train"), files.card), (part(SNOW).source("train"), SNOW)):
-        told = overlap("model", spec, card, source)
+        told = training_overlap("model", spec, card, source)
         assert told is not None
         assert f"on {len(source)} of these {len(source)} scans" in told
     others = Frames.of_scans(scans(2, [0], 90))
-    assert overlap("model", spec, SNOW, others) is None
+    assert training_overlap("model", spec, SNOW, others) is None
 
 
 def test_sequences_are_recorded_under_the_name_of_their_data() -> None:
@@ -193,11 +193,11 @@ def test_sequences_are_recorded_under_the_name_of_their_data() -> None:
 
     snow = Published(scans(2, [0, 1]), scans(1, [0, 1]), card=load_card("wads"))
     data = Mixture({"snow": snow, "spray": part(SPRAY)})
-    spec = agree(OutDet(neighbours=3, channels=("range",)), data).spec
+    spec = agree_on_task(OutDet(neighbours=3, channels=("range",)), data).spec
     assert spec.training["sequences of WADS"] == ("14", "15")
     of_15 = Frames.of_scans(scans(2, [0], 90), sequence="15")
-    assert "on 2 of these 2" in str(overlap("model", spec, load_card("wads"), of_15))
-    assert overlap("model", spec, SPRAY, of_15) is None
+    assert "on 2 of these 2" in str(training_overlap("model", spec, load_card("wads"), of_15))
+    assert training_overlap("model", spec, SPRAY, of_15) is None
 
 
 def test_a_part_needs_the_channels_that_the_model_sees() -> None:
@@ -208,11 +208,11 @@ def test_a_part_needs_the_channels_that_the_model_sees() -> None:
     }
     model = OutDet(neighbours=3, channels=("range", "doppler"))
     with pytest.raises(InputError, match=r"part 'plain': .* has no doppler"):
-        agree(model, Mixture(parts))
+        agree_on_task(model, Mixture(parts))
     dark = [replace(scan, intensity=None) for scan in scans(3, [0, 1])]
     parts = {"dark": InMemory(dark, dark, card=SNOW), "plain": part(SNOW)}
     data = Mixture(parts)
-    agree(OutDet(neighbours=3), data)
+    agree_on_task(OutDet(neighbours=3), data)
     with pytest.raises(InputError, match=r"part 'dark': .* has no intensity"):
         data.train_dataloader()
 
@@ -220,10 +220,10 @@ def test_a_part_needs_the_channels_that_the_model_sees() -> None:
 def test_units_that_differ_are_refused_where_intensity_is_seen() -> None:
     percent = replace(SNOW, intensity_unit="0..1")
     data = Mixture({"one": part(replace(SNOW, intensity_unit="0..255")), "two": part(percent)})
-    agree(OutDet(neighbours=3), data)
+    agree_on_task(OutDet(neighbours=3), data)
     with pytest.raises(InputError, match=r"'one' has it in 0\.\.255, 'two' has it in 0\.\.1"):
         data.train_dataloader()
-    agree(OutDet(neighbours=3, channels=("range",)), data)
+    agree_on_task(OutDet(neighbours=3, channels=("range",)), data)
     assert len(data.train_dataloader()) == 8
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.cards.card import DataCard
-from derain.datamodules.statistics import measured
+from derain.datamodules.statistics import with_statistics
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.scan import Scan
@@ -27,7 +27,7 @@ def random_scan(seed: int, points: int) -> Scan:
 def test_they_are_numpys_over_all_points_at_once(scans: list[tuple[int, int]]) -> None:
     drawn = [random_scan(seed, points) for seed, points in scans]
     columns = np.concatenate([np.c_[s.xyz, s.intensity, s.label][s.valid] for s in drawn])
-    card = measured(CARD, iter(drawn))
+    card = with_statistics(CARD, iter(drawn))
     # One row, however often: a channel that never changes is the next test's.
     if len(np.unique(columns, axis=0)) < 2:
         return
@@ -41,7 +41,7 @@ def test_they_are_numpys_over_all_points_at_once(scans: list[tuple[int, int]]) -
 
 def test_a_channel_that_never_changes_is_divided_by_one() -> None:
     points = np.array([[1.0, 2, 3, 7], [4, 2, 3, 7], [7, 2, 3, 7]])
-    card = measured(CARD, [Scan.of(points).with_label(np.zeros(3, np.int64))])
+    card = with_statistics(CARD, [Scan.of(points).with_label(np.zeros(3, np.int64))])
     assert card.mean == (4, 2, 3, 7)
     assert card.std == (pytest.approx(math.sqrt(6)), 1, 1, 1)
     assert card.rain_share == 0
@@ -50,7 +50,7 @@ def test_a_channel_that_never_changes_is_divided_by_one() -> None:
 def test_what_rounding_leaves_of_a_constant_is_no_variance() -> None:
     points = np.random.default_rng(0).normal(size=(9999, 4)).astype(np.float32)
     points[:, 3] = 0.1
-    assert measured(CARD, [Scan.of(points)]).std[3] == 1
+    assert with_statistics(CARD, [Scan.of(points)]).std[3] == 1
 
 
 def test_extra_channels_are_measured_over_the_numbers_of_valid_points() -> None:
@@ -65,11 +65,11 @@ def test_extra_channels_are_measured_over_the_numbers_of_valid_points() -> None:
         doppler.append(column[scan.valid & np.isfinite(column)])
         flags.append(radar[scan.valid])
     scans.append(random_scan(1, 30))  # has neither, and counts for neither
-    card = measured(CARD, iter(scans), ["doppler", "radar"])
+    card = with_statistics(CARD, iter(scans), ["doppler", "radar"])
     for name, values in (("doppler", doppler), ("radar", flags)):
         expected = np.concatenate(values)
         np.testing.assert_allclose(card.extra[name], (expected.mean(), expected.std()), rtol=1e-5)
-    usual = measured(CARD, iter(scans))
+    usual = with_statistics(CARD, iter(scans))
     assert (card.mean, card.std, card.range) == (usual.mean, usual.std, usual.range)
     assert usual.extra == {}
 
@@ -77,26 +77,26 @@ def test_extra_channels_are_measured_over_the_numbers_of_valid_points() -> None:
 def test_scans_without_intensity_do_not_count_for_it() -> None:
     scan = random_scan(1, 50)
     bare = Scan(random_scan(2, 50).xyz)
-    assert measured(CARD, [scan, bare]).mean[3] == measured(CARD, [scan]).mean[3]
-    assert (measured(CARD, [bare]).mean[3], measured(CARD, [bare]).std[3]) == (0, 1)
+    assert with_statistics(CARD, [scan, bare]).mean[3] == with_statistics(CARD, [scan]).mean[3]
+    assert (with_statistics(CARD, [bare]).mean[3], with_statistics(CARD, [bare]).std[3]) == (0, 1)
 
 
 def test_a_channel_of_which_no_scan_holds_a_number_is_refused() -> None:
     nothing = Scan(np.ones((3, 3), np.float32), fields={"doppler": np.full(3, np.nan)})
     for name in ("doppler", "dopler"):
         with pytest.raises(InputError, match=f"channel '{name}': no training scan holds a number"):
-            measured(CARD, [nothing], [name])
+            with_statistics(CARD, [nothing], [name])
 
 
 def test_points_of_unknown_class_do_not_count_for_the_share_of_rain() -> None:
     scan = Scan.of(np.ones((4, 4))).with_label(np.array([0, 3, 9, 9]))
     card = DataCard("ours", {0: "ground", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))
-    assert measured(card, [scan]).rain_share == 0.5
+    assert with_statistics(card, [scan]).rain_share == 0.5
 
 
 def test_hard_scans_give_statistics_that_can_be_divided_by() -> None:
     for name, scan in hard_cases(largest=1000):
-        card = measured(CARD, [scan.with_label(np.full(len(scan), 3))])
+        card = with_statistics(CARD, [scan.with_label(np.full(len(scan), 3))])
         assert card.has_statistics, name
         assert np.isfinite([*card.mean, *card.std, *card.range]).all(), name
         assert min(card.std) > 0, name
@@ -104,19 +104,22 @@ def test_hard_scans_give_statistics_that_can_be_divided_by() -> None:
 
 
 def test_no_scans_give_statistics_that_change_nothing() -> None:
-    card = measured(CARD, [])
+    card = with_statistics(CARD, [])
     assert (card.mean, card.std, card.range) == ((0.0,) * 4, (1.0,) * 4, (0.0, 1.0))
 
 
 def test_scans_without_labels_give_all_but_the_share_of_rain() -> None:
     scan = random_scan(1, 50)
-    card, unlabelled = measured(CARD, [scan]), measured(CARD, [Scan(scan.xyz, scan.intensity)])
+    card, unlabelled = (
+        with_statistics(CARD, [scan]),
+        with_statistics(CARD, [Scan(scan.xyz, scan.intensity)]),
+    )
     assert unlabelled.rain_share is None
     assert unlabelled.completed(rain_share=card.rain_share) == card
 
 
 def test_what_a_card_says_is_not_measured_again() -> None:
     card = CARD.completed(mean=(1.0,) * 4, rain_share=0.5)
-    complete = measured(card, [random_scan(1, 50)])
+    complete = with_statistics(card, [random_scan(1, 50)])
     assert (complete.mean, complete.rain_share) == (card.mean, 0.5)
-    assert complete.std == measured(CARD, [random_scan(1, 50)]).std
+    assert complete.std == with_statistics(CARD, [random_scan(1, 50)]).std

@@ -11,10 +11,10 @@ from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
 from derain.datamodules.in_memory import InMemory
 from derain.datamodules.loader import scan_loader
-from derain.datamodules.scan_dataset import seen
+from derain.datamodules.scan_dataset import view_in_window
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.learning.task import agree
+from derain.learning.task import agree_on_task
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
@@ -58,7 +58,7 @@ def test_scans_around_one_are_of_its_sequence_the_oldest_first(
 ) -> None:
     frames, told = drives(4, 3), []
     view: Any = SimpleNamespace(window=Window(before=2, after=1), of_window=told.append)
-    seen(view, frames[number].read(), frames, number, lambda frame: frame.read())
+    view_in_window(view, frames[number].read(), frames, number, lambda frame: frame.read())
     (window,) = told
     assert which(window.scan) == number
     assert [which(placed.scan) for placed in window.before] == before
@@ -73,7 +73,7 @@ def test_a_window_reaches_over_no_gap() -> None:
     view: Any = SimpleNamespace(window=Window(before=9, after=9), of_window=told.append)
     gap = Frames([*frames[:2], *frames[3:]])
     for number in range(4):
-        seen(view, gap[number].read(), gap, number, lambda frame: frame.read())
+        view_in_window(view, gap[number].read(), gap, number, lambda frame: frame.read())
     around = [[which(placed.scan) for placed in (*w.before, w.judged, *w.after)] for w in told]
     assert around == [[0, 1], [0, 1], [3, 4], [3, 4]]
 
@@ -84,13 +84,13 @@ def test_a_view_of_one_scan_pays_for_no_other() -> None:
 
     frames = drives(3)
     expected = NeighbourView(5)(frames[1].read())
-    found = seen(NeighbourView(5), frames[1].read(), frames, 1, read)
+    found = view_in_window(NeighbourView(5), frames[1].read(), frames, 1, read)
     np.testing.assert_array_equal(found.inputs()["points"], expected.inputs()["points"])
 
 
 def test_a_loader_gives_a_network_its_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     data = InMemory(drives(3, 2), card="wads")
-    task = agree(OutDet(), data)
+    task = agree_on_task(OutDet(), data)
     windows: list[WindowOfScans] = []
 
     def of_window(self: NeighbourView, scans: WindowOfScans) -> object:

@@ -16,7 +16,7 @@ from derain.cli import main as command_line
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.bench import bench
-from derain.export.bench.cost import timed_here
+from derain.export.bench.cost import measure_in_process
 from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNextModule
 from derain.scan import Scan
@@ -56,7 +56,7 @@ def page_folder(
     monkeypatch.chdir(tmp_path)
     # The whole proof and the timing have tests of their own.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
-    monkeypatch.setattr(bench, "measure_cost", timed_here)
+    monkeypatch.setattr(bench, "measure_cost", measure_in_process)
     with torch.random.fork_rng(devices=[]):
         yield tmp_path
 

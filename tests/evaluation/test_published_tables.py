@@ -13,7 +13,7 @@ from derain.evaluation.published_tables import (
     scans_by_group,
 )
 from derain.evaluation.scores import Scores, score
-from derain.export.bench.report import beside_published
+from derain.export.bench.report import with_published_rows
 from derain.scan import Scan
 
 
@@ -93,7 +93,7 @@ def test_every_published_method_is_one_of_ours(name: str) -> None:
 def test_our_rows_stand_under_those_of_the_same_method(scores: Scores) -> None:
     names = {"all": "all", "dsor": "dsor", "DSOR, again": "dsor"}
     rows = [OwnRow(title, kind, scores) for title, kind in names.items()]
-    text = beside_published(paper_table("table3"), {"heavy": rows}, load_card("rehearse3d"))
+    text = with_published_rows(paper_table("table3"), {"heavy": rows}, load_card("rehearse3d"))
     titles = [line.split("|")[1].strip() for line in text.splitlines() if line.startswith("| ")]
     assert titles == [
         "method",
@@ -113,7 +113,7 @@ def test_our_rows_stand_under_those_of_the_same_method(scores: Scores) -> None:
 
 def test_our_scores_are_averaged_as_the_published_ones_they_stand_under(scores: Scores) -> None:
     row = OwnRow("ours", "lisnownet", scores, milliseconds=float("nan"))
-    text = beside_published(paper_table("table2"), {"test": [row]}, load_card("rehearse3d"))
+    text = with_published_rows(paper_table("table2"), {"test": [row]}, load_card("rehearse3d"))
     (own,) = [line for line in text.splitlines() if line.startswith("| ours")]
     # Of the 280 known points of the first scan and the 300 of the others, 30 are rain in each.
     iou = 100 * (30 / 280 + 30 / 300 + 30 / 300) / 3
@@ -125,7 +125,7 @@ def test_simulated_rain_stands_beside_simulated_rain_and_misprints_are_marked(
     scores: Scores,
 ) -> None:
     ours = {name: [OwnRow("dsor", "dsor", scores)] for name in ("heavy", "medium", "light")}
-    text = beside_published(paper_table("table3"), ours, load_card("simulated"))
+    text = with_published_rows(paper_table("table3"), ours, load_card("simulated"))
     assert "Ours on simulated rain." in text
     assert text.count("| DSOR, published (*)") == 2
     assert "(*) DSOR, medium: F1 of this precision and recall is 81.59." in text

@@ -17,7 +17,7 @@ from derain.spec import Spec
 from derain.views.candidates import Bound, Candidates
 from derain.views.neighbours import Neighbourhoods
 from derain.views.range_image import RangeImage
-from derain.views.view import SeenScan
+from derain.views.view import ViewedScan
 
 from .cpp import Program
 from .hard_points import hard_scans
@@ -71,7 +71,7 @@ def metadata_at(path: Path, spec: dict[str, Any]) -> Path:
     return path
 
 
-def same_view(folder: Path, view: SeenScan) -> None:
+def same_view(folder: Path, view: ViewedScan) -> None:
     if isinstance(view, RangeImage):
         way_back = {"pixel": view.pixel, "winner": view.winner}
     else:

@@ -15,7 +15,7 @@ import pytest
 from derain.cli.main import main
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.bench import bench
-from derain.export.bench.cost import timed_here
+from derain.export.bench.cost import measure_in_process
 from derain.export.proof import THREADS
 from derain.export.runtime import Derainer
 from derain.files.labels import write_labels
@@ -121,7 +121,7 @@ def test_it_is_given_no_candidates_for_it_takes_none(
 def test_it_is_benched_beside_others(
     run_derain, model: Path, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bench, "measure_cost", timed_here)
+    monkeypatch.setattr(bench, "measure_cost", measure_in_process)
     options = ["--card", "wads", "--timed", "1", "--repeats", "1", "--out", tmp_path / "out"]
     test = root / "sequences/03/velodyne"
     outcome = run_derain("bench", "--data", test, "--methods", model, "none", *options)

@@ -14,7 +14,7 @@ from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.export.candidates import candidates_of_findings
+from derain.export.candidates import fit_network_candidates
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.models.outdet import OutDet
@@ -83,7 +83,7 @@ def test_they_are_fitted_to_the_rain_that_the_network_finds(
     random_outdet: OutDet, onnx_model: Path, labelled: list[Scan]
 ) -> None:
     card = replace(WADS, unknown=(0,))
-    fitted = candidates_of_findings(random_outdet, labelled, card, inside=0.9)
+    fitted = fit_network_candidates(random_outdet, labelled, card, inside=0.9)
     derainer = Derainer(onnx_model, 1)
     before, after, bounded = Counts(), Counts(), Counts()
     inside = found = 0
@@ -109,11 +109,11 @@ def test_they_are_fitted_to_the_rain_that_the_network_finds(
 def test_bounds_of_nothing_are_refused(random_outdet: OutDet, labelled: list[Scan]) -> None:
     dry = [scan.with_label(np.full(len(scan), 40)) for scan in labelled]
     with pytest.raises(InputError, match=r"--candidates: no point of these scans is falling-snow"):
-        candidates_of_findings(random_outdet, dry, WADS)
+        fit_network_candidates(random_outdet, dry, WADS)
     blind = deepcopy(random_outdet)
     blind.adopt(replace(blind.spec, threshold=1.0))
     with pytest.raises(InputError, match=r"--candidates: no bounds tell rain .* leave it out"):
-        candidates_of_findings(blind, labelled, WADS)
+        fit_network_candidates(blind, labelled, WADS)
 
 
 def test_a_model_that_was_trained_with_candidates_stays_within_them(
@@ -121,7 +121,7 @@ def test_a_model_that_was_trained_with_candidates_stays_within_them(
 ) -> None:
     model = deepcopy(random_outdet)
     model.adopt(replace(model.spec, candidates=Candidates((Bound("range", most=8.0),))))
-    fitted = candidates_of_findings(model, labelled, WADS, inside=0.9)
+    fitted = fit_network_candidates(model, labelled, WADS, inside=0.9)
     bounds = {bound.channel: bound for bound in fitted.candidates.bounds}
     assert bounds["range"].most <= 8.0
     assert "intensity" in bounds

@@ -16,7 +16,7 @@ from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.files import write_scan
 from derain.files.labels import read_labels, write_labels
-from derain.learning.task import agree
+from derain.learning.task import agree_on_task
 from derain.models.checkpoint import load_model, save_model
 from derain.models.outdet import OutDet
 from derain.scan import Scan
@@ -42,7 +42,7 @@ def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     data = Folder(str(folder), "wads", train=["*.npz"], loading=Loading(batch_size=2))
     torch.manual_seed(0)
     model = OutDet(channels=("x", "y", "z", DUAL_RETURN))
-    agree(model, data)
+    agree_on_task(model, data)
     save_model(model, folder / "model.ckpt")
     return folder / "model.ckpt"
 

@@ -306,7 +306,7 @@ def test_a_whole_number_of_0_is_left_alone() -> None:
     tensors += [np.array([[1e-30, -0.0], [1.0, np.nan]]), np.array(1e-30, np.float32)]
     graph.initializer.extend(onnx.numpy_helper.from_array(t, str(i)) for i, t in enumerate(tensors))
     proto = onnx.helper.make_model(graph)
-    assert onnx_file.flush(proto) == 2
+    assert onnx_file.flush_to_zero(proto) == 2
     found = [onnx.numpy_helper.to_array(tensor) for tensor in proto.graph.initializer]
     for before, after in zip(tensors, found, strict=True):
         assert (after.dtype, after.shape) == (before.dtype, before.shape)
@@ -328,7 +328,7 @@ def test_a_model_is_left_in_the_modes_that_it_was_in(
     frozen.eval()
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: SCENE)
     if not succeeds:
-        monkeypatch.setattr(onnx_file, "flush", lambda proto: 1 / 0)
+        monkeypatch.setattr(onnx_file, "flush_to_zero", lambda proto: 1 / 0)
     with nullcontext() if succeeds else pytest.raises(ZeroDivisionError):
         export(model, tmp_path / "model.onnx")
     assert [module for module in model.modules() if not module.training] == [frozen]

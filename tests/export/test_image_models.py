@@ -139,9 +139,11 @@ print(Derainer(sys.argv[1], threads=1)(scene()).nonzero()[0].tolist())
     assert json.loads(printed) == derainer(scene()).nonzero()[0].tolist()
 
 
-def with_way_back(derainer: Derainer, model: Path, way_back: str, path: Path) -> Derainer:
+def with_back_projection(
+    derainer: Derainer, model: Path, back_projection: str, path: Path
+) -> Derainer:
     """The same file, but for the back-projection in its Spec."""
-    spec = replace(derainer.spec, view={**derainer.spec.view, "way_back": way_back})
+    spec = replace(derainer.spec, view={**derainer.spec.view, "way_back": back_projection})
     proto = onnx.load(model)
     path.write_bytes(with_metadata(proto, {"spec": spec.as_dict()}))
     return Derainer(path, threads=1)
@@ -153,13 +155,17 @@ def test_the_way_back_is_the_specs_and_decides_for_what_lost_its_pixel_alone(
     scan = Scan.of(scene())
     score = probability_of_rain(logits_of(image_model, scan))
     answers: dict[str, Any] = {}
-    for way_back in ("nearest range", "copy", "vote"):
-        changed = with_way_back(derainer, image_onnx, way_back, tmp_path / "changed.onnx")
+    for back_projection in ("nearest range", "copy", "vote"):
+        changed = with_back_projection(
+            derainer, image_onnx, back_projection, tmp_path / "changed.onnx"
+        )
         view = changed.view
         assert isinstance(view, RangeView)
-        assert view.way_back == way_back
-        answers[way_back] = changed.probability(scan)
-        np.testing.assert_allclose(answers[way_back], view(scan).back(score), rtol=0, atol=1e-3)
+        assert view.back_projection == back_projection
+        answers[back_projection] = changed.probability(scan)
+        np.testing.assert_allclose(
+            answers[back_projection], view(scan).back(score), rtol=0, atol=1e-3
+        )
     seen = view(scan)
     shown = (seen.pixel >= 0) & ~seen.hidden
     np.testing.assert_array_equal(answers["copy"][shown], answers["nearest range"][shown])

@@ -71,7 +71,7 @@ def test_a_frame_is_answered_at_once_as_if_it_were_judged_alone(
         assert judgement.frame is frame
         np.testing.assert_array_equal(judgement.probability, derainer.probability(frame.read()))
         assert derainer.waiting == 0
-        assert not derainer.starts_anew(frame)
+        assert not derainer.starts_new_recording(frame)
     assert list(stopwatch.milliseconds) == ["read", "view", "network", "back"]
     assert list(derainer.flush()) == []
 
@@ -100,7 +100,11 @@ def test_a_filter_answers_as_a_model_does(name: str, drive: Path) -> None:
         np.testing.assert_array_equal(judgement.rain, method(scan))
         np.testing.assert_array_equal(judgement.probability, judgement.rain.astype(np.float32))
         np.testing.assert_array_equal(judgement.judged, scan.valid)
-    assert (method.waiting, list(method.flush()), method.starts_anew(frame)) == (0, [], False)
+    assert (method.waiting, list(method.flush()), method.starts_new_recording(frame)) == (
+        0,
+        [],
+        False,
+    )
     np.testing.assert_array_equal(method.push(points).rain, method(points))
 
 
@@ -148,9 +152,9 @@ def test_another_sequence_starts_anew(onnx_model: Path) -> None:
     first, second = Frames.of_scans(scans, "a"), Frames.of_scans(scans, "b")
     for frame in first:
         derainer.push(frame)
-    assert derainer.starts_anew(second[0])
+    assert derainer.starts_new_recording(second[0])
     assert len(list(derainer.flush())) == 1
-    assert not derainer.starts_anew(second[0])  # nothing would be lost
+    assert not derainer.starts_new_recording(second[0])  # nothing would be lost
     assert derainer.push(second[0]) is None
     answer = derainer.push(second[1])
     assert answer is not None

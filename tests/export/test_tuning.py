@@ -23,7 +23,7 @@ from derain.export.tuning import (
     Search,
     neighbours_to_find,
     pooled_iou,
-    space_of,
+    search_space,
     tune_filter,
     tune_threshold,
 )
@@ -86,7 +86,7 @@ def test_tuning_starts_from_the_defaults_and_ends_no_worse(
 
 def test_every_filter_is_looked_for_around_its_defaults() -> None:
     for name in FILTERS:
-        space, default = space_of(name), filter_from(name, {}).as_dict()
+        space, default = search_space(name), filter_from(name, {}).as_dict()
         assert all(low <= default[parameter] <= high for parameter, (low, high) in space.items())
         assert neighbours_to_find(name) == 12
 
@@ -118,7 +118,11 @@ def test_a_filter_that_does_not_say_where_to_look_is_not_tuned(
     add_filter: Callable[..., str], seen: list[LabelledNeighbourhoods]
 ) -> None:
     name = add_filter()
-    for ask in (space_of, neighbours_to_find, lambda name: tune_filter(name, seen, search(1)[0])):
+    for ask in (
+        search_space,
+        neighbours_to_find,
+        lambda name: tune_filter(name, seen, search(1)[0]),
+    ):
         with pytest.raises(InputError, match="near: it cannot be tuned"):
             ask(name)
 
@@ -137,7 +141,7 @@ def test_a_space_that_a_search_cannot_start_in_is_refused(
     add_filter: Callable[..., str], space: dict[str, Span], reason: str
 ) -> None:
     with pytest.raises(InputError, match=reason):
-        space_of(add_filter(**space))
+        search_space(add_filter(**space))
 
 
 def test_as_many_neighbours_are_found_as_any_trial_looks_at(

@@ -32,7 +32,7 @@ class Points(Format):
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
         """Reads x, y, z and intensity."""
         lines = content.data.decode("latin-1").splitlines()
-        content.room.take(32 * len(lines))
+        content.budget.reserve(32 * len(lines))
         with reading(content.path, ValueError, IndexError):
             count = int(lines[0])
             rows = [[float(word) for word in line.split()] for line in lines[1 : count + 1]]

@@ -19,7 +19,13 @@ from pyarrow import feather
 from derain import InputError, Scan
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
-from derain.files.content import ALWAYS_ROOM, LARGEST_EXPANSION, LARGEST_SCAN, Room, read_content
+from derain.files.content import (
+    LARGEST_EXPANSION,
+    LARGEST_SCAN,
+    SMALLEST_BUDGET,
+    MemoryBudget,
+    read_content,
+)
 from derain.files.format import FORMATS
 from derain.files.labels import read_labels
 
@@ -184,7 +190,7 @@ def test_small_files_cannot_take_much_memory(tmp_path: Path, name: str) -> None:
     try:
         with pytest.raises(InputError, match=reason):
             read_scan(path)
-        assert tracemalloc.get_traced_memory()[1] < 2 * ALWAYS_ROOM
+        assert tracemalloc.get_traced_memory()[1] < 2 * SMALLEST_BUDGET
         assert arrow.max_memory() == before
     finally:
         tracemalloc.stop()
@@ -197,14 +203,14 @@ def test_faces_that_claim_billions_of_vertices_leave_the_points(tmp_path: Path) 
     assert len(read_scan(path)) == 1
 
 
-@pytest.mark.parametrize("size", [0, 10**6, ALWAYS_ROOM, LARGEST_SCAN])
+@pytest.mark.parametrize("size", [0, 10**6, SMALLEST_BUDGET, LARGEST_SCAN])
 def test_room_grows_with_the_file_between_two_bounds(size: int) -> None:
-    room = Room(size)
-    most = min(max(ALWAYS_ROOM, LARGEST_EXPANSION * size), LARGEST_SCAN)
-    room.take(most - 1)
-    room.take(1)
+    budget = MemoryBudget(size)
+    most = min(max(SMALLEST_BUDGET, LARGEST_EXPANSION * size), LARGEST_SCAN)
+    budget.reserve(most - 1)
+    budget.reserve(1)
     with pytest.raises(ValueError, match="room for 0"):
-        room.take(1)
+        budget.reserve(1)
 
 
 def test_what_compresses_as_well_as_real_scans_and_better_is_read(tmp_path: Path) -> None:

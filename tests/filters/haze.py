@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from derain.filters import FILTERS, PointFilter, Span
 from derain.scan import Scan
 from derain.views.neighbours import Neighbourhoods
-from derain.views.oddities import Oddity
+from derain.views.scan_issues import ScanIssue
 
 
 @FILTERS.add("haze")
@@ -29,6 +29,6 @@ class Haze(PointFilter):
         near = np.linalg.norm(view.points[:, :3], axis=1) < self.reach
         return near & (view.distances[:, self.neighbours - 1] > self.spacing)
 
-    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+    def issues(self, scan: Scan) -> Iterator[ScanIssue]:
         if not (scan.range[scan.valid] < self.reach).any():
-            yield Oddity("nothing near", f"no point is nearer than {self.reach:g} m")
+            yield ScanIssue("nothing near", f"no point is nearer than {self.reach:g} m")

@@ -193,7 +193,9 @@ def test_points_settled_along_the_curve_are_settled_right(filter_: RadiusFilter)
     view = filter_view(filter_.neighbours)(scan)
     lonely = filter_.judge(view)
     assert 0.05 < lonely.mean() < 0.95
-    np.testing.assert_array_equal(filter_.judge_alone(view.points[:, :3].copy(), 2), lonely)
+    np.testing.assert_array_equal(
+        filter_.judge_without_neighbours(view.points[:, :3].copy(), 2), lonely
+    )
     shuffle = generator.permutation(view.size)
-    shuffled = filter_.judge_alone(view.points[shuffle, :3], 1)
+    shuffled = filter_.judge_without_neighbours(view.points[shuffle, :3], 1)
     np.testing.assert_array_equal(shuffled, lonely[shuffle])

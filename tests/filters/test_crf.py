@@ -114,7 +114,7 @@ def test_the_fitted_variant_does_the_same_within_its_own_bounds(seed: int) -> No
     def around(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
         return reference.near[rows], reference.apart[rows].astype(np.float32)
 
-    above = ground.stands_out(scan.xyz)
+    above = ground.is_above(scan.xyz)
     bounds = fit_rain_bounds(reference.xyz, reference.intensity, above, around, 3.0, 2.0)
     assert bounds is not None
     assert not bounds.is_bright
@@ -187,17 +187,17 @@ def test_rain_that_is_as_bright_as_all_else_is_left_alone() -> None:
 @pytest.mark.parametrize("variant", ["fitted", "published"])
 def test_without_intensity_nothing_is_found_and_that_is_said(variant: str) -> None:
     scan, filter_ = Scan.of(scene()), CRF(variant=variant)
-    assert not list(filter_.oddities(scan))
+    assert not list(filter_.issues(scan))
     for blind in (replace(scan, intensity=None), replace(scan, intensity=0 * scan.intensity)):
         assert not FilterDerainer(filter_)(blind).any()
-        (odd,) = filter_.oddities(blind)
+        (odd,) = filter_.issues(blind)
         assert "nothing can be found without" in odd.detail
 
 
 def test_only_the_published_bound_has_a_unit() -> None:
     scan = Scan.of(scene()).with_intensity_times(1 / 255)
-    assert not list(CRF().oddities(scan))
-    (odd,) = CRF(variant="published").oddities(scan)
+    assert not list(CRF().issues(scan))
+    (odd,) = CRF(variant="published").issues(scan)
     assert odd.kind == "intensity of a smaller unit"
 
 

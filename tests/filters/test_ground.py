@@ -43,8 +43,8 @@ def test_the_plane_of_a_road_is_found_whatever_stands_on_it(
     np.testing.assert_allclose(
         [ground.slope_x, ground.slope_y, ground.offset], [slope_x, slope_y, offset], atol=0.03
     )
-    assert not ground.stands_out(plane).any()
-    assert ground.stands_out(plane + 0.4 * up).all()
+    assert not ground.is_above(plane).any()
+    assert ground.is_above(plane + 0.4 * up).all()
     np.testing.assert_allclose(
         ground.height(np.array([[0, 0, 0], [5, 2, offset + 1]])),
         [-offset, 1 - 5 * slope_x - 2 * slope_y],

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from derain.filters.random_field import decide_in_turn
+from derain.filters.random_field import decide_sequentially
 
 
 def by_loop(
@@ -52,7 +52,7 @@ def test_waves_decide_as_a_loop_does(seed: int, points: int, size: int, vote: fl
         vote,
     )
     before = [np.copy(each) for each in of_field]
-    np.testing.assert_array_equal(decide_in_turn(*of_field), by_loop(*of_field))
+    np.testing.assert_array_equal(decide_sequentially(*of_field), by_loop(*of_field))
     for one, other in zip(before, of_field, strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -66,7 +66,7 @@ def test_a_verdict_spreads_along_the_order_to_its_end(towards: int) -> None:
     neighbours = np.stack([line, np.maximum(line - 1, 0), np.minimum(line + 1, points - 1)], axis=1)
     distances = np.abs(neighbours - line[:, None]).astype(np.float32)
     place = line if towards > 0 else line[::-1]
-    rain = decide_in_turn(feature, line, place, neighbours, distances, 2.0)
+    rain = decide_sequentially(feature, line, place, neighbours, distances, 2.0)
     # From the one that is none, "no rain" goes on and on; against the order it stays where it is.
     expected = 0 if towards > 0 else points - 2
     assert np.count_nonzero(rain) == pytest.approx(expected, abs=1)

@@ -115,7 +115,7 @@ def test_a_scan_alone_is_judged_by_itself_and_nothing_of_it_is_known() -> None:
     assert answer.known is not None
     assert not answer.known.any()
     assert recall_and_false(answer)[0] > 0.5
-    told = [oddity.kind for oddity in PersistenceDerainer().oddities(answer)]
+    told = [issue.kind for issue in PersistenceDerainer().issues(answer)]
     assert told == ["nothing is known for sure"]
 
 
@@ -139,13 +139,13 @@ def test_a_registration_that_fails_is_told_of() -> None:
     frames[2] = MemoryFrame(key="2", number=2, scan=nonsense)
     method = PersistenceDerainer()
     answers = [judgement for _, judgement, _ in judgements(method, frames[:2])]
-    assert not list(method.oddities(answers[0]))
+    assert not list(method.issues(answers[0]))
     for frame in frames:
         method.push(frame)
     # What waits is asked before the recording ends.
     last = next(method.flush())
     assert last.scan.name == "nonsense"
-    details = [oddity.detail for oddity in method.oddities(last)]
+    details = [issue.detail for issue in method.issues(last)]
     assert any("where it was taken is not known" in detail for detail in details)
 
 
@@ -161,8 +161,8 @@ def test_damaged_records_are_done_without(tmp_path: Path) -> None:
         judgements(method, named_frames([tmp_path / "yard"])), plain, strict=True
     ):
         assert (judgement.probability == expected.probability).all()
-        (oddity,) = method.oddities(judgement)
-        assert "has 1 lines for 3 scans, and none for scan_" in oddity.detail
+        (issue,) = method.issues(judgement)
+        assert "has 1 lines for 3 scans, and none for scan_" in issue.detail
 
 
 def test_the_order_of_rows_changes_nothing() -> None:

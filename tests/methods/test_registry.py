@@ -7,7 +7,7 @@ from derain.errors import InputError
 from derain.export.methods import load_method, load_method_of_one_scan
 from derain.export.runtimes.registry import Runtime
 from derain.methods.registry import METHODS
-from derain.system.registry import made_of
+from derain.system.registry import from_parameters
 
 
 @pytest.fixture
@@ -37,9 +37,9 @@ def test_what_it_cannot_do_is_one_error() -> None:
 
 
 def test_parameters_are_fields_of_a_dataclass() -> None:
-    assert made_of(Dimmer, "between", {}) == Dimmer()
+    assert from_parameters(Dimmer, "between", {}) == Dimmer()
     with pytest.raises(InputError, match="it has no parameter a, b"):
-        made_of(Dimmer, "between", {"b": 1, "a": 2, "rain_below": 3.0})
+        from_parameters(Dimmer, "between", {"b": 1, "a": 2, "rain_below": 3.0})
 
 
 @pytest.mark.usefixtures("between")

@@ -8,7 +8,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 from tensorboard.plugins.hparams.metadata import EXPERIMENT_TAG, SESSION_START_INFO_TAG
 from tensorboard.plugins.hparams.plugin_data_pb2 import HParamsPluginData
 
-from derain.models.hyperparameters import enter
+from derain.models.hyperparameters import log_hyperparameters
 
 
 def entered(folder: Path) -> Any:
@@ -33,7 +33,7 @@ def test_a_run_has_its_parameters_and_columns_that_stay_blank(tmp_path: Path) ->
         **{"channels": ("x", "y"), "candidates": None, "rule": {"residual": 0.1}},
         **{"spec": {"as": "long as a page"}, "_class_path": "hidden"},
     }
-    enter([CSVLogger(tmp_path, "csv"), logger], parameters)
+    log_hyperparameters([CSVLogger(tmp_path, "csv"), logger], parameters)
     logger.experiment.close()
     values, columns, scalars = entered(tmp_path / "log")
     assert values == {

@@ -9,11 +9,11 @@ import torch
 
 from derain.errors import InputError
 from derain.files.documents import Entry
-from derain.models.likeness import like
+from derain.models.likeness import matching_state
 
 
 def taken(found: Any, own: Any) -> Any:
-    return like(Entry("last.ckpt", "lr_schedulers", found), own)
+    return matching_state(Entry("last.ckpt", "lr_schedulers", found), own)
 
 
 def test_what_a_state_lacks_is_left_out() -> None:

@@ -115,7 +115,7 @@ def test_candidates_are_scored_as_they_are_among_all(outdet: MakeModel, sample: 
     scans = [Scan.of(scene(size, size)) for size in (300, 5, 200)]
     view = NeighbourView(9, threads=1)
     whole = [Sample(scan, view(scan), None) for scan in scans]
-    part = [Sample(scan, view.judging(candidates)(scan), None) for scan in scans]
+    part = [Sample(scan, view.with_candidates(candidates)(scan), None) for scan in scans]
     among = [candidates.among(each.scan)[each.view.first] for each in whole]
     for network in (model, model.deployed()):
         expected = network(**Batch.of(whole).inputs)[np.concatenate(among)]

@@ -57,7 +57,7 @@ def test_a_grid_is_not_fitted_to_nothing(model_class: type[DerainingModule]) -> 
 def test_a_stated_grid_is_taken_whatever_the_scans(
     model_class: type[DerainingModule], grid: str | dict[str, Any]
 ) -> None:
-    model = model_class(grid=grid, way_back="vote")
+    model = model_class(grid=grid, back_projection="vote")
     for scans in ([], [Scan.of(scene(100))]):
         expected = {"kind": "range", "grid": grid_of(grid, "").as_dict(), "way_back": "vote"}
         assert model.view_for(scans).as_dict() == expected
@@ -69,7 +69,7 @@ def test_a_stated_grid_is_taken_whatever_the_scans(
     [
         ({"grid": "mars"}, "there is no grid named 'mars'. Known are semantickitti"),
         ({"grid": {"rows": 8}}, "grid: columns is missing"),
-        ({"grid": "wads", "way_back": "guess"}, "no such back-projection: 'guess'"),
+        ({"grid": "wads", "back_projection": "guess"}, "no such back-projection: 'guess'"),
     ],
 )
 def test_a_view_that_there_is_not_is_refused(

@@ -15,7 +15,7 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.learning.batch import Batch
 from derain.learning.start import STARTED_FROM
-from derain.learning.task import agree
+from derain.learning.task import agree_on_task
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import load_model, save_model
 from derain.models.outdet import OutDet
@@ -68,7 +68,7 @@ def test_the_first_logits_are_those_of_the_start(kind: str, tmp_path: Path) -> N
     student = started(recipe, tmp_path / "start.ckpt", "mine")
     # Other scans with other statistics, which would normalise the input in another way.
     own = data(OTHER, 10, shift=3.0)
-    agree(student, own)
+    agree_on_task(student, own)
     student.eval()
     batch: Batch = next(iter(own.val_dataloader()))
     with torch.no_grad():
@@ -88,7 +88,7 @@ def test_the_first_logits_are_those_of_the_start(kind: str, tmp_path: Path) -> N
 def test_the_record_says_what_it_began_from_and_all_that_both_have_seen(tmp_path: Path) -> None:
     source = trained(OutDet(neighbours=3), FIRST, 0, tmp_path / "one.ckpt")
     student = started(OutDet(), tmp_path / "one.ckpt", "one")
-    (one,) = agree(student, data(OTHER, 10)).spec.training[STARTED_FROM]
+    (one,) = agree_on_task(student, data(OTHER, 10)).spec.training[STARTED_FROM]
     assert one.startswith("one (")
     prints = {*source.spec.training["scans"], *data(OTHER, 10).training_record()["scans"]}
     assert {*student.spec.training["scans"]} == prints
@@ -96,7 +96,7 @@ def test_the_record_says_what_it_began_from_and_all_that_both_have_seen(tmp_path
     # And so on: a student of the student.
     save_model(student, tmp_path / "two.ckpt")
     mixture = Mixture({"first": data(FIRST, 0), "new": data(FIRST, 20)})
-    last = agree(started(OutDet(), tmp_path / "two.ckpt", "two"), mixture).spec
+    last = agree_on_task(started(OutDet(), tmp_path / "two.ckpt", "two"), mixture).spec
     assert [name.split(" (")[0] for name in last.training[STARTED_FROM]] == ["one", "two"]
     assert len(last.training["scans"]) == 9
 

@@ -12,7 +12,7 @@ from derain.datamodules.in_memory import InMemory
 from derain.evaluation.hard_cases import scene
 from derain.learning.batch import Batch, Sample
 from derain.learning.losses import class_weights
-from derain.learning.task import agree
+from derain.learning.task import agree_on_task
 from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNext
 from derain.models.supervised import SupervisedModule
@@ -43,7 +43,7 @@ def test_the_rarer_class_counts_for_as_much_more_as_it_is_told(make: MakeModel) 
     weights = {}
     for balance in (0.0, 0.5, 1.0):
         model = make(balance=balance)
-        agree(model, InMemory(train=scans, card=CARD))
+        agree_on_task(model, InMemory(train=scans, card=CARD))
         weights[balance] = model.class_weight
     share = 30 / 300  # of the points that are known
     assert torch.equal(weights[1.0], class_weights([1 - share, share]))
@@ -57,7 +57,7 @@ def test_what_is_not_known_moves_no_weight(make: MakeModel) -> None:
     losses = []
     for model_says_rain in (False, True):
         model = make()
-        agree(model, InMemory(train=[scan], card=CARD))
+        agree_on_task(model, InMemory(train=[scan], card=CARD))
         view = model.spec.make_view()(scan)
         batch = Batch.of([Sample.of(scan, view, CARD)])
         of_unknown = torch.from_numpy(view.target(unknown) == 1)
@@ -81,7 +81,7 @@ def test_candidates_are_fitted_to_what_is_known() -> None:
     fitted = []
     for given in (scans, far):
         model = OutDet(candidates=0.9)
-        agree(model, InMemory(train=given, card=CARD))
+        agree_on_task(model, InMemory(train=given, card=CARD))
         assert model.spec.candidates is not None
         fitted.append(model.spec.candidates)
     assert fitted[0] == fitted[1]

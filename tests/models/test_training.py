@@ -33,7 +33,7 @@ from derain.models.salsanext import SalsaNext
 from derain.scan import Scan
 from derain.simulation.campaign import Campaign
 from derain.simulation.sensor import Sensor
-from derain.sources.training_record import by_fingerprint
+from derain.sources.training_record import record_of_scans
 from derain.system.open3d_import import import_open3d
 
 MakeTrainer = Callable[..., lightning.Trainer]
@@ -265,7 +265,7 @@ def test_a_checkpoint_of_a_run_is_a_model(
     copy = load_model(tmp_path / "run.ckpt")
     assert copy.spec == model.spec
     assert copy.spec.view == {"kind": "neighbours", "neighbours": 6}
-    assert copy.spec.training == by_fingerprint(scenes().frames("train"))
+    assert copy.spec.training == record_of_scans(scenes().frames("train"))
     assert_same(copy, model)
 
 

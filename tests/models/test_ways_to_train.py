@@ -19,7 +19,7 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
 from derain.files.labels import write_labels
-from derain.learning.task import agree
+from derain.learning.task import agree_on_task
 from derain.models.base import DerainingModule
 from derain.models.callbacks.panels import ScanPanels
 from derain.models.callbacks.prediction import PredictionWriter
@@ -96,7 +96,7 @@ def test_files_memory_and_plain_loaders_train_the_same_network(
     assert_same(in_memory.callback_metrics, expected.callback_metrics)
 
     by_loaders = make_trainer(epochs=2)
-    task = agree(of_loaders, memory)
+    task = agree_on_task(of_loaders, memory)
     training = scan_loader(memory.source("train"), "train", task, LOADING)
     validation = scan_loader(memory.source("validation"), "validation", task, LOADING)
     by_loaders.fit(of_loaders, training, validation)
@@ -114,7 +114,7 @@ def test_files_memory_and_plain_loaders_are_measured_alike(
 ) -> None:
     model = outdet()
     scores, probabilities = [], []
-    task = agree(model, memory, training=False)
+    task = agree_on_task(model, memory, training=False)
     loaders = [
         scan_loader(memory.source("test"), part, task, LOADING) for part in ("test", "predict")
     ]
@@ -145,7 +145,9 @@ def test_what_is_predicted_of_scans_in_memory_is_written_by_their_keys(
         label = np.fromfile(out / f"00000{place}.label", "<u4")
         np.testing.assert_array_equal(label, probability > model.spec.threshold)
     by_loader = tmp_path / "by_loader"
-    loader = scan_loader(memory.source("test"), "predict", agree(model, memory, training=False))
+    loader = scan_loader(
+        memory.source("test"), "predict", agree_on_task(model, memory, training=False)
+    )
     make_trainer(1, callbacks=[PredictionWriter(str(by_loader))]).predict(model, loader)
     for path in out.iterdir():
         assert (by_loader / path.name).read_bytes() == path.read_bytes()
@@ -155,7 +157,7 @@ def test_batches_that_were_made_before_are_trained_on_too(
     make_trainer: MakeTrainer, memory: InMemory, network: Callable[[], DerainingModule]
 ) -> None:
     model = network()
-    task = agree(model, memory)
+    task = agree_on_task(model, memory)
     made = [
         list(scan_loader(memory.source(part), part, task, LOADING))
         for part in ("train", "validation")
@@ -173,7 +175,7 @@ def test_batches_that_were_made_before_are_trained_on_too(
 def test_a_model_that_was_told_nothing_of_its_batches_says_what_it_lacks(
     make_trainer: MakeTrainer, memory: InMemory
 ) -> None:
-    loader = scan_loader(memory.source("train"), "train", agree(OutDet(), memory))
+    loader = scan_loader(memory.source("train"), "train", agree_on_task(OutDet(), memory))
     with pytest.raises(InputError, match=r"told nothing of them\. Call .*agree\(model, data\)"):
         make_trainer(epochs=1).fit(OutDet(), loader)
 
@@ -233,7 +235,7 @@ def test_callbacks_go_without_a_data_module(
     tmp_path: Path,
 ) -> None:
     model = OutDet()
-    task = agree(model, memory)
+    task = agree_on_task(model, memory)
     loaders = {
         part: scan_loader(memory.source(part), part, task) for part in ("train", "validation")
     }
@@ -249,7 +251,7 @@ def test_what_a_worker_cannot_read_stops_a_plain_loader_with_its_name(
     make_trainer: MakeTrainer, files: Folder, workers: int
 ) -> None:
     model = OutDet()
-    task = agree(model, files)
+    task = agree_on_task(model, files)
     (files.root / "1.bin").write_bytes(b"damaged")
     damaged = files.source("train")[1:2]  # a worker that is left in the middle takes seconds to end
     loader = scan_loader(damaged, "train", task, Loading(workers=workers))
@@ -264,7 +266,7 @@ def test_a_run_of_loaders_goes_on_from_its_checkpoint(
     def fit(epochs: int, checkpoint: Path | None = None, rows: int = 16) -> DerainingModule:
         lightning.seed_everything(0)
         model = LiSnowNet(grid={**GRID, "rows": rows}, width=2)
-        loader = scan_loader(memory.source("train"), "train", agree(model, memory), LOADING)
+        loader = scan_loader(memory.source("train"), "train", agree_on_task(model, memory), LOADING)
         trainer = make_trainer(epochs=epochs)
         trainer.fit(model, loader, ckpt_path=checkpoint)
         trainer.save_checkpoint(tmp_path / f"{epochs}.ckpt")
@@ -285,7 +287,7 @@ def test_a_run_of_loaders_does_not_go_on_with_other_candidates(
 
     def fit(candidates: float | None, checkpoint: Path | None = None) -> OutDet:
         model = OutDet(neighbours=5, candidates=candidates)
-        loader = scan_loader(memory.source("train"), "train", agree(model, memory), LOADING)
+        loader = scan_loader(memory.source("train"), "train", agree_on_task(model, memory), LOADING)
         trainer = make_trainer(epochs=1 if checkpoint is None else 2)
         trainer.fit(model, loader, ckpt_path=checkpoint)
         trainer.save_checkpoint(tmp_path / "1.ckpt")

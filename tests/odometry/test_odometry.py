@@ -41,7 +41,7 @@ def assert_is(found: np.ndarray, true: np.ndarray, metres: float, degrees: float
 def test_known_motions_are_found_through_noise_and_drops(driven) -> None:
     scans, poses = driven
     odometry = Odometry()
-    found = [odometry.take(scan) for scan in scans]
+    found = [odometry.register(scan) for scan in scans]
     assert all(each.trusted and not each.reason for each in found)
     assert_is(found[0].pose, np.eye(4), 1e-12, 1e-6)
     for each, step, pose in zip(found[1:], STEPS, poses[1:], strict=True):
@@ -56,7 +56,7 @@ def test_a_pose_is_the_product_of_all_motions(driven) -> None:
     odometry = Odometry()
     pose = np.eye(4)
     for scan in driven[0]:
-        found = odometry.take(scan)
+        found = odometry.register(scan)
         pose = pose @ found.motion
         np.testing.assert_allclose(found.pose, pose, atol=1e-12)
 
@@ -64,7 +64,7 @@ def test_a_pose_is_the_product_of_all_motions(driven) -> None:
 def test_a_sensor_that_stands_does_not_move() -> None:
     odometry = Odometry()
     for seed in range(4):
-        found = odometry.take(scan_from(np.eye(4), seed))
+        found = odometry.register(scan_from(np.eye(4), seed))
         assert found.trusted
         assert shift_of(found.pose) < 0.02
         assert turn_of(found.pose) < 0.1
@@ -87,14 +87,14 @@ def test_threads_copies_and_what_came_before_change_no_bit(driven) -> None:
 
 
 def poses_of(odometry: Odometry, scans: list[Scan]) -> np.ndarray:
-    return np.array([odometry.take(scan).pose for scan in scans])
+    return np.array([odometry.register(scan).pose for scan in scans])
 
 
 def test_a_gap_is_told_and_bridged_where_the_scans_still_meet(driven) -> None:
     # From 1.3 m a scan to 4 m: two scans are missing.
     scans, poses = drive([*STEPS, motion(3.9), motion(1.3)])
     odometry = Odometry()
-    found = [odometry.take(scan) for scan in scans]
+    found = [odometry.register(scan) for scan in scans]
     assert [each.trusted for each in found] == [True, True, True, True, False, True]
     assert "out of order or far apart" in found[4].reason
     assert_is(found[5].pose, poses[5], 0.1, 0.3)
@@ -103,7 +103,7 @@ def test_a_gap_is_told_and_bridged_where_the_scans_still_meet(driven) -> None:
 def test_scans_out_of_order_are_told(driven) -> None:
     scans, _ = drive(5 * [motion(1.3)])
     odometry = Odometry()
-    found = [odometry.take(scans[number]) for number in (0, 1, 2, 5, 3, 4)]
+    found = [odometry.register(scans[number]) for number in (0, 1, 2, 5, 3, 4)]
     assert [each.trusted for each in found] == [True, True, True, False, False, True]
     assert all("out of order" in each.reason for each in found if not each.trusted)
 
@@ -130,7 +130,7 @@ def test_what_cannot_be_registered_is_told_and_the_motion_goes_on(
 ) -> None:
     scans, _ = driven
     odometry = Odometry()
-    found = [odometry.take(scan) for scan in (scans[0], scans[1], other, scans[2], scans[3])]
+    found = [odometry.register(scan) for scan in (scans[0], scans[1], other, scans[2], scans[3])]
     assert [each.trusted for each in found] == [True, True, False, False, True]
     assert reason in found[2].reason
     np.testing.assert_array_equal(found[2].motion, found[1].motion)
@@ -140,9 +140,9 @@ def test_what_cannot_be_registered_is_told_and_the_motion_goes_on(
 
 def test_a_scan_that_sees_nothing_at_first_is_told_of_by_the_next() -> None:
     odometry = Odometry()
-    first = odometry.take(NOTHING)
-    second = odometry.take(scan_from(np.eye(4), 0))
-    third = odometry.take(scan_from(motion(1), 1))
+    first = odometry.register(NOTHING)
+    second = odometry.register(scan_from(np.eye(4), 0))
+    third = odometry.register(scan_from(motion(1), 1))
     assert (first.trusted, second.trusted, third.trusted) == (True, False, True)
     assert "the scan before has only 0 surfaces" in second.reason
     np.testing.assert_array_equal(second.motion, np.eye(4))
@@ -166,7 +166,7 @@ def test_what_nothing_tells_the_way_along_is_not_trusted(
     odometry = Odometry()
     for seed in range(2):
         seen = world(np.random.default_rng(seed))
-        found = odometry.take(scan_from(motion(1.3 * seed), seed, world=seen))
+        found = odometry.register(scan_from(motion(1.3 * seed), seed, world=seen))
     assert not found.trusted
     assert "too little stands across some direction" in found.reason
 
@@ -175,9 +175,9 @@ def test_surfaces_that_lie_farther_apart_than_usual_are_not_trusted(driven) -> N
     rough = np.random.default_rng(9)
     odometry = Odometry()
     for seed in range(FEWEST_USUAL + 1):
-        usual = odometry.take(scan_from(np.eye(4), seed))
+        usual = odometry.register(scan_from(np.eye(4), seed))
     blurred = scan_from(np.eye(4), 50)
-    found = odometry.take(Scan.of(blurred.xyz + rough.normal(0, 0.25, blurred.xyz.shape)))
+    found = odometry.register(Scan.of(blurred.xyz + rough.normal(0, 0.25, blurred.xyz.shape)))
     assert usual.trusted
     assert not found.trusted
     assert found.residual > usual.residual
@@ -198,7 +198,7 @@ def test_a_turn_is_told_to_the_last_digits(degrees: float) -> None:
 
 def registered(folder: Path, every: int = 1) -> list[Registration]:
     odometry = Odometry()
-    return [odometry.take(read_scan(path)) for path in sorted(folder.glob("*.bin"))[::every]]
+    return [odometry.register(read_scan(path)) for path in sorted(folder.glob("*.bin"))[::every]]
 
 
 def test_snowykitti_stands(shared: Path) -> None:

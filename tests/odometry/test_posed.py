@@ -58,7 +58,7 @@ def test_a_sensor_that_stands_has_one_pose(drive: Frames) -> None:
 
 def test_odometry_gives_poses_and_tells_of_each(drive: Frames) -> None:
     told: list[tuple[Frame, Registration]] = []
-    posed = with_poses(drive, "odometry", told=lambda *each: told.append(each))
+    posed = with_poses(drive, "odometry", on_registration=lambda *each: told.append(each))
     assert [frame.key for frame, _ in told] == [frame.key for frame in drive]
     for number, (frame, (_, registration)) in enumerate(zip(posed, told, strict=True)):
         np.testing.assert_array_equal(frame.pose, registration.pose)
@@ -93,7 +93,9 @@ def test_a_scan_that_cannot_be_read_is_a_gap_and_no_end(drive: Frames) -> None:
     broken = Broken(key="broken", sequence="drive", number=1, scan=drive[1].scan)
     reasons: list[str] = []
     posed = with_poses(
-        [drive[0], broken, *drive[2:]], "odometry", told=lambda _, each: reasons.append(each.reason)
+        [drive[0], broken, *drive[2:]],
+        "odometry",
+        on_registration=lambda _, each: reasons.append(each.reason),
     )
     assert len(posed) == 4
     assert reasons[1] == "it cannot be read"
@@ -105,7 +107,7 @@ def test_a_scan_taken_before_the_one_that_it_follows_is_not_trusted(drive: Frame
     odometry = FrameOdometry()
     times = (0.0, 0.1, 0.1, 0.05)
     found = [
-        odometry.take(replace(frame, seconds=time), frame.read())
+        odometry.register(replace(frame, seconds=time), frame.read())
         for frame, time in zip(drive, times, strict=True)
     ]
     assert [each.trusted for each in found] == [True, True, False, False]
@@ -166,7 +168,7 @@ def test_without_a_word_poses_beside_the_scans_count_and_odometry_fills_in(
     told: list[str] = []
     posed = with_poses(
         named_frames([tmp_path / "known", tmp_path / "unknown"], layouts=()),
-        told=lambda frame, _: told.append(frame.name),
+        on_registration=lambda frame, _: told.append(frame.name),
     )
     assert x_of(posed)[:3] == [40, 50, 0]
     assert posed[3].pose[0, 3] == pytest.approx(1.3, abs=0.05)

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from derain.persistence.points import ScanPoints, range_of
 from derain.persistence.rays import (
     ENDS_AT,
-    HALF_HEARD_AT,
-    LEAST_HEARD,
+    HALF_WEIGHT_AT,
+    LEAST_WEIGHT,
     RAYS,
     WENT_THROUGH,
     WITHIN,
     WITHIN_STEPS,
-    ask_rays,
+    ray_evidence,
 )
 from derain.scan import Scan
 
@@ -46,7 +46,7 @@ def moved(x: float, yaw: float = 0.0) -> NDArray[np.float64]:
 def test_rays_end_at_a_wall_and_go_through_a_drop_before_it() -> None:
     drop = np.array([[6.0, 0.03, 0.02]])
     points, other = points_of(np.concatenate([wall(20), drop])), points_of(wall(20))
-    evidence = ask_rays(points, other, np.eye(4))
+    evidence = ray_evidence(points, other, np.eye(4))
     of_drop = np.abs(points.xyz[:, 0] - 6) < 0.1
     assert evidence.ending[of_drop] == 0
     assert evidence.through[of_drop] == pytest.approx(1)
@@ -59,7 +59,7 @@ def test_a_sensor_that_moved_sees_the_same() -> None:
     drop = np.array([[6.0, 0.03, 0.02]])
     before = wall(20)
     after = (np.concatenate([before, drop]) - motion[:3, 3]) @ motion[:3, :3]
-    evidence = ask_rays(points_of(after), points_of(before), motion)
+    evidence = ray_evidence(points_of(after), points_of(before), motion)
     middle = np.abs(after[:, 1]) < 1
     of_drop = np.argmin(np.abs(points_of(after).xyz[:, 0] - after[-1, 0]))
     assert evidence.through[of_drop] == pytest.approx(1)
@@ -70,14 +70,14 @@ def test_a_ray_that_comes_back_tells_more_than_those_around_it() -> None:
     twig = wall(10)[[500]] * 0.6
     points = points_of(np.concatenate([wall(10), twig]))
     again = np.delete(wall(10), 500, axis=0)  # the ray to the twig ends there, not at the wall
-    evidence = ask_rays(points, points_of(np.concatenate([again, twig])), np.eye(4))
+    evidence = ray_evidence(points, points_of(np.concatenate([again, twig])), np.eye(4))
     of_twig = np.argmin(np.linalg.norm(points.xyz - twig, axis=1))
     assert evidence.ending[of_twig] > 0.4 > 1 / RAYS
 
 
 def test_what_stands_before_a_place_says_nothing_of_it() -> None:
     points, other = points_of(wall(20)), points_of(wall(10))
-    evidence = ask_rays(points, other, np.eye(4))
+    evidence = ray_evidence(points, other, np.eye(4))
     assert not evidence.ending.any()
     assert not evidence.through.any()
 
@@ -85,10 +85,10 @@ def test_what_stands_before_a_place_says_nothing_of_it() -> None:
 def test_where_there_are_no_rays_nothing_is_said() -> None:
     points = points_of(wall(20))
     for other in (points_of(-wall(20)), points_of(np.zeros((0, 3))), points_of(wall(20)[:3])):
-        evidence = ask_rays(points, other, np.eye(4))
+        evidence = ray_evidence(points, other, np.eye(4))
         assert not evidence.through.any()
         assert evidence.ending.shape == (len(points),)
-    nobody = ask_rays(points_of(np.zeros((0, 3))), points, np.eye(4))
+    nobody = ray_evidence(points_of(np.zeros((0, 3))), points, np.eye(4))
     assert nobody.ending.shape == (0,)
 
 
@@ -101,7 +101,7 @@ def test_it_is_what_asking_every_ray_says(seed: int) -> None:
     ]
     points, other = (points_of(cloud) for cloud in clouds)
     motion = moved(*generator.uniform(-0.05, 0.05, 2))
-    evidence = ask_rays(points, other, motion)
+    evidence = ray_evidence(points, other, motion)
     within = max(np.radians(WITHIN), WITHIN_STEPS * points.step)
     for number, place in enumerate(points.xyz @ motion[:3, :3].T + motion[:3, 3]):
         reach = np.linalg.norm(place)
@@ -109,8 +109,8 @@ def test_it_is_what_asking_every_ray_says(seed: int) -> None:
         chords = np.linalg.norm(other.xyz / ends[:, None] - place / reach, axis=1)
         near = np.argsort(chords, kind="stable")[:RAYS]
         near = near[chords[near] <= within]
-        heard = 1 / (1 + (chords[near] / np.radians(HALF_HEARD_AT)) ** 2)
-        total = max(heard.sum(), LEAST_HEARD)
+        heard = 1 / (1 + (chords[near] / np.radians(HALF_WEIGHT_AT)) ** 2)
+        total = max(heard.sum(), LEAST_WEIGHT)
         behind = ends[near] - reach
         at, through = (offset + slope * reach for offset, slope in (ENDS_AT, WENT_THROUGH))
         ending = heard[np.abs(behind) <= at].sum() / total

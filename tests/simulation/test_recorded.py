@@ -333,7 +333,7 @@ POINTS = np.array([[1.5, -2.0, 0.25], [10.0, 20.0, -2.0]])
 OTHERS = np.array([0, 2, 3, 5])
 
 
-def made_of(**columns: np.ndarray) -> Scan:
+def from_parameters(**columns: np.ndarray) -> Scan:
     return scan_of(Path("scan.npz"), columns)
 
 
@@ -346,7 +346,7 @@ def test_coordinates_are_written_in_the_columns_and_the_dtype_of_the_file(
     coordinates: np.ndarray,
 ) -> None:
     x, y, z = coordinates.T
-    scan = made_of(X=x, y=y.astype(np.float32), z=np.rint(z).astype(np.int16))
+    scan = from_parameters(X=x, y=y.astype(np.float32), z=np.rint(z).astype(np.int16))
     moved = with_points(scan, ROWS, POINTS)
     assert {name: column.dtype for name, column in moved.fields.items()} == {
         name: column.dtype for name, column in scan.fields.items()
@@ -362,7 +362,7 @@ def test_coordinates_are_written_in_the_columns_and_the_dtype_of_the_file(
 def test_distances_keep_their_unit(coordinates: np.ndarray) -> None:
     distance = np.linalg.norm(coordinates, axis=1)
     in_millimetres = np.rint(1000 * distance).astype(np.uint32)
-    scan = made_of(xyz=coordinates, range=in_millimetres, distance=distance)
+    scan = from_parameters(xyz=coordinates, range=in_millimetres, distance=distance)
     moved = with_points(scan, ROWS, POINTS)
     expected = np.linalg.norm(POINTS, axis=1)
     assert moved.fields["range"][ROWS] == pytest.approx(1000 * expected, rel=1e-3)
@@ -371,14 +371,14 @@ def test_distances_keep_their_unit(coordinates: np.ndarray) -> None:
 
 
 def test_what_is_not_a_number_is_zero_among_whole_numbers(coordinates: np.ndarray) -> None:
-    scan = made_of(xyz=coordinates, range=np.full(6, 5, np.uint32))
+    scan = from_parameters(xyz=coordinates, range=np.full(6, 5, np.uint32))
     moved = with_points(scan, ROWS, np.full((2, 3), np.nan))
     assert np.isnan(moved.xyz[ROWS]).all()
     assert (moved.fields["range"][ROWS] == 0).all()
 
 
 def test_intensities_are_rounded_to_what_the_column_holds(coordinates: np.ndarray) -> None:
-    scan = made_of(xyz=coordinates, Reflectivity=np.arange(6, dtype=np.uint8))
+    scan = from_parameters(xyz=coordinates, Reflectivity=np.arange(6, dtype=np.uint8))
     relit = with_intensity(scan, ROWS, np.array([12.6, 300.0]))
     assert relit.fields["Reflectivity"].tolist() == [0, 13, 2, 3, 255, 5]
     assert relit.intensity is not None
@@ -387,14 +387,14 @@ def test_intensities_are_rounded_to_what_the_column_holds(coordinates: np.ndarra
 
 def test_only_the_intensity_that_is_read_is_rewritten(coordinates: np.ndarray) -> None:
     first, second = np.zeros(6, np.float32), np.zeros(6, np.float32)
-    scan = made_of(xyz=coordinates, signal=first, intensity=second)
+    scan = from_parameters(xyz=coordinates, signal=first, intensity=second)
     relit = with_intensity(scan, ROWS, np.array([1.0, 2.0]))
     assert relit.fields["signal"].tolist() == [0] * 6
     assert relit.fields["intensity"].tolist() == [0, 1, 0, 0, 2, 0]
 
 
 def test_the_scan_that_is_given_stays_as_it_is(coordinates: np.ndarray) -> None:
-    scan = made_of(xyz=coordinates, intensity=np.arange(6.0))
+    scan = from_parameters(xyz=coordinates, intensity=np.arange(6.0))
     with_intensity(with_points(scan, ROWS, POINTS), ROWS, np.array([7.0, 8.0]))
     assert (scan.fields["xyz"] == coordinates).all()
     assert (scan.fields["intensity"] == np.arange(6)).all()

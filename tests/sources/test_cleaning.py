@@ -11,7 +11,7 @@ from derain.files.labels import read_labels
 from derain.sources.cleaning import CleanedScan, CleaningObserver
 from derain.sources.judgement import Judgement
 from derain.sources.weather_monitor import WeatherOptions
-from derain.views.oddities import Oddity
+from derain.views.scan_issues import ScanIssue
 
 DROR = derain.FilterDerainer(derain.DROR())
 
@@ -22,7 +22,7 @@ class Recorder(CleaningObserver):
     def __init__(self) -> None:
         self.calls: list[tuple[str, str]] = []
 
-    def judged(self, judgement: Judgement, odd: list[Oddity]) -> None:
+    def judged(self, judgement: Judgement, odd: list[ScanIssue]) -> None:
         self.calls.append(("judged", Path(judgement.scan.name).name))
 
     def cleaned(self, judgement: Judgement, scan: CleanedScan) -> None:

@@ -41,12 +41,12 @@ def test_windows_are_those_of_the_whole_recording(
     recent = RecentFrames(Window(before, after))
     found = []
     for frame in frames(*lengths):
-        if recent.starts_anew(frame):
-            found += [recent.give() for _ in range(recent.waiting)]
-        given_back = recent.take(frame, PlacedScan(SCAN, frame.time))
+        if recent.starts_new_recording(frame):
+            found += [recent.pop() for _ in range(recent.waiting)]
+        given_back = recent.push(frame, PlacedScan(SCAN, frame.time))
         found += [given_back] if given_back else []
         assert recent.waiting <= after
-    found += [recent.give() for _ in range(recent.waiting)]
+    found += [recent.pop() for _ in range(recent.waiting)]
 
     expected, start = [], 0
     for length in lengths:
@@ -62,7 +62,7 @@ def test_windows_are_those_of_the_whole_recording(
 def test_nothing_is_kept_that_no_window_asks_for() -> None:
     recent = RecentFrames(Window(1, 2))
     for frame in frames(50):
-        recent.take(frame, PlacedScan(SCAN, frame.time))
+        recent.push(frame, PlacedScan(SCAN, frame.time))
     assert len(recent._kept) == 3  # one given back, two that wait
 
 
@@ -70,21 +70,21 @@ def test_nothing_is_kept_that_no_window_asks_for() -> None:
 def test_a_gap_starts_anew(number: int) -> None:
     recent = RecentFrames(Window(1, 1))
     all_of_them = frames(10)
-    recent.take(all_of_them[2], PlacedScan(SCAN, all_of_them[2].time))
-    recent.take(all_of_them[3], PlacedScan(SCAN, all_of_them[3].time))
-    assert recent.starts_anew(all_of_them[number])
-    assert recent.take(all_of_them[number], PlacedScan(SCAN, all_of_them[number].time)) is None
+    recent.push(all_of_them[2], PlacedScan(SCAN, all_of_them[2].time))
+    recent.push(all_of_them[3], PlacedScan(SCAN, all_of_them[3].time))
+    assert recent.starts_new_recording(all_of_them[number])
+    assert recent.push(all_of_them[number], PlacedScan(SCAN, all_of_them[number].time)) is None
     assert recent.waiting == 1
-    assert seen(recent.give()) == ([], [number], [])
+    assert seen(recent.pop()) == ([], [number], [])
 
 
 def test_who_goes_on_after_flushing_sees_what_was_before() -> None:
     recent = RecentFrames(Window(2, 1))
     all_of_them = frames(5)
     for frame in all_of_them[:3]:
-        recent.take(frame, PlacedScan(SCAN, frame.time))
-    assert seen(recent.give()) == ([0, 1], [2], [])
-    assert recent.take(all_of_them[3], PlacedScan(SCAN, all_of_them[3].time)) is None
-    given_back = recent.take(all_of_them[4], PlacedScan(SCAN, all_of_them[4].time))
+        recent.push(frame, PlacedScan(SCAN, frame.time))
+    assert seen(recent.pop()) == ([0, 1], [2], [])
+    assert recent.push(all_of_them[3], PlacedScan(SCAN, all_of_them[3].time)) is None
+    given_back = recent.push(all_of_them[4], PlacedScan(SCAN, all_of_them[4].time))
     assert given_back is not None
     assert seen(given_back) == ([1, 2], [3], [4])

@@ -17,7 +17,7 @@ from derain.scan import Scan
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.sources.scan_warnings import ScanWarnings
-from derain.views.oddities import Oddity
+from derain.views.scan_issues import ScanIssue
 
 
 def warned(judge: Callable[[], object]) -> list[warnings.WarningMessage]:
@@ -69,15 +69,15 @@ def test_a_method_that_is_loaded_for_a_command_does_not_warn() -> None:
 def test_one_scan_in_so_many_is_examined_and_the_share_of_rain_looked_at_in_each() -> None:
     examined: list[int] = []
 
-    def examine(judgement: Judgement) -> Iterator[Oddity]:
+    def examine(judgement: Judgement) -> Iterator[ScanIssue]:
         examined.append(len(judgement.scan))
-        yield Oddity("odd", "it is odd")
+        yield ScanIssue("odd", "it is odd")
 
     look, texts = ScanWarnings(examine, examined_of=3), []
     for points in range(1, 6):
         rain = np.full(points, points == 2)
         answer = Judgement(rain.astype(np.float32), rain, ~rain, Scan.of(np.ones((points, 3))))
-        texts += [str(each.message) for each in warned(lambda answer=answer: look.look(answer))]
+        texts += [str(each.message) for each in warned(lambda answer=answer: look.check(answer))]
     assert examined == [1, 4]
     assert texts[0] == "array: it is odd"
     assert "100% of the points are called rain" in texts[1]

@@ -11,7 +11,12 @@ from derain.export.model_file import ModelFile
 from derain.sources.file_frame import ENDS, FileFrame
 from derain.sources.folders import named_frames
 from derain.sources.source import Source
-from derain.sources.training_record import MOST_NAMES, by_fingerprint, by_name, overlap
+from derain.sources.training_record import (
+    MOST_NAMES,
+    record_of_scans,
+    record_of_sequences,
+    training_overlap,
+)
 
 CARD = load_card("wads")
 SPEC = ModelFile.read(Path(__file__).parents[1] / "export/kept/outdet.onnx").spec
@@ -28,30 +33,35 @@ def scans(tmp_path: Path) -> Source:
 
 
 def test_a_sequence_is_known_by_its_name_where_the_data_are_the_same(scans: Source) -> None:
-    spec = replace(SPEC, training=by_name(["10", "11"]))
-    note = overlap("mine", spec, CARD, scans)
+    spec = replace(SPEC, training=record_of_sequences(["10", "11"]))
+    note = training_overlap("mine", spec, CARD, scans)
     assert note is not None
     assert note.startswith(f"mine was trained on 2 of these 3 scans, such as {scans[0].name}")
-    assert overlap("mine", replace(spec, training=by_name(["10", "13"])), CARD, scans) is None
+    assert (
+        training_overlap(
+            "mine", replace(spec, training=record_of_sequences(["10", "13"])), CARD, scans
+        )
+        is None
+    )
     # Sequences of other data may well be called the same.
-    assert overlap("mine", replace(spec, data="other data"), CARD, scans) is None
+    assert training_overlap("mine", replace(spec, data="other data"), CARD, scans) is None
 
 
 def test_a_scan_is_known_by_its_content_wherever_it_lies(scans: Source, tmp_path: Path) -> None:
-    spec = replace(SPEC, training=by_fingerprint(scans[:1]), data="whatever")
+    spec = replace(SPEC, training=record_of_scans(scans[:1]), data="whatever")
     moved = tmp_path / "elsewhere" / "other_name.bin"
     moved.parent.mkdir()
     moved.write_bytes(Path(scans[0].name).read_bytes())
-    note = overlap("mine", spec, CARD, [scans[1], *named_frames([moved])])
+    note = training_overlap("mine", spec, CARD, [scans[1], *named_frames([moved])])
     assert note is not None
     assert note.startswith(f"mine was trained on 1 of these 2 scans, such as {moved}")
     # One of the same name in a folder of the same name is another.
-    assert overlap("mine", spec, CARD, scans[1:]) is None
+    assert training_overlap("mine", spec, CARD, scans[1:]) is None
 
 
 def test_nothing_is_said_where_nothing_is_known(scans: Source) -> None:
-    assert by_fingerprint([]) == by_name([]) == {}
-    assert overlap("mine", replace(SPEC, training={}), CARD, scans) is None
+    assert record_of_scans([]) == record_of_sequences([]) == {}
+    assert training_overlap("mine", replace(SPEC, training={}), CARD, scans) is None
 
 
 def test_both_ends_and_the_length_of_a_file_tell_it_from_others(tmp_path: Path) -> None:
@@ -66,8 +76,8 @@ def test_both_ends_and_the_length_of_a_file_tell_it_from_others(tmp_path: Path) 
 
 
 def test_a_record_stays_small(scans: Source, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert len(by_name(map(str, range(2 * MOST_NAMES)))["sequences"]) == MOST_NAMES
+    assert len(record_of_sequences(map(str, range(2 * MOST_NAMES)))["sequences"]) == MOST_NAMES
     monkeypatch.setattr("derain.sources.training_record.MOST_NAMES", 2)
-    assert by_fingerprint(scans) == {
+    assert record_of_scans(scans) == {
         "scans": tuple(sorted(frame.fingerprint() for frame in scans[::2]))
     }

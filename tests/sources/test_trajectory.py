@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from derain.errors import InputError
 from derain.fusion.extrinsics import Extrinsics
-from derain.sources.quaternions import between, quaternion_of, rotation_of
+from derain.sources.quaternions import quaternion_of, rotation_of, slerp
 from derain.sources.trajectory import (
     LONGEST_GAP,
     TIME_ROUNDING,
@@ -53,7 +53,7 @@ def test_known_quaternions() -> None:
 def test_on_the_way_between_two_turns_lies_their_share(
     start: float, change: float, share: float
 ) -> None:
-    found = between(quaternion_of(turned(start)), quaternion_of(turned(start + change)), share)
+    found = slerp(quaternion_of(turned(start)), quaternion_of(turned(start + change)), share)
     np.testing.assert_allclose(rotation_of(found), turned(start + share * change), atol=1e-9)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from derain.system.workers import LAUNCHER, end_with_launcher, worker_pool
+from derain.system.workers import LAUNCHER, exit_with_launcher, worker_pool
 
 HAS_A_WORKER = """
 import time
@@ -25,9 +25,9 @@ if __name__ == "__main__":
 
 HAS_A_RANK = """
 import os, subprocess, sys, time
-from derain.system.workers import end_with_launcher
+from derain.system.workers import exit_with_launcher
 
-end_with_launcher()
+exit_with_launcher()
 if "LOCAL_RANK" in os.environ:
     print("at work", flush=True)
     time.sleep(600)
@@ -70,5 +70,5 @@ def test_a_process_that_nobody_of_ours_began_goes_on_without_its_parent(
 ) -> None:
     monkeypatch.setattr(os, "environ", dict(environment))
     threads = threading.active_count()
-    end_with_launcher()
+    exit_with_launcher()
     assert threading.active_count() == threads

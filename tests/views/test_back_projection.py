@@ -107,10 +107,10 @@ def test_copying_gives_every_point_its_pixels_score(
 @settings(deadline=None)
 @given(projections(), st.sampled_from(sorted(BACK_PROJECTIONS)), st.sampled_from([0.0, 1.0]))
 def test_a_unanimous_image_gives_every_point_its_answer(
-    projection: tuple[ProjectedPoints, NDArray[np.float32]], way_back: str, answer: float
+    projection: tuple[ProjectedPoints, NDArray[np.float32]], back_projection: str, answer: float
 ) -> None:
     points, score = projection
-    result = BACK_PROJECTIONS[way_back](points, np.full_like(score, answer))
+    result = BACK_PROJECTIONS[back_projection](points, np.full_like(score, answer))
     assert result.dtype == np.float32
     assert result.tolist() == [answer] * len(points.pixel)
 
@@ -118,12 +118,12 @@ def test_a_unanimous_image_gives_every_point_its_answer(
 @settings(deadline=None)
 @given(projections(), st.sampled_from(["nearest range", "copy"]))
 def test_points_that_are_shown_have_their_own_pixels_score(
-    projection: tuple[ProjectedPoints, NDArray[np.float32]], way_back: str
+    projection: tuple[ProjectedPoints, NDArray[np.float32]], back_projection: str
 ) -> None:
     points, score = projection
     shown = points.range == points.nearest.ravel()[points.pixel]
     np.testing.assert_array_equal(
-        BACK_PROJECTIONS[way_back](points, score)[shown], score[points.pixel[shown]]
+        BACK_PROJECTIONS[back_projection](points, score)[shown], score[points.pixel[shown]]
     )
 
 
@@ -166,17 +166,17 @@ def test_a_tied_vote_is_not_rain_and_a_lone_return_decides_for_itself() -> None:
     assert vote(far, np.full(8, 0.5, np.float32)).tolist() == [0, 0]
 
 
-@pytest.mark.parametrize("way_back", [nearest_range, vote])
+@pytest.mark.parametrize("back_projection", [nearest_range, vote])
 def test_answers_do_not_depend_on_how_many_points_look_around_at_a_time(
-    way_back: PixelsToPoints, monkeypatch: pytest.MonkeyPatch
+    back_projection: PixelsToPoints, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rng = np.random.default_rng(1)
     points = project(rng.integers(0, 600, 900), rng.uniform(1, 9, 900), (20, 30), True)
     score = rng.random(600, np.float32)
     assert CHUNK > 900
-    whole = way_back(points, score)
+    whole = back_projection(points, score)
     monkeypatch.setattr("derain.views.back_projection.CHUNK", 7)
-    np.testing.assert_array_equal(way_back(points, score), whole)
+    np.testing.assert_array_equal(back_projection(points, score), whole)
 
 
 def test_away_from_the_borders_the_vote_is_the_published_one() -> None:

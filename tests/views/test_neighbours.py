@@ -145,7 +145,7 @@ def test_points_hold_the_channels_asked_for_in_their_order_and_a_stand_in_for_ga
     rcs = np.where(np.arange(50) < 20, np.nan, rng.normal(size=50))
     scan = Scan(xyz, fields={"rcs": rcs})
     channels = ("rcs", "range", "z", "intensity")
-    view = NeighbourView(channels=channels, stand_in={"rcs": 7.5, "intensity": 9.5})(scan)
+    view = NeighbourView(channels=channels, fill_value={"rcs": 7.5, "intensity": 9.5})(scan)
     rows = view.first
     np.testing.assert_array_equal(
         view.points[:, 0], np.float32(np.where(rows < 20, 7.5, rcs[rows]))
@@ -187,7 +187,7 @@ def test_candidates_have_the_neighbourhoods_that_they_have_among_all(
     scan = Scan.of(np.repeat(scene(points + 10, seed)[:points], 2, axis=0))
     candidates = Candidates((Bound("range", most=farthest),))
     view = NeighbourView(k)
-    whole, part = view(scan), view.judging(candidates)(scan)
+    whole, part = view(scan), view.with_candidates(candidates)(scan)
     candidate = np.flatnonzero(candidates.among(scan)[whole.first])
     assert part.candidates is not None
     assert part.size == len(part.candidates) == len(candidate)

@@ -18,7 +18,7 @@ from derain.views.one_viewpoint import (
     crowding_far_off,
     range_step,
     rays_near_axes,
-    unlike_one_viewpoint,
+    viewpoint_issues,
 )
 
 # Where the sensor is above the road, metres.
@@ -68,7 +68,7 @@ def scan_of(points: Points) -> Scan:
 
 
 def kinds(points: Points) -> list[str]:
-    return [oddity.kind for oddity in unlike_one_viewpoint(scan_of(points))]
+    return [issue.kind for issue in viewpoint_issues(scan_of(points))]
 
 
 SKYWARD = rays(64, 1024) @ [[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]]
@@ -278,19 +278,19 @@ def test_every_oddity_says_what_can_be_done(spinning: Points) -> None:
         "is the sensor covered": spinning[:9],
     }
     for remedy, points in remedies.items():
-        (oddity,) = unlike_one_viewpoint(scan_of(points))
-        assert remedy in oddity.detail
+        (issue,) = viewpoint_issues(scan_of(points))
+        assert remedy in issue.detail
 
 
 @pytest.mark.parametrize("method", ["network", "filter"])
 def test_networks_and_filters_say_it(spinning: Points, method: str) -> None:
     scan = Scan.of(np.column_stack([spinning * 1000, np.resize(np.arange(90.0), len(spinning))]))
     if method == "network":
-        found = OutDet().spec_for(load_card("wads")).oddities(scan)
+        found = OutDet().spec_for(load_card("wads")).issues(scan)
     else:
         derainer = FilterDerainer(DROR(), threads=1)
-        found = derainer.oddities(derainer.judge(scan))
-    assert [oddity.kind for oddity in found] == ["points farther off than sensors see"]
+        found = derainer.issues(derainer.judge(scan))
+    assert [issue.kind for issue in found] == ["points farther off than sensors see"]
 
 
 @pytest.fixture(scope="module")
@@ -304,7 +304,7 @@ def real(shared: Path) -> dict[str, Scan]:
 
 def test_no_real_scan_is_odd(real: dict[str, Scan]) -> None:
     assert len(real) >= 30
-    assert not {name: odd for name, scan in real.items() if (odd := [*unlike_one_viewpoint(scan)])}
+    assert not {name: odd for name, scan in real.items() if (odd := [*viewpoint_issues(scan)])}
 
 
 @pytest.mark.parametrize(
@@ -335,13 +335,13 @@ def test_every_real_scan_is_once_it_is_changed(
 ) -> None:
     for name, scan in real.items():
         changed = Scan(change(scan.xyz[scan.valid]))
-        (oddity,) = unlike_one_viewpoint(changed)
-        assert kind in oddity.kind, name
+        (issue,) = viewpoint_issues(changed)
+        assert kind in issue.kind, name
 
 
 def test_real_scans_in_feet_are_odd_unless_their_sensor_is_low(real: dict[str, Scan]) -> None:
     changed = {name: Scan(scan.xyz[scan.valid] * np.float32(3.28)) for name, scan in real.items()}
-    missed = {name for name, scan in changed.items() if not [*unlike_one_viewpoint(scan)]}
+    missed = {name for name, scan in changed.items() if not [*viewpoint_issues(scan)]}
     assert missed == {"hesai_at128_front.pcd", "velodyne_vlp16_dual.pcd"}
 
 
@@ -353,5 +353,5 @@ def test_real_scans_of_a_drive_are_odd_once_merged(
     drive = [scan for name, scan in sorted(real.items()) if name.startswith("0422")]
     assert len(drive) == 20
     parts = [scan.xyz[scan.valid] + np.float32([step * n, 0, 0]) for n, scan in enumerate(drive)]
-    (oddity,) = unlike_one_viewpoint(Scan(np.concatenate(parts[:scans])))
-    assert oddity.kind == "points of several viewpoints"
+    (issue,) = viewpoint_issues(Scan(np.concatenate(parts[:scans])))
+    assert issue.kind == "points of several viewpoints"

@@ -97,7 +97,7 @@ def test_a_view_has_the_channels_it_is_asked_for_in_their_order() -> None:
 
 
 def test_a_scan_without_intensity_takes_the_stand_in_and_empty_pixels_stay_zero() -> None:
-    view = RangeView(FULL, channels=("intensity",), stand_in={"intensity": 9.5})
+    view = RangeView(FULL, channels=("intensity",), fill_value={"intensity": 9.5})
     image = view(Scan.of(np.ones((1, 3), np.float32)))
     assert sorted(image.image.ravel())[-2:] == [0, 9.5]
 
@@ -105,7 +105,7 @@ def test_a_scan_without_intensity_takes_the_stand_in_and_empty_pixels_stay_zero(
 def test_a_pixel_shows_the_columns_of_its_nearest_point_and_a_stand_in_for_gaps() -> None:
     columns = {"doppler": np.array([1.0, 2.0, np.nan]), "radar": np.array([0, 1, 1], np.uint8)}
     xyz = np.array([[9, 0, 0], [3, 0, 0], [0, 9, 0]], np.float32)
-    view = RangeView(FULL, channels=("doppler", "radar"), stand_in={"doppler": -0.5})
+    view = RangeView(FULL, channels=("doppler", "radar"), fill_value={"doppler": -0.5})
     image = view(Scan(xyz, fields=columns))
     shown = image.image.reshape(2, -1)
     assert shown[:, image.pixel].T.tolist() == [[2, 1], [2, 1], [-0.5, 1]]
@@ -149,21 +149,21 @@ BOUNDS = st.builds(
 )
 
 
-@pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
+@pytest.mark.parametrize("back_projection", BACK_PROJECTIONS)
 @pytest.mark.parametrize("grid", [FULL, FRONT], ids=["full circle", "front"])
 @settings(deadline=None)
 @given(points=clouds, candidates=BOUNDS, seed=st.integers(0, 2**32 - 1))
 def test_candidates_are_given_scores_of_candidates_alone(
     grid: SphericalGrid,
-    way_back: str,
+    back_projection: str,
     points: NDArray[np.float32],
     candidates: Candidates,
     seed: int,
 ) -> None:
     rng, scan = np.random.default_rng(seed), Scan.of(points)
     score = rng.random(grid.rows * grid.columns, np.float32)
-    view = RangeView(grid, way_back=way_back)
-    whole, image = view(scan), view.judging(candidates)(scan)
+    view = RangeView(grid, back_projection=back_projection)
+    whole, image = view(scan), view.with_candidates(candidates)(scan)
     candidate = candidates.among(scan)
     asked = np.array([row >= 0 and candidate[row] for row in whole.winner])
 
@@ -199,8 +199,8 @@ def pixels_around(grid: SphericalGrid, pixel: int) -> list[int]:
 def test_a_view_judging_candidates_is_the_same_otherwise() -> None:
     candidates = Candidates((Bound("range", most=10.0),))
     view = RangeView(FRONT, ("z", "range"), "vote", {"z": 1.0})
-    assert view.judging(candidates) == replace(view, candidates=candidates)
-    assert view.judging(candidates).as_dict() == view.as_dict()
+    assert view.with_candidates(candidates) == replace(view, candidates=candidates)
+    assert view.with_candidates(candidates).as_dict() == view.as_dict()
 
 
 def test_packing_keeps_every_scan_to_its_own_image() -> None:
@@ -217,7 +217,7 @@ def test_packing_keeps_every_scan_to_its_own_image() -> None:
 
 def test_an_unknown_back_projection_is_refused() -> None:
     with pytest.raises(InputError, match="no such back-projection: 'knn'"):
-        RangeView(FULL, way_back="knn")
+        RangeView(FULL, back_projection="knn")
 
 
 @pytest.mark.parametrize("case", HARD_CASES)
@@ -254,9 +254,11 @@ def test_scores_come_back_to_every_point_of_every_real_scan(shared: Path, name: 
     image = view(scan)
     np.testing.assert_array_equal(image.pixel >= 0, scan.valid)
     # A constant comes back by every way; a vote makes it the share of votes.
-    for way_back in BACK_PROJECTIONS:
-        back = replace(image, way_back=way_back).back(np.full(image.size, 0.75, np.float32))
-        constant = np.float32(1 if way_back == "vote" else 0.75)
+    for back_projection in BACK_PROJECTIONS:
+        back = replace(image, back_projection_name=back_projection).back(
+            np.full(image.size, 0.75, np.float32)
+        )
+        constant = np.float32(1 if back_projection == "vote" else 0.75)
         np.testing.assert_array_equal(back, np.where(scan.valid, constant, 0))
     # So does a score of its own for every point that is shown, or is a copy of one.
     of_pixel = np.random.default_rng(0).random(image.size, np.float32)
@@ -290,7 +292,7 @@ def test_a_perfect_labelling_of_a_fitted_grid_is_nearly_perfect_for_the_points(
 
 
 @pytest.mark.parametrize(
-    ("grid", "way_back", "iou"),
+    ("grid", "back_projection", "iou"),
     [
         (SphericalGrid.even(64, 2048, (-25, 15)), "copy", 0.403),
         (SphericalGrid.even(64, 2048, (-25, 15)), "nearest range", 0.935),
@@ -299,8 +301,8 @@ def test_a_perfect_labelling_of_a_fitted_grid_is_nearly_perfect_for_the_points(
     ],
 )
 def test_what_published_grids_allow_is_as_measured_elsewhere(
-    shared: Path, grid: SphericalGrid, way_back: str, iou: float
+    shared: Path, grid: SphericalGrid, back_projection: str, iou: float
 ) -> None:
     sample = labelled(shared / "data/wads/sample.bin")
-    found = iou_of_perfect_pixels(RangeView(grid, way_back=way_back), *sample)
+    found = iou_of_perfect_pixels(RangeView(grid, back_projection=back_projection), *sample)
     assert found == pytest.approx(iou, abs=0.001)

@@ -72,7 +72,7 @@ def test_what_the_file_says_is_what_directions_say(columns: Columns) -> None:
     scan = with_columns(recording, **columns(recording))
     by_directions = pair_returns(Scan.of(recording.xyz))
     stated = pair_returns(scan)
-    assert stated.told_by in {name.lower() for name in scan.fields}
+    assert stated.found_by in {name.lower() for name in scan.fields}
     for name in ("nearer", "farther", "partner", "partner_range"):
         np.testing.assert_array_equal(getattr(stated, name), getattr(by_directions, name))
 
@@ -143,7 +143,7 @@ def test_a_second_return_in_the_row_of_the_first_is_known_by_its_range() -> None
     xyz = np.array([[10, 0, 0], [0, 20, 0], [0, 0, 5], [7, 0, 0]], np.float32)
     columns = {"range": np.array([9990, 20_000, 5000, 0]), "range2": np.array([29_970, 4000, 0, 9])}
     returns = pair_returns(Scan(xyz, fields=columns))
-    assert returns.told_by == "range2"
+    assert returns.found_by == "range2"
     assert returns.nearer.tolist() == [True, False, False, False]
     assert returns.farther.tolist() == [False, True, False, False]
     assert (returns.partner == -1).all()

@@ -13,7 +13,7 @@ from derain.files import read_scan
 from derain.scan import Scan
 from derain.views.return_columns import LEAST_APART
 from derain.views.returns import RayReturns, pair_returns
-from derain.views.shared_directions import FEWEST_PAIRS, TOLERANCES, one_direction
+from derain.views.shared_directions import FEWEST_PAIRS, TOLERANCES, shared_direction_pairs
 
 from ..two_returns import Recording
 
@@ -22,7 +22,7 @@ CLEAN = ["kitti_hdl64.bin", "kitti_front.bin", "pandaset_pandar64.pcd", "ouster_
 
 
 def assert_same(found: RayReturns, expected: RayReturns) -> None:
-    for name in ("nearer", "farther", "partner", "partner_range", "told_by"):
+    for name in ("nearer", "farther", "partner", "partner_range", "found_by"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
 
 
@@ -45,7 +45,7 @@ def test_the_rays_of_a_sensor_of_two_returns_are_found(
         returns.partner_range[recording.two], recording.distance[partner[recording.two]], rtol=1e-5
     )
     assert np.isnan(returns.partner_range[~recording.two]).all()
-    assert returns.told_by == "directions"
+    assert returns.found_by == "directions"
 
 
 def apart(unit: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -71,7 +71,7 @@ def test_pairs_are_those_of_a_brute_force_search_anywhere_on_the_sphere(
     unit = np.concatenate([unit, twins / np.linalg.norm(twins, axis=1, keepdims=True)])
     near = np.argwhere(apart(unit) < 2 * TOLERANCES[0])
     xyz = (unit * generator.uniform(1, 90, (len(unit), 1))).astype(np.float32)
-    found = one_direction(xyz)
+    found = shared_direction_pairs(xyz)
     assert len(found) > 100
     np.testing.assert_array_equal(found[np.lexsort(found.T[::-1])], near[near[:, 0] < near[:, 1]])
 

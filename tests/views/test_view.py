@@ -30,13 +30,13 @@ def test_derain_has_these_views_and_each_knows_its_name() -> None:
 
 @pytest.mark.parametrize("view", OURS.values(), ids=OURS.keys())
 def test_a_view_reads_back_what_it_says_of_itself(view: View) -> None:
-    channels, stand_in = ("z", "range"), {"z": 1.5}
+    channels, fill_value = ("z", "range"), {"z": 1.5}
     entry = Entry("model", "view", view.as_dict())
     assert entry.value["kind"] == view.NAME
-    expected = replace(view, channels=channels, stand_in=stand_in)
+    expected = replace(view, channels=channels, fill_value=fill_value)
     if isinstance(view, NeighbourView):
         expected = replace(expected, threads=3)
-    assert type(view).of(entry, channels, stand_in, threads=3) == expected
+    assert type(view).of(entry, channels, fill_value, threads=3) == expected
 
 
 @pytest.mark.parametrize("view", OURS.values(), ids=OURS.keys())
@@ -68,14 +68,14 @@ class ChangeView(View):
     """Sees a point's neighbours, and as its one channel how far the scan before was from it."""
 
     channels: tuple[str, ...] = ("change",)
-    stand_in: Mapping[str, float] = field(default_factory=dict)
+    fill_value: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(
-        cls, entry: Entry, channels: tuple[str, ...], stand_in: Mapping[str, float], threads: int
+        cls, entry: Entry, channels: tuple[str, ...], fill_value: Mapping[str, float], threads: int
     ) -> Self:
         entry.record({"kind": Entry.text})
-        return cls(channels, stand_in)
+        return cls(channels, fill_value)
 
     def as_dict(self) -> dict[str, Any]:
         return {"kind": self.NAME}

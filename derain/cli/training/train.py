@@ -2,7 +2,7 @@
 
 import shlex
 
-from derain.cli.outputs import say
+from derain.cli.outputs import print_lines
 from derain.cli.training.help import ALL, EXAMPLES
 from derain.workflows.training import run_trainer
 
@@ -20,5 +20,5 @@ def train(arguments: list[str]) -> None:
     trainer = run_trainer(words, descriptions=EXAMPLES).trainer
     best = getattr(trainer.checkpoint_callback, "best_model_path", "")
     if arguments[0] == "fit" and best and trainer.is_global_zero:
-        say(f"Best checkpoint: {best}")
-        say(f"derain export {shlex.quote(best)} --out model.onnx")
+        print_lines(f"Best checkpoint: {best}")
+        print_lines(f"derain export {shlex.quote(best)} --out model.onnx")

@@ -129,7 +129,7 @@ class Npz(Format):
                 fields[name] = array.reshape(math.prod(grid), *array.shape[len(grid) :])
             elif shape and array.shape == shape[1:]:
                 with reading(path, ValueError):
-                    content.room.take(shape[0] * array.nbytes)
+                    content.budget.reserve(shape[0] * array.nbytes)
                 fields[name] = np.tile(array, shape[0])
             else:
                 constants[name] = array
@@ -187,7 +187,7 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
         for member in archive.infolist():
             if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
                 raise ValueError(f"{member.filename} is compressed as NumPy never does")
-            content.room.take(member.file_size)
+            content.budget.reserve(member.file_size)
             with archive.open(member) as file:
                 # So many bytes, not all: what a member states is not what it may expand to.
                 data = file.read(member.file_size)

@@ -32,6 +32,11 @@ def refusal(run_derain, *options: str) -> str:
         ("--trainer.logger.nam", "x", "no such option. Did you mean --trainer.logger.name?"),
         ("--checkpoint.moniter", "x", "no such option. Did you mean --checkpoint.monitor?"),
         ("--ckpt", "x", "no such option. Did you mean --ckpt_path?"),
+        (
+            "--data.loading.kept_megabytes",
+            "1",
+            "no such option. Did you mean --data.loading.cache_mb?",
+        ),
         ("--colour_of_the_sky", "x", "no such option. All options: --help-all."),
         ("--trainer.max_epochs", "three", "cannot be three. Give: int."),
         ("--data.campaign.scans", "[3]", "cannot be [3]. Give: int."),
@@ -45,6 +50,10 @@ def test_an_option_is_refused_in_a_line(run_derain, option: str, value: str, sai
     ("content", "said"),
     [
         ("trainer: {max_epoch: 3}", "trainer.max_epoch: no such option. Did you mean trainer.max_"),
+        (
+            SIMULATED % "{loading: {kept_megabytes: 1}}",
+            "data.loading.kept_megabytes: no such option. Did you mean data.loading.cache_mb?",
+        ),
         ("seed_everythin: 3", "seed_everythin: no such option. Did you mean seed_everything?"),
         (SIMULATED % "{rot: x}", "data.rot: no such option. Did you mean data.root?"),
         (SIMULATED % "{loading: {worker: 1}}", "data.loading.worker: no such option. Did you mean"),

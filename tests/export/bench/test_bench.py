@@ -14,7 +14,7 @@ from derain.evaluation.baselines import all_points
 from derain.evaluation.counts import Counts
 from derain.export.bench import bench as module
 from derain.export.bench.bench import bench
-from derain.export.bench.cost import timed_here
+from derain.export.bench.cost import measure_in_process
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.methods import load_method
 from derain.export.runtime import Derainer
@@ -25,7 +25,7 @@ from derain.scan import Scan
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Times methods in this process; that each has its own is tested by itself."""
-    monkeypatch.setattr(module, "measure_cost", timed_here)
+    monkeypatch.setattr(module, "measure_cost", measure_in_process)
 
 
 @pytest.mark.usefixtures("here")

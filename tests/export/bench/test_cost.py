@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from derain.export.bench.contestants import Contestant, contestants
-from derain.export.bench.cost import Timing, measure_cost, timed_here
+from derain.export.bench.bench_entries import BenchEntry, bench_entries
+from derain.export.bench.cost import Timing, measure_cost, measure_in_process
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.methods import load_method
 from derain.export.timing import STAGES, WARM_UP
@@ -26,8 +26,8 @@ def test_each_run_is_timed_by_stage(labelled: LabelledFrames) -> None:
         stopwatch.milliseconds["network"] = next(milliseconds)
         return np.zeros(len(scan), bool)
 
-    row = Contestant("timed", "outdet", lambda threads: method)
-    cost = timed_here(row, Timing(labelled.frames, threads=1, repeats=2))
+    row = BenchEntry("timed", "outdet", lambda threads: method)
+    cost = measure_in_process(row, Timing(labelled.frames, threads=1, repeats=2))
     stages = cost.times.stages
     assert list(stages) == list(STAGES)
     runs = range(WARM_UP, WARM_UP + 2 * 3)
@@ -41,7 +41,7 @@ def test_each_run_is_timed_by_stage(labelled: LabelledFrames) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is Linux's to tell")
 def test_a_process_of_its_own_holds_little_but_the_method(labelled: LabelledFrames) -> None:
-    (row,) = contestants(["dsor"])
+    (row,) = bench_entries(["dsor"])
     held = np.ones(300_000_000, np.uint8)  # in this process, not in that one
     cost = measure_cost(row, Timing(labelled.frames[:1], threads=1, repeats=1))
     assert len(cost.times.stages["view"]) == 1
@@ -58,7 +58,7 @@ def test_a_process_of_its_own_holds_little_but_the_method(labelled: LabelledFram
 def test_a_method_that_cannot_be_timed_says_why(
     labelled: LabelledFrames, ready: Callable[[int], Any], reason: str
 ) -> None:
-    cost = measure_cost(Contestant("broken", "outdet", ready), Timing(labelled.frames, repeats=1))
+    cost = measure_cost(BenchEntry("broken", "outdet", ready), Timing(labelled.frames, repeats=1))
     assert cost.failure is not None
     assert cost.failure.startswith(reason)
     assert np.isnan(cost.times.percentile(50))
@@ -67,7 +67,7 @@ def test_a_method_that_cannot_be_timed_says_why(
 
 def test_methods_can_be_sent_to_another_process(labelled: LabelledFrames, onnx_model: Path) -> None:
     training = [labelled.read(frame) for frame in labelled.frames]
-    rows = contestants(
+    rows = bench_entries(
         [str(onnx_model), "dror", "position", "intensity", "all", "none"],
         lambda: ((scan, scan.label == 3) for scan in training),
     )

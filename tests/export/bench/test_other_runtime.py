@@ -9,8 +9,8 @@ import pytest
 from derain.errors import InputError
 from derain.export.bench import bench as bench_module
 from derain.export.bench.bench import bench
-from derain.export.bench.contestants import contestants
-from derain.export.bench.cost import timed_here
+from derain.export.bench.bench_entries import bench_entries
+from derain.export.bench.cost import measure_in_process
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import Runtime
@@ -23,13 +23,13 @@ pytestmark = pytest.mark.usefixtures("rainy")
 @pytest.fixture(autouse=True)
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Times methods in this process, where there is the runtime of these tests."""
-    monkeypatch.setattr(bench_module, "measure_cost", timed_here)
+    monkeypatch.setattr(bench_module, "measure_cost", measure_in_process)
 
 
 def test_every_model_is_followed_by_itself_by_the_other_runtime(tmp_path: Path) -> None:
     low = tmp_path / "low.yaml"
     low.write_text(f"method: {KEPT}\nthreshold: 0.25\n")
-    rows = contestants([f"a={KEPT}", "dror", str(low)], runtime=Runtime("rainy", "bf16"))
+    rows = bench_entries([f"a={KEPT}", "dror", str(low)], runtime=Runtime("rainy", "bf16"))
     assert [row.title for row in rows] == [
         *("a", "a (rainy bf16)", "dror", "low", "low (rainy bf16)")
     ]
@@ -43,14 +43,14 @@ def test_every_model_is_followed_by_itself_by_the_other_runtime(tmp_path: Path) 
 
 
 def test_without_another_runtime_nothing_is_added() -> None:
-    (row,) = contestants([str(KEPT)])
+    (row,) = bench_entries([str(KEPT)])
     assert row.by_other is None
     assert "runtime" not in row.facts
 
 
 def test_a_runtime_with_nothing_to_run_is_refused() -> None:
     with pytest.raises(InputError, match="runtime rainy: none of the methods is a model"):
-        contestants(["dror", "all"], runtime=Runtime("rainy"))
+        bench_entries(["dror", "all"], runtime=Runtime("rainy"))
 
 
 def test_what_it_changes_is_counted(labelled: LabelledFrames, tmp_path: Path) -> None:
@@ -90,9 +90,9 @@ def test_what_fails_is_told(labelled: LabelledFrames, monkeypatch: pytest.Monkey
         raise MemoryError("no room")
 
     scans = [frame.path for frame in labelled.frames]
-    rows = contestants([str(KEPT)], runtime=Runtime("rainy"))
+    rows = bench_entries([str(KEPT)], runtime=Runtime("rainy"))
     assert len(rows) == 2
-    monkeypatch.setattr("derain.export.proof.beside", failing)
+    monkeypatch.setattr("derain.export.proof.compare_runtimes", failing)
     found = bench([str(KEPT)], scans, labelled.card, threads=1, timed=1, repeats=1, runtime="rainy")
     assert found.facts["runtimes"] == [
         {"method": "outdet (rainy)", "runtime": "rainy", "failure": "no room"}

@@ -13,7 +13,7 @@ from matplotlib.image import imread
 from derain.evaluation.counts import Counts, or_none
 from derain.evaluation.scores import Scores, score
 from derain.export.bench.bench import scored_methods
-from derain.export.bench.contestants import FILE_SIZE, Contestant, contestants
+from derain.export.bench.bench_entries import FILE_SIZE, BenchEntry, bench_entries
 from derain.export.bench.cost import Cost
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.report import (
@@ -22,7 +22,7 @@ from derain.export.bench.report import (
     draw_speed_error,
     write_report,
 )
-from derain.export.bench.rows import Row, joined
+from derain.export.bench.rows import Row, bench_rows
 from derain.export.timing import STAGES, RunTimes
 
 FACTS = {
@@ -38,7 +38,7 @@ def cost(milliseconds: float) -> Cost:
     return Cost(RunTimes({stage: np.full(5, milliseconds / 4) for stage in STAGES}), 100.0)
 
 
-def scored(methods: list[Contestant], data: LabelledFrames) -> list[Scores]:
+def scored(methods: list[BenchEntry], data: LabelledFrames) -> list[Scores]:
     rates = list(map(data.rain_rate, data.frames))
     scans = map(data.read, data.frames)
     return score(scored_methods(methods, 1), scans, data.card, rain_rates=rates)
@@ -51,10 +51,10 @@ def rows(labelled: LabelledFrames) -> list[Row]:
     def broken(scan: object, stopwatch: object) -> np.ndarray:
         raise MemoryError("no room")
 
-    methods = [*contestants(["dror", "all"]), Contestant("broken", "outdet", lambda _: broken)]
+    methods = [*bench_entries(["dror", "all"]), BenchEntry("broken", "outdet", lambda _: broken)]
     failed = Cost(RunTimes.of_no_runs(), None, "no room")
     scores = scored(methods, labelled)
-    return joined(methods, scores, [cost(40), cost(4), failed], np.random.default_rng(0))
+    return bench_rows(methods, scores, [cost(40), cost(4), failed], np.random.default_rng(0))
 
 
 def test_json_and_csv_hold_the_same_figures(rows: list[Row], tmp_path: Path) -> None:
@@ -122,8 +122,8 @@ def test_simulated_data_are_called_so(rows: list[Row]) -> None:
 
 def test_one_scan_has_no_interval(labelled: LabelledFrames) -> None:
     one = replace(labelled, frames=labelled.frames[:1])
-    methods = contestants(["all"])
-    (row,) = joined(methods, scored(methods, one), [cost(4)], np.random.default_rng(0))
+    methods = bench_entries(["all"])
+    (row,) = bench_rows(methods, scored(methods, one), [cost(4)], np.random.default_rng(0))
     assert row.iou_interval is None
     assert row.as_dict()["iou_behind_best_interval"] is None
 
@@ -131,8 +131,8 @@ def test_one_scan_has_no_interval(labelled: LabelledFrames) -> None:
 def test_the_picture_says_how_large_files_are(
     rows: list[Row], tmp_path: Path, saved_figures: list[Figure]
 ) -> None:
-    contestant = replace(rows[0].contestant, facts={FILE_SIZE: 67_535})
-    draw_speed_error([replace(rows[0], contestant=contestant)], FACTS, tmp_path / "picture.png")
+    bench_entry = replace(rows[0].bench_entry, facts={FILE_SIZE: 67_535})
+    draw_speed_error([replace(rows[0], bench_entry=bench_entry)], FACTS, tmp_path / "picture.png")
     ((axes,),) = [figure.axes for figure in saved_figures]
     assert [text.get_text() for text in axes.texts] == ["dror · 68 kB"]
 

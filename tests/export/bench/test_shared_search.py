@@ -5,7 +5,7 @@ import pytest
 
 from derain.evaluation.scores import score
 from derain.export.bench.bench import scored_methods
-from derain.export.bench.contestants import contestants
+from derain.export.bench.bench_entries import bench_entries
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.filters import FILTERS, FilterDerainer
 from derain.scan import Scan
@@ -22,7 +22,7 @@ def test_filters_share_one_search_and_score_as_they_would_alone(
         searches.append(self.neighbours)
         return view(self, scan)
 
-    rows = contestants(list(FILTERS))
+    rows = bench_entries(list(FILTERS))
     monkeypatch.setattr(NeighbourView, "__call__", counted)
     scans = list(map(labelled.read, labelled.frames))
     together = score(scored_methods(rows, threads=1), scans, labelled.card)

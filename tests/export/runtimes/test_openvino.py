@@ -20,7 +20,7 @@ from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file, proof
 from derain.export.model_file import METADATA_KEY
 from derain.export.onnx_file import export
-from derain.export.proof import BF16, FLOAT32, beside, prove
+from derain.export.proof import BF16, FLOAT32, compare_runtimes, prove
 from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import Runtime
 from derain.models.base import DerainingModule
@@ -76,9 +76,9 @@ def test_networks_on_images_come_out_alike(
     bounds: proof.Bounds,
 ) -> None:
     usual, other = Derainer(image_onnx, 1), Derainer(image_onnx, 1, "openvino", precision)
-    found = beside(usual, other, HARD_CASES.items())
+    found = compare_runtimes(usual, other, HARD_CASES.items())
     assert bounds.difference is not None
-    assert found.worst.difference < bounds.difference * image_model.AMPLIFIES
+    assert found.worst.difference < bounds.difference * image_model.LOGIT_GAIN
     assert found.flipped <= len(found.cases) + (bounds.flipped or 0) * found.points
     assert found.rain_iou > 0.95
 

@@ -22,7 +22,7 @@ from derain.files.labels import write_labels
 from derain.learning.batch import Batch, Sample
 from derain.models.checkpoint import load_model, save_model
 from derain.models.lisnownet import LiSnowNet
-from derain.models.lisnownet.deployed import cube_roots, select
+from derain.models.lisnownet.deployed import cube_roots, rain_logits
 from derain.models.lisnownet.network import LiSnowNetwork, published_key
 from derain.models.lisnownet.selection_rule import FEWEST, SelectionRule
 from derain.models.lisnownet.sparsity import sparsity_loss
@@ -138,7 +138,7 @@ def test_a_probability_above_one_half_is_what_the_published_rule_says(rule: Sele
     seen = cube_roots(torch.from_numpy(image)[None], rule)
     denoised = seen + torch.from_numpy(rng.normal(0.2, 0.5, (1, 2, *size)).astype(np.float32))
     returned = torch.from_numpy(rng.random((1, 1, *size)) < 0.9)
-    logits = select(torch.from_numpy(image)[None], returned, seen, denoised, rule)
+    logits = rain_logits(torch.from_numpy(image)[None], returned, seen, denoised, rule)
     probability = probability_of_rain(logits.numpy()).reshape(size)
     change = (denoised - seen)[0].numpy()
     snow = says_snow(image.astype(np.float64), change.astype(np.float64), rule)
@@ -169,7 +169,7 @@ def test_the_limits_of_the_rule_are_where_they_were_published(
     image = torch.tensor(pixel)[None, :, None, None]
     seen = torch.zeros(1, 2, 1, 1)
     returned = torch.ones(1, 1, 1, 1, dtype=torch.bool)
-    logits = select(image, returned, seen, torch.tensor(change)[None, :, None, None], rule)
+    logits = rain_logits(image, returned, seen, torch.tensor(change)[None, :, None, None], rule)
     assert (probability_of_rain(logits.numpy())[0] > 0.5) == rain
 
 
@@ -178,7 +178,7 @@ def test_the_probability_rises_with_the_residual() -> None:
     denoised = torch.stack([changes, torch.full_like(changes, 0.5)])[None, :, None]
     image = torch.tensor([10.0, 0.0, 0.0])[None, :, None, None].expand(1, 3, 1, 101)
     seen, rule = torch.zeros(1, 2, 1, 101), SelectionRule(residual=0.125)
-    logits = select(image, image[:, :1] > 0, seen, denoised, rule)
+    logits = rain_logits(image, image[:, :1] > 0, seen, denoised, rule)
     margin = logits[:, 1] - logits[:, 0]
     # At twice the limit the margin is 4: a probability of .98.
     assert margin[100].item() == pytest.approx(4.0)

@@ -13,7 +13,7 @@ from derain.datamodules.in_memory import InMemory
 from derain.datamodules.loading import Loading
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.export.candidates import candidates_of_findings
+from derain.export.candidates import fit_network_candidates
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.learning.batch import Batch, Sample
@@ -73,12 +73,12 @@ def test_it_takes_no_candidates(trained: RelativeOutDet) -> None:
     """What it says of a point depends on all the others, so that none may be left out."""
     candidates = Candidates((Bound("range", most=20.0),))
     view = trained.spec.make_view()
-    assert trained.sees_through(view)
-    assert not trained.sees_through(view.judging(candidates))
+    assert trained.accepts_view(view)
+    assert not trained.accepts_view(view.with_candidates(candidates))
     with pytest.raises(InputError, match="relative_outdet"):
         RelativeOutDet().adopt(replace(trained.spec, candidates=candidates))
     with pytest.raises(InputError, match="--candidates: relative_outdet judges every point alike"):
-        candidates_of_findings(trained, [labelled(3)], load_card("wads"))
+        fit_network_candidates(trained, [labelled(3)], load_card("wads"))
 
 
 def test_a_checkpoint_gives_the_same(trained: RelativeOutDet, tmp_path: Path) -> None:

@@ -262,7 +262,7 @@ def test_the_model_learns_grid_spec_and_class_weights_from_its_data(
     fitted = SalsaNext(width=4).spec_for(WADS, list(data.training_scans(20)))
     assert model.spec == replace(fitted, training=data.training_record())
     assert torch.equal(model.class_weight, class_weights([1 - 0.11974, 0.11974]))
-    assert trainer.callback_metrics["val/merit"] == trainer.callback_metrics["val/iou"]
+    assert trainer.callback_metrics["val/score"] == trainer.callback_metrics["val/iou"]
 
 
 @pytest.mark.parametrize("missing", ["0.label", "3.label"])

@@ -71,12 +71,12 @@ class Feather(Format):
                 raise ValueError("it does not begin as Feather version 2 does")
             # As a stream, so that what is read are the messages that were checked.
             stream = content.data[len(_MAGIC) :]
-            compression = check_messages(arrow, stream, content.room)
+            compression = check_messages(arrow, stream, content.budget)
             with arrow.ipc.open_stream(stream) as messages:
                 table = messages.read_all()
             table.validate(full=True)
             check_columns(table.num_columns)
-            content.room.take(table.nbytes)
+            content.budget.reserve(table.nbytes)
             if len(set(table.column_names)) < table.num_columns:
                 raise ValueError("two columns have one name")
             numbers = [name for name in table.column_names if _has_numbers(arrow, table[name])]

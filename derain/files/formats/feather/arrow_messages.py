@@ -11,7 +11,7 @@ from typing import Any
 from flatbuffers import number_types
 from flatbuffers.table import Table
 
-from derain.files.content import Room
+from derain.files.content import MemoryBudget
 
 # Members of tables, by their place in Message.fbs.
 _MESSAGE_HEADER = 2
@@ -25,13 +25,13 @@ _BUFFER = struct.Struct("<qq")  # where a buffer begins in the message's body, a
 _SIZE = struct.Struct("<q")
 
 
-def check_messages(arrow: ModuleType, stream: bytes, room: Room) -> str:
+def check_messages(arrow: ModuleType, stream: bytes, budget: MemoryBudget) -> str:
     """Takes room for what compressed messages of a stream expand to.
 
     Args:
         arrow: PyArrow.
         stream: The messages.
-        room: What there is.
+        budget: What there is.
 
     Returns:
         How they are compressed: "uncompressed", "lz4" or "zstd".
@@ -49,14 +49,14 @@ def check_messages(arrow: ModuleType, stream: bytes, room: Room) -> str:
             batch = _member(batch, _DICTIONARY_DATA)
         codec = None if batch is None else _member(batch, _BATCH_COMPRESSION)
         if batch is not None and codec is not None:
-            _take(batch, memoryview(message.body), room)
+            _take(batch, memoryview(message.body), budget)
             compression = _CODECS[
                 codec.GetSlot(_slot(_COMPRESSION_CODEC), 0, number_types.Int8Flags)
             ]
     return compression
 
 
-def _take(batch: Any, body: memoryview, room: Room) -> None:
+def _take(batch: Any, body: memoryview, budget: MemoryBudget) -> None:
     """Takes room for the buffers of a compressed batch."""
     place = batch.Offset(_slot(_BATCH_BUFFERS))
     first, count = batch.Vector(place), batch.VectorLen(place)
@@ -64,7 +64,7 @@ def _take(batch: Any, body: memoryview, room: Room) -> None:
         begin, length = _BUFFER.unpack_from(batch.Bytes, first + number * _BUFFER.size)
         if length > 0:
             (size,) = _SIZE.unpack_from(body, begin)
-            room.take(max(size, 0))  # -1 says that the buffer is not compressed
+            budget.reserve(max(size, 0))  # -1 says that the buffer is not compressed
 
 
 def _member(table: Any, number: int) -> Any:

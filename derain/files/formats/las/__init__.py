@@ -216,7 +216,7 @@ def _check_counts(content: Content) -> None:
         extended, points = struct.unpack_from("<IQ", data, 243)
     if records * _RECORD + extended * _EXTENDED_RECORD > len(data):
         raise ValueError(f"{records + extended:,} records in the header")
-    content.room.take(points * size)
+    content.budget.reserve(points * size)
 
 
 def _origin(whole: NDArray[np.int64], scales: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -39,7 +39,7 @@ class Pcd(Format):
         """
         with reading(content.path, ValueError):
             header, data = parse_header(content.data)
-            fields = DECODERS[header.encoding](header, data, content.room)
+            fields = DECODERS[header.encoding](header, data, content.budget)
         points = len(next(iter(fields.values())))
         organised = header.height > 1 and header.width * header.height == points
         shape = (header.height, header.width) if organised else None

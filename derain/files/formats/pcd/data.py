@@ -13,24 +13,26 @@ import lzf
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.files.content import Room
+from derain.files.content import MemoryBudget
 from derain.files.formats.pcd.header import PADDING, PcdHeader
 from derain.files.text import format_rows, parse_rows
 
 
-def _decode_ascii(header: PcdHeader, data: bytes, _: Room) -> dict[str, NDArray[Any]]:
+def _decode_ascii(header: PcdHeader, data: bytes, _: MemoryBudget) -> dict[str, NDArray[Any]]:
     table = parse_rows(data, header.row)
     _check_points(header, len(table), rest=0)
     return _columns_of_rows(header, table)
 
 
-def _decode_binary(header: PcdHeader, data: bytes, _: Room) -> dict[str, NDArray[Any]]:
+def _decode_binary(header: PcdHeader, data: bytes, _: MemoryBudget) -> dict[str, NDArray[Any]]:
     points, rest = divmod(len(data), header.row.itemsize)
     _check_points(header, points, rest)
     return _columns_of_rows(header, np.frombuffer(data, header.row, points))
 
 
-def _decode_compressed(header: PcdHeader, data: bytes, room: Room) -> dict[str, NDArray[Any]]:
+def _decode_compressed(
+    header: PcdHeader, data: bytes, budget: MemoryBudget
+) -> dict[str, NDArray[Any]]:
     """One column after the other, all of them compressed as one block."""
     compressed_size, size = np.frombuffer(data, "<u4", count=2).tolist()
     named = replace(
@@ -40,7 +42,7 @@ def _decode_compressed(header: PcdHeader, data: bytes, room: Room) -> dict[str, 
         header = named
     points, rest = divmod(size, header.row.itemsize)
     _check_points(header, points, rest)
-    room.take(size)
+    budget.reserve(size)
     plain = lzf.decompress(data[8 : 8 + compressed_size], size) if size else b""
     if plain is None or len(plain) != size:
         raise ValueError(f"the compressed data do not yield {size} bytes")
@@ -77,7 +79,7 @@ def _encode_compressed(table: NDArray[Any]) -> bytes:
     return np.array([len(compressed), len(plain)], "<u4").tobytes() + compressed
 
 
-DECODERS: dict[str, Callable[[PcdHeader, bytes, Room], dict[str, NDArray[Any]]]] = {
+DECODERS: dict[str, Callable[[PcdHeader, bytes, MemoryBudget], dict[str, NDArray[Any]]]] = {
     "ascii": _decode_ascii,
     "binary": _decode_binary,
     "binary_compressed": _decode_compressed,

@@ -14,10 +14,10 @@ from derain.filters import DROR, SSR, FilterDerainer
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.spec import Spec
-from derain.views.oddities import (
+from derain.views.scan_issues import (
     HEAVIEST_RAIN,
     MOST_OUTSIDE,
-    Examiner,
+    ScanChecker,
     left_out,
     much_removed,
     outside_view,
@@ -36,33 +36,33 @@ def with_intensity(values: float | np.ndarray, points: int = 300) -> Scan:
     return Scan.of(xyzi)
 
 
-def kinds(scan: Scan, examiner: Examiner) -> list[str]:
-    return [oddity.kind for oddity in examiner.oddities(scan)]
+def kinds(scan: Scan, checker: ScanChecker) -> list[str]:
+    return [issue.kind for issue in checker.issues(scan)]
 
 
 def test_an_ordinary_scan_is_not_odd(spec: Spec) -> None:
-    for examiner in (spec, SSR(), DROR(), IntensityRule(1.0, 20.0)):
-        assert kinds(Scan.of(scene(300)), examiner) == []
+    for checker in (spec, SSR(), DROR(), IntensityRule(1.0, 20.0)):
+        assert kinds(Scan.of(scene(300)), checker) == []
 
 
 @pytest.mark.parametrize("value", [0.0, 7.0, 255.0, 65_535.0])
 def test_one_intensity_everywhere_was_not_measured(spec: Spec, value: float) -> None:
     scan = with_intensity(value)
-    (oddity,) = spec.oddities(scan)
-    assert oddity.kind == "intensity not measured"
-    assert oddity.detail == (
+    (issue,) = spec.issues(scan)
+    assert issue.kind == "intensity not measured"
+    assert issue.detail == (
         f"intensity {value:g} at every point, so that it was not measured: "
         "the mean of WADS, 9.88, stands in"
     )
-    for examiner in (SSR(), IntensityRule(1e6, 1e6)):
-        assert kinds(scan, examiner) == ["intensity not measured"]
+    for checker in (SSR(), IntensityRule(1e6, 1e6)):
+        assert kinds(scan, checker) == ["intensity not measured"]
     assert kinds(scan, DROR()) == []  # it looks at places alone
 
 
 def test_intensities_that_are_no_numbers_were_not_measured(spec: Spec) -> None:
     for values in (np.nan, np.resize([np.nan, np.inf, 1e9], 300)):
-        (oddity,) = spec.oddities(with_intensity(values))
-        assert oddity.detail.startswith("no intensity is a number that sensors measure: the mean")
+        (issue,) = spec.issues(with_intensity(values))
+        assert issue.detail.startswith("no intensity is a number that sensors measure: the mean")
 
 
 def test_every_channel_that_is_missing_is_an_oddity_of_its_own(spec: Spec) -> None:
@@ -83,9 +83,9 @@ def test_intensities_of_another_unit_are_told_from_those_of_a_bright_scene(
     # Bright enough for the means to be no farther apart than those of two scenes may be.
     shares = np.random.default_rng(0).beta(*((8, 4) if full_scale == 1 else (0.05, 20)), 3000)
     scan = with_intensity(np.maximum(shares, 0.01) * full_scale, 3000)
-    for examiner in (spec, SSR()):
-        assert kinds(scan, examiner) == [f"intensity of a {unit} unit"]
-        assert kinds(scan.with_intensity_times(255 / full_scale), examiner) == []
+    for checker in (spec, SSR()):
+        assert kinds(scan, checker) == [f"intensity of a {unit} unit"]
+        assert kinds(scan.with_intensity_times(255 / full_scale), checker) == []
 
 
 def test_real_scans_are_odd_only_where_their_intensities_are_shares(
@@ -102,8 +102,8 @@ def test_real_scans_are_odd_only_where_their_intensities_are_shares(
         "wads/sample.bin": [],
     }
     scans = {name: read_scan(shared / "data" / name) for name in units}
-    for examiner in (spec, SSR()):
-        assert {name: kinds(scan, examiner) for name, scan in scans.items()} == units
+    for checker in (spec, SSR()):
+        assert {name: kinds(scan, checker) for name, scan in scans.items()} == units
 
 
 def test_a_unit_that_is_not_stated_is_told_by_the_mean_alone(spec: Spec) -> None:
@@ -114,9 +114,9 @@ def test_a_unit_that_is_not_stated_is_told_by_the_mean_alone(spec: Spec) -> None
 
 def test_a_scan_without_a_point_is_not_odd(spec: Spec) -> None:
     for points in (np.zeros((0, 4), np.float32), np.full((200, 4), np.nan, np.float32)):
-        for examiner in (spec, SSR(), DROR(), IntensityRule(1.0, 20.0)):
-            assert kinds(Scan.of(points), examiner) == []
-            assert kinds(Scan.of(points[:, :3]), examiner) == []
+        for checker in (spec, SSR(), DROR(), IntensityRule(1.0, 20.0)):
+            assert kinds(Scan.of(points), checker) == []
+            assert kinds(Scan.of(points[:, :3]), checker) == []
         assert list(outside_view(Scan.of(points), np.zeros(len(points), bool), spec.data)) == []
 
 
@@ -124,14 +124,14 @@ def test_points_outside_the_view_are_odd_where_they_are_many(spec: Spec) -> None
     scan = Scan.of(scene(1000))
     few = np.arange(1000) >= 1000 * MOST_OUTSIDE
     assert list(outside_view(scan, few, spec.data)) == []
-    (oddity,) = outside_view(scan, np.arange(1000) >= 250, spec.data)
-    assert oddity.detail == "25% of the points lie outside the grid of WADS, and stay"
+    (issue,) = outside_view(scan, np.arange(1000) >= 250, spec.data)
+    assert issue.detail == "25% of the points lie outside the grid of WADS, and stay"
 
 
 def test_more_than_twice_the_heaviest_rain_is_too_much() -> None:
     assert not list(much_removed(2 * HEAVIEST_RAIN))
-    (oddity,) = much_removed(0.36)
-    assert oddity.detail.startswith("36% of the points are called rain")
+    (issue,) = much_removed(0.36)
+    assert issue.detail.startswith("36% of the points are called rain")
 
 
 def test_any_header_may_say_that_parts_of_its_file_are_not_written() -> None:
@@ -140,9 +140,9 @@ def test_any_header_may_say_that_parts_of_its_file_are_not_written() -> None:
         left_out: tuple[str, ...]
 
     scan = Scan.of(scene(9))
-    (oddity,) = left_out(replace(scan, header=Header(("edge", "material"))))
-    assert oddity.kind == "parts of the file that are not written"
-    assert oddity.detail == "the cleaned file is without its edge, material"
+    (issue,) = left_out(replace(scan, header=Header(("edge", "material"))))
+    assert issue.kind == "parts of the file that are not written"
+    assert issue.detail == "the cleaned file is without its edge, material"
     for header in (Header(()), None, "of another format"):
         assert not list(left_out(replace(scan, header=header)))
 

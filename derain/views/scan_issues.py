@@ -1,4 +1,4 @@
-"""What may be odd about a scan, in plain values; each method says which of it matters to itself."""
+"""What may be wrong with a scan; each method chooses which of it matters to itself."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -30,8 +30,8 @@ MOST_RAIN = 0.35
 
 
 @dataclass(frozen=True)
-class Oddity:
-    """One thing that is odd about a scan.
+class ScanIssue:
+    """One thing about a scan that may not suit a method.
 
     Attributes:
         kind: What it is, in the same words for every scan that has it.
@@ -42,10 +42,10 @@ class Oddity:
     detail: str
 
 
-class Examiner(Protocol):
+class ScanChecker(Protocol):
     """What scans are judged by, and what can say of a scan beforehand whether it suits."""
 
-    def oddities(self, scan: Scan) -> Iterator[Oddity]:
+    def issues(self, scan: Scan) -> Iterator[ScanIssue]:
         """What is odd about a scan before it is judged.
 
         Args:
@@ -54,29 +54,29 @@ class Examiner(Protocol):
         """
 
 
-def missing_channels(scan: Scan, stand_in: Mapping[str, float], data: str) -> Iterator[Oddity]:
+def missing_channels(scan: Scan, fill_value: Mapping[str, float], data: str) -> Iterator[ScanIssue]:
     """Says which channels of a model a scan has not got.
 
     Args:
         scan: The scan.
-        stand_in: The channels that it has not got, and the means that stand in for them.
+        fill_value: The channels that it has not got, and the means that stand in for them.
         data: Name of the data that the means are of.
     """
     if not scan.valid.any():
         return
-    for name, mean in stand_in.items():
+    for name, mean in fill_value.items():
         lack, detail = _lack(scan) if name == "intensity" else (f"no {name}", f"no {name}")
-        yield Oddity(lack, f"{detail}: the mean of {data}, {mean:.3g}, stands in")
+        yield ScanIssue(lack, f"{detail}: the mean of {data}, {mean:.3g}, stands in")
 
 
-def missing_intensity(scan: Scan) -> Iterator[Oddity]:
+def missing_intensity(scan: Scan) -> Iterator[ScanIssue]:
     """Whether a scan lacks the intensity without which a method finds nothing."""
     if scan.measured_intensity is None and scan.valid.any():
         lack, detail = _lack(scan)
-        yield Oddity(lack, f"{detail}: nothing can be found without")
+        yield ScanIssue(lack, f"{detail}: nothing can be found without")
 
 
-def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> Iterator[Oddity]:
+def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> Iterator[ScanIssue]:
     """Whether a scan's intensities are of another unit than a model's training data.
 
     Args:
@@ -90,7 +90,7 @@ def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> 
     intensity = scan.measured_intensity[scan.valid]
     found = float(intensity.mean(dtype="float64")) if len(intensity) else 0.0
     if found > 0 and not 1 / INTENSITY_MISMATCH < found / mean < INTENSITY_MISMATCH:
-        yield Oddity(
+        yield ScanIssue(
             _other_unit(found < mean),
             f"mean intensity {found:.3g}, but {mean:.3g} where the model was trained "
             f"(unit {unit}): see --intensity-scale or Scan.with_intensity_times",
@@ -99,7 +99,7 @@ def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> 
         yield from intensity_of_another_scale(scan, full_scale, data)
 
 
-def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Iterator[Oddity]:
+def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Iterator[ScanIssue]:
     """Whether a scan's intensities have another full scale than expected.
 
     Args:
@@ -115,14 +115,14 @@ def intensity_of_another_scale(scan: Scan, expected: float, whose: str) -> Itera
     bright = np.percentile(intensity, FULL_SCALE_PERCENTILE)
     scale = next((scale for scale in FULL_SCALES if bright <= scale), FULL_SCALES[-1])
     if scale != expected:
-        yield Oddity(
+        yield ScanIssue(
             _other_unit(scale < expected),
             f"intensities of 0..{scale:g}, but 0..{expected:g} for {whose}: see --intensity-scale "
             "or Scan.with_intensity_times",
         )
 
 
-def outside_view(scan: Scan, judged: NDArray[np.bool_], data: str) -> Iterator[Oddity]:
+def outside_view(scan: Scan, judged: NDArray[np.bool_], data: str) -> Iterator[ScanIssue]:
     """Whether much of a scan lies outside what a model sees.
 
     Only who judged the scan can say: to project it once more would take as long as the view. A
@@ -137,36 +137,36 @@ def outside_view(scan: Scan, judged: NDArray[np.bool_], data: str) -> Iterator[O
     valid = scan.valid
     outside = float((~judged[valid]).mean()) if valid.any() else 0.0
     if outside > MOST_OUTSIDE:
-        yield Oddity(
+        yield ScanIssue(
             "points outside the grid",
             f"{outside:.0%} of the points lie outside the grid of {data}, and stay",
         )
 
 
-def much_removed(share: float) -> Iterator[Oddity]:
+def much_removed(share: float) -> Iterator[ScanIssue]:
     """Whether a method calls more of a scan rain than rain ever was.
 
     Args:
         share: Share of the points that can be judged which it calls rain.
     """
     if share > MOST_RAIN:
-        yield Oddity(
+        yield ScanIssue(
             f"more than {MOST_RAIN:.0%} called rain",
             f"{share:.0%} of the points are called rain, where the heaviest rain has "
             f"{HEAVIEST_RAIN:.0%}: the method may not suit the sensor",
         )
 
 
-def no_points(scan: Scan) -> Iterator[Oddity]:
+def no_points(scan: Scan) -> Iterator[ScanIssue]:
     """Whether a scan holds no points: by its format that may be, but it was hardly meant."""
     if not len(scan):
-        yield Oddity("no points", "it holds no points: the file may be a copy that failed")
+        yield ScanIssue("no points", "it holds no points: the file may be a copy that failed")
 
 
-def left_out(scan: Scan) -> Iterator[Oddity]:
+def left_out(scan: Scan) -> Iterator[ScanIssue]:
     """Whether a scan's file holds what is not written with the cleaned scan."""
     if isinstance(scan.header, PartialHeader) and scan.header.left_out:
-        yield Oddity(
+        yield ScanIssue(
             "parts of the file that are not written",
             f"the cleaned file is without its {', '.join(scan.header.left_out)}",
         )

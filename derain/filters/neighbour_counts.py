@@ -18,7 +18,7 @@ CURVE_STEPS = 4
 MARGIN = 1e-6
 
 
-def few_around(
+def has_few_neighbours(
     xyz: NDArray[np.float32],
     radius: NDArray[np.float64],
     count: int,

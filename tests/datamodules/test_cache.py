@@ -13,7 +13,7 @@ from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.datamodules.loader import scan_loader
 from derain.datamodules.loading import Part
-from derain.datamodules.scan_dataset import Kept, bytes_of
+from derain.datamodules.scan_dataset import Cache, bytes_of
 from derain.evaluation.hard_cases import scene
 from derain.learning.batch import Batch
 from derain.scan import Scan
@@ -41,7 +41,7 @@ def test_what_came_first_stays_as_long_as_it_fits() -> None:
         made.append(number)
         return scan_of(100 if number != 1 else 1000)
 
-    kept = Kept[Scan](3 * bytes_of(scan_of(100)))
+    kept = Cache[Scan](3 * bytes_of(scan_of(100)))
     for _ in range(2):
         for number in range(5):
             assert len(kept.get(number, lambda n=number: item(n))) == len(item(number))
@@ -74,7 +74,7 @@ def test_keeping_changes_no_batch(
     data: Folder, part: Part, augmentation: Augmentation, workers: int
 ) -> None:
     kept = epochs(data, part, Loading(workers=workers, augmentation=augmentation))
-    anew = epochs(data, part, Loading(augmentation=augmentation, kept_megabytes=0))
+    anew = epochs(data, part, Loading(augmentation=augmentation, cache_mb=0))
     for one, other in zip(kept, anew, strict=True):
         for name, tensor in other.inputs.items():
             assert torch.equal(one.inputs[name], tensor)
@@ -99,7 +99,7 @@ def test_scans_are_read_once_where_there_is_room(
         return original(self, frame)
 
     monkeypatch.setattr(FrameReader, "read_unlabelled", counted)
-    list(epochs(data, part, Loading(augmentation=EVERYTHING, kept_megabytes=megabytes)))
+    list(epochs(data, part, Loading(augmentation=EVERYTHING, cache_mb=megabytes)))
     assert len(read) == reads
 
 

@@ -9,7 +9,7 @@ import yaml
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.export.bench.contestants import FILE_SIZE, contestants
+from derain.export.bench.bench_entries import FILE_SIZE, bench_entries
 from derain.export.runtime import Derainer
 from derain.filters import DSOR
 from derain.scan import Scan
@@ -25,7 +25,7 @@ def test_a_row_is_called_by_its_title_else_by_its_name(onnx_model: Path, tmp_pat
     tuned = parameters(tmp_path / "best.yaml", method="dsor", range_multiplier=0.08)
     odd = parameters(tmp_path / "r=0.1.yaml", method="dsor", range_multiplier=0.1)
     names = [str(onnx_model), f"fine={onnx_model}", "dror", tuned, "none", odd, f"other={odd}"]
-    rows = contestants(names)
+    rows = bench_entries(names)
     assert [(row.title, row.kind) for row in rows] == [
         ("outdet", "outdet"),
         ("fine", "outdet"),
@@ -40,7 +40,7 @@ def test_a_row_is_called_by_its_title_else_by_its_name(onnx_model: Path, tmp_pat
 
 def test_a_file_of_parameters_gives_a_model_its_threshold(onnx_model: Path, tmp_path: Path) -> None:
     file = parameters(tmp_path / "low.yaml", method=str(onnx_model), threshold=0.25)
-    (row,) = contestants([file])
+    (row,) = bench_entries([file])
     scan = Scan.of(scene(300))
     probability = Derainer(onnx_model, 1).probability(scan)
     np.testing.assert_array_equal(row.ready(1)(scan, Stopwatch()), probability > 0.25)
@@ -48,7 +48,7 @@ def test_a_file_of_parameters_gives_a_model_its_threshold(onnx_model: Path, tmp_
 
 
 def test_the_weights_are_those_of_the_network(random_outdet, onnx_model: Path) -> None:
-    (row,) = contestants([str(onnx_model)])
+    (row,) = bench_entries([str(onnx_model)])
     # Two convolutions of 9 neighbours, 4 channels and a distance to 32 and 32 to 32, their biases,
     # the shortcut past them, and the head: the norms are folded into them.
     folded = 9 * (4 + 1) * 32 + 32 + 9 * 32 * 32 + 32 + 4 * 32 + 32 * 2 + 2
@@ -64,7 +64,7 @@ def test_the_weights_are_those_of_the_network(random_outdet, onnx_model: Path) -
 def test_baselines_learn_from_the_scans_that_are_given() -> None:
     scan = Scan.of(scene(300))
     rain = np.arange(300) >= 270
-    position, intensity = contestants(["position", "intensity"], lambda: iter([(scan, rain)]))
+    position, intensity = bench_entries(["position", "intensity"], lambda: iter([(scan, rain)]))
     for row in (position, intensity):
         called = row.ready(1)(scan, Stopwatch())
         assert np.count_nonzero(called & rain) / np.count_nonzero(called | rain) > 0.5
@@ -82,4 +82,4 @@ def test_baselines_learn_from_the_scans_that_are_given() -> None:
 )
 def test_a_method_that_cannot_be_used_is_refused(names: list[str], reason: str) -> None:
     with pytest.raises(InputError, match=reason):
-        contestants(names)
+        bench_entries(names)

@@ -17,8 +17,13 @@ from numpy.typing import NDArray
 from derain.errors import InputError, printable
 from derain.evaluation.baselines import PositionPrior, all_points, no_points
 from derain.evaluation.intensity_rule import IntensityRule
-from derain.export.bench.other_runtime import OtherRuntime, beside_themselves, run_by
-from derain.export.methods import load_method_of_one_scan, named_method, require_one_scan, titled
+from derain.export.bench.other_runtime import OtherRuntime, with_runtime, with_runtime_variants
+from derain.export.methods import (
+    load_method_of_one_scan,
+    named_method,
+    require_one_scan,
+    split_title,
+)
 from derain.export.model_file import number_of_weights
 from derain.export.runtime import Derainer
 from derain.export.runtimes.registry import Runtime
@@ -27,7 +32,7 @@ from derain.filters.parameters import CANDIDATES
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
-from derain.views.oddities import Examiner
+from derain.views.scan_issues import ScanChecker
 
 # Returns which points of a scan are rain, bool (N,), and times its stages.
 TimedMethod = Callable[[Scan, Stopwatch], NDArray[np.bool_]]
@@ -49,7 +54,7 @@ LEARNT = ("position", "intensity")
 
 
 @dataclass(frozen=True)
-class Contestant:
+class BenchEntry:
     """One row of a bench.
 
     Attributes:
@@ -59,7 +64,7 @@ class Contestant:
         facts: File or parameters, from which the bench can be repeated.
         filter: The filter, where it is one: filters share one search for neighbours.
         candidates: Bounds outside which that filter calls nothing rain, if it has any.
-        judges_by: Checks whether a scan suits the method: a model's Spec or a filter.
+        spec_or_filter: Checks whether a scan suits the method: a model's Spec or a filter.
         by_other: The runtime of a model, where that is not onnxruntime in float32.
     """
 
@@ -69,11 +74,11 @@ class Contestant:
     facts: dict[str, Any] = field(default_factory=dict)
     filter: PointFilter | None = None
     candidates: Candidates | None = None
-    judges_by: Examiner | None = None
+    spec_or_filter: ScanChecker | None = None
     by_other: OtherRuntime | None = None
 
     @cached_property
-    def can_be_sent(self) -> bool:
+    def is_picklable(self) -> bool:
         """Whether it can be sent to another process.
 
         Objects that cannot be pickled cannot, nor can those that the user's own script or session
@@ -85,11 +90,11 @@ class Contestant:
             return False
 
 
-def contestants(
+def bench_entries(
     methods: Sequence[GivenMethod] | Mapping[str, GivenMethod],
     learn_from: LearnFrom | None = None,
     runtime: Runtime = Runtime(),
-) -> list[Contestant]:
+) -> list[BenchEntry]:
     """The methods of a bench.
 
     Args:
@@ -107,12 +112,12 @@ def contestants(
         raise InputError("methods", "there are none", "Give one or more.")
     if isinstance(methods, Mapping):
         rows = [
-            replace(_contestant(method, learn_from), title=printable(title))
+            replace(_bench_entry(method, learn_from), title=printable(title))
             for title, method in methods.items()
         ]
     else:
-        rows = [_contestant(method, learn_from) for method in methods]
-    rows = beside_themselves(rows, runtime)
+        rows = [_bench_entry(method, learn_from) for method in methods]
+    rows = with_runtime_variants(rows, runtime)
     titles = [row.title for row in rows]
     for title in titles:
         if titles.count(title) > 1:
@@ -122,7 +127,7 @@ def contestants(
     return rows
 
 
-def _contestant(method: GivenMethod, learn_from: LearnFrom | None) -> Contestant:
+def _bench_entry(method: GivenMethod, learn_from: LearnFrom | None) -> BenchEntry:
     match method:
         case str():
             return _named(method, learn_from)
@@ -136,7 +141,7 @@ def _contestant(method: GivenMethod, learn_from: LearnFrom | None) -> Contestant
             known = {"threshold": spec.threshold}
             ready = partial(load_method_of_one_scan, name, known)
             row = _model(printable(Path(name).stem), name, method, ready)
-            return row if method.runtime.is_default else run_by(row, method.runtime)
+            return row if method.runtime.is_default else with_runtime(row, method.runtime)
         case _ if callable(method) and not isinstance(method, type):
             return _function(method)
     kind = f"the class {method.__name__}" if isinstance(method, type) else type(method).__name__
@@ -147,16 +152,16 @@ def _contestant(method: GivenMethod, learn_from: LearnFrom | None) -> Contestant
     )
 
 
-def _named(text: str, learn_from: LearnFrom | None) -> Contestant:
-    title, name = titled(text)
+def _named(text: str, learn_from: LearnFrom | None) -> BenchEntry:
+    title, name = split_title(text)
     if name in TRIVIAL:
-        return Contestant(title, name, TimedFunction(TRIVIAL[name]).ready)
+        return BenchEntry(title, name, TimedFunction(TRIVIAL[name]).ready)
     if name in LEARNT:
         return _learnt(title, name, learn_from)
     return _deployable(title, *named_method(name))
 
 
-def _deployable(title: str, name: str, parameters: dict[str, Any]) -> Contestant:
+def _deployable(title: str, name: str, parameters: dict[str, Any]) -> BenchEntry:
     """A method of ``derain run``; made here once, so that errors come before any work."""
     ready = partial(load_method_of_one_scan, name, parameters)
     match ready(1):
@@ -166,13 +171,13 @@ def _deployable(title: str, name: str, parameters: dict[str, Any]) -> Contestant
             return _model(title, name, derainer, ready)
 
 
-def _filter(title: str, derainer: FilterDerainer) -> Contestant:
+def _filter(title: str, derainer: FilterDerainer) -> BenchEntry:
     filter, candidates = derainer.filter, derainer.candidates
     facts: dict[str, Any] = {"parameters": filter.as_dict()}
     if candidates is not None:
         facts[CANDIDATES] = str(candidates)
     ready = partial(_ready_filter, filter, candidates)
-    return Contestant(title, filter.name, ready, facts, filter, candidates, judges_by=filter)
+    return BenchEntry(title, filter.name, ready, facts, filter, candidates, spec_or_filter=filter)
 
 
 def _ready_filter(
@@ -185,7 +190,7 @@ def _ready_filter(
 
 def _model(
     title: str, name: str, derainer: Derainer, ready: Callable[[int], FilterDerainer | Derainer]
-) -> Contestant:
+) -> BenchEntry:
     require_one_scan(derainer)
     spec, content = derainer.spec, derainer.path.read_bytes()
     facts = {
@@ -196,25 +201,25 @@ def _model(
         "trained_on": spec.data,
         "threshold": spec.threshold,
     }
-    return Contestant(title, spec.network, ready, facts, judges_by=spec)
+    return BenchEntry(title, spec.network, ready, facts, spec_or_filter=spec)
 
 
-def _learnt(title: str, name: str, learn_from: LearnFrom | None) -> Contestant:
+def _learnt(title: str, name: str, learn_from: LearnFrom | None) -> BenchEntry:
     if learn_from is None:
         raise InputError(
             name, "it has no scans to learn from", "Give --train, or leave it out of --methods."
         )
     if name == "position":
         prior = PositionPrior.learn(learn_from())
-        return Contestant(title, name, TimedFunction(prior).ready, {"voxel": prior.voxel})
+        return BenchEntry(title, name, TimedFunction(prior).ready, {"voxel": prior.voxel})
     rule = IntensityRule.best(learn_from())
     limits = f"intensity <= {rule.intensity:.4g} and range <= {rule.range:.4g} m"
-    return Contestant(title, name, TimedFunction(rule).ready, {"rule": limits}, judges_by=rule)
+    return BenchEntry(title, name, TimedFunction(rule).ready, {"rule": limits}, spec_or_filter=rule)
 
 
-def _function(function: Callable[[Scan], NDArray[Any]]) -> Contestant:
+def _function(function: Callable[[Scan], NDArray[Any]]) -> BenchEntry:
     title = printable(getattr(function, "__name__", type(function).__name__))
-    return Contestant(title, "function", TimedFunction(function).ready)
+    return BenchEntry(title, "function", TimedFunction(function).ready)
 
 
 @dataclass(frozen=True)
