@@ -33,13 +33,13 @@ def scan_loader(
     Example:
         >>> import numpy as np
         >>> from derain.datamodules.in_memory import InMemory
-        >>> from derain.learning.task import agree
+        >>> from derain.learning.task import agree_on_task
         >>> from derain.models.outdet import OutDet
         >>> from derain.scan import Scan
         >>> points = np.random.default_rng(0).normal(size=(100, 4))
         >>> scan = Scan.of(points).with_label(np.resize([0, 110], 100))
         >>> data = InMemory(train=[scan] * 3, card="wads")
-        >>> task = agree(OutDet(), data)
+        >>> task = agree_on_task(OutDet(), data)
         >>> loader = scan_loader(data.source("train"), "train", task, Loading(batch_size=2))
         >>> [batch.cells for batch in loader]
         [[100, 100], [100]]

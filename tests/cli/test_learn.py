@@ -10,6 +10,7 @@ from matplotlib.image import imread
 from recording_read_back import ReadBack
 
 from derain.errors import InputError
+from derain.evaluation.answers import Answers
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.runtime import Derainer
@@ -18,7 +19,6 @@ from derain.files.labels import read_labels, write_labels
 from derain.scan import Scan
 from derain.system.notices import warn
 from derain.teaching.manifest import Manifest
-from derain.teaching.shares import TaughtShares
 from derain.workflows import learn, learn_report
 from derain.workflows.teaching import TeachResults
 
@@ -169,7 +169,7 @@ def test_a_recording_of_which_too_few_scans_can_be_labelled_is_refused_with_the_
 ) -> None:
     def teach(*_: object, **options: object) -> TeachResults:
         warn("2.bin: not to be trusted: it is of another place")
-        return TeachResults(Manifest({"method": "dror"}), 5, TaughtShares(), None)
+        return TeachResults(Manifest({"method": "dror"}), 5, Answers.none(), None)
 
     monkeypatch.setattr(learn, "teach_recordings", teach)
     outcome = run_derain("learn", write(scans=5), "--out", "model.onnx", "--teacher", "dror")

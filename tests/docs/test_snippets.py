@@ -104,7 +104,7 @@ def test_what_is_not_run_has_a_reason_and_options_that_there_are(snippet: Snippe
         words = snippet.arguments(line)
         if words[0] == "derain":
             assert words[1] not in command_line.TRAINING, f"{snippet.place}: run it, shortened"
-            command_line._parser().parse_args(words[1:])
+            command_line._parser(words[1]).parse_args(words[1:])
         elif words[:2] == ["python", "-m"]:
             assert find_spec(words[2]), f"{snippet.place}: no module {words[2]}"
     pytest.skip(f"not run: {snippet.not_run}")

@@ -138,7 +138,7 @@ def test_help_says_which_files_do_not_name_their_columns(
         main(["run", "--help"])
     told = " ".join(capsys.readouterr().out.split())
     unnamed = ".bin, .npy, .npz of one array, text without a line of names"
-    assert f"files that do not name them: {unnamed} (default: x,y,z,intensity)" in told
+    assert f"column names for files without them: {unnamed} (default: x,y,z,intensity)" in told
 
 
 def test_the_formats_are_listed_with_what_they_need(capsys: pytest.CaptureFixture[str]) -> None:

@@ -76,8 +76,8 @@ def test_threads_copies_and_what_came_before_change_no_bit(driven) -> None:
     empty_rows = np.full((5, 3), np.nan, np.float32)
     with_holes = [Scan.of(np.concatenate([empty_rows, scan.xyz])) for scan in scans]
     used = Odometry(1)
-    used.take(scan_from(motion(30), 77))
-    used.take(NOTHING)
+    used.register(scan_from(motion(30), 77))
+    used.register(NOTHING)
     used.restart()
     reference = poses_of(Odometry(1), scans)
     np.testing.assert_array_equal(poses_of(Odometry(2), scans), reference)
