@@ -9,8 +9,6 @@ from derain.cli.scan_options import add_columns
 from derain.sources.folders import named_frames
 from derain.system.extras import EXPORT_LIBRARIES, OPEN3D, OPTUNA, TRAINING_LIBRARIES, require
 
-SUMMARY = "the whole story on simulated rain, in about six minutes"
-
 DESCRIPTION = """\
 Simulates rain in streets and draws a scan of it; trains 3D-OutDet, SalsaNext and LiSnowNet-L1 on
 the scans, the last without labels; exports and proves each; cleans scans; and compares the

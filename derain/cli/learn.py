@@ -14,8 +14,6 @@ from derain.system.extras import EXPORT_LIBRARIES, TRAINING_LIBRARIES, require
 from derain.workflows.learn_config import PERSISTENCE, STUDENTS, LearnConfig
 from derain.workflows.start import START_HELP
 
-SUMMARY = "a derainer from an unlabelled recording, in about six minutes"
-
 DESCRIPTION = """\
 Trains a network to take the rain out of a sensor's scans, from an unlabelled recording: consecutive
 scans in a folder. A teacher labels each point rain, not rain or not known; a network is trained on

@@ -14,6 +14,7 @@ from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
 from derain.datamodules.loading import Loading
 from derain.datamodules.scan_data import ScanData
 from derain.default import DEFAULT
+from derain.errors import InputError
 from derain.export.bench.bench import Bench, Effort, run_bench
 from derain.export.bench.bench_entries import bench_entries
 from derain.export.bench.labelled_frames import LabelledFrames
@@ -28,16 +29,15 @@ from derain.pictures.scan_pictures import before_after_figure, save
 from derain.scan import Scan
 from derain.simulation.campaign import Campaign, partition
 from derain.simulation.dataset import simulate_track
+from derain.sources.cleaning import CleanedScan, CleaningObserver, CleanReport, clean
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
-from derain.sources.judging import judgements
-from derain.sources.method import Method
-from derain.sources.sink import FolderSink
+from derain.sources.judgement import Judgement
 from derain.sources.source import Source
 from derain.system.cores import usable_cores
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
-from derain.views.scan_issues import left_out, much_removed, no_points
+from derain.views.scan_issues import ScanIssue
 from derain.workflows.fit import fit
 from derain.workflows.learn import export_checkpoint
 from derain.workflows.steps import Show, Steps, show_nothing
@@ -193,12 +193,12 @@ def _clean(config: DemoConfig, title: str, frame: Frame, steps: Steps) -> None:
     """Cleans the sequence of a scan, and draws the scan before and after."""
     folder, model = Path(frame.name).parent, config.model(title)
     steps.begin(f"Cleaning: {folder}, by {model}")
-    picture = Picture(
+    drawing = Drawing(
         config.out / "before_after.png", frame.name, f"Simulated rain, cleaned by {title}"
     )
-    source = named_frames([folder])
-    cleaned = clean(load_method(str(model), {}), source, config.out / "cleaned", picture)
-    steps.end(f"{cleaned}; before and after: {picture.file}")
+    method = load_method(str(model), {})
+    report = clean(named_frames([folder]), method, config.out / "cleaned", observer=drawing)
+    steps.end(f"{report}; before and after: {drawing.file}")
 
 
 def _compare(config: DemoConfig, data: ScanData, steps: Steps) -> Bench:
@@ -221,24 +221,38 @@ def _compare(config: DemoConfig, data: ScanData, steps: Steps) -> Bench:
     return found
 
 
-@dataclass(frozen=True)
-class Removed:
-    """What was removed of scans; as text, one line.
+class Drawing(CleaningObserver):
+    """Draws one of the scans before and after, counts what is removed by range, and warns.
+
+    Args:
+        file: The picture.
+        scan: Name of the scan.
+        heading: Title of the picture.
 
     Attributes:
         by_range: Valid points and removed points by band of BANDS, int64 (bands, 2).
-        scans: How many scans.
     """
 
-    by_range: NDArray[np.int64]
-    scans: int
+    def __init__(self, file: Path, scan: str, heading: str) -> None:
+        self.file = file
+        self.by_range = np.zeros((len(BANDS), 2), np.int64)
+        self._scan, self._heading = scan, heading
+        self._notices = Notices()
 
-    def __str__(self) -> str:
-        points, removed = self.by_range.sum(axis=0).tolist()
-        return (
-            f"{self.scans:,} scans: {points:,} valid points, {removed:,} removed "
-            f"({removed / max(points, 1):.1%})"
-        )
+    def judged(self, judgement: Judgement, odd: list[ScanIssue]) -> None:
+        """Draws the scan, whether it is written or left whole."""
+        assert judgement.frame is not None
+        self._notices.warn(judgement.frame.name, odd)
+        if judgement.frame.name == self._scan:
+            save(before_after_figure(judgement.scan, judgement.rain, self._heading), self.file)
+
+    def cleaned(self, judgement: Judgement, scan: CleanedScan) -> None:
+        """Counts a scan that is written."""
+        self.by_range += removed_by_range(judgement.scan, judgement.rain)
+
+    def failed(self, error: InputError) -> None:
+        """Warns of a scan that is left whole or cannot be read."""
+        warn(str(error))
 
     @property
     def shares(self) -> str:
@@ -251,22 +265,7 @@ class Removed:
         )
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A picture of one of the scans that are cleaned, before and after.
-
-    Attributes:
-        file: Where it is written.
-        scan: Name of the scan.
-        heading: Title above it.
-    """
-
-    file: Path
-    scan: str
-    heading: str
-
-
-def clean_own_scans(scans: Path, columns: Sequence[str], out: Path, steps: Steps) -> Removed:
+def clean_own_scans(scans: Path, columns: Sequence[str], out: Path, steps: Steps) -> CleanReport:
     """Cleans your own scans by the model that comes with derain, with a picture of the first.
 
     Args:
@@ -276,45 +275,16 @@ def clean_own_scans(scans: Path, columns: Sequence[str], out: Path, steps: Steps
         steps: Shows the step.
 
     Raises:
-        InputError: A scan that cannot be read, or an output that cannot be written.
+        InputError: A folder without scans, or an output that cannot be written.
     """
     steps.begin(f"Cleaning: {scans}, by the model that comes with derain")
     source = named_frames([scans], columns)
     heading = f"{source[0].key}, cleaned by the model that comes with derain"
-    picture = Picture(out / "before_after.png", source[0].name, heading)
-    removed = clean(load_method(DEFAULT, {}), source, out, picture)
-    steps.end(f"{removed}; before and after: {picture.file}")
-    steps.show(f"        removed by range: {removed.shares}")
-    return removed
-
-
-def clean(method: Method, source: Source, out: Path, picture: Picture) -> Removed:
-    """Writes scans without their rain, draws one of them, and warns of what is odd.
-
-    A scan of which more is called rain than the heaviest rain has is left whole.
-
-    Raises:
-        InputError: A scan that cannot be read, or an output that cannot be written.
-    """
-    sink, notices = FolderSink(out, again=False), Notices()
-    sink.refuse_clashes(source)
-    by_range = np.zeros((len(BANDS), 2), np.int64)
-    cleaned = 0
-    for frame, judgement, _ in judgements(method, source):
-        scan, rain = judgement.scan, judgement.rain
-        odd = [*method.issues(judgement), *left_out(scan), *no_points(scan)]
-        notices.warn(frame.name, odd)
-        if frame.name == picture.scan:
-            save(before_after_figure(scan, rain, picture.heading), picture.file)
-        too_much = next(much_removed(judgement.share_of_rain), None)
-        if too_much is not None:
-            warn(f"{frame.name}: left whole: {too_much.detail}")
-            continue
-        sink.write(frame, scan.take(~rain), rain, None)
-        by_range += removed_by_range(scan, rain)
-        cleaned += 1
-    notices.warn_of_repeats()
-    return Removed(by_range, cleaned)
+    drawing = Drawing(out / "before_after.png", source[0].name, heading)
+    report = clean(source, load_method(DEFAULT, {}), out, observer=drawing)
+    steps.end(f"{report}; before and after: {drawing.file}")
+    steps.show(f"        removed by range: {drawing.shares}")
+    return report
 
 
 def removed_by_range(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:

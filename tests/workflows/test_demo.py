@@ -87,9 +87,9 @@ def test_the_model_that_comes_with_derain_cleans_your_own_scans(
         scene(500, number).tofile(mine / f"{number}.bin")
     np.full((60, 4), 1e5, np.float32).tofile(mine / "far.bin")
     out, lines = tmp_path / "out", []
-    removed = clean_own_scans(mine, DEFAULT_COLUMNS, out, Steps(lines.append))
-    assert removed.scans == 2
-    assert removed.by_range[:, 0].sum() == 1000
+    report = clean_own_scans(mine, DEFAULT_COLUMNS, out, Steps(lines.append))
+    assert sum(scan.points for scan in report.scans) == 1000
+    assert [Path(error.subject).name for error in report.failures] == ["far.bin"]
     assert "far.bin: left whole" in capsys.readouterr().err
     assert re.search(r"0-10 m [\d.]+%, .*, 40-80 m [\d.]+%$", lines[-1])
     assert imread(out / "before_after.png")[..., :3].std() > 0
