@@ -95,6 +95,12 @@ class DemoConfig:
         """File of the filter's tuned parameters."""
         return self.out / "dsor.yaml"
 
+    @property
+    def steps(self) -> int:
+        """How many there are: four once, two for each network, and one for each cleaning."""
+        cleanings = bool(self.networks) + (self.scan is not None)
+        return 4 + 2 * len(self.networks) + cleanings
+
     def model(self, title: str) -> Path:
         """The ONNX file of a network."""
         return self.out / f"{DEMO_NETWORKS[title]}.onnx"
@@ -113,7 +119,7 @@ def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
     Raises:
         InputError: What a step raises.
     """
-    steps = Steps(show)
+    steps = Steps(show, config.steps)
     steps.begin(f"Simulation: rain in {len(config.streets.names)} streets")
     simulate_track(config.data, config.streets, config.workers)
     steps.end(f"{len(config.streets.names) * config.streets.scans} scans in {config.data}")

@@ -40,6 +40,9 @@ from derain.workflows.teaching import TeachResults, teach_recordings
 # A folder with this file may be cleared by a second run.
 MARK = "learning.txt"
 
+# Teaching, training and export; odometry comes first where nothing states the poses.
+LEARN_STEPS = 3
+
 
 def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
     """Labels a recording by a teacher, trains a network on the labels, exports and measures it.
@@ -74,7 +77,7 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
     if not config.blind and source[0].read().intensity is None:
         config = without_intensity(config)
         show("The scans have no intensities: the network learns without.")
-    steps = Steps(show)
+    steps = Steps(show, LEARN_STEPS + config.needs_odometry(source))
     with recorded_warnings() as warnings:
         poses = _find_poses(config, source, steps)
         _teach(config, poses, len(source), steps, warnings)

@@ -67,6 +67,7 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
     assert outcome.code == 0, outcome.err
     steps = [line.partition(":")[0] for line in outcome.out.splitlines()]
     assert [step for step in steps if step.istitle()][:3] == ["Teaching", "Training", "Export"]
+    assert "(step 3 of 3)" in outcome.out
     derainer = Derainer("model.onnx")
     assert derainer.spec.network == "outdet"
     assert "taught by dror" in derainer.spec.data

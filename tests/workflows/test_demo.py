@@ -59,6 +59,7 @@ def test_every_step_is_shown_and_leaves_its_files(small: DemoConfig) -> None:
     steps = [line.partition(":")[0] for line in lines if re.match(r"[A-Z]\w+: ", line)]
     of_network = ["Training", "Export", "Cleaning"]
     assert steps == ["Simulation", "Tuning", "Picture", *of_network, "Comparison"]
+    assert any(line.endswith(f"(step {len(steps)} of {len(steps)})") for line in lines)
     times = [line for line in lines if re.match(r"  \d+:\d\d  \S", line)]
     assert len(times) == len(steps)
     assert any("IoU 0." in line for line in times)
