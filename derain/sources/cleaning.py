@@ -169,7 +169,7 @@ class _Cleaner:
     def clean(self, judgement: Judgement, stopwatch: Stopwatch) -> CleanedScan:
         frame, scan = judgement.frame, judgement.scan
         assert frame is not None
-        odd = self._oddities(judgement)
+        odd = self._issues(judgement)
         self.observer.judged(judgement, odd)
         self._refuse_too_much_rain(frame, judgement.share_of_rain)
         with stopwatch.stage("weather"):
@@ -191,7 +191,7 @@ class _Cleaner:
         self.observer.cleaned(judgement, cleaned)
         return cleaned
 
-    def _oddities(self, judgement: Judgement) -> list[ScanIssue]:
+    def _issues(self, judgement: Judgement) -> list[ScanIssue]:
         scan, share = judgement.scan, judgement.share_of_rain
         odd = [*self.method.issues(judgement), *left_out(scan), *no_points(scan)]
         return odd if share > self.most_removed else [*odd, *much_removed(share)]

@@ -1,6 +1,7 @@
 """Trains a network from a packaged configuration or one of your own."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,8 +31,9 @@ class FitResults:
 
     @property
     def iou(self) -> float | None:
-        """IoU of rain on the validation scans after the last epoch; None where it has none."""
-        return self.metrics.get("val_iou")
+        """IoU of rain on the validation scans after the last epoch; None where it is undefined."""
+        iou = self.metrics.get("val_iou", math.nan)
+        return None if math.isnan(iou) else iou
 
 
 def fit(

@@ -10,7 +10,7 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.models.checkpoint import load_model
-from derain.workflows.fit import fit, fit_options
+from derain.workflows.fit import FitResults, fit, fit_options
 
 
 def test_settings_are_options_of_the_command() -> None:
@@ -46,3 +46,7 @@ def test_a_training_returns_its_best_checkpoint_and_score(
     assert capsys.readouterr().out == ""
     with pytest.raises(InputError, match=r"--data.rot: no such option"):
         fit("outdet_wads.yaml", {"data.rot": "WADS"})
+
+
+def test_without_rain_to_validate_on_there_is_no_iou() -> None:
+    assert FitResults(Path("best.ckpt"), None, {"val_iou": np.nan}).iou is None
