@@ -23,7 +23,7 @@ from derain.annotation.plane import Plane
 from derain.annotation.scene import Correction, Scene, inside
 from derain.annotation.steps import annotate, road_plane
 from derain.evaluation.counts import intersection_over_union
-from derain.fusion.label_transfer import UNKNOWN
+from derain.fusion import UNKNOWN
 from derain.pictures.scan_pictures import save
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass

@@ -8,7 +8,7 @@
       --rain 0 25 100 400 --sequences 4 --scans 4 --seed 2 --out drives/standing
     python benchmarks/persistence_weights.py drives/*
 
-Prints what stands in derain/persistence/evidence.py: logistic regressions on what other scans'
+Prints what stands in derain/recordings/evidence.py: logistic regressions on what other scans'
 rays say, and on how points lie in their own scan, each alone. Every scan counts as much as the
 others, whatever its number of points.
 """
@@ -24,9 +24,9 @@ from sklearn.linear_model import LogisticRegression
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import NamedScans
-from derain.persistence.points import ScanPoints
-from derain.persistence.rays import mean_evidence, ray_evidence
-from derain.persistence.surroundings import surroundings_features
+from derain.recordings.known_points import ScanPoints
+from derain.recordings.seen_through import mean_evidence, ray_evidence
+from derain.recordings.surroundings import surroundings_features
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
 from derain.system.cores import usable_cores

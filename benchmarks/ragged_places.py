@@ -2,7 +2,7 @@
 
     python benchmarks/ragged_places.py --seeds 3 ../shared/data/clean/*
 
-A point looks like a drop where ``derain.persistence.evidence.surroundings_log_odds`` says so, which
+A point looks like a drop where ``derain.recordings.evidence.surroundings_log_odds`` says so, which
 was fitted to simulated drives: by the distance of its neighbours in steps of the rays, by how they
 are scattered, and by its range, beyond 30 m hardly ever. Nothing in any of these scans is a drop.
 For every real scan, and for every place as sensors see it, between 0 and 10 m, 10 and 30, beyond,
@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.files import read_scan
-from derain.persistence.evidence import surroundings_log_odds
-from derain.persistence.points import ScanPoints
-from derain.persistence.surroundings import STEP_EPSILON, USUAL_STEPS, surroundings_features
+from derain.recordings.evidence import surroundings_log_odds
+from derain.recordings.known_points import ScanPoints
+from derain.recordings.surroundings import STEP_EPSILON, USUAL_STEPS, surroundings_features
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.layouts import LAYOUTS

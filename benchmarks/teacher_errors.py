@@ -20,6 +20,12 @@ import numpy as np
 import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
 
+from derain.annotation.taught_labels import (
+    TAUGHT_CARD,
+    TAUGHT_NOT_RAIN,
+    TAUGHT_RAIN,
+    TAUGHT_UNKNOWN,
+)
 from derain.cards.card import DataCard, load_card
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.in_memory import InMemory
@@ -31,7 +37,6 @@ from derain.models.supervised import SupervisedModule
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.system.cores import usable_cores
-from derain.teaching.labels import TAUGHT_CARD, TAUGHT_NOT_RAIN, TAUGHT_RAIN, TAUGHT_UNKNOWN
 
 # Shares of the rain that is missed, of what is called rain and is not, and of what is not known;
 # about those of persistence on a drive in snow (precision .8, recall .87).

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from derain.annotation.manifest import CARD, is_taught
 from derain.cards.card import DataCard, load_card, packaged_cards
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
@@ -17,7 +18,6 @@ from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.simulation.manifest import RAIN_RATE, manifest_of, rates_of_sequences, read_manifest
 from derain.sources.folders import find_layout
-from derain.teaching.manifest import CARD, is_taught
 
 
 def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> ScanData:

@@ -7,6 +7,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from derain.annotation.held_out import FEWEST_SCANS
+from derain.annotation.manifest import CARD, HELD_OUT_PART, TRAINING_PART, Manifest
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import layouts_for
 from derain.cards.layout import Layout
@@ -18,8 +20,6 @@ from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.sources.training_record import record_of_scans, record_of_sequences
-from derain.teaching.held_out import FEWEST_SCANS
-from derain.teaching.manifest import CARD, HELD_OUT_PART, TRAINING_PART, Manifest
 
 
 class ScanData(ABC):

@@ -18,7 +18,7 @@ class Taught(TaughtData, ScanDataModule):
         >>> from pathlib import Path
         >>> from derain.filters import DROR, FilterDerainer
         >>> from derain.sources.folders import named_frames
-        >>> from derain.teaching.teach import teach
+        >>> from derain.annotation.teach import teach
         >>> scans = named_frames([Path("scan.bin")])
         >>> manifest = teach(FilterDerainer(DROR()), scans, Path("taught"))
         >>> data = Taught("taught")

@@ -28,7 +28,6 @@ from derain.filters import ROR as ROR
 from derain.filters import SOR as SOR
 from derain.filters import SSR as SSR
 from derain.filters import FilterDerainer as FilterDerainer
-from derain.methods.persistence import PersistenceDerainer as PersistenceDerainer
 from derain.models.checkpoint import load_model as load_model
 from derain.models.lisnownet import LiSnowNet as LiSnowNet
 from derain.models.lisnownet import LiSnowNetwork as LiSnowNetwork
@@ -40,7 +39,8 @@ from derain.models.salsanext import SalsaNext as SalsaNext
 from derain.models.salsanext import SalsaNextNetwork as SalsaNextNetwork
 from derain.models.salsanext_lite import SalsaNextLite as SalsaNextLite
 from derain.models.salsanext_lite import SalsaNextLiteNetwork as SalsaNextLiteNetwork
-from derain.odometry.odometry import Odometry as Odometry
+from derain.recordings.odometry import Odometry as Odometry
+from derain.recordings.persistence import PersistenceDerainer as PersistenceDerainer
 from derain.scan import Scan as Scan
 from derain.sources.clean_sink import CleanSink as CleanSink
 from derain.sources.cleaning import CleanReport as CleanReport

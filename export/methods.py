@@ -13,7 +13,7 @@ from derain.export.runtimes.registry import Runtime
 from derain.files.reading import is_file
 from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
 from derain.filters.parameters import CANDIDATES
-from derain.methods.registry import METHODS
+from derain.recordings.registry import METHODS
 from derain.sources.method import Method
 
 PARAMETER_SUFFIXES = (".yaml", ".yml")

@@ -292,7 +292,7 @@ def _path_of(model: object) -> Path:
         return Path(model)
     # Imported here, for what runs a model needs neither.
     from derain.filters import FILTERS, PointFilter
-    from derain.methods.registry import METHODS
+    from derain.recordings.registry import METHODS
 
     match model:
         case PointFilter():

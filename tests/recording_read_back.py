@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
-from derain.playback.entities import FRAME, TIME
+from derain.pictures.entities import FRAME, TIME
 
 POSITIONS = "Points3D:positions"
 

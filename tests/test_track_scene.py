@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from benchmarks.track_scene import rectangle_around, scene_of_track
 from derain.annotation.scene import Rectangle, Scene
 from derain.annotation.steps import annotate, road_plane
-from derain.fusion.label_transfer import UNKNOWN
+from derain.fusion import UNKNOWN
 from derain.simulation import objects
 from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_facility

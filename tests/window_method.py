@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.methods.recording_method import RecordingMethod
+from derain.recordings.recording_method import RecordingMethod
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement

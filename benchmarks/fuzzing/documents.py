@@ -12,15 +12,16 @@ import yaml
 
 from benchmarks.fuzzing.mutations import as_json, changed
 from benchmarks.fuzzing.reader import Reader
+from derain.annotation.manifest import LABELS, TAUGHT_PARTS, Manifest
 from derain.annotation.scene_file import read_scene
 from derain.cards.card import load_card, packaged_cards
 from derain.cards.layout import Layout
 from derain.evaluation.contents import find_sequences
 from derain.evaluation.hard_cases import scene
 from derain.files.documents import Entry
+from derain.files.extrinsics import read_extrinsics
 from derain.files.frame_times import read_frame_times
 from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
-from derain.fusion.extrinsics import read_extrinsics
 from derain.simulation.campaign import Campaign
 from derain.simulation.drawn_sensor import draw_sensor
 from derain.simulation.manifest import MANIFEST, rates_of_sequences, read_manifest
@@ -28,7 +29,6 @@ from derain.simulation.returns import Returns
 from derain.simulation.sensor import Sensor
 from derain.simulation.sensor_file import load_sensor, packaged_sensors
 from derain.simulation.spans import SensorSpans
-from derain.teaching.manifest import LABELS, TAUGHT_PARTS, Manifest
 
 SCENE = """
 height: 0.1

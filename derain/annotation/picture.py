@@ -8,7 +8,7 @@ from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
 from derain.annotation.scene import Scene
-from derain.fusion.label_transfer import UNKNOWN
+from derain.fusion import UNKNOWN
 from derain.pictures.palette import BACKGROUND
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass

@@ -11,7 +11,7 @@ Source: REHEARSE-3D, section III.B. Step by step:
 7. Other points over the polygon are road: `annotate`.
 8. All other points are background: `annotate`.
 9. Boxes are corrected by sequence: `Scene.in_sequence`.
-10. Points of the radar take the label of the nearest LiDAR point: `derain.fusion.label_transfer`.
+10. Points of the radar take the label of the nearest LiDAR point: `derain.fusion`.
 
 No row is dropped: points that the paper omits, and invalid rows, are unknown here.
 """
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from derain.annotation.plane import Plane, find_plane
 from derain.annotation.scene import Scene, inside
-from derain.fusion.label_transfer import UNKNOWN
+from derain.fusion import UNKNOWN
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 

@@ -16,7 +16,7 @@ from derain.cli.arguments import factor
 from derain.cli.outputs import folder_sink, print_lines
 from derain.cli.scan_options import add_columns
 from derain.errors import InputError
-from derain.fusion.label_transfer import LABEL_WITHIN, UNKNOWN, transfer_labels
+from derain.fusion import LABEL_WITHIN, UNKNOWN, transfer_labels
 from derain.simulation.classes import TrackClass
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame

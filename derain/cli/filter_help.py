@@ -4,7 +4,7 @@ import argparse
 
 from derain.default import DEFAULT
 from derain.filters import FILTERS
-from derain.methods.registry import METHODS
+from derain.recordings.registry import METHODS
 
 _MODEL = f"the model that comes with derain:\n  {DEFAULT}  see `derain info {DEFAULT}`"
 _FILTERS_HERE, _METHODS_HERE = "{filters}", "{methods}"

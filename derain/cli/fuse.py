@@ -16,11 +16,10 @@ from derain.cli.scan_options import add_columns
 from derain.errors import InputError
 from derain.files import write_scan
 from derain.files.atomic import replacing
+from derain.files.extrinsics import Extrinsics, read_extrinsics
 from derain.files.frame_times import FRAME_COLUMNS, METADATA, read_frame_times
 from derain.files.labels import LABEL, instance, read_labels, semantic, write_labels
-from derain.fusion.extrinsics import Extrinsics, read_extrinsics
-from derain.fusion.fuse import NO_DETECTIONS, fuse, nearest_in_time
-from derain.fusion.label_transfer import LABEL_WITHIN, UNKNOWN
+from derain.fusion import LABEL_WITHIN, NO_DETECTIONS, UNKNOWN, fuse, nearest_in_time
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame

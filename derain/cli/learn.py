@@ -113,7 +113,7 @@ def _write_playback(config: LearnConfig, out: Path) -> None:
     """Writes a Rerun file of the teacher's labels and the student's, scan after scan."""
     from derain.datamodules.taught import Taught
     from derain.export.runtime import Derainer
-    from derain.playback.selection import Labels, Selection
+    from derain.pictures.selection import Labels, Selection
     from derain.sources.source import Frames
     from derain.sources.spread import evenly_spaced
 

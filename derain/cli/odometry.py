@@ -15,7 +15,7 @@ from derain.cli.outputs import print_facts, print_lines
 from derain.cli.scan_by_scan import ScanByScan, exit_code
 from derain.cli.scan_options import add_columns
 from derain.errors import printable
-from derain.odometry.registration import Registration
+from derain.recordings.registration import Registration
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.records import POSES

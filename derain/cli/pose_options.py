@@ -2,11 +2,11 @@
 
 import argparse
 
-from derain.odometry.posed import ODOMETRY, STANDING
+from derain.recordings.posed import ODOMETRY, STANDING
 
 
 def add_poses(parser: argparse._ActionsContainer) -> None:
-    """Declares where poses come from, as :func:`derain.odometry.posed.with_poses` takes it."""
+    """Declares where poses come from, as :func:`derain.recordings.posed.with_poses` takes it."""
     parser.add_argument(
         "--poses",
         metavar="POSES",

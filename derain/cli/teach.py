@@ -106,7 +106,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    from derain.teaching.teach import refuse_to_overwrite
+    from derain.annotation.teach import refuse_to_overwrite
     from derain.workflows.teaching import teach_recordings
 
     keep_freed_memory()

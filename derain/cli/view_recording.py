@@ -28,7 +28,7 @@ from derain.system.notices import Notices, warn
 from derain.workflows.odometry import placed
 
 if TYPE_CHECKING:
-    from derain.playback.selection import Labels, Selection
+    from derain.pictures.selection import Labels, Selection
 
 SUFFIX = ".rrd"
 
@@ -45,7 +45,7 @@ def view_recording(arguments: argparse.Namespace) -> int:
     """
     out: Path = arguments.rerun
     refuse_unusable(out)
-    from derain.playback.selection import Labels, Selection
+    from derain.pictures.selection import Labels, Selection
 
     keep_freed_memory()
     methods = _methods(arguments.methods, arguments.threads)
@@ -97,7 +97,7 @@ def write_and_report(
     Raises:
         InputError: No scan that can be read, or a file that cannot be written.
     """
-    from derain.playback.playback import write_playback
+    from derain.pictures.playback import write_playback
 
     scans = len(selection.frames)
     print_lines(f"{scans:,} scans, methods: {', '.join(methods)}")

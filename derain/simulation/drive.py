@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import shown
-from derain.fusion.extrinsics import POSE, Extrinsics
+from derain.files.extrinsics import POSE, Extrinsics
 from derain.simulation.sensor import Sensor
 
 # Fastest vehicle, m/s: 216 km/h.

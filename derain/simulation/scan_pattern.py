@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from derain.fusion.extrinsics import Extrinsics
+from derain.files.extrinsics import Extrinsics
 
 
 def unit_vectors(azimuth: ArrayLike, inclination: ArrayLike) -> NDArray[np.float64]:

@@ -28,10 +28,10 @@ from numpy.typing import ArrayLike, NDArray
 from derain.cards.card import load_card
 from derain.files import write_scan
 from derain.files.atomic import replacing
+from derain.files.extrinsics import POSE, Extrinsics
 from derain.files.frame_times import FRAME_COLUMNS, METADATA
 from derain.files.labels import write_labels
-from derain.fusion.extrinsics import POSE, Extrinsics
-from derain.fusion.fuse import NO_DETECTIONS, fuse, nearest_in_time
+from derain.fusion import NO_DETECTIONS, fuse, nearest_in_time
 from derain.scan import Scan, to_float32
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import unpacked

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.atomic import replacing
+from derain.files.extrinsics import ROTATION_TOLERANCE, Extrinsics
 from derain.files.reading import is_file
-from derain.fusion.extrinsics import ROTATION_TOLERANCE, Extrinsics
 from derain.sources.number_lines import finite_numbers, read_lines, read_numbers
 from derain.sources.quaternions import quaternion_of, rotation_of, slerp
 

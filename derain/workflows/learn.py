@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from derain.annotation.held_out import FEWEST_SCANS
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method
@@ -14,7 +15,7 @@ from derain.export.runtime import Derainer
 from derain.files.atomic import replacing, require_writable
 from derain.files.reading import reading
 from derain.models.checkpoint import load_model
-from derain.odometry.posed import ODOMETRY, STANDING
+from derain.recordings.posed import ODOMETRY, STANDING
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
@@ -22,7 +23,6 @@ from derain.sources.records import POSES
 from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import recorded_warnings, warn
-from derain.teaching.held_out import FEWEST_SCANS
 from derain.workflows.evaluation import evaluate_student, teacher_answers
 from derain.workflows.fit import fit, fit_options
 from derain.workflows.learn_config import (

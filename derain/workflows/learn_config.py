@@ -8,7 +8,7 @@ import yaml
 
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
-from derain.odometry.posed import ODOMETRY
+from derain.recordings.posed import ODOMETRY
 from derain.sources.source import Source
 from derain.workflows.configurations import packaged_configs
 from derain.workflows.start import checkpoint_of

@@ -18,9 +18,9 @@ from derain.errors import InputError
 from derain.files import RECORDS
 from derain.files.atomic import require_writable
 from derain.files.reading import is_file
-from derain.odometry.posed import ODOMETRY, with_poses
-from derain.odometry.recordings import FrameOdometry
-from derain.odometry.registration import Registration
+from derain.recordings.pose_search import FrameOdometry
+from derain.recordings.posed import ODOMETRY, with_poses
+from derain.recordings.registration import Registration
 from derain.sources.frame import Frame
 from derain.sources.judging import Guard, unguarded
 from derain.sources.recordings import recordings_of
@@ -135,8 +135,8 @@ def placed(source: Source, poses: str | None, threads: int = 0) -> Source:
 
     Args:
         source: The frames.
-        poses: As :func:`derain.odometry.posed.with_poses` takes it. None leaves the frames as they
-            are: a method that needs poses takes those beside the scans, or finds them itself.
+        poses: As :func:`derain.recordings.posed.with_poses` takes it. None leaves the frames as
+            they are: a method that needs poses takes those beside the scans, or finds them itself.
         threads: Threads of odometry; 0 takes every core.
 
     Raises:

@@ -7,6 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.annotation.manifest import HELD_OUT_PART, Manifest
+from derain.annotation.taught_labels import TAUGHT_CARD
+from derain.annotation.teach import teach
+from derain.annotation.truth import TruthRecord
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.answers import Answers
@@ -15,10 +19,6 @@ from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.sources.source import Source
 from derain.system.notices import Notices, warn
-from derain.teaching.labels import TAUGHT_CARD
-from derain.teaching.manifest import HELD_OUT_PART, Manifest
-from derain.teaching.teach import teach
-from derain.teaching.truth import TruthRecord
 from derain.views.scan_issues import much_removed
 
 
@@ -77,13 +77,13 @@ def teach_recordings(
     Args:
         method: The teacher.
         source: Scans in files, in time order, one sequence after the other.
-        out: Folder of the labels, as :func:`derain.teaching.teach.teach` writes it.
+        out: Folder of the labels, as :func:`derain.annotation.teach.teach` writes it.
         card: Data card of the scans, whose own labels measure the teacher's; they change nothing.
         guard: Surrounds the work on each scan; one whose error it holds back gets no labels.
         watch: Receives each scan.
 
     Raises:
-        InputError: As for :func:`derain.teaching.teach.teach`.
+        InputError: As for :func:`derain.annotation.teach.teach`.
     """
     for sentence in irregularities(source, method.window):
         warn(sentence)

@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgba
 from derain.annotation.picture import CLASS_COLOURS, SURROUNDINGS, UNKNOWN_COLOUR, annotation_figure
 from derain.annotation.scene import Box, Scene
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.fusion.label_transfer import UNKNOWN
+from derain.fusion import UNKNOWN
 from derain.pictures.scan_pictures import save
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass

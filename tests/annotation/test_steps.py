@@ -9,7 +9,7 @@ from derain.annotation.scene import Box, Scene
 from derain.annotation.steps import annotate, road_plane
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
-from derain.fusion.label_transfer import UNKNOWN
+from derain.fusion import UNKNOWN
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 

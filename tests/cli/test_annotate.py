@@ -12,7 +12,7 @@ from derain.cli.annotate import DESCRIPTION
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
 from derain.files.labels import read_labels, semantic
-from derain.fusion.label_transfer import UNKNOWN
+from derain.fusion import UNKNOWN
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 

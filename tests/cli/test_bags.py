@@ -10,8 +10,8 @@ import pytest
 from small_bags import small_bag, tables
 
 from benchmarks.recorded_bags import CLOUD_TYPE, START, STORAGES, Recorded, Ros, Storage
+from derain.annotation.manifest import HELD_OUT_PART, TRAINING_PART, Manifest
 from derain.files.labels import write_labels
-from derain.teaching.manifest import HELD_OUT_PART, TRAINING_PART, Manifest
 
 
 @pytest.mark.parametrize("storage", STORAGES)

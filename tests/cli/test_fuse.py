@@ -11,9 +11,9 @@ import pytest
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
+from derain.files.extrinsics import Extrinsics
 from derain.files.labels import instance, read_labels, semantic, write_labels
-from derain.fusion.extrinsics import Extrinsics
-from derain.fusion.label_transfer import UNKNOWN
+from derain.fusion import UNKNOWN
 from derain.simulation.campaign import Campaign
 from derain.simulation.radar import Radar
 from derain.simulation.sequence import write_sequence

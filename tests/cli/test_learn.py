@@ -9,6 +9,7 @@ import pytest
 from matplotlib.image import imread
 from recording_read_back import ReadBack
 
+from derain.annotation.manifest import Manifest
 from derain.errors import InputError
 from derain.evaluation.answers import Answers
 from derain.evaluation.hard_cases import scene
@@ -18,7 +19,6 @@ from derain.files import read_scan
 from derain.files.labels import read_labels, write_labels
 from derain.scan import Scan
 from derain.system.notices import warn
-from derain.teaching.manifest import Manifest
 from derain.workflows import learn, learn_report
 from derain.workflows.teaching import TeachResults
 

@@ -12,7 +12,7 @@ import pytest
 from derain.cli.main import main
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
-from derain.odometry.registration import shift_of
+from derain.recordings.registration import shift_of
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.sources.trajectory import read_trajectory

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from window_method import Between
 
+from derain.annotation.manifest import Manifest
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import read_labels, write_labels
-from derain.methods.registry import METHODS
-from derain.teaching.manifest import Manifest
+from derain.recordings.registry import METHODS
 
 POINTS = 200
 

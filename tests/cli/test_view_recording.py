@@ -12,7 +12,7 @@ from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import read_labels, write_labels
-from derain.playback.entities import CLASS_KEPT, CLASS_NOT_KNOWN, CLASS_RAIN
+from derain.pictures.entities import CLASS_KEPT, CLASS_NOT_KNOWN, CLASS_RAIN
 
 SCANS = 4
 

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from window_method import Between
 
+from derain.annotation.manifest import CARD, TAUGHT_MANIFEST
+from derain.annotation.teach import teach
 from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.labelled import card_of, labelled_scans
 from derain.datamodules.scan_data import TaughtData
@@ -19,8 +21,6 @@ from derain.files.labels import write_labels
 from derain.filters import DROR, FilterDerainer
 from derain.sources.folders import named_frames
 from derain.sources.training_record import SCANS
-from derain.teaching.manifest import CARD, TAUGHT_MANIFEST
-from derain.teaching.teach import teach
 
 POINTS = 200
 

@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from derain.files import read_scan
+from derain.files.extrinsics import read_extrinsics
 from derain.files.labels import instance, read_labels, semantic
-from derain.fusion.extrinsics import read_extrinsics
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import TrackClass
 from derain.simulation.drive import Drive

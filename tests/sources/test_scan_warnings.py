@@ -12,7 +12,7 @@ from derain.evaluation.hard_cases import scene
 from derain.export.methods import load_method
 from derain.export.runtime import Derainer
 from derain.filters import DROR, SSR, FilterDerainer
-from derain.methods.persistence import PersistenceDerainer
+from derain.recordings.persistence import PersistenceDerainer
 from derain.scan import Scan
 from derain.sources.judgement import Judgement
 from derain.sources.method import Method

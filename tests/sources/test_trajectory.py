@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.errors import InputError
-from derain.fusion.extrinsics import Extrinsics
+from derain.files.extrinsics import Extrinsics
 from derain.sources.quaternions import quaternion_of, rotation_of, slerp
 from derain.sources.trajectory import (
     LONGEST_GAP,

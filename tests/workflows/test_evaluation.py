@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from small_bags import small_bag
 
+from derain.annotation.teach import teach
 from derain.cards.card import load_card
 from derain.datamodules.taught import Taught
 from derain.evaluation.counts import Counts
@@ -14,7 +15,6 @@ from derain.files.labels import write_labels
 from derain.filters import DROR, FilterDerainer
 from derain.scan import Scan
 from derain.sources.folders import named_frames
-from derain.teaching.teach import teach
 from derain.workflows.evaluation import scores_by_labels
 
 DROPS = np.arange(300) >= 270

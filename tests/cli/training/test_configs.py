@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
+from derain.annotation.teach import teach
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
@@ -18,7 +19,6 @@ from derain.models.checkpoint import load_model
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.system.open3d_import import import_open3d
-from derain.teaching.teach import teach
 from derain.workflows.configurations import packaged_configs
 
 WriteScan = Callable[..., None]

@@ -1,1 +1,0 @@
-"""LiDAR and 4D radar as one cloud."""

@@ -1,1 +1,0 @@
-"""How the sensor moved from scan to scan, found from the scans themselves."""

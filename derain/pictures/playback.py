@@ -1,0 +1,296 @@
+"""Writes a recording for Rerun's viewer: scans over time, their labels, and what methods find."""
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import rerun
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from derain.errors import InputError, printable
+from derain.evaluation.counts import Counts, ratio
+from derain.pictures.entities import (
+    CAPTION,
+    CLASS_KEPT,
+    CLASS_MISSED,
+    CLASS_NOT_KNOWN,
+    CLASS_RAIN,
+    FRAME,
+    NOTHING,
+    POINTS,
+    RANGES,
+    SCAN,
+    SENSOR,
+    TIME,
+    MethodEntities,
+    class_of,
+)
+from derain.pictures.palette import (
+    LOST,
+    MISSED,
+    OUTCOMES,
+    PROBABILITY,
+    RAIN,
+    SOLID,
+    WITHOUT_LABELS,
+    outcomes,
+    shades,
+)
+from derain.pictures.playback_layout import layout, write_static
+from derain.pictures.recording_file import RecordingFile, recording_file
+from derain.pictures.selection import LabelledRain, Labels, Selection
+from derain.pictures.sensor_look import PER_METRE, SensorLook
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
+from derain.sources.judging import Guard, judgements, unguarded
+from derain.sources.method import Method
+
+# Points that are less probably rain, most of a scan, are not written among the probabilities.
+LEAST_PROBABILITY = 0.01
+
+# Names of the palette's colours.
+COLOUR_NAMES = {SOLID: "grey", RAIN: "blue", MISSED: "yellow", LOST: "red"}
+
+PROBABILITY_TEXT = "Probability of rain: dark, blue, white, ever higher"
+
+
+def write_playback(
+    path: Path,
+    selection: Selection,
+    methods: Mapping[str, Method],
+    labels: Labels | None = None,
+    guard: Guard = unguarded,
+    watch: Callable[[str, Judgement], None] = lambda title, judgement: None,
+) -> None:
+    """Writes a file for Rerun's viewer.
+
+    The scans are read once more for every method, so that only a few are in memory however long
+    the recording is. A scan that cannot be read or judged is shown empty.
+
+    Args:
+        path: The file, ``.rrd``.
+        selection: The scans to show.
+        methods: Methods by their titles.
+        labels: Labels of the scans; None where they have none or no data card explains them.
+        guard: Context of the work on each scan, which may hold back its error.
+        watch: Called with the method's title and each judgement that is written.
+
+    Raises:
+        InputError: The file cannot be written; no scan can be read; one cannot, and the guard does
+            not hold the error back.
+    """
+    look = SensorLook.of(selection.frames)
+    first = selection.frames[0]
+    name = printable(first.sequence or Path(first.name).name)
+    opened_with = layout(methods, labels, placed=bool(selection.poses))
+    with recording_file(path, name, opened_with) as file:
+        write_static(file, selection, labels, methods)
+        writer = PlaybackWriter(file, selection, look, labels)
+        _write_scans(writer, selection, guard)
+        for title, method in methods.items():
+            missing = {frame.key: frame for frame in selection.frames}
+            frames = tqdm(selection.for_method(method), title, unit="scan", disable=None)
+            for frame, judgement, _ in judgements(method, frames, guard):
+                if frame.key in missing:
+                    with guard(frame):
+                        writer.write_judgement(title, method, judgement)
+                        watch(title, judgement)
+                        del missing[frame.key]
+                    file.flush()
+            for frame in missing.values():
+                writer.write_no_judgement(title, frame)
+
+
+def _write_scans(writer: "PlaybackWriter", selection: Selection, guard: Guard) -> None:
+    written = 0
+    for frame in tqdm(selection.frames, "scans", unit="scan", disable=None):
+        before = written
+        with guard(frame):
+            writer.write_scan(frame)
+            written += 1
+        if written == before:
+            writer.write_no_scan(frame)
+        writer.file.flush()
+    if not written:
+        first = selection.frames[0]
+        raise InputError(first.name, "there is nothing to show: no scan can be read", "See above.")
+
+
+class PlaybackWriter:
+    """Writes scans and judgements to their entities.
+
+    Args:
+        file: The file to write to.
+        selection: The scans shown.
+        look: How they are drawn.
+        labels: Labels of the scans; None where there are none.
+    """
+
+    def __init__(
+        self, file: RecordingFile, selection: Selection, look: SensorLook, labels: Labels | None
+    ) -> None:
+        self.file = file
+        self.selection = selection
+        self.look = look
+        self.labels = labels
+
+    def write_scan(self, frame: Frame) -> None:
+        """Writes a scan with its pose and its labels.
+
+        Raises:
+            InputError: A scan or labels that cannot be read.
+        """
+        scan = frame.read()
+        labelled = None if self.labels is None else self.labels.of(frame, scan)
+        self._set_time(frame)
+        by = None if labelled is None else self.labels
+        text = caption(frame, scan, by, frame.key in self.selection.held_out)
+        self.file.log(CAPTION, rerun.TextDocument(text, media_type="text/markdown"))
+        if frame.key in self.selection.poses:
+            pose = self.selection.poses[frame.key]
+            self.file.log(SENSOR, rerun.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
+        colours = self.look.colours(scan)[scan.valid]
+        self.file.log(POINTS, rerun.Points3D(scan.xyz[scan.valid], colors=colours))
+        if self.look.view is not None:
+            image = rerun.DepthImage(
+                self.look.centimetres(self.look.view(scan)),
+                meter=PER_METRE,
+                colormap="grayscale",
+                depth_range=(0, self.look.farthest * PER_METRE),
+            )
+            self.file.log(RANGES, image)
+        if self.labels is not None:
+            self._write_labels(self.labels, scan, labelled)
+
+    def write_judgement(self, title: str, method: Method, judgement: Judgement) -> None:
+        """Writes what a method finds in a scan.
+
+        Args:
+            title: Title of the method.
+            method: The method.
+            judgement: Its judgement of a frame that is shown.
+
+        Raises:
+            InputError: Labels that cannot be read.
+        """
+        frame, scan, rain = judgement.frame, judgement.scan, judgement.rain
+        assert frame is not None  # the method was given frames, not points
+        entities = MethodEntities(title)
+        labelled = None if self.labels is None else self.labels.of(frame, scan)
+        classed = class_of(outcomes(rain, _truth(labelled, rain)))
+        self._set_time(frame)
+        for entity, rows in ((entities.kept, scan.valid & ~rain), (entities.removed, rain)):
+            self.file.log(entity, rerun.Points3D(scan.xyz[rows], class_ids=classed[rows]))
+        if self.labels is not None:
+            self._write_errors(entities, judgement, labelled)
+        if method.gives_probabilities:
+            rows = judgement.probability >= LEAST_PROBABILITY
+            colours = shades(PROBABILITY, judgement.probability[rows])
+            self.file.log(entities.probability, rerun.Points3D(scan.xyz[rows], colors=colours))
+        if self.look.view is not None:
+            winner = self.look.view(scan).winner
+            coloured = np.append(np.where(classed == CLASS_KEPT, NOTHING, classed), NOTHING)
+            image = coloured[winner].reshape(self.look.view.grid.rows, -1)
+            self.file.log(entities.image, rerun.SegmentationImage(image.astype(np.uint8)))
+        self._write_share(entities.share, rain, scan)
+
+    def write_no_scan(self, frame: Frame) -> None:
+        """Clears the scan, so that the one before does not stay."""
+        self._set_time(frame)
+        self._clear(SCAN, RANGES, CAPTION)
+
+    def write_no_judgement(self, title: str, frame: Frame) -> None:
+        """Clears what a method found, so that its judgement of the scan before does not stay."""
+        self._set_time(frame)
+        entities = MethodEntities(title)
+        self._clear(entities.all, entities.image, entities.share, entities.iou)
+
+    def _write_labels(self, labels: Labels, scan: Scan, found: LabelledRain | None) -> None:
+        entities = labels.entities
+        if found is None:
+            self._clear(entities.points, entities.share, entities.share_not_known)
+            return
+        shown = scan.valid & (found.rain | ~found.known)
+        classed = np.where(found.rain[shown], CLASS_RAIN, CLASS_NOT_KNOWN).astype(np.uint16)
+        self.file.log(entities.points, rerun.Points3D(scan.xyz[shown], class_ids=classed))
+        self._write_share(entities.share, found.rain, scan)
+        if labels.card.unknown:
+            self._write_share(entities.share_not_known, ~found.known, scan)
+
+    def _write_errors(
+        self, entities: MethodEntities, judgement: Judgement, found: LabelledRain | None
+    ) -> None:
+        """Writes the rain that a method keeps, which is drawn large, and its IoU."""
+        if found is None:
+            self._clear(entities.missed, entities.iou)
+            return
+        scan, rain = judgement.scan, judgement.rain
+        judged = scan.valid & found.known
+        missed = scan.xyz[judged & found.rain & ~rain]
+        self.file.log(entities.missed, rerun.Points3D(missed, class_ids=CLASS_MISSED))
+        self._write_number(entities.iou, Counts.of(rain[judged], found.rain[judged]).iou)
+
+    def _write_share(self, entity: str, part: NDArray[np.bool_], scan: Scan) -> None:
+        """Writes the share of the valid points, per cent, that a part of them is."""
+        whole = np.count_nonzero(scan.valid)
+        self._write_number(entity, 100 * float(ratio(np.count_nonzero(part & scan.valid), whole)))
+
+    def _write_number(self, entity: str, value: float) -> None:
+        """Writes a number of a curve; where it is undefined, the curve has a gap."""
+        if math.isnan(value):
+            self._clear(entity)
+        else:
+            self.file.log(entity, rerun.Scalars(value))
+
+    def _clear(self, *entities: str) -> None:
+        for entity in entities:
+            self.file.log(entity, rerun.Clear(recursive=True))
+
+    def _set_time(self, frame: Frame) -> None:
+        """Dates all that is logged from here on to a frame."""
+        stream, seconds = self.file.stream, self.selection.seconds.get(frame.key)
+        stream.reset_time()
+        stream.set_time(FRAME, sequence=self.selection.number_of[frame.key])
+        if seconds is not None:
+            stream.set_time(TIME, duration=seconds)
+
+
+def caption(frame: Frame, scan: Scan, labels: Labels | None, held_out: bool) -> str:
+    """Text beside a scan, in Markdown: which scan it is, and what the colours mean.
+
+    Args:
+        frame: The frame.
+        scan: Its scan.
+        labels: The labels that its rain is known by; None where it has none.
+        held_out: Whether a model was trained, and not on this scan.
+    """
+    which = f"**{_escaped(frame.key)}**, {len(scan):,} points" + ", held out" * held_out
+    coloured = OUTCOMES if labels else WITHOUT_LABELS
+    meanings = "\n".join(
+        f"- {COLOUR_NAMES[colour]}: {meaning}" for meaning, colour in coloured.items()
+    )
+    return f"{which}\n\n{meanings}\n\n{_known_by(labels)} {PROBABILITY_TEXT}.\n"
+
+
+def _known_by(labels: Labels | None) -> str:
+    if labels is None:
+        return "No labels: which points are rain is not known."
+    if not labels.card.unknown:
+        return f"Rain is what the {labels.name} calls rain."
+    return (
+        f"Rain is what the {labels.name} calls rain; in its own view, yellow is what it does not "
+        "know."
+    )
+
+
+def _escaped(text: str) -> str:
+    """A name with Markdown's marks escaped."""
+    return "".join(f"\\{c}" if c in "\\`*_{}[]<>()#+-!|" else c for c in printable(text))
+
+
+def _truth(labelled: LabelledRain | None, rain: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Points that are rain, bool (N,); where that is not known, those that were called rain."""
+    return rain if labelled is None else np.where(labelled.known, labelled.rain, rain)

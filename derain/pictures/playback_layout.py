@@ -1,0 +1,183 @@
+"""How the viewer shows a recording: scans side by side by method, range images, curves."""
+
+from collections.abc import Mapping, Sequence
+
+import rerun
+import rerun.blueprint as views
+from rerun.blueprint import Blueprint
+
+from derain.pictures.entities import (
+    CAPTION,
+    FRAME,
+    IOU,
+    POINTS,
+    RANGE_IMAGE,
+    RANGES,
+    SENSOR,
+    SHARE,
+    TRAJECTORY,
+    MethodEntities,
+    classes,
+)
+from derain.pictures.palette import BACKGROUND, LINES, MISSED, PROBABILITY, SOLID, rgb
+from derain.pictures.recording_file import RecordingFile
+from derain.pictures.selection import Labels, Selection
+from derain.sources.method import Method
+
+# Where the viewer's eye is, and the point that it looks at, metres: from behind and above.
+EYE, LOOK_TARGET = (-22.0, 0.0, 16.0), (6.0, 0.0, 0.0)
+
+# Sizes of points on the screen, which Rerun takes as negative numbers. A method's points are drawn
+# over those of the scan, and have to cover them.
+SMALL, LARGE = -1.2, -2.4
+
+
+def layout(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -> Blueprint:
+    """Views and panels that the viewer opens with.
+
+    Args:
+        methods: The methods by their titles.
+        labels: Labels of the scans, where they have some.
+        placed: Whether the sensor's poses are known.
+    """
+    return Blueprint(
+        views.Vertical(
+            _clouds(methods, labels, placed),
+            _images(methods),
+            _curves(labels),
+            row_shares=[5.5, 1.3, 2.6],
+        ),
+        # It stays at the first scan until somebody presses play.
+        views.TimePanel(
+            timeline=FRAME, state="collapsed", fps=10, play_state="paused", loop_mode="all"
+        ),
+        views.SelectionPanel(state="hidden"),
+        views.BlueprintPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _clouds(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -> views.Tabs:
+    """The point clouds: tabs of what is removed, kept, and probable, the methods side by side."""
+    scan = [POINTS] if labels is None else [POINTS, labels.entities.points]
+    first = "scan" if labels is None else f"scan and {labels.name}"
+    entities = {title: MethodEntities(title) for title in methods}
+    removed = [
+        _cloud(title, [m.kept, m.removed, m.missed], placed) for title, m in entities.items()
+    ]
+    cleaned = [
+        _cloud(f"{title}: kept", [m.kept, m.missed], placed) for title, m in entities.items()
+    ]
+    probability = [
+        _cloud(f"{title}: probability", [POINTS, m.probability], placed, dark=True)
+        for title, m in entities.items()
+        if methods[title].gives_probabilities
+    ]
+    tabs = {"Removed": removed, "Cleaned": cleaned, "Probability": probability}
+    return views.Tabs(
+        *(
+            views.Horizontal(_cloud(first, scan, placed), *of_methods, name=name)
+            for name, of_methods in tabs.items()
+            if of_methods
+        ),
+        active_tab=0,
+    )
+
+
+def _cloud(
+    name: str, paths: Sequence[str], placed: bool, *, dark: bool = False
+) -> views.Spatial3DView:
+    # Bright points would look like probable rain, so all have the shade of probability 0.
+    shade = rerun.Points3D.from_fields(colors=rgb(PROBABILITY[0]))
+    return views.Spatial3DView(
+        origin="/",
+        contents=[f"+ {path}" for path in (*paths, TRAJECTORY)],
+        name=name,
+        background=rgb(BACKGROUND),
+        overrides={POINTS: shade} if dark else None,
+        eye_controls=views.EyeControls3D(
+            kind=views.Eye3DKind.Orbital,
+            position=EYE,
+            look_target=LOOK_TARGET,
+            eye_up=(0, 0, 1),
+            tracking_entity=SENSOR if placed else None,
+        ),
+    )
+
+
+def _images(methods: Mapping[str, Method]) -> views.Tabs:
+    """The range image, and over it the result of each method."""
+    return views.Tabs(
+        *(
+            _image(f"{title}: range image", [RANGES, MethodEntities(title).image])
+            for title in methods
+        ),
+        _image("range image", [RANGES]),
+        active_tab=0,
+    )
+
+
+def _image(name: str, paths: Sequence[str]) -> views.Spatial2DView:
+    return views.Spatial2DView(
+        origin=RANGE_IMAGE,
+        contents=[f"+ {path}" for path in paths],
+        name=name,
+        background=rgb(BACKGROUND),
+    )
+
+
+def _curves(labels: Labels | None) -> views.Horizontal:
+    """Numbers over the scans, and the text of the scan."""
+    shares = _curve(SHARE, "Share of the points, %", legend=True)
+    text = views.TextDocumentView(origin=CAPTION, name="Scan")
+    if labels is None:
+        return views.Horizontal(shares, text, column_shares=[3, 1])
+    iou = _curve(IOU, f"IoU with the {labels.name}", legend=False)  # colours as in the shares
+    return views.Horizontal(shares, iou, text, column_shares=[3, 3, 2])
+
+
+def _curve(origin: str, name: str, *, legend: bool) -> views.TimeSeriesView:
+    return views.TimeSeriesView(
+        origin=origin, name=name, plot_legend=views.PlotLegend(visible=legend)
+    )
+
+
+def write_static(
+    file: RecordingFile, selection: Selection, labels: Labels | None, methods: Mapping[str, Method]
+) -> None:
+    """Writes what holds for the whole recording: colours, sizes, names, the sensor's path.
+
+    Args:
+        file: The file to write to.
+        selection: The scans shown.
+        labels: Labels of the scans, where they have some.
+        methods: The methods by their titles.
+    """
+    file.log("/", rerun.ViewCoordinates.FLU, classes(), static=True)
+    _sized(file, SMALL, [POINTS])
+    if selection.paths:
+        path = rerun.LineStrips3D(selection.paths, colors=rgb(SOLID), radii=LARGE)
+        file.log(TRAJECTORY, path, static=True)
+    if labels is not None:
+        of_labels = labels.entities
+        _sized(file, LARGE, [of_labels.points])
+        _line(file, of_labels.share, labels.name, SOLID)
+        _line(file, of_labels.share_not_known, f"not known to the {labels.name}", MISSED)
+    for number, title in enumerate(methods):
+        entities = MethodEntities(title)
+        _sized(file, SMALL, [entities.kept])
+        _sized(file, LARGE, [entities.removed, entities.missed, entities.probability])
+        for line in (entities.share, entities.iou):
+            _line(file, line, title, LINES[number % len(LINES)])
+
+
+def _sized(file: RecordingFile, size: float, entities: Sequence[str]) -> None:
+    # Where points are few, the viewer would otherwise write their class over them.
+    look = rerun.Points3D.from_fields(radii=size, show_labels=False)
+    for entity in entities:
+        file.log(entity, look, static=True)
+
+
+def _line(file: RecordingFile, entity: str, name: str, colour: str) -> None:
+    file.log(entity, rerun.SeriesLines(colors=rgb(colour), names=name, widths=2), static=True)

@@ -1,0 +1,157 @@
+"""The scans of a recording that are shown: when and where each was taken, and its labels."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.cards.card import DataCard
+from derain.errors import InputError
+from derain.pictures.entities import LabelEntities
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.method import Method
+from derain.sources.reader import FrameReader
+from derain.sources.source import Source
+from derain.system.notices import warn
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Some scans of a source, in time order.
+
+    Attributes:
+        source: All scans.
+        numbers: The places of the scans shown, ascending.
+        held_out: Keys of scans that a model was not trained on, where one was trained.
+
+    Raises:
+        InputError: No scan is shown.
+    """
+
+    source: Source
+    numbers: Sequence[int]
+    held_out: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        if not self.numbers:
+            raise InputError(
+                "--frames",
+                f"none of them is among the {len(self.source):,} scans",
+                "They count from 0; leave it out to show all.",
+            )
+
+    @cached_property
+    def frames(self) -> list[Frame]:
+        """The frames shown."""
+        return [self.source[number] for number in self.numbers]
+
+    @cached_property
+    def number_of(self) -> dict[str, int]:
+        """The place of each shown frame in the source, by the frame's key."""
+        return {frame.key: n for n, frame in zip(self.numbers, self.frames, strict=True)}
+
+    def for_method(self, method: Method) -> Sequence[Frame]:
+        """The frames to give to a method; one of several scans also gets frames not shown."""
+        window = method.window
+        if window.is_one_scan:
+            return self.frames
+        first, last = self.numbers[0], self.numbers[-1]
+        return self.source[max(first - window.before, 0) : last + 1 + window.after]
+
+    @cached_property
+    def seconds(self) -> dict[str, float]:
+        """Seconds from the first shown frame to each, by the frame's key.
+
+        Empty where a frame has no time, or where the times do not ascend, as with several
+        recordings.
+        """
+        try:
+            times = [frame.time for frame in self.frames]
+        except InputError as error:
+            warn(f"when the scans were taken is not shown: {error}")
+            return {}
+        known = [time for time in times if time is not None]
+        if len(known) < len(times) or any(before >= after for before, after in pairwise(known)):
+            return {}
+        return {f.key: time - known[0] for f, time in zip(self.frames, known, strict=True)}
+
+    @cached_property
+    def poses(self) -> dict[str, NDArray[np.float64]]:
+        """Pose of each shown frame, by the frame's key, float64 (4, 4), metres.
+
+        A pose takes the sensor's frame to that of the first scan shown of its sequence: the viewer
+        computes in float32, in which points far from the origin would tremble. Empty where a frame
+        has no pose.
+        """
+        try:
+            poses = [frame.pose for frame in self.frames]
+        except InputError as error:
+            warn(f"where the scans were taken is not shown: {error}")
+            return {}
+        to_first: dict[str, NDArray[np.float64]] = {}
+        placed = {}
+        for frame, pose in zip(self.frames, poses, strict=True):
+            if pose is None:
+                return {}
+            back = to_first.setdefault(frame.sequence, np.linalg.inv(pose).astype(np.float64))
+            placed[frame.key] = back @ pose
+        return placed
+
+    @cached_property
+    def paths(self) -> list[NDArray[np.float32]]:
+        """The sensor's path in each sequence, float32 (scans, 3), metres."""
+        paths: dict[str, list[NDArray[np.float64]]] = {}
+        for frame in self.frames:
+            if frame.key in self.poses:
+                paths.setdefault(frame.sequence, []).append(self.poses[frame.key][:3, 3])
+        return [np.array(path, np.float32) for path in paths.values()]
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledRain:
+    """Labels of the points of one scan.
+
+    Attributes:
+        rain: True for rain, bool (N,).
+        known: False for points whose label is unknown, bool (N,).
+    """
+
+    rain: NDArray[np.bool_]
+    known: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Labels that lie with scans.
+
+    Attributes:
+        card: Their data card.
+        name: ``truth``, or ``teacher``.
+    """
+
+    card: DataCard
+    name: str = "truth"
+
+    @property
+    def entities(self) -> LabelEntities:
+        """Paths of their entities."""
+        return LabelEntities(self.name)
+
+    def of(self, frame: Frame, scan: Scan) -> LabelledRain | None:
+        """The labels of a scan; None where it has none.
+
+        Args:
+            frame: The frame.
+            scan: The scan read from it.
+
+        Raises:
+            InputError: Labels that are damaged, or that the data card does not know.
+        """
+        if not frame.has_labels:
+            return None
+        labelled = FrameReader(self.card).with_labels(scan, frame)
+        return LabelledRain(self.card.rain_of(labelled), ~self.card.unknown_of(labelled))

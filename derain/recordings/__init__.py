@@ -1,0 +1,5 @@
+"""What several scans of a recording show together: where the sensor was, and what persists.
+
+A method that learns nothing and sees several scans at once is a file of this folder, which enters
+it by ``@METHODS.add("its name")`` (:class:`~derain.recordings.recording_method.RecordingMethod`).
+"""

@@ -1,0 +1,264 @@
+"""Rain by free space: what rays of the scans before and after went through was not there."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar, Self
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.documents import shown
+from derain.recordings.evidence import combined_log_odds
+from derain.recordings.known_points import ScanPoints
+from derain.recordings.pose_search import FrameOdometry
+from derain.recordings.recording_method import RecordingMethod
+from derain.recordings.registry import METHODS
+from derain.recordings.seen_through import RayEvidence, mean_evidence, ray_evidence
+from derain.recordings.vote import vote
+from derain.scan import Scan
+from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.judgement import Judgement
+from derain.sources.recent_frames import FrameInWindow, RecentFrames
+from derain.system.cores import threads_of
+from derain.system.registry import from_parameters
+from derain.system.stopwatch import Stopwatch
+from derain.views.one_viewpoint import viewpoint_issues
+from derain.views.scan_issues import ScanIssue
+from derain.views.window import PlacedScan, Window, WindowOfScans
+
+# Scans kept at a time are bounded: each takes some 30 MB with its neighbours and rays.
+MOST_SCANS = 50
+
+
+@dataclass(frozen=True)
+class Persistence:
+    """How far persistence looks, and when it is sure.
+
+    Attributes:
+        before: Scans before the one that is judged.
+        after: Scans after it.
+        sure: Odds, to one, from which on it is sure of an answer on which a point and its
+            neighbours agree.
+
+    Raises:
+        InputError: Other numbers of scans than 0 to 50, or odds below one.
+    """
+
+    before: int = 1
+    after: int = 1
+    sure: float = 3.0
+
+    def __post_init__(self) -> None:
+        for name in ("before", "after"):
+            number: Any = getattr(self, name)  # whatever a user gave
+            whole = isinstance(number, int) and not isinstance(number, bool)
+            if not (whole and 0 <= number <= MOST_SCANS):
+                raise InputError(
+                    "persistence",
+                    f"{name} is {shown(number)}",
+                    f"Give a whole number from 0 to {MOST_SCANS}.",
+                )
+        sure: Any = self.sure
+        if not (isinstance(sure, int | float) and 1 <= sure < math.inf):
+            raise InputError("persistence", f"sure is {shown(sure)}", "Give odds of 1 or more.")
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """A scan of the window as the evidence needs it.
+
+    Attributes:
+        points: Its points.
+        pose: Sensor to world, float64 (4, 4), metres.
+        stretch: Scans of one number have poses in one world, with none in doubt between them.
+    """
+
+    points: ScanPoints
+    pose: NDArray[np.float64]
+    stretch: int
+
+
+@METHODS.add("persistence")
+class PersistenceDerainer(RecordingMethod):
+    """Calls rain what is not where it was, by what rays of other scans say and how it lies.
+
+    Solid things are where they were a tenth of a second ago; a drop is not, and the rays that pass
+    its place in the scans before and after go through it. What moves, as cars do, hangs together
+    in its own scan, and a drop does not. So neither intensity nor anything that is learnt from
+    labels is needed; see :mod:`derain.recordings`.
+
+    Poses are those of the frames. Where a frame has none, or the record of it is damaged, they are
+    found as it goes, and where that fails, no evidence is taken across the gap. A scan without any
+    other is judged by itself, and nothing of it is known for sure.
+
+    Example:
+        >>> scans = [derain.read_scan("scan.bin")] * 3  # a wall, and drops that stay where they are
+        >>> method = PersistenceDerainer()
+        >>> answers = [method.push(scan) for scan in scans] + list(method.flush())
+        >>> [answer is None for answer in answers]  # each but the last waits for the scan after it
+        [True, False, False, False]
+
+    Args:
+        persistence: How far it looks, and when it is sure.
+        threads: Threads to use; 0 takes every core this process may use.
+
+    Source: free and occupied space as evidence follows occupancy grids (A. Elfes, "Using Occupancy
+        Grids for Mobile Robot Perception and Navigation", 1989), asked by rays instead of cells.
+    """
+
+    HELP: ClassVar[str] = "rain is not where it was: rays of other scans went through its place"
+    EXAMINE_EVERY: ClassVar[int] = 1  # any scan may be one whose place is not known
+
+    def __init__(self, persistence: Persistence = Persistence(), threads: int = 0) -> None:
+        self.persistence = persistence
+        self.threads = threads_of(threads)
+        self._end_recording()
+
+    @classmethod
+    def with_parameters(cls, parameters: Mapping[str, Any], threads: int) -> Self:
+        """Makes the method of the fields of :class:`Persistence`.
+
+        Raises:
+            InputError: A parameter that it does not have, or a value that it cannot have.
+        """
+        return cls(from_parameters(Persistence, "persistence", parameters), threads)
+
+    @property
+    def window(self) -> Window:
+        """The scans before and after the one that it judges."""
+        return Window(self.persistence.before, self.persistence.after)
+
+    @property
+    def waiting(self) -> int:
+        """How many frames were pushed and are not answered for."""
+        return self._recent.waiting
+
+    def starts_new_recording(self, frame: Frame) -> bool:
+        """Whether a frame does not follow those that wait."""
+        return self.waiting > 0 and self._recent.starts_new_recording(frame)
+
+    def push(
+        self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
+    ) -> Judgement | None:
+        """Takes the next frame of a recording; see :meth:`derain.sources.method.Method.push`.
+
+        The stages are read, odometry where no pose is told, view, network (the evidence) and back.
+        """
+        stopwatch = stopwatch or Stopwatch()
+        if not isinstance(frame, Frame):
+            number = self._recent.next_number
+            frame = MemoryFrame(key=f"{number:06d}", number=number, scan=Scan.of(frame))
+        with stopwatch.stage("read"):
+            scan = frame.read()  # an object of its own, even of a scan that is pushed again
+        with stopwatch.stage("odometry"):
+            pose, stretch = self._place(frame, scan)
+        with stopwatch.stage("view"):
+            self._placed[scan] = _Placed(ScanPoints.of(scan, self.threads), pose, stretch)
+        ready = self._recent.push(frame, PlacedScan(scan))
+        return None if ready is None else self._judged(ready, stopwatch)
+
+    def flush(self, stopwatch: Stopwatch | None = None) -> Iterator[Judgement]:
+        """Ends a recording: answers for the frames that still wait, with the scans that there are.
+
+        Args:
+            stopwatch: Takes the times of the stages network and back.
+        """
+        while self.waiting:
+            yield self._judged(self._recent.pop(), stopwatch or Stopwatch())
+        self._end_recording()
+
+    def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
+        """What is odd about a scan: its places, nothing known of it, or no pose to be trusted."""
+        yield from viewpoint_issues(judgement.scan)
+        yield from self._doubts.get(judgement.scan, ())
+        if judgement.known is not None and not judgement.known.any() and judgement.judged.any():
+            yield ScanIssue(
+                "nothing is known for sure",
+                "no scan before or after it tells anything: it is judged by itself",
+            )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Its name and parameters."""
+        return {"method": METHODS.name_of(type(self)), **asdict(self.persistence)}
+
+    def __reduce__(self) -> tuple[type[Self], tuple[Persistence, int], dict[str, Any]]:
+        # A copy, as in another process, begins a recording of its own.
+        return type(self), (self.persistence, self.threads), {"warns": self.warns}
+
+    def _end_recording(self) -> None:
+        self._recent = RecentFrames(self.window)
+        self._odometry = FrameOdometry(self.threads)
+        self._placed: WeakKeyDictionary[Scan, _Placed] = WeakKeyDictionary()
+        self._doubts: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()
+        self._stretch = 0
+        self._poses_are_told: bool | None = None  # not before the first frame
+
+    def _place(self, frame: Frame, scan: Scan) -> tuple[NDArray[np.float64], int]:
+        """Where a frame was taken, and in which stretch of its recording."""
+        pose = self._given_pose(frame, scan)
+        told = pose is not None
+        if self._poses_are_told not in (None, told) or self._recent.starts_new_recording(frame):
+            self._stretch += 1  # another world
+        self._poses_are_told = told
+        if pose is not None:
+            return pose, self._stretch
+        registration = self._odometry.register(frame, scan)
+        self._doubts.setdefault(scan, []).extend(registration.issues())
+        if not registration.trusted:
+            self._stretch += 1
+        return registration.pose, self._stretch
+
+    def _given_pose(self, frame: Frame, scan: Scan) -> NDArray[np.float64] | None:
+        """The pose that is told with a frame; None without one, and of a record that is damaged."""
+        try:
+            return frame.pose
+        except InputError as error:
+            detail = f"its pose is not known, and is sought from the scans: {error}"
+            self._doubts[scan] = [ScanIssue("its pose is sought from the scans", detail)]
+            return None
+
+    def _judged(self, ready: FrameInWindow, stopwatch: Stopwatch) -> Judgement:
+        scan = ready.scans.scan
+        points = self._placed[scan].points
+        with stopwatch.stage("network"):
+            evidence = self._evidence(ready.scans)
+            alone = combined_log_odds(points, evidence)
+            agreed = vote(points, alone)
+            sure = np.log(self.persistence.sure)
+            known = (evidence is not None) & (np.minimum(agreed, alone) > sure)
+            known |= (evidence is not None) & (np.maximum(agreed, alone) < -sure)
+        with stopwatch.stage("back"):
+            judgement = _by_row(scan, points, agreed, known, ready.frame)
+        return self.with_warnings(judgement)
+
+    def _evidence(self, scans: WindowOfScans) -> RayEvidence | None:
+        """What the rays of the other scans say of the places of the points; None without any."""
+        own = self._placed[scans.scan]
+        others = [self._placed[each.scan] for each in (*scans.before, *scans.after)]
+        told = [
+            ray_evidence(own.points, other.points, np.linalg.inv(other.pose) @ own.pose)
+            for other in others
+            if other.stretch == own.stretch and len(other.points)
+        ]
+        return mean_evidence(told) if told else None
+
+
+def _by_row(
+    scan: Scan,
+    points: ScanPoints,
+    log_odds: NDArray[np.float64],
+    known: NDArray[np.bool_],
+    frame: Frame,
+) -> Judgement:
+    """What is said of points, for the rows of their scan."""
+    judged = points.inverse >= 0
+    of_rows = points.inverse[judged]
+    probability = np.zeros(len(scan), np.float32)
+    rain, sure = np.zeros(len(scan), bool), np.zeros(len(scan), bool)
+    probability[judged] = (1 / (1 + np.exp(-log_odds[of_rows]))).astype(np.float32)
+    rain[judged] = log_odds[of_rows] > 0
+    sure[judged] = known[of_rows]
+    return Judgement(probability, rain, judged, scan, frame, sure)

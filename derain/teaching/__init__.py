@@ -1,1 +1,0 @@
-"""Labels of a teacher: rain, not rain, or not known, and what of them a student trains on."""

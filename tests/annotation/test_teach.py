@@ -1,0 +1,196 @@
+"""Recordings are labelled by what a method says of them, and by nothing else."""
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from window_method import Between, Dimmer
+
+from derain.annotation.manifest import CARD, LABELS, TAUGHT_MANIFEST, Manifest
+from derain.annotation.taught_labels import labels_of
+from derain.annotation.teach import teach
+from derain.cards.card import load_card
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.files.labels import read_labels
+from derain.filters import DROR, FilterDerainer
+from derain.scan import Scan
+from derain.sources.folders import named_frames
+from derain.sources.judgement import Judgement
+from derain.sources.judging import judgements
+from derain.sources.source import Frames, Source
+
+from .conftest import POINTS, MakeDrive
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def of(drive: Path) -> Source:
+    return named_frames([drive], labelled=True)
+
+
+def test_labels_say_rain_not_rain_and_not_known() -> None:
+    points = scene(6)
+    points[4] = np.nan
+    scan = Scan.of(points)
+    rain = np.array([1, 0, 1, 0, 0, 1], bool)
+    judged = np.array([1, 1, 1, 1, 1, 0], bool)
+    known = np.array([1, 1, 0, 0, 1, 1], bool)
+    judgement = Judgement(rain.astype(np.float32), rain, judged, scan, known=known)
+    np.testing.assert_array_equal(labels_of(judgement), [1, 0, 255, 255, 255, 255])
+    certain = Judgement(rain.astype(np.float32), rain, judged, scan)
+    np.testing.assert_array_equal(labels_of(certain), [1, 0, 1, 0, 255, 255])
+
+
+@pytest.mark.parametrize("make", [Between, lambda: FilterDerainer(DROR(), 1)])
+def test_labels_are_what_the_method_says(
+    make: Callable[[], Between | FilterDerainer], make_drive: MakeDrive, tmp_path: Path
+) -> None:
+    drive, out = make_drive(), tmp_path / "taught"
+    told = []
+    manifest = teach(make(), of(drive), out, watch=lambda answer, labels: told.append(labels))
+    keys = [scan.key for scan in manifest.scans]
+    unlabelled = named_frames([drive])
+    for labels, (frame, judgement, _) in zip(told, judgements(make(), unlabelled), strict=True):
+        np.testing.assert_array_equal(labels, labels_of(judgement))
+        assert (frame.key in keys) == bool(judgement.answered.any())
+        if frame.key in keys:
+            written = read_labels(out / LABELS / f"{frame.key}.label", POINTS)
+            np.testing.assert_array_equal(written, labels)
+    # Of the first and the last the method that looks before and after knows nothing.
+    numbers = range(1, 5) if isinstance(make(), Between) else range(6)
+    assert keys == [f"{number:06d}" for number in numbers]
+    assert [scan.number for scan in manifest.scans] == [*numbers]
+    assert manifest.scans[-1].part == "validation"
+    assert Manifest.read(out).teacher == make().as_dict()
+    assert {*files(out)} == {CARD, TAUGHT_MANIFEST, *(f"{LABELS}/{key}.label" for key in keys)}
+
+
+def test_the_card_says_what_the_labels_mean(make_drive: MakeDrive, tmp_path: Path) -> None:
+    teach(Between(), of(make_drive()), tmp_path / "plain")
+    card = load_card(tmp_path / "plain" / CARD)
+    assert (card.rain, card.unknown, {*card.classes}) == ((1,), (255,), {0, 1, 255})
+    assert not card.has_statistics
+    wads = load_card("wads")
+    teach(Between(), of(make_drive("other")), tmp_path / "wads", wads)
+    card = load_card(tmp_path / "wads" / CARD)
+    assert card.name == "WADS taught by between"
+    assert (card.intensity_unit, card.deduplicate) == (wads.intensity_unit, wads.deduplicate)
+    assert wads.licence in card.licence
+
+
+def test_truth_changes_no_byte(make_drive: MakeDrive, tmp_path: Path) -> None:
+    drive = make_drive(labelled=True)
+    truth = drive.parent / LABELS
+    teach(Between(), of(drive), tmp_path / "with")
+    for file in truth.iterdir():
+        file.write_bytes(b"garbage")
+    teach(Between(), of(drive), tmp_path / "garbage")
+    shutil.rmtree(truth)
+    teach(Between(), of(drive), tmp_path / "without")
+    assert files(tmp_path / "with") == files(tmp_path / "garbage") == files(tmp_path / "without")
+
+
+@pytest.mark.parametrize("labelled", [True, False])
+@pytest.mark.parametrize("out", [".", "velodyne/..", "labels/.."])
+def test_labels_of_the_recording_stay(make_drive: MakeDrive, labelled: bool, out: str) -> None:
+    drive = make_drive(labelled=labelled)
+    (drive.parent / LABELS).mkdir(exist_ok=True)
+    before = files(drive.parent)
+    with pytest.raises(InputError):
+        teach(Between(), of(drive), drive.parent / out)
+    assert files(drive.parent) == before
+
+
+@pytest.mark.parametrize("name", [CARD, TAUGHT_MANIFEST, f"{LABELS}/000000.label"])
+def test_what_is_no_teachers_stays(make_drive: MakeDrive, tmp_path: Path, name: str) -> None:
+    out = tmp_path / "out"
+    (out / name).parent.mkdir(parents=True)
+    (out / name).write_text("mine")
+    with pytest.raises(InputError, match="is there already, and no teacher's"):
+        teach(Between(), of(make_drive()), out)
+    assert files(out) == {name: b"mine"}
+
+
+def test_a_second_teaching_takes_the_place_of_the_first(
+    make_drive: MakeDrive, tmp_path: Path
+) -> None:
+    drive, out = make_drive(scans=6), tmp_path / "taught"
+    teach(Between(), of(drive), out)
+    teach(FilterDerainer(DROR(), 1), of(drive)[:4], out)
+    teach(FilterDerainer(DROR(), 1), of(drive)[:4], tmp_path / "alone")
+    assert files(out) == files(tmp_path / "alone")
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_what_fails_half_way_leaves_what_was_there(
+    make_drive: MakeDrive, tmp_path: Path, there: bool
+) -> None:
+    drive, out = make_drive(), tmp_path / "taught"
+    if there:
+        teach(Between(), of(drive), out)
+    before = files(out)
+    (drive / "000003.bin").write_bytes(b"12345")
+    with pytest.raises(InputError, match="000003"):
+        teach(Between(), of(drive), out)
+    assert files(out) == before
+    assert out.exists() == there
+
+
+def test_a_broken_pipe_is_no_fault_of_the_folder(make_drive: MakeDrive, tmp_path: Path) -> None:
+    def watch(*_: object) -> None:
+        raise BrokenPipeError
+
+    with pytest.raises(BrokenPipeError):
+        teach(FilterDerainer(DROR(), 1), of(make_drive()), tmp_path / "out", watch=watch)
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_interrupted_while_it_is_put_in_place_is_known(
+    make_drive: MakeDrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive, out = make_drive(), tmp_path / "taught"
+    teach(Between(), of(drive), out)
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("derain.annotation.teach.write_card", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            teach(FilterDerainer(DROR(), 1), of(drive), out)
+    with pytest.raises(InputError, match="its labels are not complete"):
+        Manifest.read(out)
+    teach(FilterDerainer(DROR(), 1), of(drive), out)
+    assert Manifest.read(out).teacher["method"] == "dror"
+
+
+def test_a_teacher_that_knows_nothing_writes_nothing(make_drive: MakeDrive, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="of no point it is known whether it is rain"):
+        teach(Between(Dimmer(sure_within=0.0)), of(make_drive()), tmp_path / "out")
+    with pytest.raises(InputError, match="of no point it is known"):
+        teach(Between(), of(make_drive("two", scans=2)), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_scans_in_no_file_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is in no file"):
+        teach(Between(), Frames.of_scans([Scan.of(scene(9), name="mine")] * 3), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_name_that_is_no_text_is_refused(make_drive: MakeDrive, tmp_path: Path) -> None:
+    drive = make_drive(scans=3)
+    os.rename(drive / "000001.bin", os.fsencode(drive) + b"/\xff.bin")
+    with pytest.raises(InputError, match="its name is no text"):
+        teach(Between(), of(drive), tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,220 @@
+"""Odometry finds known motions, the same on any number of threads, and says where it fails."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.files import read_scan
+from derain.recordings.odometry import Odometry
+from derain.recordings.registration import Registration, shift_of, turn_of
+from derain.recordings.surfaces import FARTHEST, FEWEST_SURFACES, Surfaces
+from derain.recordings.trust import FEWEST_USUAL
+from derain.scan import Scan
+
+from .street import HEIGHT, motion, scan_from
+
+STEPS = [motion(1.3, 0.01, yaw=1.0), motion(1.32, 0.0, yaw=1.5), motion(1.35, 0.02, yaw=2.0)]
+NOTHING = Scan.of(np.zeros((0, 3)))
+
+
+def drive(steps: list[np.ndarray], first_seed: int = 0) -> tuple[list[Scan], list[np.ndarray]]:
+    """Scans along a drive, and the poses that they were taken at."""
+    poses = [np.eye(4)]
+    for step in steps:
+        poses.append(poses[-1] @ step)
+    return [scan_from(pose, first_seed + place) for place, pose in enumerate(poses)], poses
+
+
+@pytest.fixture(scope="module")
+def driven() -> tuple[list[Scan], list[np.ndarray]]:
+    return drive(STEPS)
+
+
+def assert_is(found: np.ndarray, true: np.ndarray, metres: float, degrees: float) -> None:
+    error = np.linalg.inv(true) @ found
+    assert shift_of(error) < metres
+    assert turn_of(error) < degrees
+
+
+def test_known_motions_are_found_through_noise_and_drops(driven) -> None:
+    scans, poses = driven
+    odometry = Odometry()
+    found = [odometry.register(scan) for scan in scans]
+    assert all(each.trusted and not each.reason for each in found)
+    assert_is(found[0].pose, np.eye(4), 1e-12, 1e-6)
+    for each, step, pose in zip(found[1:], STEPS, poses[1:], strict=True):
+        assert_is(each.motion, step, 0.03, 0.1)
+        assert_is(each.pose, pose, 0.05, 0.2)
+        assert 0 < each.residual < 0.05
+        assert each.matched > 0.7
+        assert each.distance == pytest.approx(1.3, abs=0.1)
+
+
+def test_a_pose_is_the_product_of_all_motions(driven) -> None:
+    odometry = Odometry()
+    pose = np.eye(4)
+    for scan in driven[0]:
+        found = odometry.register(scan)
+        pose = pose @ found.motion
+        np.testing.assert_allclose(found.pose, pose, atol=1e-12)
+
+
+def test_a_sensor_that_stands_does_not_move() -> None:
+    odometry = Odometry()
+    for seed in range(4):
+        found = odometry.register(scan_from(np.eye(4), seed))
+        assert found.trusted
+        assert shift_of(found.pose) < 0.02
+        assert turn_of(found.pose) < 0.1
+
+
+def test_threads_copies_and_what_came_before_change_no_bit(driven) -> None:
+    scans, _ = driven
+    copies = [scan.take(np.repeat(np.arange(len(scan)), 2)) for scan in scans]
+    empty_rows = np.full((5, 3), np.nan, np.float32)
+    with_holes = [Scan.of(np.concatenate([empty_rows, scan.xyz])) for scan in scans]
+    used = Odometry(1)
+    used.register(scan_from(motion(30), 77))
+    used.register(NOTHING)
+    used.restart()
+    reference = poses_of(Odometry(1), scans)
+    np.testing.assert_array_equal(poses_of(Odometry(2), scans), reference)
+    np.testing.assert_array_equal(poses_of(Odometry(1), copies), reference)
+    np.testing.assert_array_equal(poses_of(Odometry(1), with_holes), reference)
+    np.testing.assert_array_equal(poses_of(used, scans), reference)
+
+
+def poses_of(odometry: Odometry, scans: list[Scan]) -> np.ndarray:
+    return np.array([odometry.register(scan).pose for scan in scans])
+
+
+def test_a_gap_is_told_and_bridged_where_the_scans_still_meet(driven) -> None:
+    # From 1.3 m a scan to 4 m: two scans are missing.
+    scans, poses = drive([*STEPS, motion(3.9), motion(1.3)])
+    odometry = Odometry()
+    found = [odometry.register(scan) for scan in scans]
+    assert [each.trusted for each in found] == [True, True, True, True, False, True]
+    assert "out of order or far apart" in found[4].reason
+    assert_is(found[5].pose, poses[5], 0.1, 0.3)
+
+
+def test_scans_out_of_order_are_told(driven) -> None:
+    scans, _ = drive(5 * [motion(1.3)])
+    odometry = Odometry()
+    found = [odometry.register(scans[number]) for number in (0, 1, 2, 5, 3, 4)]
+    assert [each.trusted for each in found] == [True, True, True, False, False, True]
+    assert all("out of order" in each.reason for each in found if not each.trusted)
+
+
+def around(generator: np.random.Generator) -> np.ndarray:
+    """A place that is nothing like the street."""
+    ball = generator.normal(size=(5_000, 3))
+    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
+    return generator.uniform(20, 40, (len(ball), 1)) * ball
+
+
+@pytest.mark.parametrize(
+    ("other", "reason"),
+    [
+        (NOTHING, "has only 0 surfaces in reach"),
+        (Scan.of(np.full((100, 3), 2 * FARTHEST)), "has only 0 surfaces in reach"),
+        (Scan.of(np.full((100, 3), np.nan)), "has only 0 surfaces in reach"),
+        (Scan.of(np.full((100, 3), 10.0)), "has only 1 surfaces in reach"),
+        (Scan.of(around(np.random.default_rng(0))), "of its surfaces are where the scan before"),
+    ],
+)
+def test_what_cannot_be_registered_is_told_and_the_motion_goes_on(
+    driven, other: Scan, reason: str
+) -> None:
+    scans, _ = driven
+    odometry = Odometry()
+    found = [odometry.register(scan) for scan in (scans[0], scans[1], other, scans[2], scans[3])]
+    assert [each.trusted for each in found] == [True, True, False, False, True]
+    assert reason in found[2].reason
+    np.testing.assert_array_equal(found[2].motion, found[1].motion)
+    np.testing.assert_array_equal(found[3].motion, found[1].motion)
+    assert_is(found[4].motion, STEPS[2], 0.03, 0.1)
+
+
+def test_a_scan_that_sees_nothing_at_first_is_told_of_by_the_next() -> None:
+    odometry = Odometry()
+    first = odometry.register(NOTHING)
+    second = odometry.register(scan_from(np.eye(4), 0))
+    third = odometry.register(scan_from(motion(1), 1))
+    assert (first.trusted, second.trusted, third.trusted) == (True, False, True)
+    assert "the scan before has only 0 surfaces" in second.reason
+    np.testing.assert_array_equal(second.motion, np.eye(4))
+    assert np.isnan(second.residual)
+    assert second.matched == 0
+
+
+def bare_road(generator: np.random.Generator) -> np.ndarray:
+    return np.c_[generator.uniform(-60, 60, (40_000, 2)), np.zeros(40_000)]
+
+
+def tunnel(generator: np.random.Generator) -> np.ndarray:
+    angle = generator.uniform(0, np.pi, 40_000)
+    return np.c_[generator.uniform(-60, 60, 40_000), 7 * np.cos(angle), 7 * np.sin(angle) - HEIGHT]
+
+
+@pytest.mark.parametrize("world", [bare_road, tunnel])
+def test_what_nothing_tells_the_way_along_is_not_trusted(
+    world: Callable[[np.random.Generator], np.ndarray],
+) -> None:
+    odometry = Odometry()
+    for seed in range(2):
+        seen = world(np.random.default_rng(seed))
+        found = odometry.register(scan_from(motion(1.3 * seed), seed, world=seen))
+    assert not found.trusted
+    assert "too little stands across some direction" in found.reason
+
+
+def test_surfaces_that_lie_farther_apart_than_usual_are_not_trusted(driven) -> None:
+    rough = np.random.default_rng(9)
+    odometry = Odometry()
+    for seed in range(FEWEST_USUAL + 1):
+        usual = odometry.register(scan_from(np.eye(4), seed))
+    blurred = scan_from(np.eye(4), 50)
+    found = odometry.register(Scan.of(blurred.xyz + rough.normal(0, 0.25, blurred.xyz.shape)))
+    assert usual.trusted
+    assert not found.trusted
+    assert found.residual > usual.residual
+
+
+def test_few_surfaces_are_counted_as_they_are() -> None:
+    corners = np.mgrid[10:30:2, 0:40:2, 0:1].reshape(3, -1).T
+    few = Surfaces(Scan.of(corners), 1)
+    assert len(few) == FEWEST_SURFACES
+    assert few.are_enough
+    assert not Surfaces(Scan.of(corners[1:]), 1).are_enough
+
+
+@pytest.mark.parametrize("degrees", [0, 1e-9, 1e-3, 1, 90, 179.999, 180])
+def test_a_turn_is_told_to_the_last_digits(degrees: float) -> None:
+    assert turn_of(motion(5, 5, yaw=degrees)) == pytest.approx(degrees, abs=1e-10)
+
+
+def registered(folder: Path, every: int = 1) -> list[Registration]:
+    odometry = Odometry()
+    return [odometry.register(read_scan(path)) for path in sorted(folder.glob("*.bin"))[::every]]
+
+
+def test_snowykitti_stands(shared: Path) -> None:
+    found = registered(shared / "data/snowykitti/velodyne")
+    assert len(found) == 5
+    assert all(each.trusted for each in found)
+    assert max(each.distance for each in found) < 0.02
+    assert max(each.turn for each in found) < 0.1
+
+
+def test_the_wads_drive_goes_on_evenly(shared: Path) -> None:
+    folder = shared / "data/wads/drive/velodyne"
+    found, skipping = registered(folder), registered(folder, every=2)
+    assert len(found) == 20
+    assert all(each.trusted for each in (*found, *skipping))
+    assert all(1.2 < each.distance < 1.4 for each in found[1:])
+    for place, each in enumerate(skipping[1:], 1):
+        composed = found[2 * place - 1].motion @ found[2 * place].motion
+        assert_is(composed, each.motion, 0.03, 0.1)

@@ -1,0 +1,255 @@
+"""Persistence as a method: what a drive past walls, drops and cars comes to."""
+
+import pickle
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.export.methods import load_method
+from derain.files import write_scan
+from derain.recordings.persistence import Persistence, PersistenceDerainer
+from derain.scan import Scan
+from derain.sources.folders import named_frames
+from derain.sources.frame import MemoryFrame
+from derain.sources.judgement import Judgement
+from derain.sources.judging import judgements
+
+# Of every scan the last points are drops.
+DROPS = 60
+
+STEP = np.radians(0.35)
+
+
+def seen_from(x: float, seed: int) -> NDArray[np.float64]:
+    """A yard with a floor, walls and drops, seen by a sensor at (x, 0, 0), float64 (N, 3)."""
+    generator = np.random.default_rng(seed)
+    azimuth = np.arange(-np.pi, np.pi, STEP)
+    inclination = (np.arange(48) - 36) * STEP
+    azimuth, inclination = (a.ravel() for a in np.meshgrid(azimuth, inclination))
+    rays = np.stack([np.cos(azimuth), np.sin(azimuth), np.tan(inclination)], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        to_walls = np.stack(
+            [
+                np.where(rays[:, 0] > 0, (15 - x) / rays[:, 0], (-15 - x) / rays[:, 0]),
+                np.abs(8 / rays[:, 1]),
+                np.where(rays[:, 2] < 0, -1.7 / rays[:, 2], np.inf),
+            ]
+        )
+    walls = rays * to_walls.min(axis=0)[:, None]
+    walls *= 1 + generator.normal(0, 1e-3, (len(walls), 1))
+    drops = walls[generator.choice(len(walls), DROPS, replace=False)]
+    return np.concatenate([walls, drops * generator.uniform(0.3, 0.8, (DROPS, 1))])
+
+
+def drive(scans: int = 4, step: float = 0.5, posed: bool = True) -> list[MemoryFrame]:
+    frames = []
+    for number in range(scans):
+        pose = np.eye(4)
+        pose[0, 3] = number * step
+        frames.append(
+            MemoryFrame(
+                key=f"{number:06d}",
+                number=number,
+                scan=Scan.of(seen_from(number * step, number), f"scan {number}"),
+                sensor_to_world=pose if posed else None,
+            )
+        )
+    return frames
+
+
+def judged(frames: Iterable[MemoryFrame], **parameters: int) -> list[Judgement]:
+    method = PersistenceDerainer(Persistence(**parameters), threads=2)
+    return [judgement for _, judgement, _ in judgements(method, frames)]
+
+
+def is_drop(scan: Scan) -> NDArray[np.bool_]:
+    return np.arange(len(scan)) >= len(scan) - DROPS
+
+
+def recall_and_false(judgement: Judgement) -> tuple[float, float]:
+    drop = is_drop(judgement.scan)
+    return judgement.rain[drop].mean(), judgement.rain[~drop].mean()
+
+
+@pytest.mark.parametrize("posed", [True, False])
+def test_it_finds_drops_and_leaves_walls(posed: bool) -> None:
+    answers = judged(drive(posed=posed))
+    assert [answer.frame.number for answer in answers if answer.frame] == [0, 1, 2, 3]
+    for answer in answers:
+        recall, false = recall_and_false(answer)
+        assert recall > 0.8
+        assert false < 0.005
+        assert answer.known is not None
+        assert answer.known.mean() > 0.9
+        assert (answer.rain == (answer.probability > 0.5)).all()
+
+
+def test_a_thing_that_stays_is_less_like_rain_than_one_that_comes_and_goes() -> None:
+    frames = drive()
+    sphere = np.random.default_rng(3).normal(0, 1, (40, 3))
+    thing = np.array([5.0, 1.0, 0.5]) + 0.2 * sphere / np.linalg.norm(sphere, axis=1)[:, None]
+    here = [Scan.of(np.concatenate([thing, seen_from(0, number)])) for number in range(3)]
+    gone = [here[1] if number == 1 else Scan.of(seen_from(0, number)) for number in range(3)]
+    probabilities = []
+    for scans in (here, gone):
+        frames = [MemoryFrame(key=str(n), number=n, scan=scan) for n, scan in enumerate(scans)]
+        probabilities.append(judged(frames)[1].probability[: len(thing)].mean())
+    assert probabilities[0] < probabilities[1] - 0.3
+
+
+def test_a_wider_window_asks_more_scans() -> None:
+    method = PersistenceDerainer(Persistence(before=2, after=3))
+    assert (method.window.before, method.window.after) == (2, 3)
+    answers = judged(drive(6), before=2, after=3)
+    assert len(answers) == 6
+    assert recall_and_false(answers[2])[0] > 0.8
+
+
+def test_a_scan_alone_is_judged_by_itself_and_nothing_of_it_is_known() -> None:
+    (answer,) = judged(drive(1))
+    assert answer.known is not None
+    assert not answer.known.any()
+    assert recall_and_false(answer)[0] > 0.5
+    told = [issue.kind for issue in PersistenceDerainer().issues(answer)]
+    assert told == ["nothing is known for sure"]
+
+
+def test_no_evidence_is_taken_across_a_gap() -> None:
+    frames = drive(4)
+    far = [
+        *frames[:2],
+        MemoryFrame(key="2", number=2, scan=Scan.of(np.full((400, 3), 50.0) + np.eye(3)[0])),
+    ]
+    # The last scan has no pose, and its own odometry has nothing to go on from.
+    answers = judged(far)
+    alone = judged([far[1]])[0]
+    with_first = judged(far[:2])[1]
+    assert (answers[1].probability == with_first.probability).all()
+    assert not (answers[1].probability == alone.probability).all()
+
+
+def test_a_registration_that_fails_is_told_of() -> None:
+    frames = drive(3, posed=False)
+    nonsense = Scan.of(np.random.default_rng(0).uniform(-30, 30, (4000, 3)), "nonsense")
+    frames[2] = MemoryFrame(key="2", number=2, scan=nonsense)
+    method = PersistenceDerainer()
+    answers = [judgement for _, judgement, _ in judgements(method, frames[:2])]
+    assert not list(method.issues(answers[0]))
+    for frame in frames:
+        method.push(frame)
+    # What waits is asked before the recording ends.
+    last = next(method.flush())
+    assert last.scan.name == "nonsense"
+    details = [issue.detail for issue in method.issues(last)]
+    assert any("where it was taken is not known" in detail for detail in details)
+
+
+def test_damaged_records_are_done_without(tmp_path: Path) -> None:
+    for number, frame in enumerate(drive(3)):
+        write_scan(tmp_path / f"yard/scan_{number}.pcd", frame.scan)
+    frames = named_frames([tmp_path / "yard"])
+    method = PersistenceDerainer(threads=2)
+    plain = [judgement for _, judgement, _ in judgements(method, frames)]
+    (tmp_path / "yard/poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")  # one line for three
+    (tmp_path / "yard/times.txt").write_text("soon\n")
+    for (_, judgement, _), expected in zip(
+        judgements(method, named_frames([tmp_path / "yard"])), plain, strict=True
+    ):
+        assert (judgement.probability == expected.probability).all()
+        (issue,) = method.issues(judgement)
+        assert "has 1 lines for 3 scans, and none for scan_" in issue.detail
+
+
+def test_the_order_of_rows_changes_nothing() -> None:
+    frames = drive(3)
+    order = np.random.default_rng(5).permutation(len(frames[1].scan))
+    shuffled = [*frames]
+    shuffled[1] = MemoryFrame(
+        key="1",
+        number=1,
+        scan=frames[1].scan.take(order),
+        sensor_to_world=frames[1].sensor_to_world,
+    )
+    assert (judged(shuffled)[1].rain == judged(frames)[1].rain[order]).all()
+
+
+def test_intensity_and_threads_change_nothing() -> None:
+    frames = drive(3)
+    bright = []
+    for frame in frames:
+        intensity = np.random.default_rng(1).uniform(0, 255, (len(frame.scan), 1))
+        scan = Scan.of(np.hstack([frame.scan.xyz, intensity]))
+        bright.append(MemoryFrame(key=frame.key, number=frame.number, scan=scan))
+    plain = [MemoryFrame(key=f.key, number=f.number, scan=f.scan) for f in frames]
+    one = PersistenceDerainer(threads=1)
+    answers = [judgement for _, judgement, _ in judgements(one, bright)]
+    for first, second in zip(judged(plain), answers, strict=True):
+        assert (first.probability == second.probability).all()
+
+
+def test_hard_cases_are_answered() -> None:
+    frames = [
+        MemoryFrame(key=name, number=number, scan=scan)
+        for number, (name, scan) in enumerate(hard_cases(4000))
+    ]
+    answers = judged(frames)
+    assert len(answers) == len(frames)
+    for answer in answers:
+        assert np.isfinite(answer.probability).all()
+        assert not answer.rain[~answer.scan.valid].any()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "told"),
+    [
+        ({"before": -1}, "before is -1"),
+        ({"after": 51}, "after is 51"),
+        ({"before": 1.5}, "before is 1.5"),
+        ({"before": True}, "before is True"),
+        ({"sure": 0.5}, "sure is 0.5"),
+        ({"sure": "much"}, "sure is"),
+        ({"reach": 3}, "it has no parameter reach. It has before, after, sure."),
+    ],
+)
+def test_wrong_parameters_are_refused(parameters: dict[str, object], told: str) -> None:
+    with pytest.raises(InputError) as refused:
+        load_method("persistence", parameters)
+    assert told in str(refused.value)
+
+
+def test_what_it_says_of_itself_makes_it_again() -> None:
+    content = PersistenceDerainer(Persistence(before=2, sure=9.0)).as_dict()
+    again = load_method(content.pop("method"), content)
+    assert isinstance(again, PersistenceDerainer)
+    assert again.persistence == Persistence(before=2, sure=9.0)
+
+
+def test_real_snow_is_found_by_free_space(shared: Path) -> None:
+    from derain.cards.card import load_card
+    from derain.sources.reader import FrameReader
+    from derain.views.morton import first_rows
+
+    drive = shared / "data/wads/drive/velodyne"
+    frames = [f for f in named_frames([drive], labelled=True) if 2 <= f.number < 6]
+    reader = FrameReader(load_card("wads"))
+    found = wrong = missed = 0
+    for frame, judgement, _ in judgements(PersistenceDerainer(), frames):
+        rows = first_rows(judgement.scan)
+        truth = reader.card.rain_of(reader.read(frame))[rows]
+        rain = judgement.rain[rows]
+        found += (rain & truth).sum()
+        wrong += (rain & ~truth).sum()
+        missed += (truth & ~rain).sum()
+    assert found / (found + wrong + missed) > 0.87
+
+
+def test_it_can_be_pickled_and_begins_a_recording_of_its_own() -> None:
+    method = PersistenceDerainer(Persistence(before=2, sure=5.0), threads=1)
+    method.push(scene(100))
+    again = pickle.loads(pickle.dumps(method))
+    assert (again.persistence, again.threads, again.waiting) == (method.persistence, 1, 0)

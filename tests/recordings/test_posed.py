@@ -1,0 +1,201 @@
+"""Frames get their poses from a file, from odometry, from what lies beside them, or stand."""
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from derain.errors import InputError
+from derain.files import write_scan
+from derain.recordings.pose_search import FrameOdometry
+from derain.recordings.posed import with_poses
+from derain.recordings.registration import Registration, shift_of
+from derain.scan import Scan
+from derain.sources.folders import named_frames
+from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.recordings import recordings_of
+from derain.sources.source import Frames
+
+from .street import motion, scan_from
+
+STEP = motion(1.3, yaw=0.5)
+
+
+@pytest.fixture(scope="module")
+def scans() -> list[Scan]:
+    """Four scans of a drive, one step apart."""
+    poses = [np.linalg.matrix_power(STEP, number) for number in range(4)]
+    return [scan_from(pose, seed) for seed, pose in enumerate(poses)]
+
+
+@pytest.fixture
+def drive(scans: list[Scan]) -> Frames:
+    return Frames.of_scans(scans, "drive")
+
+
+def x_of(frames: Frames) -> list[float]:
+    return [round(float(frame.pose[0, 3]), 9) for frame in frames]
+
+
+def lines(ahead: list[float]) -> str:
+    return "".join(f"1 0 0 {x} 0 1 0 0 0 0 1 0\n" for x in ahead)
+
+
+def test_recordings_are_runs_of_frames_that_follow_one_another(drive: Frames) -> None:
+    other = Frames.of_scans([drive[0].read()], "other")
+    frames = [*drive[:2], drive[3], *other, *drive[:2]]
+    assert [len(recording) for recording in recordings_of(frames)] == [2, 1, 1, 2]
+    assert recordings_of([]) == []
+
+
+def test_a_sensor_that_stands_has_one_pose(drive: Frames) -> None:
+    posed = with_poses(drive, "standing")
+    assert all((frame.pose == np.eye(4)).all() for frame in posed)
+    assert [frame.key for frame in posed] == [frame.key for frame in drive]
+
+
+def test_odometry_gives_poses_and_tells_of_each(drive: Frames) -> None:
+    told: list[tuple[Frame, Registration]] = []
+    posed = with_poses(drive, "odometry", on_registration=lambda *each: told.append(each))
+    assert [frame.key for frame, _ in told] == [frame.key for frame in drive]
+    for number, (frame, (_, registration)) in enumerate(zip(posed, told, strict=True)):
+        np.testing.assert_array_equal(frame.pose, registration.pose)
+        error = np.linalg.inv(np.linalg.matrix_power(STEP, number)) @ frame.pose
+        assert shift_of(error) < 0.05
+    assert all(later.follows(earlier) for earlier, later in pairwise(posed))
+
+
+def test_each_recording_starts_at_the_identity(drive: Frames) -> None:
+    twice = [*drive, *(replace(frame, sequence="again") for frame in drive)]
+    posed = with_poses(twice, "odometry")
+    for number in range(4):
+        np.testing.assert_array_equal(posed[number].pose, posed[number + 4].pose)
+
+
+def test_no_window_reaches_over_what_could_not_be_registered(drive: Frames) -> None:
+    blind = replace(drive[1], scan=Scan.of(np.zeros((0, 3))))
+    posed = with_poses([drive[0], blind, *drive[2:]], "odometry")
+    following = [later.follows(earlier) for earlier, later in pairwise(posed)]
+    assert following == [False, False, True]
+    assert posed[3].pose[0, 3] == pytest.approx(1.3, abs=0.1)
+
+
+class Broken(MemoryFrame):
+    """A scan that cannot be read."""
+
+    def read(self) -> Scan:
+        raise InputError(self.name, "is damaged", "Record it again.")
+
+
+def test_a_scan_that_cannot_be_read_is_a_gap_and_no_end(drive: Frames) -> None:
+    broken = Broken(key="broken", sequence="drive", number=1, scan=drive[1].scan)
+    reasons: list[str] = []
+    posed = with_poses(
+        [drive[0], broken, *drive[2:]],
+        "odometry",
+        on_registration=lambda _, each: reasons.append(each.reason),
+    )
+    assert len(posed) == 4
+    assert reasons[1] == "it cannot be read"
+    assert not posed[2].follows(posed[1])
+    assert posed[3].follows(posed[2])
+
+
+def test_a_scan_taken_before_the_one_that_it_follows_is_not_trusted(drive: Frames) -> None:
+    odometry = FrameOdometry()
+    times = (0.0, 0.1, 0.1, 0.05)
+    found = [
+        odometry.register(replace(frame, seconds=time), frame.read())
+        for frame, time in zip(drive, times, strict=True)
+    ]
+    assert [each.trusted for each in found] == [True, True, False, False]
+    assert found[2].reason == ("it was taken at 0.100 s, the scan before at 0.100 s: out of order")
+
+
+def test_poses_of_a_file_go_line_by_line_or_by_number(drive: Frames, tmp_path: Path) -> None:
+    path = tmp_path / "mine.txt"
+    path.write_text(lines([0, 1, 2, 3]))
+    assert x_of(with_poses(drive, path)) == [0, 1, 2, 3]
+    assert x_of(with_poses(drive, str(path))) == [0, 1, 2, 3]
+    for number, frame in enumerate(drive):
+        write_scan(tmp_path / f"drive/{number + 5:06d}.pcd", frame.read())
+    some = named_frames([tmp_path / "drive"])
+    path.write_text(lines(list(range(9))))
+    assert x_of(with_poses(some, path)) == [5, 6, 7, 8]
+
+
+def test_poses_of_a_file_go_by_time_where_both_have_one(drive: Frames, tmp_path: Path) -> None:
+    path = tmp_path / "mine.tum"
+    path.write_text("0.95 0 0 0 0 0 0 1\n1.45 5 0 0 0 0 0 1\n")
+    timed = [replace(frame, seconds=1 + frame.number / 10) for frame in drive]
+    assert x_of(with_poses(timed, path)) == [0.5, 1.5, 2.5, 3.5]
+    path.write_text("".join(f"{n} {n} 0 0 0 0 0 1\n" for n in range(4)))
+    assert x_of(with_poses(drive, path)) == [0, 1, 2, 3]
+
+
+def test_a_folder_has_a_file_for_each_recording(drive: Frames, tmp_path: Path) -> None:
+    both = [*drive, *Frames.of_scans([drive[0].read()], "other")]
+    with pytest.raises(InputError, match=r"drive\.txt: there is no such file"):
+        with_poses(both, tmp_path)
+    (tmp_path / "drive.txt").write_text(lines([0, 1, 2, 3]))
+    (tmp_path / "other.txt").write_text(lines([7]))
+    assert x_of(with_poses(both, tmp_path)) == [0, 1, 2, 3, 7]
+    with pytest.raises(InputError, match="is one file of poses for 2 recordings"):
+        with_poses(both, tmp_path / "drive.txt")
+
+
+@pytest.mark.parametrize("count", [0, 1, 3, 5])
+def test_poses_of_another_length_are_refused(scans: list[Scan], tmp_path: Path, count: int) -> None:
+    named = Frames(
+        MemoryFrame(key=f"{n}", number=n, scan=replace(scan, name=f"scan_{n}"))
+        for n, scan in enumerate(scans)
+    )
+    path = tmp_path / "mine.txt"
+    path.write_text(lines(list(range(count))))
+    with pytest.raises(InputError, match=f"has {count} lines for 4 scans, and none for scan_0"):
+        with_poses(named, path)
+
+
+def test_without_a_word_poses_beside_the_scans_count_and_odometry_fills_in(
+    drive: Frames, tmp_path: Path
+) -> None:
+    for name in ("known", "unknown"):
+        for number, frame in enumerate(drive[:2]):
+            write_scan(tmp_path / name / f"{number:06d}.pcd", frame.read())
+    (tmp_path / "known/poses.txt").write_text(lines([40, 50]))
+    told: list[str] = []
+    posed = with_poses(
+        named_frames([tmp_path / "known", tmp_path / "unknown"], layouts=()),
+        on_registration=lambda frame, _: told.append(frame.name),
+    )
+    assert x_of(posed)[:3] == [40, 50, 0]
+    assert posed[3].pose[0, 3] == pytest.approx(1.3, abs=0.05)
+    assert told == [str(tmp_path / f"unknown/00000{number}.pcd") for number in range(2)]
+
+
+def test_a_record_that_is_damaged_is_told_and_not_passed_over(
+    drive: Frames, tmp_path: Path
+) -> None:
+    write_scan(tmp_path / "a/0.pcd", drive[0].read())
+    (tmp_path / "a/poses.txt").write_text("damaged")
+    with pytest.raises(InputError, match="line 1 is not 12 numbers"):
+        with_poses(named_frames([tmp_path / "a"]))
+
+
+def test_gaps_of_one_part_do_not_close_up_to_the_next(drive: Frames) -> None:
+    blind = [replace(frame, scan=Scan.of(np.zeros((0, 3)))) for frame in drive[:3]]
+    later = replace(drive[3], number=5)  # two scans of the sequence are missing before it
+    posed = with_poses([*blind, later], "odometry")
+    assert not any(after.follows(before) for before, after in pairwise(posed))
+
+
+def test_poses_that_go_by_lines_ask_for_no_times(drive: Frames, tmp_path: Path) -> None:
+    for number, frame in enumerate(drive[:2]):
+        write_scan(tmp_path / f"a/{number}.pcd", frame.read())
+    (tmp_path / "a/times.txt").write_text("soon")
+    (tmp_path / "mine.txt").write_text(lines([4, 5]))
+    frames = named_frames([tmp_path / "a"])
+    assert x_of(with_poses(frames, tmp_path / "mine.txt")) == [4, 5]
+    assert with_poses(frames, "odometry")[1].pose[0, 3] == pytest.approx(1.3, abs=0.05)

@@ -1,0 +1,189 @@
+"""LiDAR and radar joined: pairs in time by brute force, rows in order, and the parts had back."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.files import read_scan, write_scan
+from derain.files.extrinsics import Extrinsics
+from derain.fusion import NO_DETECTIONS, UNKNOWN, fuse, nearest_in_time
+from derain.scan import Scan
+
+PLACE = Extrinsics.of_pose(1.5, -0.3, -0.7, 1, -2, 3)
+HERE = Extrinsics(np.eye(4))
+ARS548 = ("x", "y", "z", "doppler", "rcs", "range", "azimuth", "elevation", "multi_target", "class")
+
+# Multiples of a quarter are exact, so that ties are ties.
+quarters = st.integers(-20, 20).map(lambda number: number / 4)
+
+
+def radar_frame(points: int = 30, seed: int = 1) -> Scan:
+    random = np.random.default_rng(seed)
+    xyz = random.uniform(-20, 20, (points, 3)).astype(np.float32)
+    fields = {"doppler": random.normal(size=points), "rcs": np.arange(points)}
+    return Scan(xyz, fields={**dict(zip("xyz", xyz.T, strict=True)), **fields}, name="frame.npz")
+
+
+@pytest.fixture(scope="module")
+def ars548(shared: Path) -> Scan:
+    """Real detections of a 4D radar."""
+    return read_scan(shared / "data/radar/ars548_detections.npy", ARS548)
+
+
+@given(st.lists(quarters, max_size=12), st.lists(quarters, max_size=12), quarters.map(abs))
+def test_pairs_in_time_are_those_that_brute_force_finds(
+    times: list[float], among: list[float], within: float
+) -> None:
+    expected = []
+    for time in times:
+        # The nearest; of equally near ones the earlier; of equal ones the first.
+        rank = [(abs(other - time), other, row) for row, other in enumerate(among)]
+        distance, _, row = min(rank, default=(math.inf, 0.0, -1))
+        expected.append(row if distance <= within else -1)
+    found = nearest_in_time(np.array(times), np.array(among), within)
+    assert found.tolist() == expected
+    assert found.dtype == np.int64
+
+
+def test_a_radar_of_another_rate_is_paired_within_half_its_period() -> None:
+    epoch = 1_700_000_000
+    lidar, radar = epoch + np.arange(294) / 10, epoch + 0.013 + np.arange(496) / 16.5
+    pairs = nearest_in_time(lidar, radar, within=0.5 / 16.5 + 1e-6)
+    assert (pairs >= 0).all()
+    assert (np.diff(pairs) >= 1).all()
+
+
+def test_the_lidar_comes_first_and_both_keep_their_order() -> None:
+    lidar, radar = Scan.of(scene(100)), radar_frame()
+    fused = fuse(lidar, radar, PLACE)
+    assert fused.radar is not None
+    assert fused.radar.tolist() == [False] * 100 + [True] * 30
+    np.testing.assert_array_equal(fused.xyz[:100], lidar.xyz)
+    np.testing.assert_array_equal(fused.xyz[100:], PLACE(radar.xyz))
+    assert fused.intensity is not None
+    np.testing.assert_array_equal(fused.intensity[:100], lidar.intensity)
+    assert (fused.intensity[100:] == 0).all()
+    assert fused.label is None
+
+
+def test_a_radar_with_intensity_keeps_it() -> None:
+    radar = replace(radar_frame(3), intensity=np.array([1, 2, 3], np.float32))
+    fused = fuse(Scan(np.ones((1, 3), np.float32)), radar, PLACE)
+    assert fused.intensity is not None
+    assert fused.intensity.tolist() == [0, 1, 2, 3]
+
+
+def test_both_parts_are_had_back(ars548: Scan, shared: Path) -> None:
+    lidar = read_scan(shared / "data/clean/kitti_front.bin")
+    fused = fuse(lidar, ars548, PLACE, channels=["doppler", "rcs"])
+    assert fused.radar is not None
+    assert len(fused) == len(lidar) + 308
+    np.testing.assert_array_equal(fused.xyz[~fused.radar], lidar.xyz)
+    np.testing.assert_array_equal(fused.intensity[~fused.radar], lidar.intensity)
+    back = PLACE.inverse(fused.xyz[fused.radar])
+    np.testing.assert_allclose(back, ars548.xyz, atol=1e-4)
+    for name in ("doppler", "rcs"):
+        np.testing.assert_array_equal(fused.fields[name][fused.radar], ars548.fields[name])
+        assert np.isnan(fused.fields[name][~fused.radar]).all()
+
+
+def test_real_detections_are_where_their_angles_say(ars548: Scan) -> None:
+    # Which says that the format example is in our frame: x forward, y left, z up.
+    distance, azimuth, elevation = (ars548.fields[n] for n in ("range", "azimuth", "elevation"))
+    level = distance * np.cos(elevation)
+    expected = [level * np.cos(azimuth), level * np.sin(azimuth), distance * np.sin(elevation)]
+    np.testing.assert_allclose(ars548.xyz, np.stack(expected, axis=1), atol=1e-3)
+
+
+def test_what_no_lidar_point_is_near_is_of_unknown_label(ars548: Scan, shared: Path) -> None:
+    lidar = read_scan(shared / "data/clean/kitti_front.bin")
+    lidar = lidar.with_label(np.arange(len(lidar)) % 8)
+    fused = fuse(lidar, ars548, PLACE, label_within=1)
+    assert fused.label is not None
+    np.testing.assert_array_equal(fused.label[: len(lidar)], lidar.label)
+    distance = np.linalg.norm(
+        fused.xyz[fused.radar, None].astype(float) - lidar.xyz.astype(float), axis=2
+    )
+    expected = np.where(distance.min(axis=1) <= 1, lidar.label[distance.argmin(axis=1)], UNKNOWN)
+    np.testing.assert_array_equal(fused.label[fused.radar], expected)
+    assert 0 < (expected == UNKNOWN).sum() < len(expected)
+
+
+def test_a_label_is_sought_in_the_frame_of_the_lidar() -> None:
+    lidar = Scan(np.array([[10, 0, 0]], np.float32)).with_label(np.array([4]))
+    radar = Scan(np.array([[9, 0, 0], [10, 0, 0]], np.float32))
+    ahead = Extrinsics.of_pose(1, 0, 0, 0, 0, 0)
+    fused = fuse(lidar, radar, ahead, label_within=0.5)
+    assert fused.label is not None
+    assert fused.label.tolist() == [4, 4, UNKNOWN]
+
+
+def test_a_radar_that_knows_its_labels_keeps_them() -> None:
+    lidar = Scan.of(scene(10)).with_label(np.zeros(10, np.int64))
+    fused = fuse(lidar, radar_frame(3).with_label(np.array([1, 2, 3])), PLACE)
+    assert fused.label is not None
+    assert fused.label[10:].tolist() == [1, 2, 3]
+
+
+def test_rows_that_cannot_be_judged_stay_as_they_are() -> None:
+    xyz = np.array([[0, 0, 0], [np.nan, 1, 2], [np.inf, 0, 0], [5, 0, 0]], np.float32)
+    fused = fuse(Scan.of(scene(5)), Scan(xyz), PLACE)
+    np.testing.assert_array_equal(fused.xyz[5:8], xyz[:3])
+    assert fused.valid[5:].tolist() == [False, False, False, True]
+
+
+def test_a_fused_file_has_the_columns_of_rehearse_3d(tmp_path: Path) -> None:
+    fused = fuse(Scan.of(scene(50)), radar_frame(), PLACE)
+    write_scan(tmp_path / "fused.bin", fused)
+    table = np.fromfile(tmp_path / "fused.bin", "<f4").reshape(-1, 4)
+    np.testing.assert_array_equal(table, np.c_[fused.xyz, fused.intensity])
+
+
+def test_a_file_with_channels_names_them_and_tells_the_sensors_apart(tmp_path: Path) -> None:
+    lidar, radar = Scan.of(scene(50)), radar_frame()
+    fused = fuse(lidar, radar, PLACE, channels=["rcs", "doppler"])
+    write_scan(tmp_path / "fused.npz", fused)
+    again = read_scan(tmp_path / "fused.npz")
+    assert list(again.fields) == ["x", "y", "z", "intensity", "radar", "rcs", "doppler"]
+    np.testing.assert_array_equal(again.xyz, fused.xyz)
+    np.testing.assert_array_equal(again.intensity, fused.intensity)
+    np.testing.assert_array_equal(again.fields["radar"] == 1, fused.radar)
+    np.testing.assert_array_equal(again.fields["rcs"][50:], np.arange(30))
+    assert again.valid.all()
+
+
+def test_a_scan_without_a_radar_frame_stays_alone() -> None:
+    lidar = Scan.of(scene(20)).with_label(np.ones(20, np.int64))
+    fused = fuse(lidar, NO_DETECTIONS, PLACE, channels=["rcs"])
+    assert fused.radar is not None
+    assert (len(fused), fused.radar.any()) == (20, False)
+    assert np.isnan(fused.fields["rcs"]).all()
+    np.testing.assert_array_equal(fused.label, lidar.label)
+
+
+def test_a_channel_that_the_radar_lacks_is_named() -> None:
+    with pytest.raises(InputError, match=r"frame\.npz: has no column snr .*x, y, z, doppler"):
+        fuse(Scan.of(scene(5)), radar_frame(), PLACE, channels=["snr"])
+
+
+@pytest.mark.parametrize("channel", ["x", "intensity", "radar"])
+def test_a_channel_does_not_take_the_place_of_a_merged_column(channel: str) -> None:
+    with pytest.raises(InputError, match=f"{channel}: is a column of the merged cloud itself"):
+        fuse(Scan.of(scene(5)), radar_frame(), PLACE, channels=["rcs", channel])
+
+
+@pytest.mark.parametrize(("name", "scan"), list(hard_cases(2000)))
+def test_every_hard_case_is_fused_from_either_side(name: str, scan: Scan) -> None:
+    ordinary = radar_frame()
+    labelled = scan.with_label(np.zeros(len(scan), np.int64))
+    for lidar, radar in ((labelled, ordinary), (Scan.of(scene(20)), scan)):
+        fused = fuse(lidar, radar, HERE)
+        valid = np.concatenate([lidar.valid, radar.valid])
+        np.testing.assert_array_equal(fused.valid, valid)
