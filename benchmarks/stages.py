@@ -8,8 +8,7 @@ from pathlib import Path
 
 from benchmarks.installed import DERAIN
 from derain.errors import InputError
-
-CONFIGURATION = "relative_outdet_worlds.yaml"
+from derain.simulation.world_campaign import WorldCampaign
 
 # Written into the folder of a training once it has ended: the command that it was.
 RECORD = "command.txt"
@@ -26,6 +25,8 @@ class Stage:
         validation: Scans that are held out.
         epochs: How often each is trained on.
         rate: Highest rate of learning.
+        drawn: Seed of the worlds.
+        configuration: The packaged configuration that trains it.
     """
 
     world: str
@@ -34,6 +35,13 @@ class Stage:
     validation: int
     epochs: int
     rate: float
+    drawn: int = 0
+    configuration: str = "relative_outdet_worlds.yaml"
+
+    @property
+    def campaign(self) -> WorldCampaign:
+        """How its scans are simulated."""
+        return WorldCampaign(self.train, self.validation, seed=self.drawn, world=self.world)
 
     def command(self, folder: Path, seed: int, start: Path | None = None) -> list[str]:
         """Options of derain that train it.
@@ -45,8 +53,9 @@ class Stage:
         """
         started = [] if start is None else ["--start", str(start)]
         return [
-            *("fit", "--config", CONFIGURATION, "--seed_everything", str(seed)),
+            *("fit", "--config", self.configuration, "--seed_everything", str(seed)),
             *("--data.root", str(self.root), "--data.campaign.world", self.world),
+            *("--data.campaign.seed", str(self.drawn)),
             *("--data.campaign.train", str(self.train)),
             *("--data.campaign.validation", str(self.validation)),
             *("--trainer.max_epochs", str(self.epochs)),

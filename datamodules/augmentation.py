@@ -7,7 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import Scan
+from derain.views.channels import INTENSITY_RANK
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
+
+# Levels that intensities are cut to, where they are.
+FEW_LEVELS = 7
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,10 @@ class Augmentation:
         sector_probability: Share of scans of which only a sector is kept, so that a batch of as
             many points holds more scans.
         sector: Width of the sector, degrees.
+        shift_probability: Share of scans whose sensor is moved aside, as in a vehicle's frame.
+        shift: How far it is moved at most along x and along y, metres.
+        brightness_probability: Share of scans whose intensities are made all alike, inverted, or
+            cut to a few levels: on another sensor, brightness means something else.
 
     Source: sporsho/3D_OutDet, dataset/_point_cloud_dataset.py, for rotation, jitter and their 0.5;
         TiagoCortinhal/SalsaNext for mirroring and dropping.
@@ -45,12 +53,16 @@ class Augmentation:
     dropping: float = 0.5
     sector_probability: float = 0.0
     sector: float = 90.0
+    shift_probability: float = 0.0
+    shift: float = 3.0
+    brightness_probability: float = 0.0
 
     @property
     def changes_anything(self) -> bool:
         """Whether any scan is changed."""
         of_points = self.jitter_probability, self.dropping_probability, self.sector_probability
-        return max(of_points) > 0 or self.moves_the_sensor
+        of_sensor = self.shift_probability, self.brightness_probability
+        return max(*of_points, *of_sensor) > 0 or self.moves_the_sensor
 
     @property
     def moves_the_sensor(self) -> bool:
@@ -60,7 +72,7 @@ class Augmentation:
     def __call__(
         self, scan: Scan, generator: np.random.Generator, azimuth: tuple[float, float] = ALL_AROUND
     ) -> Scan:
-        """Returns a changed copy; points keep their order, labels and intensities.
+        """Returns a changed copy; points keep their order and labels.
 
         Args:
             scan: The scan.
@@ -78,15 +90,40 @@ class Augmentation:
             moved = moved + generator.normal(0, self.jitter, moved.shape).astype(np.float32)
         if generator.random() < self.mirror_probability:
             moved = moved @ _mirror(0.0 if sees_all_around else math.radians(left + right) / 2)
+        if self.shift_probability and generator.random() < self.shift_probability:
+            aside = generator.uniform(-self.shift, self.shift, 2)
+            moved = moved - np.array([*aside, 0], np.float32)
         xyz = scan.xyz.copy()
         xyz[valid] = moved
         changed = replace(scan, xyz=xyz)
+        if self.brightness_probability and generator.random() < self.brightness_probability:
+            changed = _other_brightness(changed, generator)
         if generator.random() < self.dropping_probability:
             share = generator.uniform(0, self.dropping)
             changed = changed.take(generator.random(len(scan)) >= share)
         if self.sector_probability and generator.random() < self.sector_probability:
             return _sector(changed, self.sector, generator)
         return changed
+
+
+def _other_brightness(scan: Scan, generator: np.random.Generator) -> Scan:
+    """The scan with intensities that are alike, inverted, or of a few levels.
+
+    What its columns hold of ranks is computed anew from them.
+    """
+    if scan.intensity is None:
+        return scan
+    change = generator.integers(3)
+    known = scan.intensity[scan.valid]
+    if change == 0 or not len(known):
+        intensity = np.zeros_like(scan.intensity)
+    elif change == 1:
+        intensity = known.max() - scan.intensity
+    else:
+        levels = np.sort(generator.choice(known, FEW_LEVELS - 1))
+        intensity = np.searchsorted(levels, scan.intensity).astype(np.float32)
+    fields = {name: column for name, column in scan.fields.items() if name != INTENSITY_RANK}
+    return replace(scan, intensity=intensity, fields=fields)
 
 
 def _sector(scan: Scan, width: float, generator: np.random.Generator) -> Scan:

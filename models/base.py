@@ -160,6 +160,20 @@ class DerainingModule(MeasuredModule):
     def configure_optimizers(self) -> OptimizerLRScheduler:
         """What trains it, as Lightning takes it."""
 
+    def begin_from(self, source: "DerainingModule") -> None:
+        """Takes over the weights of a trained model, to be trained on.
+
+        Raises:
+            InputError: A model of another network.
+        """
+        if type(source) is not type(self):
+            raise InputError(
+                source.NAME,
+                f"a model of it, from which {self.NAME} cannot start",
+                f"Train {source.NAME}, or give a checkpoint of {self.NAME}.",
+            )
+        self.load_state_dict(source.state_dict())
+
     def deployed(self) -> nn.Module:
         """The network as it is exported, in evaluation mode: from raw inputs to logits.
 

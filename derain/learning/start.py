@@ -36,6 +36,13 @@ class Start:
             for data, record in records
         )
         starts = (*self.spec.training.get(STARTED_FROM, ()), self.name)
+        spec = replace(
+            spec,
+            licence=f"{spec.licence}; started from {self.spec.data} ({self.spec.licence})",
+            training={**together, STARTED_FROM: starts},
+        )
+        if spec.network != self.spec.network:  # it began from a part of what it is
+            return spec
         return replace(
             spec,
             view=self.spec.view,
@@ -43,6 +50,4 @@ class Start:
             mean=self.spec.mean,
             std=self.spec.std,
             rule=self.spec.rule,
-            licence=f"{spec.licence}; started from {self.spec.data} ({self.spec.licence})",
-            training={**together, STARTED_FROM: starts},
         )

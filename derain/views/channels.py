@@ -18,6 +18,11 @@ from derain.views.returns import pair_returns
 # The channel of the place of a return in its ray.
 DUAL_RETURN = "dual_return"
 
+# The channel of the rank of a point's intensity among those of its scan, in so many steps: what
+# stays the same whatever unit and gain a sensor's intensities have.
+INTENSITY_RANK = "intensity_rank"
+INTENSITY_RANKS = 32
+
 # What networks see unless they are told otherwise. All other channels are extra: a scan need not
 # have them, and a data card has their statistics only where a network has asked for them.
 USUAL_CHANNELS = ("x", "y", "z", "intensity", "range")
@@ -31,6 +36,7 @@ UNITS = {
     "rcs": "dBsm",
     "radar": "0 or 1",
     DUAL_RETURN: "-1, 0 or 1",
+    INTENSITY_RANK: "0 to 1",
 }
 
 
@@ -52,13 +58,34 @@ def channel_of(scan: Scan, name: str) -> NDArray[np.float32] | None:
         for a sensor that tells one is another than one that has seen none behind it.
     """
     column = scan.channel(name)
-    if column is not None or name != DUAL_RETURN:
+    if column is not None or name not in (DUAL_RETURN, INTENSITY_RANK):
         return column
+    if name == INTENSITY_RANK:
+        return _intensity_rank(scan)
     returns = pair_returns(scan)
     if not returns.dual:
         return None
     # In the middle of three, the ray went through as well.
     return np.where(returns.nearer, 1, np.where(returns.farther, -1, 0)).astype(np.float32)
+
+
+def _intensity_rank(scan: Scan) -> NDArray[np.float32] | None:
+    """How bright points are among those of their scan, from 0 to 1 in steps, float32 (N,).
+
+    Every intensity that occurs counts by the root of how often it does: where most of the points
+    share one, such as 0, the others are still told apart.
+    """
+    intensity = scan.measured_intensity
+    if intensity is None:
+        return None
+    levels, points = np.unique(intensity[scan.valid], return_counts=True)
+    weight = np.sqrt(points)
+    darker = np.cumsum(weight) - weight
+    steps = np.arange(1, INTENSITY_RANKS) / INTENSITY_RANKS * weight.sum()
+    first_level = np.searchsorted(darker, steps)
+    edges = np.append(levels, np.float32(np.inf))[first_level]
+    rank = np.searchsorted(edges, intensity, side="right")
+    return (rank / np.float32(INTENSITY_RANKS - 1)).astype(np.float32)
 
 
 def with_columns(scan: Scan, channels: Sequence[str]) -> Scan:

@@ -11,6 +11,7 @@
 #include "candidates.hpp"
 #include "inputs.hpp"
 #include "kd_tree.hpp"
+#include "merged_points.hpp"
 #include "parallel.hpp"
 #include "scan.hpp"
 #include "spec.hpp"
@@ -192,21 +193,56 @@ inline void add_around_candidates(const Scan& scan, const KdTree& tree,
 
 }  // namespace detail
 
-// A scan as the network of a Spec sees it; `threads` is 1 or more.
-inline NeighbourView neighbour_view(const Scan& scan, const Spec& spec, unsigned threads) {
-  NeighbourView view;
-  view.k = spec.neighbours;
-  const std::vector<bool> valid = valid_rows(scan);
-  detail::find_points(scan, valid, view);
-  detail::fill_points(scan, valid, spec, view);
+namespace detail {
+
+inline std::vector<Position> positions_of(const Scan& scan, const NeighbourView& view) {
   std::vector<Position> positions;
   positions.reserve(view.first.size());
   for (const std::int64_t first : view.first) {
     const float* row = scan.row(static_cast<std::size_t>(first));
     positions.push_back({row[0], row[1], row[2]});
   }
-  const KdTree tree(std::move(positions), view.first, threads);
+  return positions;
+}
+
+// All points with their neighbourhoods.
+inline void add_all(const Scan& scan, unsigned threads, NeighbourView& view) {
+  const KdTree tree(positions_of(scan, view), view.first, threads);
+  add_neighbourhoods(scan, tree, numbers_where(std::vector<bool>(view.first.size(), true)),
+                     threads, view);
+}
+
+// Makes one point of those that are one return; whether there were any.
+inline bool merge_points(const Scan& scan, NeighbourView& view) {
+  const std::vector<std::int64_t> keeper =
+      keepers(positions_of(scan, view), view.first, view.neighbours, view.distances, view.k);
+  std::vector<std::int64_t> first;
+  std::vector<std::int64_t> place(keeper.size(), -1);
+  for (std::size_t point = 0; point < keeper.size(); ++point) {
+    if (keeper[point] != static_cast<std::int64_t>(point)) continue;
+    place[point] = static_cast<std::int64_t>(first.size());
+    first.push_back(view.first[point]);
+  }
+  if (first.size() == view.first.size()) return false;
+  for (std::int64_t& point : view.inverse) {
+    if (point >= 0) point = place[static_cast<std::size_t>(keeper[static_cast<std::size_t>(point)])];
+  }
+  view.first = std::move(first);
+  view.neighbours.clear();
+  view.distances.clear();
+  return true;
+}
+
+}  // namespace detail
+
+// A scan as the network of a Spec sees it; `threads` is 1 or more.
+inline NeighbourView neighbour_view(const Scan& scan, const Spec& spec, unsigned threads) {
+  NeighbourView view;
+  view.k = spec.neighbours;
+  const std::vector<bool> valid = valid_rows(scan);
+  detail::find_points(scan, valid, view);
   if (spec.candidates) {
+    const KdTree tree(detail::positions_of(scan, view), view.first, threads);
     const std::vector<bool> rows = candidate_rows(scan, valid, spec);
     std::vector<bool> candidate;
     for (const std::int64_t first : view.first) {
@@ -214,9 +250,10 @@ inline NeighbourView neighbour_view(const Scan& scan, const Spec& spec, unsigned
     }
     detail::add_around_candidates(scan, tree, candidate, threads, view);
   } else {
-    const std::vector<bool> all(view.first.size(), true);
-    detail::add_neighbourhoods(scan, tree, detail::numbers_where(all), threads, view);
+    detail::add_all(scan, threads, view);
+    if (spec.merged && detail::merge_points(scan, view)) detail::add_all(scan, threads, view);
   }
+  detail::fill_points(scan, valid, spec, view);
   return view;
 }
 

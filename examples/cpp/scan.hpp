@@ -24,6 +24,9 @@ constexpr float kSentinel = -1.0F;
 // Where all of so many points have one intensity, it was filled in and not measured.
 constexpr std::size_t kFewestAlike = 100;
 
+// Steps in which intensities are ranked.
+constexpr int kIntensityRanks = 32;
+
 constexpr std::size_t kColumns = 4;
 
 // Files are little-endian, as are all processors that this program is likely to meet.
@@ -98,11 +101,46 @@ inline float range_of(const float* row) {
   return static_cast<float>(std::sqrt(x * x + y * y + z * z));
 }
 
+// How bright each row is among the valid ones, from 0 to 1 in steps: every intensity that occurs
+// counts by the root of how often it does.
+inline std::vector<float> intensity_rank(const Scan& scan, const std::vector<bool>& valid) {
+  std::vector<float> ascending;
+  for (std::size_t row = 0; row < scan.size(); ++row) {
+    if (valid[row]) ascending.push_back(scan.row(row)[3]);
+  }
+  std::sort(ascending.begin(), ascending.end());
+  std::vector<float> levels;
+  std::vector<double> darker{0};  // than each level, and than none: weights added up
+  for (auto level = ascending.cbegin(); level != ascending.cend();) {
+    const auto next = std::upper_bound(level, ascending.cend(), *level);
+    levels.push_back(*level);
+    darker.push_back(darker.back() + std::sqrt(static_cast<double>(next - level)));
+    level = next;
+  }
+  std::vector<float> edges;
+  for (int step = 1; step < kIntensityRanks; ++step) {
+    const double weight = static_cast<double>(step) / kIntensityRanks * darker.back();
+    const auto first = std::lower_bound(darker.cbegin(), darker.cend() - 1, weight);
+    const auto level = static_cast<std::size_t>(first - darker.cbegin());
+    edges.push_back(level < levels.size() ? levels[level] : INFINITY);
+  }
+  std::vector<float> ranks(scan.size());
+  for (std::size_t row = 0; row < scan.size(); ++row) {
+    const auto edge = std::upper_bound(edges.cbegin(), edges.cend(), scan.row(row)[3]);
+    ranks[row] = static_cast<float>(edge - edges.cbegin()) / (kIntensityRanks - 1);
+  }
+  return ranks;
+}
+
 // One value per row by the name of a channel; nothing where the scan has no such channel.
 inline std::optional<std::vector<float>> channel_of(const Scan& scan,
                                                     const std::vector<bool>& valid,
                                                     const std::string& name) {
   static const std::vector<std::string> columns = {"x", "y", "z", "intensity"};
+  if (name == "intensity_rank") {
+    if (!has_measured_intensity(scan, valid)) return std::nullopt;
+    return intensity_rank(scan, valid);
+  }
   const auto column = std::find(columns.begin(), columns.end(), name) - columns.begin();
   const bool is_column = column < static_cast<std::ptrdiff_t>(kColumns);
   if (!is_column && name != "range") return std::nullopt;

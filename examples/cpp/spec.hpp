@@ -36,6 +36,7 @@ struct RangeSpec {
 struct Spec {
   std::string network;
   std::size_t neighbours = 0;         // k of the neighbour view, the point itself included
+  bool merged = false;                // whether points that are one return are one point
   std::optional<RangeSpec> range;     // the range view, where the network has that one
   std::vector<std::string> channels;  // what the network sees of a point, in order
   std::vector<float> mean;            // stands in for what a scan lacks, by channel
@@ -99,6 +100,7 @@ inline void read_view(const Json& view, Spec& spec) {
   const std::string kind = member(view, "kind", Json::Kind::text).text;
   if (kind == "neighbours") {
     spec.neighbours = neighbours_of(view);
+    spec.merged = view["merged"].is(Json::Kind::boolean) && view["merged"].number != 0;
   } else if (kind == "range") {
     spec.range = range_spec_of(view);
   } else {

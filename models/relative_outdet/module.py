@@ -9,7 +9,7 @@ Efficient Outlier Detector for 3D LiDAR Point Clouds in Adverse Weather", IEEE I
 convolutions over nearest neighbours.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar
 
 import torch
@@ -25,9 +25,6 @@ from derain.models.supervised import SupervisedModule
 from derain.scan import Scan
 from derain.views.neighbours import NeighbourView
 from derain.views.view import View
-
-# What the view gives it of a point; the network takes from it what does not differ.
-CHANNELS = ("x", "y", "z")
 
 # Share of the training in which the learning rate rises; then it falls to nothing.
 WARM_UP_SHARE = 0.1
@@ -60,6 +57,10 @@ class RelativeOutDet(SupervisedModule):
     """
 
     VIEW: ClassVar[type[View]] = NeighbourView
+    # What the view gives it of a point; the network takes from it what does not differ.
+    CHANNELS: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    # Whether points that are one return, written more than once, are one point.
+    MERGED: ClassVar[bool] = False
     network: RelativeOutDetNetwork
 
     def __init__(
@@ -75,7 +76,7 @@ class RelativeOutDet(SupervisedModule):
         balance: float = 0.0,
         spec: dict[str, Any] | None = None,
     ) -> None:
-        super().__init__(CHANNELS)
+        super().__init__(self.CHANNELS)
         if neighbours <= STEP_NEIGHBOUR:
             remedy = f"Give {STEP_NEIGHBOUR + 1} or more."
             raise InputError("neighbours", f"{neighbours} are too few", remedy)
@@ -85,7 +86,7 @@ class RelativeOutDet(SupervisedModule):
 
     def view_for(self, scans: Sequence[Scan]) -> NeighbourView:
         """The view that the network sees a scan through, whatever the scans."""
-        return NeighbourView(self.hparams["neighbours"], self.channels)
+        return NeighbourView(self.hparams["neighbours"], self.channels, merged=self.MERGED)
 
     def accepts_view(self, view: View) -> bool:
         """Whether the network can take what a Spec's view gives: all points, and its neighbours."""
@@ -93,6 +94,7 @@ class RelativeOutDet(SupervisedModule):
             isinstance(view, NeighbourView)
             and view.neighbours == self.hparams["neighbours"]
             and view.candidates is None
+            and view.merged == self.MERGED
         )
 
     def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
@@ -101,15 +103,18 @@ class RelativeOutDet(SupervisedModule):
 
     def logits_of(self, batch: Batch) -> Tensor:
         """Logits of every cell, float (M, 2), scan by scan: each has a context of its own."""
-        begin, logits = 0, []
+        return torch.cat([self(*scan) for scan in self.scans_of(batch)])
+
+    def scans_of(self, batch: Batch) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
+        """Points, distances and neighbours of each scan of a batch."""
+        begin = 0
         for cells in batch.cells:
             points, distances, neighbours = (
                 batch.inputs[name][begin : begin + cells]
                 for name in ("points", "distances", "neighbours")
             )
-            logits.append(self(points, distances, neighbours - begin))
+            yield points, distances, neighbours - begin
             begin += cells
-        return torch.cat(logits)
 
     def deployed(self) -> RelativeOutDetNetwork:
         """The network as it is exported."""
@@ -117,14 +122,16 @@ class RelativeOutDet(SupervisedModule):
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
         """AdamW with a learning rate that rises and falls once in the whole training."""
-        rate = self.hparams["learning_rate"]
-        optimizer = torch.optim.AdamW(
-            self.parameters(), lr=rate, weight_decay=self.hparams["weight_decay"]
-        )
+        groups = self.parameter_groups()
+        optimizer = torch.optim.AdamW(groups, weight_decay=self.hparams["weight_decay"])
         schedule = torch.optim.lr_scheduler.OneCycleLR(
             optimizer,
-            rate,
+            [group["lr"] for group in groups],
             total_steps=max(int(self.trainer.estimated_stepping_batches), 2),
             pct_start=WARM_UP_SHARE,
         )
         return {"optimizer": optimizer, "lr_scheduler": {"scheduler": schedule, "interval": "step"}}
+
+    def parameter_groups(self) -> list[dict[str, Any]]:
+        """What is trained, and the highest rate that it learns at."""
+        return [{"params": self.parameters(), "lr": self.hparams["learning_rate"]}]

@@ -87,6 +87,18 @@ class RelativeOutDetNetwork(nn.Module):
         Returns:
             Logits of "not rain" and "rain", float (M, 2).
         """
+        rain, far = self.rain_and_range(points, distances, neighbours)
+        return both_logits(rain if self.training else without_carrier(rain, far))
+
+    def rain_and_range(
+        self, points: Tensor, distances: Tensor, neighbours: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """What :meth:`forward` is made of; arguments are the same.
+
+        Returns:
+            Logits of rain, before what is likely of the carrier is taken back, float (M,); and
+            logarithms of the points' ranges over the usual one, float (M,).
+        """
         seen, far = in_steps(points, distances, neighbours)
         around = _active(self.neighbour(seen)).flatten(1)
         features = _active(_of_both(self.neighbourhood, around, far[:, None]))
@@ -94,10 +106,7 @@ class RelativeOutDetNetwork(nn.Module):
             features = features + self._context(features, far)
         heard = functional.embedding(neighbours, _active(self.to_opinion(features))).flatten(1)
         features = features + _active(_of_both(self.opinions, heard, features))
-        rain = self.head(features)[:, 0]
-        if not self.training:
-            rain = _without_carrier(rain, far)
-        return torch.stack([torch.zeros_like(rain), rain], dim=1)
+        return self.head(features)[:, 0], far
 
     def _context(self, features: Tensor, far: Tensor) -> Tensor:
         """What the scan holds at the range of each point, and in all."""
@@ -125,7 +134,12 @@ def _of_both(layer: nn.Linear, first: Tensor, second: Tensor) -> Tensor:
     return of_first + functional.linear(second, layer.weight[:, width:])
 
 
-def _without_carrier(rain: Tensor, far: Tensor) -> Tensor:
+def both_logits(rain: Tensor) -> Tensor:
+    """Logits of "not rain", which are 0, and of "rain", float (M, 2), of the latter, float (M,)."""
+    return torch.stack([torch.zeros_like(rain), rain], dim=1)
+
+
+def without_carrier(rain: Tensor, far: Tensor) -> Tensor:
     """Lowers logits of rain right before the sensor where there is hardly any rain beyond.
 
     It is a rule for scans as they are judged; training leaves it out.

@@ -14,8 +14,10 @@ NEAREST_TO_AXIS = 0.01
 # own beam may be nearer still.
 STEP_NEIGHBOUR = 3
 
-# The step of a scan is the median over so many of its points, evenly spread over its rows.
-SAMPLED_POINTS = 2049
+# The step of a scan is the median over so many of its points, evenly spread over its rows. With
+# 2,049, the answers changed with the order of the rows: one scan of snow, turned by half a degree,
+# went from an IoU of .54 to .67.
+SAMPLED_POINTS = 32769
 
 # Radians; no sensor's beams lie closer together.
 FINEST_ANGLE = 1e-4

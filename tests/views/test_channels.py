@@ -14,6 +14,8 @@ from derain.scan import Scan
 from derain.views.candidates import Bound, Candidates
 from derain.views.channels import (
     DUAL_RETURN,
+    INTENSITY_RANK,
+    INTENSITY_RANKS,
     USUAL_CHANNELS,
     channel_image,
     channel_of,
@@ -140,3 +142,34 @@ def test_candidates_may_be_bounded_by_the_place_of_their_return() -> None:
     scan = Scan.of(Recording(0).xyz)
     candidates = Candidates((Bound(DUAL_RETURN, least=0.0),))
     np.testing.assert_array_equal(candidates.among(scan), ~pair_returns(scan).farther)
+
+
+@given(
+    hnp.arrays(np.uint8, st.integers(100, 300)).filter(lambda column: len(np.unique(column)) > 1),
+    st.sampled_from([1 / 255, 1.0, 257.0]),
+)
+def test_ranks_of_intensity_keep_its_order_in_whatever_unit(
+    column: NDArray[np.uint8], gain: float
+) -> None:
+    xyz = np.ones((len(column), 3), np.float32)
+    rank = channel_of(Scan(xyz, intensity=column.astype(np.float32)), INTENSITY_RANK)
+    scaled = channel_of(Scan(xyz, intensity=(column * gain).astype(np.float32)), INTENSITY_RANK)
+    np.testing.assert_array_equal(rank, scaled)
+    order = np.argsort(column, kind="stable")
+    assert (np.diff(rank[order]) >= 0).all()
+    assert rank[order[0]] == 0
+    steps = rank * (INTENSITY_RANKS - 1)
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-5)
+
+
+def test_ranks_tell_intensities_apart_where_most_points_share_one() -> None:
+    intensity = np.repeat(np.arange(20, dtype=np.float32), [8000] + [100] * 19)
+    scan = Scan(np.ones((len(intensity), 3), np.float32), intensity=intensity)
+    rank = channel_of(scan, INTENSITY_RANK)
+    assert len(np.unique(rank)) > 12
+
+
+def test_without_measured_intensities_there_are_no_ranks() -> None:
+    xyz = np.ones((200, 3), np.float32)
+    assert channel_of(Scan(xyz), INTENSITY_RANK) is None
+    assert channel_of(Scan(xyz, intensity=np.zeros(200, np.float32)), INTENSITY_RANK) is None

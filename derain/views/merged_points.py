@@ -1,0 +1,66 @@
+"""Points that are one return, written more than once: on one ray, as good as equally far.
+
+Sensors with two returns, deskewed scans and merged files write most points nearly twice, fractions
+of a millimetre to centimetres apart. Such copies say nothing about a neighbourhood, as those at
+exactly one position say nothing.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Two points are one return where their ranges differ by no more than this, metres, and their
+# directions by no more than this, radians. LiDARs measure ranges to 1 to 3 cm, and neighbouring
+# rays are at least three times as far apart, in all but the finest sensors.
+# Source: modelling choice.
+RANGE_RESOLUTION = 0.05
+SAME_RAY = 4e-4
+
+
+def merged_points(
+    xyz: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    neighbours: NDArray[np.int64],
+    distances: NDArray[np.float32],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Finds which points of a scan are one return.
+
+    Each is one with the point of the lowest row among those that it is one return with.
+
+    Args:
+        xyz: Distinct positions in the sensor's frame, float32 (M, 3), metres.
+        rows: Their rows in the scan, int64 (M,).
+        neighbours: Of each point itself and its nearest neighbours, int64 (M, k).
+        distances: How far those are, float32 (M, k), metres.
+
+    Returns:
+        Of each return the point of the lowest row, int64 (R,), in the order of the points; and the
+        return that each point is, as a row of the former, int64 (M,).
+    """
+    own, other = _of_one_return(xyz, neighbours, distances)
+    by_row = np.argsort(rows)
+    place = np.empty_like(by_row)
+    place[by_row] = np.arange(len(rows))
+    lowest = place.copy()  # places in the order of rows, so that the least is of the lowest row
+    np.minimum.at(lowest, own, place[other])
+    np.minimum.at(lowest, other, place[own])
+    keeper = by_row[lowest]
+    while (keeper[keeper] != keeper).any():  # what a point is one with may be one with another
+        keeper = keeper[keeper]
+    kept = np.flatnonzero(keeper == np.arange(len(rows)))
+    return kept, np.searchsorted(kept, keeper)
+
+
+def _of_one_return(
+    xyz: NDArray[np.float32], neighbours: NDArray[np.int64], distances: NDArray[np.float32]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of points and neighbours that are one return, each int64 (P,)."""
+    point, place = np.nonzero(distances[:, 1:] <= 2 * RANGE_RESOLUTION)
+    other = neighbours[point, place + 1]
+    one, two = xyz[point].astype(np.float64), xyz[other].astype(np.float64)
+    range_one, range_two = np.linalg.norm(one, axis=1), np.linalg.norm(two, axis=1)
+    aside = np.linalg.norm(np.cross(one, two), axis=1)  # the sine of their angle, by both ranges
+    same = (np.abs(range_one - range_two) <= RANGE_RESOLUTION) & (
+        aside <= SAME_RAY * range_one * range_two
+    )
+    same &= point != other  # the farthest point found fills up where there are few
+    return point[same], other[same]

@@ -1,0 +1,90 @@
+"""Merged points: copies of a return along its ray are one point, all else stays."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.evaluation.hard_cases import hard_cases, scene
+from derain.scan import Scan
+from derain.views.candidates import Bound, Candidates
+from derain.views.merged_points import RANGE_RESOLUTION, SAME_RAY, merged_points
+from derain.views.neighbour_search import NeighbourSearch
+from derain.views.neighbours import NeighbourView
+
+VIEW = NeighbourView(9, ("x", "y", "z"), merged=True)
+
+
+def rays(azimuths: int = 60, inclinations: int = 8) -> NDArray[np.float64]:
+    """Directions of a coarse sensor's rays, float64 (M, 3)."""
+    azimuth = np.linspace(0, 2 * np.pi, azimuths, endpoint=False)
+    azimuth, inclination = np.meshgrid(azimuth, np.radians(np.linspace(-20, 5, inclinations)))
+    level = np.cos(inclination)
+    directions = [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(inclination)]
+    return np.stack(directions, axis=-1).reshape(-1, 3)
+
+
+def merged(xyz: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    points = xyz.astype(np.float32)
+    neighbours, distances = NeighbourSearch(points)(9)
+    return merged_points(points, np.arange(len(points)), neighbours, distances)
+
+
+@given(st.floats(1, 100), st.floats(1e-6, 0.9 * RANGE_RESOLUTION), st.integers(0, 2**32 - 1))
+def test_copies_along_the_ray_are_one_with_what_they_copy(
+    range_: float, behind: float, seed: int
+) -> None:
+    points = range_ * rays()
+    copies = (range_ + behind) * rays()
+    order = np.random.default_rng(seed).permutation(2 * len(points))
+    kept, point = merged(np.concatenate([points, copies])[order])
+    assert len(kept) == len(points)
+    number = order % len(points)
+    np.testing.assert_array_equal(number[kept][point], number)
+    _, lowest = np.unique(number, return_index=True)
+    np.testing.assert_array_equal(kept, np.sort(lowest))
+
+
+@pytest.mark.parametrize("apart", [1.2 * RANGE_RESOLUTION, 0.5])
+def test_a_second_return_farther_behind_stays(apart: float) -> None:
+    kept, point = merged(np.concatenate([10 * rays(), (10 + apart) * rays()]))
+    assert len(kept) == len(point) == 2 * len(rays())
+
+
+def test_neighbouring_rays_stay_apart() -> None:
+    azimuth = np.arange(200) * 2 * SAME_RAY
+    arc = 5 * np.stack([np.cos(azimuth), np.sin(azimuth), np.zeros(200)], axis=1)
+    assert len(merged(arc)[0]) == 200
+
+
+def test_a_view_gives_every_row_the_score_of_its_return() -> None:
+    points = scene(2000)
+    xyz = points[:, :3].astype(np.float64)
+    behind = xyz * (1 + 0.004 / np.linalg.norm(xyz, axis=1, keepdims=True))
+    once = VIEW(Scan.of(points))
+    twice = VIEW(Scan.of(np.concatenate([xyz, behind]).astype(np.float32)))
+    assert twice.size <= once.size
+    score = np.arange(twice.size, dtype=np.float32)
+    first, second = twice.back(score).reshape(2, -1)
+    np.testing.assert_array_equal(first, second)
+
+
+def test_without_copies_it_is_the_view_that_merges_nothing() -> None:
+    scan = Scan.of((7 * rays()).astype(np.float32))
+    own, other = VIEW(scan), NeighbourView(9, ("x", "y", "z"))(scan)
+    for name, array in own.inputs().items():
+        np.testing.assert_array_equal(array, other.inputs()[name])
+
+
+@pytest.mark.parametrize(("name", "scan"), list(hard_cases(2000)))
+def test_hard_scans_are_viewed(name: str, scan: Scan) -> None:
+    seen = VIEW(scan)
+    assert (seen.judged == scan.valid).all()
+    assert all(np.isfinite(array).all() for array in seen.inputs().values())
+
+
+def test_candidates_are_refused() -> None:
+    with pytest.raises(InputError, match="cannot leave points out"):
+        VIEW.with_candidates(Candidates((Bound("range", most=10.0),)))
