@@ -11,6 +11,7 @@ from derain.files import DEFAULT_COLUMNS
 from derain.recordings.posed import ODOMETRY
 from derain.sources.source import Source
 from derain.workflows.configurations import packaged_configs
+from derain.views.channels import INTENSITY_RANK
 from derain.workflows.start import checkpoint_of
 
 PERSISTENCE = "persistence"
@@ -120,7 +121,7 @@ def with_network(config: LearnConfig) -> LearnConfig:
             f"{config.start} is of {spec.network}, from which {config.model} cannot start",
             f"Leave --model out, or give a start of {config.model}.",
         )
-    sees_intensity = "intensity" in spec.channels
+    sees_intensity = bool({"intensity", INTENSITY_RANK} & set(spec.channels))
     if config.blind and sees_intensity:
         raise InputError(
             "--blind",
@@ -134,8 +135,10 @@ def without_intensity(config: LearnConfig) -> LearnConfig:
     """The same configuration for a recording without intensities.
 
     Raises:
-        InputError: A start that sees intensity.
+        InputError: A start that sees intensity, other than by ranks, which may all be alike.
     """
+    if config.model == "cued_outdet":
+        return config
     if config.start is not None:
         raise InputError(
             config.recordings[0],

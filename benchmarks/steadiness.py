@@ -1,0 +1,120 @@
+"""What methods make of one scan of snow after what users do to scans, and of doubled clean ones.
+
+    python -m benchmarks.steadiness --shared ../shared --methods default old.onnx crf
+
+IoU of the changed WADS sample, in which labels go with their points; and the share that is taken of
+a clean scan of KITTI whose every point has a copy behind it on its ray.
+"""
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.cards.card import load_card
+from derain.evaluation.text_tables import markdown_table
+from derain.export.methods import load_method
+from derain.files import read_scan
+from derain.files.labels import label_beside, read_labels, semantic
+from derain.scan import Scan
+
+SNOW = Path("data/wads/sample.bin")
+CLEAN = Path("data/clean/kitti_hdl64.bin")
+
+FOOT = 0.3048
+COPIES_BEHIND = (0.001, 0.002, 0.004, 0.02)  # metres
+JITTERS = (1e-6, 1e-3, 2e-2)  # metres
+
+
+def main() -> None:
+    """Prints the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--shared", type=Path, required=True, help="folder of the real scans")
+    parser.add_argument("--methods", nargs="+", required=True, help="models and filters")
+    arguments = parser.parse_args()
+    methods = {name: load_method(name, {}) for name in arguments.methods}
+    card, path = load_card("wads"), arguments.shared / SNOW
+    snow = read_scan(path)
+    snow = snow.with_label(semantic(read_labels(label_beside(path), len(snow))))
+    rows = []
+    for name, scan in changed(snow):
+        rain = card.rain_of(scan)
+        ious = [iou(method.push(scan).rain, rain) for method in methods.values()]
+        rows.append([name, *(f"{value:.3f}" for value in ious)])
+    for name, scan in doubled(read_scan(arguments.shared / CLEAN)):
+        taken = [100 * method.push(scan).rain.mean() for method in methods.values()]
+        rows.append([name, *(f"{value:.3f} %" for value in taken)])
+    print(markdown_table(["scan", *methods], rows))
+
+
+def iou(called: NDArray[np.bool_], rain: NDArray[np.bool_]) -> float:
+    """Intersection over union of what is called rain, bool (N,), and what is."""
+    return float((called & rain).sum() / max((called | rain).sum(), 1))
+
+
+def changed(scan: Scan) -> Iterator[tuple[str, Scan]]:
+    """The scan after what users do to it, each change with its name.
+
+    Args:
+        scan: A labelled scan.
+    """
+    generator = np.random.default_rng(0)
+    xyz = scan.xyz
+    yield "unchanged", scan
+    for degrees in (0.5, 1.3, 45, 90, 200):
+        yield f"turned by {degrees:g}°", replace(scan, xyz=_turned(xyz, np.radians(degrees)))
+    yield "mirrored", replace(scan, xyz=xyz * np.float32([1, -1, 1]))
+    yield "rows shuffled", scan.take(generator.permutation(len(scan)))
+    yield "every second row missing", scan.take(np.arange(0, len(scan), 2))
+    yield "three of four rows missing", scan.take(np.arange(0, len(scan), 4))
+    for spread in (0.02, 0.05):
+        across = _across(xyz, generator.normal(0, spread, (2, len(scan))))
+        yield f"noise of {100 * spread:g} cm across the ray", replace(scan, xyz=across)
+    along = _behind(xyz, generator.normal(0, 0.02, len(scan)))
+    yield "noise of 2 cm along the ray", replace(scan, xyz=along)
+    yield "3 m aside of the sensor", replace(scan, xyz=xyz + np.float32([3, 0, 0]))
+    yield "1 m above the sensor", replace(scan, xyz=xyz + np.float32([0, 0, 1]))
+    yield "y > 0 alone", scan.take(xyz[:, 1] > 0)
+    yield "in feet", replace(scan, xyz=(xyz / np.float32(FOOT)).astype(np.float32))
+    for jitter in JITTERS:
+        copy = replace(scan, xyz=_behind(xyz, generator.normal(0, jitter, len(scan))))
+        rows = np.arange(2 * len(scan)) % len(scan)
+        twice = replace(scan.take(rows), xyz=np.concatenate([xyz, copy.xyz]))
+        yield f"doubled, ranges {1e3 * jitter:g} mm apart", twice
+
+
+def doubled(scan: Scan) -> Iterator[tuple[str, Scan]]:
+    """A clean scan whose every point has a copy behind it."""
+    yield "clean KITTI, unchanged", scan
+    rows = np.arange(2 * len(scan)) % len(scan)
+    for behind in COPIES_BEHIND:
+        xyz = np.concatenate([scan.xyz, _behind(scan.xyz, np.full(len(scan), behind))])
+        yield f"clean KITTI, doubled at {1e3 * behind:g} mm", replace(scan.take(rows), xyz=xyz)
+
+
+def _turned(xyz: NDArray[np.float32], angle: float) -> NDArray[np.float32]:
+    sine, cosine = np.sin(angle), np.cos(angle)
+    turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    return (xyz @ turn).astype(np.float32)
+
+
+def _behind(xyz: NDArray[np.float32], metres: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Points moved along their rays, float32 (N, 3)."""
+    ray = xyz / np.linalg.norm(xyz, axis=1, keepdims=True)
+    return (xyz + ray * metres[:, None]).astype(np.float32)
+
+
+def _across(xyz: NDArray[np.float32], metres: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Points moved aside and up, across their rays, float32 (N, 3)."""
+    ray = xyz / np.linalg.norm(xyz, axis=1, keepdims=True)
+    aside = np.cross([0, 0, 1], ray)
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    up = np.cross(ray, aside)
+    return (xyz + aside * metres[0][:, None] + up * metres[1][:, None]).astype(np.float32)
+
+
+if __name__ == "__main__":
+    main()
