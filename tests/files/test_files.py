@@ -12,7 +12,7 @@ import pytest
 from derain import InputError, Scan, ScanWarning
 from derain.files import DEFAULT_COLUMNS, find_scans, read_scan, write_scan
 from derain.files.format import FORMATS
-from derain.files.formats.pcd.header import PcdHeader
+from derain.files.formats.pcd import PcdHeader
 from derain.files.formats.ply import PlyHeader
 
 RADAR = (

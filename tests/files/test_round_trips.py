@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from derain import Scan
 from derain.files import DEFAULT_COLUMNS, read_scan, write_scan
 from derain.files.columns import scan_of
-from derain.files.formats.pcd.header import ENCODINGS, VALUE_TYPES, PcdHeader
+from derain.files.formats.pcd import ENCODINGS, VALUE_TYPES, PcdHeader
 from derain.files.formats.ply import PlyHeader
 from derain.files.formats.ply.header import BYTE_ORDERS
 

@@ -13,7 +13,7 @@ import pytest
 
 from derain import InputError, Scan
 from derain.files import read_scan, write_scan
-from derain.files.formats.pcd.header import ENCODINGS, PcdHeader
+from derain.files.formats.pcd import ENCODINGS, PcdHeader
 
 HEADER = """\
 # .PCD v.7 - Point Cloud Data file format
