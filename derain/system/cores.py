@@ -13,6 +13,11 @@ from derain.errors import InputError
 MEMBERSHIP = Path("/proc/self/cgroup")
 GROUPS = Path("/sys/fs/cgroup")
 
+# Files of a group, by version, that state its quota and its period: how many microseconds of
+# processor time in how many; no limit is -1 in version 1, and ``max`` in version 2.
+# Source: Linux, Documentation/scheduler/sched-bwc.rst; Documentation/admin-guide/cgroup-v2.rst.
+QUOTA_FILES = (("cpu.cfs_quota_us", "cpu.cfs_period_us"), ("cpu.max",))
+
 # How OpenMP's threads wait, which it reads once, when it is loaded.
 # Source: OpenMP 5.2, 21.7, OMP_WAIT_POLICY.
 WAIT_POLICY = "OMP_WAIT_POLICY"
@@ -69,9 +74,10 @@ def _allowed_cores() -> int:
 def _quotas(membership: Path, groups: Path) -> Iterator[int]:
     """Cores that each group's quota keeps busy; a missing or malformed file sets none."""
     for group in _groups(membership, groups):
-        for read in (_version_1, _version_2):
-            with suppress(OSError, ValueError):
-                quota, period = read(group)
+        for files in QUOTA_FILES:
+            with suppress(OSError, ValueError):  # ValueError: no limit, ``max``, is no number
+                words = " ".join((group / file).read_text("utf-8") for file in files).split()
+                quota, period = map(int, words)
                 if quota > 0 and period > 0:
                     yield -(-quota // period)
 
@@ -89,21 +95,3 @@ def _groups(membership: Path, groups: Path) -> Iterator[Path]:
                 own = PurePosixPath(path.lstrip("/"))
                 for group in (own, *own.parents):
                     yield groups / controllers / group
-
-
-def _version_1(group: Path) -> tuple[int, int]:
-    """Quota and period: how many microseconds of processor time in how many; -1 for no limit.
-
-    Source: Linux, Documentation/scheduler/sched-bwc.rst.
-    """
-    quota = int((group / "cpu.cfs_quota_us").read_text("utf-8"))
-    return quota, int((group / "cpu.cfs_period_us").read_text("utf-8"))
-
-
-def _version_2(group: Path) -> tuple[int, int]:
-    """The same in version 2, where no limit is ``max``: that is no number and raises ValueError.
-
-    Source: Linux, Documentation/admin-guide/cgroup-v2.rst, cpu.max.
-    """
-    quota, period = (group / "cpu.max").read_text("utf-8").split()
-    return int(quota), int(period)
