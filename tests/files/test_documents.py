@@ -24,13 +24,14 @@ BAD_YAML = {
     "sixties": ":".join(["1"] * 200) + ".0",
     "digits": "9" * 5000,
     "control": "a: \x07",
+    "no text": "\xff\xfe\x00",
 }
 
 
 @pytest.mark.parametrize("name", BAD_YAML)
 def test_bad_yaml_is_one_short_line(name: str, tmp_path: Path) -> None:
     path = tmp_path / "document.yaml"
-    path.write_text(BAD_YAML[name])
+    path.write_bytes(BAD_YAML[name].encode("latin-1"))
     with pytest.raises(InputError) as caught:
         Entry.of_yaml(path)
     assert str(path) in str(caught.value)

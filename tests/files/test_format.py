@@ -112,25 +112,6 @@ def test_an_installed_format_is_known_to_the_commands(
     assert "  .pts                    points under a line with their number\n" in told
 
 
-def test_a_format_that_cannot_be_imported_is_named(
-    file: Path, installed: Path, tmp_path: Path
-) -> None:
-    (installed / "points_format.py").write_text("import a_module_that_is_not_there\n")
-    run = derain(*RUN, file.parent, "--out", tmp_path / "out", path=installed)
-    assert run.returncode == 2
-    assert "derain.formats: points: points_format cannot be imported" in run.stderr
-    assert "holds no scans" in run.stderr
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_suffix_is_taken_once() -> None:
-    with pytest.raises(InputError, match=r"derain\.formats: \.pcd: is the name of two"):
-
-        @FORMATS.add(".pcd")
-        class Another(FORMATS[".ply"]):
-            """Another format of this suffix."""
-
-
 def test_help_says_which_files_do_not_name_their_columns(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

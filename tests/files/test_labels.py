@@ -48,11 +48,6 @@ def test_labels_of_another_length_are_refused_with_both_numbers(
         read_labels(path, points=3)
 
 
-def test_a_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
-        read_labels(tmp_path / "scan.label", points=3)
-
-
 @pytest.mark.parametrize("label", [-1, 65536])
 def test_an_id_that_needs_more_than_16_bits_is_not_written(tmp_path: Path, label: int) -> None:
     ids = np.array([0, label])

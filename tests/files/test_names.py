@@ -7,13 +7,10 @@ import numpy as np
 import pytest
 
 from derain import InputError, Scan
-from derain.evaluation.contents import count_frame
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
-from derain.files.frame_times import read_frame_times
 from derain.files.labels import label_beside
 from derain.files.names import beside, scan_stem, scan_suffix
-from derain.sources.folders import frame_of
 
 
 @pytest.mark.parametrize(
@@ -34,21 +31,11 @@ def test_stem_and_suffix_leave_the_compression_out(name: str, stem: str, suffix:
     assert beside(path, ".label") == Path("folder") / f"{stem}.label"
 
 
-def test_labels_and_times_of_a_compressed_scan_are_found(tmp_path: Path) -> None:
-    (tmp_path / "metadata.csv").write_text("frame,timestamp\n12,0.5\n000013.bin.gz,0.7\n")
-    scans = [tmp_path / "000012.bin.gz", tmp_path / "000013.bin"]
-    assert read_frame_times(scans).tolist() == [0.5, 0.7]
-    for scan in scans:
+def test_labels_of_a_compressed_scan_are_found(tmp_path: Path) -> None:
+    for scan in (tmp_path / "000012.bin.gz", tmp_path / "000013.bin"):
         assert label_beside(scan).parent.name == "labels"
         (tmp_path / f"{scan.name[:6]}.label").touch()
         assert label_beside(scan) == tmp_path / f"{scan.name[:6]}.label"
-
-
-def test_points_of_a_compressed_scan_are_counted_by_class(tmp_path: Path) -> None:
-    write_scan(tmp_path / "scan.bin.gz", Scan(np.ones((3, 3), np.float32), np.ones(3, np.float32)))
-    np.array([1, 0, 1], "<u4").tofile(tmp_path / "scan.label")
-    tally = count_frame(frame_of(tmp_path / "scan.bin.gz"))
-    assert (tally.points, dict(tally.labelled)) == (3, {0: 1, 1: 2})
 
 
 def test_a_compressed_scan_is_cleaned_into_a_compressed_scan(run_derain, tmp_path: Path) -> None:
@@ -68,14 +55,6 @@ def test_a_compressed_scan_is_cleaned_into_a_compressed_scan(run_derain, tmp_pat
     cleaned = (out / "plain.bin").read_bytes()
     assert 0 < len(cleaned) < points.nbytes
     assert gzip.decompress((out / "scan.bin.gz").read_bytes()) == cleaned
-
-
-def test_two_scans_whose_labels_would_have_one_name_are_refused(run_derain, tmp_path: Path) -> None:
-    for name in ("scan.bin", "scan.bin.gz"):
-        write_scan(tmp_path / name, Scan(np.ones((3, 3), np.float32)))
-    outcome = run_derain("run", "ror", tmp_path, "--out", tmp_path / "out")
-    assert outcome.code == 2
-    assert "another scan has the same name" in outcome.err
 
 
 @pytest.mark.parametrize("suffix", [".bin", ".npy", ".npz", ".pcd", ".ply", ".csv", ".txt"])

@@ -2,7 +2,6 @@
 
 import math
 import struct
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -53,6 +52,13 @@ def column_by_column() -> bytes:
     return b"".join(struct.pack(f"<2{kind}", *values) for kind, values in columns)
 
 
+ENCODED = {
+    "binary": DATA,
+    "ascii": b"1.5 -2 .25 7\nnan inf -0 65535\n",
+    "binary_compressed": compress(column_by_column()),
+}
+
+
 def check_points(scan: Scan) -> None:
     expected = np.array([point[:3] for point in POINTS], np.float32)
     np.testing.assert_array_equal(scan.xyz, expected, strict=True)
@@ -62,12 +68,7 @@ def check_points(scan: Scan) -> None:
 
 @pytest.mark.parametrize(
     ("encoding", "data"),
-    [
-        ("binary", DATA),
-        ("ascii", b"1.5 -2 .25 7\nnan inf -0 65535\n"),
-        ("ascii", b"  1.5\t-2e0 +0.25 7\r\n\r\nNaN Infinity -0.0 65535"),
-        ("binary_compressed", compress(column_by_column())),
-    ],
+    [*ENCODED.items(), ("ascii", b"  1.5\t-2e0 +0.25 7\r\n\r\nNaN Infinity -0.0 65535")],
 )
 def test_every_encoding_is_read(file: Path, encoding: str, data: bytes) -> None:
     check_points(read_scan(write(file, HEADER.replace("DATA binary", f"DATA {encoding}"), data)))
@@ -107,16 +108,6 @@ def test_padding_is_passed_over_in_every_encoding(file: Path) -> None:
         scan = read_scan(write(file, header.replace("DATA binary", f"DATA {encoding}"), data))
         check_points(scan)
         assert list(scan.fields) == ["x", "y", "z", "intensity"]
-
-
-@pytest.mark.parametrize("encoding", ENCODINGS)
-def test_columns_of_several_values_stay_together(
-    copied: Callable[[Scan, str, object], Scan], scan: Scan, encoding: str
-) -> None:
-    histogram = np.arange(15, dtype=np.int16).reshape(5, 3)
-    wide = replace(scan, fields={**scan.fields, "histogram": histogram})
-    copy = copied(wide, ".pcd", PcdHeader((), 0, 0, 0, encoding))
-    np.testing.assert_array_equal(copy.fields["histogram"], histogram, strict=True)
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
@@ -169,12 +160,10 @@ def test_what_open3d_writes_is_read(
         cloud.point[name] = columns[name][:, None]
     open3d.t.io.write_point_cloud(str(file), cloud, ascii_data, compressed)
     copy = read_scan(file)
-    exact = not ascii_data  # Open3D writes ten decimals
-    np.testing.assert_allclose(copy.xyz, scan.xyz, rtol=0 if exact else 1e-6)
+    tolerances = (1e-6, 1e-9) if ascii_data else (0, 0)  # Open3D writes ten decimals
+    np.testing.assert_allclose(copy.xyz, scan.xyz, *tolerances)
     for name in columns.keys() - set("xyz"):
-        np.testing.assert_allclose(
-            copy.fields[name], columns[name], rtol=0 if exact else 1e-6, atol=0 if exact else 1e-9
-        )
+        np.testing.assert_allclose(copy.fields[name], columns[name], *tolerances)
 
 
 @pytest.mark.parametrize(
@@ -191,11 +180,7 @@ def test_a_wrong_number_of_points_is_overruled_by_the_data(
     file: Path, stated: str, shape: tuple[int, int] | None
 ) -> None:
     header = HEADER.replace("HEIGHT 1\n", "").replace("POINTS 2\n", "").replace("WIDTH 2", stated)
-    for encoding, data in (
-        ("binary", DATA),
-        ("ascii", b"1.5 -2 .25 7\nnan inf -0 65535\n"),
-        ("binary_compressed", compress(column_by_column())),
-    ):
+    for encoding, data in ENCODED.items():
         scan = read_scan(write(file, header.replace("DATA binary", f"DATA {encoding}"), data))
         check_points(scan)
         assert scan.shape == shape
@@ -262,12 +247,6 @@ def test_headers_that_make_no_sense_are_refused(file: Path, old: str, new: str) 
         read_scan(write(file, HEADER.replace(old, new), DATA))
 
 
-def test_a_count_beyond_all_memory_is_refused(file: Path) -> None:
-    header = HEADER.replace("COUNT 1", "COUNT 99999999999999999999")
-    with pytest.raises(InputError, match=r"cannot be read as \.pcd"):
-        read_scan(write(file, header, DATA))
-
-
 def test_a_cloud_without_coordinates_is_refused(file: Path) -> None:
     with pytest.raises(InputError, match=r"no x, y and z among its columns \(x, y, depth, "):
         read_scan(write(file, HEADER.replace("x y z", "x y depth"), DATA))
@@ -278,16 +257,6 @@ def test_files_that_are_no_pcd_are_refused(file: Path, content: bytes) -> None:
     file.write_bytes(content)
     with pytest.raises(InputError, match="the header has no DATA line"):
         read_scan(file)
-
-
-@pytest.mark.parametrize("encoding", ENCODINGS)
-def test_a_cloud_of_no_points_comes_back(file: Path, scan: Scan, encoding: str) -> None:
-    write_scan(file, replace(scan.take(np.array([], int)), header=PcdHeader((), 0, 0, 0, encoding)))
-    copy = read_scan(file)
-    assert len(copy) == 0
-    assert {name: column.dtype for name, column in copy.fields.items()} == {
-        name: column.dtype for name, column in scan.fields.items()
-    }
 
 
 @pytest.mark.parametrize(

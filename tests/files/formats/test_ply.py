@@ -116,14 +116,6 @@ def test_what_open3d_writes_is_read(file: Path, scan: Scan, ascii_data: bool, op
     np.testing.assert_array_equal(copy.intensity, scan.intensity)
 
 
-@pytest.mark.parametrize("encoding", BYTE_ORDERS)
-def test_a_cloud_of_no_points_comes_back(file: Path, scan: Scan, encoding: str) -> None:
-    write_scan(file, replace(scan.take(np.array([], int)), header=PlyHeader(encoding)))
-    copy = read_scan(file)
-    assert len(copy) == 0
-    assert list(copy.fields) == list(scan.fields)
-
-
 @pytest.mark.parametrize(
     ("header", "data"),
     [
