@@ -29,23 +29,6 @@ def test_a_pose_turns_about_fixed_axes_and_then_moves(pose: tuple[float, ...]) -
     np.testing.assert_allclose(moved, expected, atol=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("turn", "ahead"),
-    [
-        ({"yaw": 90}, (0, 1, 0)),
-        ({"pitch": 90}, (0, 0, -1)),
-        ({"roll": 90}, (1, 0, 0)),
-        ({"roll": 90, "yaw": 90}, (0, 1, 0)),
-    ],
-    ids=str,
-)
-def test_yaw_looks_left_and_pitch_looks_down(
-    turn: dict[str, float], ahead: tuple[float, ...]
-) -> None:
-    extrinsics = Extrinsics.of_pose(**{**dict.fromkeys(POSE, 0.0), **turn})
-    np.testing.assert_allclose(extrinsics(np.array([[1, 0, 0]], "f4")), [ahead], atol=1e-7)
-
-
 @given(poses)
 def test_the_inverse_leads_back(pose: tuple[float, ...]) -> None:
     extrinsics = Extrinsics.of_pose(*pose)

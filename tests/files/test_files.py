@@ -88,11 +88,12 @@ def test_intensity_is_found_under_its_many_names(tmp_path: Path, name: str) -> N
     ],
 )
 def test_the_numbers_of_a_scan_can_be_changed_without_changing_its_columns(
-    copied: Callable[[Scan, str, object], Scan], suffix: str, header: object
+    tmp_path: Path, suffix: str, header: object
 ) -> None:
-    ones = np.ones((3, 3), np.float32)
+    ones, path = np.ones((3, 3), np.float32), tmp_path / f"scan{suffix}"
     for fields in ({}, {"xyz": ones, "intensity": ones[:, 0].copy()}):
-        scan = copied(Scan(ones, ones[:, 0], fields=fields), suffix, header)
+        write_scan(path, Scan(ones, ones[:, 0], fields=fields, header=header))
+        scan = read_scan(path)
         assert scan.intensity is not None
         scan.xyz[:] = 7
         scan.intensity[:] = 7

@@ -1,5 +1,6 @@
 """Label files: class in the low half, instance in the high half."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -38,12 +39,15 @@ def test_a_mask_is_written_as_classes_0_and_1(tmp_path: Path) -> None:
     assert read_labels(path, 3).tolist() == [1, 0, 1]
 
 
-@pytest.mark.parametrize(("size", "found"), [(8, "2"), (16, "4"), (13, "3.25"), (0, "0")])
-def test_labels_of_another_length_are_refused_with_both_numbers(
+@pytest.mark.parametrize(
+    ("size", "found"), [(8, "2"), (16, "4"), (13, "3.25"), (0, "0"), (2**42, r"1\.09951e\+12")]
+)
+def test_labels_of_another_length_are_refused_unread_with_both_numbers(
     tmp_path: Path, size: int, found: str
 ) -> None:
     path = tmp_path / "scan.label"
-    path.write_bytes(bytes(size))
+    path.touch()
+    os.truncate(path, size)
     with pytest.raises(InputError, match=rf"holds {found} labels .* for a scan of 3 points"):
         read_labels(path, points=3)
 

@@ -38,25 +38,6 @@ def test_labels_of_a_compressed_scan_are_found(tmp_path: Path) -> None:
         assert label_beside(scan) == tmp_path / f"{scan.name[:6]}.label"
 
 
-def test_a_compressed_scan_is_cleaned_into_a_compressed_scan(run_derain, tmp_path: Path) -> None:
-    points = scene(300)
-    points[:200, :3] *= 0.01  # near one another, so that the filter keeps them
-    (tmp_path / "scan.bin.gz").write_bytes(gzip.compress(points.tobytes()))
-    points.tofile(tmp_path / "plain.bin")
-    out = tmp_path / "out"
-    outcome = run_derain(
-        *("run", "ror", tmp_path / "scan.bin.gz", tmp_path / "plain.bin", "--out", out)
-    )
-    assert outcome.code == 0
-    assert {path.name for path in out.iterdir()} == {
-        *("scan.bin.gz", "scan.label", "plain.bin", "plain.label")
-    }
-    assert (out / "scan.label").read_bytes() == (out / "plain.label").read_bytes()
-    cleaned = (out / "plain.bin").read_bytes()
-    assert 0 < len(cleaned) < points.nbytes
-    assert gzip.decompress((out / "scan.bin.gz").read_bytes()) == cleaned
-
-
 @pytest.mark.parametrize("suffix", [".bin", ".npy", ".npz", ".pcd", ".ply", ".csv", ".txt"])
 def test_every_format_is_compressed_into_the_same_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str

@@ -191,30 +191,35 @@ def test_a_line_feed_behind_the_data_is_passed_over(file: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("header", "data"),
+    ("encoding", "data"),
     [
-        (HEADER, DATA[:-1]),
-        (HEADER, DATA[:14]),
-        (HEADER, DATA + b"garbage"[:5] * 3),
-        (HEADER.replace("POINTS 2", "POINTS 9"), DATA * 3),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n"),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3\n"),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3 4 5\n"),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 three 4\n"),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3 65536\n"),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3 4 # 5\n"),
-        (HEADER.replace("binary", "binary_compressed"), b""),
-        (HEADER.replace("binary", "binary_compressed"), compress(column_by_column())[:-3]),
-        (HEADER.replace("binary", "binary_compressed"), compress(column_by_column()[:-2])),
-        (HEADER.replace("binary", "binary_compressed"), struct.pack("<II", 9, 28) + b"\xff" * 9),
-        (HEADER.replace("binary", "binary_compressed"), struct.pack("<II", 2, 28) + b"\0A"),
+        *(("binary", data) for data in (DATA[:-1], DATA[:14], DATA + b"garba" * 3)),
+        *(
+            ("ascii", b"1 2 3 4\n" + line)
+            for line in (
+                b"",
+                b"1 2 3",
+                b"1 2 3 4 5",
+                b"1 2 three 4",
+                b"1 2 3 65536",
+                b"1 2 3 4 # 5",
+            )
+        ),
+        ("binary_compressed", b""),
+        ("binary_compressed", compress(column_by_column())[:-3]),
+        ("binary_compressed", compress(column_by_column()[:-2])),
+        ("binary_compressed", struct.pack("<II", 9, 28) + b"\xff" * 9),
+        ("binary_compressed", struct.pack("<II", 2, 28) + b"\0A"),
     ],
 )
 def test_data_that_do_not_match_the_header_are_refused(
-    file: Path, header: str, data: bytes
+    file: Path, encoding: str, data: bytes
 ) -> None:
+    header = HEADER.replace("DATA binary", f"DATA {encoding}")
     with pytest.raises(InputError, match=r"scan\.pcd: cannot be read as \.pcd \(.*write it again"):
         read_scan(write(file, header, data))
+    with pytest.raises(InputError, match="points where the header states 99"):
+        read_scan(write(file, HEADER.replace("POINTS 2", "POINTS 99"), DATA * 3))
 
 
 @pytest.mark.parametrize(
