@@ -92,17 +92,13 @@ def test_what_is_no_number_of_threads_is_refused(threads: Any) -> None:
         threads_of(threads)
 
 
-def test_what_is_imported_inside_is_told_to_sleep_and_nothing_else(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(("user", "inside"), [(None, "passive"), ("active", "active")])
+def test_what_is_imported_inside_is_told_to_sleep_unless_the_user_has_said_otherwise(
+    monkeypatch: pytest.MonkeyPatch, user: str | None, inside: str
 ) -> None:
     monkeypatch.delenv(WAIT_POLICY, raising=False)
-    with pytest.raises(ModuleNotFoundError, match="passive"), sleeping_threads():
+    if user is not None:
+        monkeypatch.setenv(WAIT_POLICY, user)
+    with pytest.raises(ModuleNotFoundError, match=inside), sleeping_threads():
         raise ModuleNotFoundError(os.environ[WAIT_POLICY])
-    assert WAIT_POLICY not in os.environ
-
-
-def test_what_the_user_has_said_holds(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(WAIT_POLICY, "active")
-    with sleeping_threads():
-        assert os.environ[WAIT_POLICY] == "active"
-    assert os.environ[WAIT_POLICY] == "active"
+    assert os.environ.get(WAIT_POLICY) == user

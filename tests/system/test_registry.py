@@ -45,15 +45,20 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
 @pytest.fixture
 def things(write: Write) -> Registry[type]:
     """The registry of a package of two files, whose names are not in the order of their members."""
+    write("things/first.py", member("pebble", "Pebble"))
+    write("things/second.py", member("brick", "Brick"))
+    return registry(write, "'things'")
+
+
+def registry(write: Write, arguments: str) -> Registry[type]:
+    """The registry of a package, made with these arguments."""
     write("things/__init__.py")
     write(
         "things/registry.py",
-        "from derain.system.registry import Registry\nITEMS = Registry('things')",
+        f"from derain.system.registry import Registry\nITEMS = Registry({arguments})",
     )
-    write("things/first.py", member("pebble", "Pebble"))
-    write("things/second.py", member("brick", "Brick"))
-    registry: Registry[type] = importlib.import_module("things.registry").ITEMS
-    return registry
+    made: Registry[type] = importlib.import_module("things.registry").ITEMS
+    return made
 
 
 def member(name: str, title: str, package: str = "things") -> str:
@@ -80,34 +85,16 @@ def test_what_there_is_comes_in_alphabetical_order_whatever_was_imported_first(
     assert len(things) == 2
 
 
-def test_files_are_imported_when_somebody_asks_and_not_before(things: Registry[type]) -> None:
-    assert loaded() == {"things.registry"}
-    assert "brick" in things
-    assert loaded() == {"things.registry", "things.first", "things.second"}
-
-
-def test_other_packages_are_imported_where_derain_does_not_have_the_name(
+def test_modules_are_imported_when_somebody_asks_and_other_packages_last(
     things: Registry[type], write: Write
 ) -> None:
     write("foreign_cobble.py", member("cobble", "Cobble"))
     installed(write, "foreign_cobble", anything="foreign_cobble")
+    assert loaded() == {"things.registry"}
     assert "brick" in things
-    assert "foreign_cobble" not in loaded()
+    assert loaded() == {"things.registry", "things.first", "things.second"}
     assert things["cobble"].__module__ == "foreign_cobble"
     assert list(things) == ["brick", "cobble", "pebble"]
-
-
-def test_a_list_asks_other_packages_as_well(things: Registry[type], write: Write) -> None:
-    write("foreign_cobble.py", member("cobble", "Cobble"))
-    installed(write, "foreign_cobble", anything="foreign_cobble")
-    assert list(things) == ["brick", "cobble", "pebble"]
-
-
-def test_what_nobody_brings_is_not_there(things: Registry[type]) -> None:
-    assert "boulder" not in things
-    assert things.get("boulder") is None
-    with pytest.raises(KeyError):
-        things["boulder"]
 
 
 @pytest.mark.parametrize(
@@ -147,6 +134,8 @@ def test_a_package_that_fails_half_way_brings_nothing(things: Registry[type], wr
     installed(write, "foreign_bad", bad="foreign_bad")
     assert list(things) == ["brick", "pebble"]
     assert "cobble" not in things
+    with pytest.raises(KeyError):
+        things["cobble"]
 
 
 def test_a_file_of_the_package_that_cannot_be_imported_is_an_error_every_time(
@@ -240,13 +229,8 @@ def test_a_module_may_ask_what_there_is_while_it_is_imported(
 
 
 def test_entry_points_may_be_of_another_name_than_the_package(write: Write) -> None:
-    write("things/__init__.py")
-    write(
-        "things/registry.py",
-        "from derain.system.registry import Registry\nITEMS = Registry('things', 'things of all')",
-    )
-    registry: Registry[type] = importlib.import_module("things.registry").ITEMS
+    items = registry(write, "'things', 'things of all'")
     write("foreign_cobble.py", member("cobble", "Cobble"))
     installed(write, "foreign_cobble", cobble="foreign_cobble")
-    assert list(registry) == []
+    assert list(items) == []
     assert "foreign_cobble" not in loaded()
