@@ -6,7 +6,6 @@ Source: Apache Arrow, "Arrow Columnar Format", version 1.5, section on IPC.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -79,8 +78,11 @@ class Feather(Format):
             content.budget.reserve(table.nbytes)
             if len(set(table.column_names)) < table.num_columns:
                 raise ValueError("two columns have one name")
-            numbers = [name for name in table.column_names if _has_numbers(arrow, table[name])]
-            fields = {name: table[name].to_numpy() for name in numbers}
+            fields = {
+                name: column.to_numpy()
+                for name, column in zip(table.column_names, table.columns, strict=True)
+                if arrow.types.is_integer(column.type) or arrow.types.is_floating(column.type)
+            }
         return scan_of(content.path, fields, header=FeatherHeader(table, compression))
 
     def encode(self, path: Path, scan: Scan) -> bytes:
@@ -111,8 +113,3 @@ class Feather(Format):
         sink = arrow.BufferOutputStream()
         feather.write_feather(table, sink, header.compression if header else "lz4")
         return bytes(sink.getvalue())
-
-
-def _has_numbers(arrow: ModuleType, column: Any) -> bool:
-    kinds = arrow.types
-    return bool(kinds.is_integer(column.type) or kinds.is_floating(column.type))

@@ -106,9 +106,8 @@ class Las(Format):
         if not isinstance(scan.header, LasHeader):
             raise _refused(path)
         header, origin = scan.header.header, scan.header.origin
-        stored = {
-            name.lower() if name in ("X", "Y", "Z") else name for name in _stored_names(header)
-        }
+        names: tuple[str, ...] = header.point_format.dtype().names
+        stored = {name.lower() if name in ("X", "Y", "Z") else name for name in names}
         further = {name: column for name, column in columns.items() if name not in stored}
         header = _with_dimensions(laspy, path, header, further)
         points = laspy.ScaleAwarePointRecord.zeros(len(scan), header=header)
@@ -136,12 +135,6 @@ def _panics_as_errors() -> Iterator[None]:
         if type(error).__name__ != "PanicException":
             raise
         raise ValueError(str(error)) from error
-
-
-def _stored_names(header: Any) -> tuple[str, ...]:
-    """Names of what the points of a file store."""
-    names: tuple[str, ...] = header.point_format.dtype().names
-    return names
 
 
 def _with_dimensions(
