@@ -66,14 +66,6 @@ def test_another_number_of_instances_than_classes_is_not_written(tmp_path: Path)
         write_labels(tmp_path / "scan.label", np.zeros(3, np.int64), np.zeros(2, np.int64))
 
 
-def test_real_labels_come_back(tmp_path: Path, shared: Path) -> None:
-    source = shared / "data" / "wads" / "sample.label"
-    raw = read_labels(source, points=115_881)
-    assert np.count_nonzero(semantic(raw) == 110) == 14_276
-    write_labels(tmp_path / "scan.label", semantic(raw), instance(raw))
-    assert (tmp_path / "scan.label").read_bytes() == source.read_bytes()
-
-
 @pytest.mark.parametrize(
     ("scans", "labels"), [("velodyne", "labels"), ("lidar_radar_pcd", "lidar_radar_labels")]
 )
