@@ -182,19 +182,19 @@ def _id(key: str, entry: Entry) -> int:
 # What reads each part of a Spec.
 _PARSERS: dict[str, Callable[[Entry], Any]] = {
     "network": Entry.text,
-    "view": lambda entry: {key: part.value for key, part in entry.members().items()},
-    "mean": lambda entry: tuple(item.number() for item in entry.items()),
-    "std": lambda entry: tuple(item.positive() for item in entry.items()),
+    "view": lambda entry: entry.each(lambda part: part.value),
+    "mean": Entry.numbers,
+    "std": lambda entry: entry.numbers(read=Entry.positive),
     "classes": _classes,
     "rain": lambda entry: tuple(item.whole(0, LARGEST_ID) for item in entry.items()),
     "data": Entry.text,
     "licence": Entry.text,
     "channels": _channels,
     "units": Entry.texts,
-    "rule": lambda entry: {name: part.number() for name, part in entry.members().items()},
+    "rule": lambda entry: entry.each(Entry.number),
     "threshold": lambda entry: entry.within(0, 1),
     "candidates": candidates_at,
-    "training": lambda entry: {name: part.texts() for name, part in entry.members().items()},
+    "training": lambda entry: entry.each(Entry.texts),
     "schema": lambda entry: entry.whole(1, SCHEMA),
 }
 

@@ -16,7 +16,7 @@ from typing import Any
 from weakref import WeakValueDictionary
 
 from derain.bags.ros2_metadata import Ros2Metadata
-from derain.files.temporary import temporary_folder
+from derain.files.atomic import temporary_folder
 from derain.system.extras import LZ4, ZSTANDARD
 
 # The most that a chunk or a message may take, bytes: a cloud of eight million points of 32 bytes.

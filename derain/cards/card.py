@@ -194,6 +194,7 @@ def load_card(name: str | Path) -> DataCard:
 
 
 def _card(document: Entry) -> DataCard:
+    channels = len(CHANNELS_OF_STATISTICS)
     parsers: dict[str, Callable[[Entry], Any]] = {
         "name": Entry.text,
         "classes": _classes,
@@ -201,14 +202,14 @@ def _card(document: Entry) -> DataCard:
         "unknown": _ids,
         "licence": Entry.text,
         "intensity_unit": Entry.text,
-        "mean": _if_known(lambda entry: entry.numbers(len(CHANNELS_OF_STATISTICS))),
-        "std": _if_known(_deviations),
+        "mean": _if_known(lambda entry: entry.numbers(channels)),
+        "std": _if_known(lambda entry: entry.numbers(channels, Entry.positive)),
         "range": _if_known(_mean_and_deviation),
-        "extra": lambda entry: _each(entry, _mean_and_deviation),
+        "extra": lambda entry: entry.each(_mean_and_deviation),
         "rain_share": _if_known(lambda entry: entry.within(0, 1)),
         "simulated": Entry.truth,
         "deduplicate": Entry.truth,
-        "split": lambda entry: _each(entry, Entry.texts),
+        "split": lambda entry: entry.each(Entry.texts),
         "layout": Layout.of,
         "auto_detect": _auto_detect,
         "folders_tell": _auto_detect,  # its name in earlier versions
@@ -241,12 +242,6 @@ def _ids(entry: Entry) -> tuple[int, ...]:
     return tuple(item.whole(0, LARGEST_ID) for item in entry.items())
 
 
-def _deviations(entry: Entry) -> tuple[float, ...]:
-    for item in entry.items():
-        item.positive()
-    return entry.numbers(len(CHANNELS_OF_STATISTICS))
-
-
 def _mean_and_deviation(entry: Entry) -> tuple[float, ...]:
     numbers = entry.numbers(2)
     entry.items()[1].positive()
@@ -262,7 +257,3 @@ def _auto_detect(entry: Entry) -> AutoDetect:
         raise entry.fault(f"is {shown(entry.value)}", f"Give {', '.join(get_args(AutoDetect))}.")
     detected: AutoDetect = entry.value
     return detected
-
-
-def _each(entry: Entry, parser: Callable[[Entry], Parsed]) -> dict[str, Parsed]:
-    return {name: parser(member) for name, member in entry.members().items()}

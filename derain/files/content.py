@@ -74,7 +74,9 @@ def read_content(path: Path) -> Content:
         data = read_bytes(path, LARGEST_SCAN)
         budget = MemoryBudget(len(data))
         if is_compressed(path):
-            data = _decompressed(data, budget)
+            with gzip.GzipFile(fileobj=io.BytesIO(data)) as file:
+                data = file.read(budget.left + 1)
+            budget.reserve(len(data))
         return Content(path, data, budget)
 
 
@@ -91,10 +93,3 @@ def check_columns(count: int) -> None:
     """
     if count > MOST_COLUMNS:
         raise ValueError(f"{count:,} columns, more than {MOST_COLUMNS:,}")
-
-
-def _decompressed(data: bytes, budget: MemoryBudget) -> bytes:
-    with gzip.GzipFile(fileobj=io.BytesIO(data)) as file:
-        plain = file.read(budget.left + 1)
-    budget.reserve(len(plain))
-    return plain

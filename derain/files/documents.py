@@ -11,7 +11,7 @@ import reprlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 
@@ -62,6 +62,8 @@ _Loader.add_implicit_resolver(
     re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+$"),
     list("-+.0123456789"),
 )
+
+Parsed = TypeVar("Parsed")
 
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, 60, 60
@@ -145,6 +147,10 @@ class Entry:
             for key, value in self.value.items()
         }
 
+    def each(self, read: Callable[["Entry"], Parsed]) -> dict[str, Parsed]:
+        """What a function reads of each value of a mapping, by key."""
+        return {key: read(entry) for key, entry in self.members().items()}
+
     def numbered(self, least: int, most: int) -> dict[int, "Entry"]:
         """The values of a mapping by their keys, which must be whole numbers of this span."""
         if not isinstance(self.value, dict):
@@ -184,12 +190,19 @@ class Entry:
             for number, value in enumerate(self.value)
         ]
 
-    def numbers(self, count: int | None = None) -> tuple[float, ...]:
-        """A list of so many finite numbers, or of any number of them."""
+    def numbers(
+        self, count: int | None = None, read: Callable[["Entry"], float] | None = None
+    ) -> tuple[float, ...]:
+        """A list of so many finite numbers, or of any number of them.
+
+        Args:
+            count: How many; None allows any number.
+            read: What reads each of them, such as ``Entry.positive``; by default ``Entry.number``.
+        """
         items = self.items()
         if count is not None and len(items) != count:
             raise self.fault(f"{shown(self.value)} are not {count} numbers", f"Write {count}.")
-        return tuple(item.number() for item in items)
+        return tuple(map(read or Entry.number, items))
 
     def number(self) -> float:
         """A finite number."""

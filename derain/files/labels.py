@@ -23,12 +23,9 @@ def label_beside(scan: Path) -> Path:
     """Where a scan's labels lie: beside it if they are there, else in the sibling `labels`."""
     label = beside(scan, LABEL)
     # Not Path.is_file, which raises where the name has become too long by its suffix.
-    return label if os.path.isfile(label) else _sequence(scan) / "labels" / label.name
-
-
-def _sequence(scan: Path) -> Path:
-    """The folder that a scan's folder lies in, also where the scan is named from within its own."""
-    return scan.absolute().parent.parent
+    # The folder above the scan's, also where the scan is named from within its own.
+    sequence = scan.absolute().parent.parent
+    return label if os.path.isfile(label) else sequence / "labels" / label.name
 
 
 def read_labels(path: Path, points: int) -> NDArray[np.uint32]:

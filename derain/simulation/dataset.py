@@ -21,8 +21,7 @@ from typing import Any, Protocol, Self
 from tqdm import tqdm
 
 from derain.errors import InputError
-from derain.files.lock import lock
-from derain.files.temporary import remove_abandoned
+from derain.files.atomic import lock, remove_abandoned
 from derain.simulation.manifest import MANIFEST, checksums, read_manifest, write_manifest
 from derain.system.open3d_import import import_open3d
 from derain.system.workers import worker_pool

@@ -17,7 +17,7 @@ from derain.bags.cloud_topic import CloudTopic, damaged_cloud
 from derain.bags.names import is_bag
 from derain.bags.point_cloud import PointCloud
 from derain.errors import InputError
-from derain.files.temporary import temporary_folder
+from derain.files.atomic import temporary_folder
 from derain.sources.bag_frame import BagFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement

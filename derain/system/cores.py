@@ -9,26 +9,27 @@ from typing import Any
 
 from derain.errors import InputError
 
-# Where Linux lists the control groups of a process, and where they are mounted.
+# Where Linux lists the control groups of a process, of version 1 or 2, and where they are mounted.
 MEMBERSHIP = Path("/proc/self/cgroup")
 GROUPS = Path("/sys/fs/cgroup")
+
+# Files of a group, by version, that state its quota and its period: how many microseconds of
+# processor time in how many; no limit is -1 in version 1, and ``max`` in version 2.
+# Source: Linux, Documentation/scheduler/sched-bwc.rst; Documentation/admin-guide/cgroup-v2.rst.
+QUOTA_FILES = (("cpu.cfs_quota_us", "cpu.cfs_period_us"), ("cpu.max",))
 
 # How OpenMP's threads wait, which it reads once, when it is loaded.
 # Source: OpenMP 5.2, 21.7, OMP_WAIT_POLICY.
 WAIT_POLICY = "OMP_WAIT_POLICY"
 
 
-def usable_cores(membership: Path = MEMBERSHIP, groups: Path = GROUPS) -> int:
+def usable_cores() -> int:
     """Cores this process may use, at least one.
 
     They are the cores that it may run on, and in a container with limited processor time no more
     than that time keeps busy, rounded up: further threads would only wait.
-
-    Args:
-        membership: File that names the control groups of the process, of version 1 or 2.
-        groups: Folder that they are mounted below.
     """
-    return max(1, min([_allowed_cores(), *_quotas(membership, groups)]))
+    return max(1, min([_allowed_cores(), *_quotas()]))
 
 
 def threads_of(threads: Any) -> int:
@@ -66,44 +67,27 @@ def _allowed_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _quotas(membership: Path, groups: Path) -> Iterator[int]:
+def _quotas() -> Iterator[int]:
     """Cores that each group's quota keeps busy; a missing or malformed file sets none."""
-    for group in _groups(membership, groups):
-        for read in (_version_1, _version_2):
-            with suppress(OSError, ValueError):
-                quota, period = read(group)
+    for group in _groups():
+        for files in QUOTA_FILES:
+            with suppress(OSError, ValueError):  # ValueError: no limit, ``max``, is no number
+                words = " ".join((group / file).read_text("utf-8") for file in files).split()
+                quota, period = map(int, words)
                 if quota > 0 and period > 0:
                     yield -(-quota // period)
 
 
-def _groups(membership: Path, groups: Path) -> Iterator[Path]:
+def _groups() -> Iterator[Path]:
     """The control groups that may limit the process's time: its own, and all that hold those.
 
     In a container a path may be that on the machine, while the folder of the container's own group
     is mounted at the top. The top is one of the groups that are looked at.
     """
     with suppress(OSError, ValueError):
-        for line in membership.read_text("utf-8").splitlines():
+        for line in MEMBERSHIP.read_text("utf-8").splitlines():
             _, controllers, path = line.split(":", 2)  # of version 2 if it names no controllers
             if not controllers or "cpu" in controllers.split(","):
                 own = PurePosixPath(path.lstrip("/"))
                 for group in (own, *own.parents):
-                    yield groups / controllers / group
-
-
-def _version_1(group: Path) -> tuple[int, int]:
-    """Quota and period: how many microseconds of processor time in how many; -1 for no limit.
-
-    Source: Linux, Documentation/scheduler/sched-bwc.rst.
-    """
-    quota = int((group / "cpu.cfs_quota_us").read_text("utf-8"))
-    return quota, int((group / "cpu.cfs_period_us").read_text("utf-8"))
-
-
-def _version_2(group: Path) -> tuple[int, int]:
-    """The same in version 2, where no limit is ``max``: that is no number and raises ValueError.
-
-    Source: Linux, Documentation/admin-guide/cgroup-v2.rst, cpu.max.
-    """
-    quota, period = (group / "cpu.max").read_text("utf-8").split()
-    return int(quota), int(period)
+                    yield GROUPS / controllers / group

@@ -121,22 +121,15 @@ def missing_extra(subject: str | Path, error: ModuleNotFoundError) -> MissingExt
 
 
 def _missing(subject: str | Path, extras: Sequence[Extra]) -> MissingExtraError:
-    libraries = " and ".join(
-        filter(None, (", ".join(extra.library for extra in extras[:-1]), extras[-1].library))
-    )
-    names = ",".join(_fewest_names(extras))
-    is_or_are = "is" if len(extras) == 1 else "are"
+    *others, last = [extra.library for extra in extras]
+    libraries = f"{', '.join(others)} and {last}" if others else last
+    names = {extra.name for extra in extras}
+    # Without those that a larger one includes.
+    fewest = dict.fromkeys(extra.name for extra in extras if names.isdisjoint(extra.also))
     error = MissingExtraError(
         subject,
-        f"needs {libraries}, which {is_or_are} not installed",
-        f"pip install 'derain[{names}]'",
+        f"needs {libraries}, which {'are' if others else 'is'} not installed",
+        f"pip install 'derain[{','.join(fewest)}]'",
     )
     error.name = extras[0].library
     return error
-
-
-def _fewest_names(extras: Sequence[Extra]) -> list[str]:
-    """Extras that install all of the libraries, without those that a larger one includes."""
-    names = {extra.name for extra in extras}
-    chosen = dict.fromkeys(extra.name for extra in extras if names.isdisjoint(extra.also))
-    return list(chosen)

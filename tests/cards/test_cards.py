@@ -33,12 +33,20 @@ def card_file(tmp_path: Path) -> Path:
     return tmp_path / "yard.yaml"
 
 
+def written(card_file: Path, *missing: str, **changes: Any) -> DataCard:
+    """Our own card as read from a file, with changes and without some of its keys."""
+    content = {name: value for name, value in {**OWN, **changes}.items() if name not in missing}
+    card_file.write_text(yaml.safe_dump(content))
+    return load_card(card_file)
+
+
 @pytest.mark.parametrize("name", packaged_cards())
 def test_a_packaged_card_can_be_read(name: str) -> None:
     card = load_card(name)
     assert set(card.rain) <= set(card.classes)
-    assert len(set(card.classes.values())) == len(card.classes)
     assert card.std is None or min(card.std) > 0
+    sequences = [sequence for part in card.split.values() for sequence in part]
+    assert len(set(sequences)) == len(sequences)
 
 
 # Source: sporsho/3D_OutDet, class weights that its recipes were trained with.
@@ -60,18 +68,12 @@ def test_the_rain_share_gives_the_published_class_weights(
         weights, rel=1e-3
     )
     assert card.rain == rain
-
-
-def test_a_split_is_of_different_sequences() -> None:
-    for name in packaged_cards():
-        parts = load_card(name).split.values()
-        sequences = [sequence for part in parts for sequence in part]
-        assert len(set(sequences)) == len(sequences)
+    if name == "rehearse3d":  # data_cfg.yaml of its published SalsaNext run, of all points
+        assert math.isclose(card.rain_share, 0.06638644365199696, rel_tol=1e-6)
 
 
 def test_a_card_of_ones_own_holds_what_its_file_says(card_file: Path) -> None:
-    card_file.write_text(yaml.safe_dump(OWN))
-    assert load_card(card_file) == DataCard(
+    assert written(card_file) == DataCard(
         name="our yard",
         classes={0: "ground", 3: "rain", 4: "spray"},
         rain=(3, 4),
@@ -85,101 +87,57 @@ def test_a_card_of_ones_own_holds_what_its_file_says(card_file: Path) -> None:
 
 
 def test_a_card_of_an_earlier_version_keeps_its_automatic_detection(card_file: Path) -> None:
-    card_file.write_text(yaml.safe_dump({**OWN, "folders_tell": "rain"}))
-    assert load_card(card_file).auto_detect == "rain"
+    assert written(card_file, folders_tell="rain").auto_detect == "rain"
 
 
-def test_a_card_without_all_its_statistics_says_so(card_file: Path) -> None:
-    for missing in ("mean", "std", "range", "rain_share"):
-        card_file.write_text(yaml.safe_dump({k: v for k, v in OWN.items() if k != missing}))
-        card = load_card(card_file)
-        assert not card.has_statistics
-        statistics = {"mean": (0.0,) * 4, "std": (1.0,) * 4, "range": (9.0, 9.0), "rain_share": 0.5}
-        whole = card.completed(**statistics)
-        assert whole.has_statistics
-        # What it knew already stays.
-        assert whole == card.completed(**{missing: statistics[missing]})
+@pytest.mark.parametrize("missing", ["mean", "std", "range", "rain_share"])
+def test_a_card_is_completed_by_the_statistics_that_it_lacks(card_file: Path, missing: str) -> None:
+    card = written(card_file, missing)
+    assert not card.has_statistics
+    statistics = {"mean": (0.0,) * 4, "std": (1.0,) * 4, "range": (9.0, 9.0), "rain_share": 0.5}
+    whole = card.completed(extra={"rcs": (1.0, 2.0), "ring": (0.0, 1.0)}, **statistics)
+    assert whole.has_statistics
+    # What it knew already stays.
+    extra = {"doppler": (-0.5, 2), "ring": (31.5, 18.4), "rcs": (1, 2)}
+    assert whole == replace(card, extra=extra, **{missing: statistics[missing]})
 
 
 def test_every_channel_has_its_statistics_and_its_unit(card_file: Path) -> None:
-    card_file.write_text(yaml.safe_dump(OWN))
-    card = load_card(card_file)
+    card = written(card_file)
     assert card.statistics("intensity") == (4, 8)
     assert card.statistics("range") == (9, 10)
     assert card.statistics("doppler") == (-0.5, 2)
-    units = {name: card.unit(name) for name in ("z", "range", "doppler", "rcs", "radar", "ring")}
-    assert units == {
-        "z": "m",
-        "range": "m",
-        "doppler": "m/s",
-        "rcs": "dBsm",
-        "radar": "0 or 1",
-        "ring": "not stated",
-    }
+    units = {"z": "m", "range": "m", "doppler": "m/s", "rcs": "dBsm", "radar": "0 or 1"}
+    assert {name: card.unit(name) for name in (*units, "ring")} == {**units, "ring": "not stated"}
     with pytest.raises(InputError, match="our yard: the data card has no statistics of rcs"):
         card.statistics("rcs")
 
 
-def test_extra_statistics_join_those_that_a_card_has(card_file: Path) -> None:
-    card_file.write_text(yaml.safe_dump(OWN))
-    card = load_card(card_file).completed(extra={"rcs": (1.0, 2.0), "ring": (0.0, 1.0)})
-    assert card.extra == {"doppler": (-0.5, 2), "ring": (31.5, 18.4), "rcs": (1, 2)}
-
-
 @pytest.mark.parametrize(
-    "change",
+    ("key", "value"),
     [
-        {"classes": None},
-        {"classes": ["ground", "rain"]},
-        {"classes": {"three": "rain"}},
-        {"classes": {0: "ground", 3: "rain", 4: "spray", 10**6: "moon"}},
-        {"classes": {0: "ground", 3: ["rain"], 4: "spray"}},
-        {"name": {"a": 1}},
-        {"classes": {0: "rain", 3: "rain", 4: "spray"}},
-        {"rain": 3},
-        {"rain": [5]},
-        {"unknown": [5]},
-        {"simulated": "no"},
-        {"unknown": [0, 3]},
-        {"unknown": 4},
-        {"rain": [3, math.inf]},
-        {"rain": [[3]]},
-        {"rain": [10**400]},
-        {"mean": [1, 2, 3]},
-        {"mean": 1},
-        {"mean": [1, 2, 3, 10**400]},
-        {"mean": list(range(5000))},
-        {"std": [1, 1, 1, 0]},
-        {"mean": [1, 2, 3, math.nan]},
-        {"std": [1, 1, 1, math.inf]},
-        {"std": ["a", "b", "c", "d"]},
-        {"extra": ["doppler"]},
-        {"extra": {"doppler": [1]}},
-        {"extra": {"doppler": None}},
-        {"extra": {"doppler": [1, 0]}},
-        {"rain_share": 1.5},
-        {"rain_share": "much"},
-        {"split": {"train": "00"}},
-        {"split": ["00"]},
-        {"split": {"train": [["00"]]}},
-        {"licence": ["free"] * 1000},
-        {"resolution": 5},
+        *(("classes", value) for value in (None, ["ground", "rain"], {"three": "rain"})),
+        ("classes", {0: "ground", 3: "rain", 4: "spray", 10**6: "moon"}),
+        ("classes", {0: "ground", 3: ["rain"], 4: "spray"}),
+        ("classes", {0: "rain", 3: "rain", 4: "spray"}),
+        *(("rain", value) for value in (3, [5], [3, math.inf], [[3]], [10**400])),
+        *(("unknown", value) for value in (4, [5], [0, 3])),
+        *(("mean", value) for value in (1, [1, 2, 3], [1, 2, 3, 10**400], list(range(5000)))),
+        *(("std", value) for value in ([1, 1, 1, 0], [1, 1, 1, math.inf], ["a", "b", "c", "d"])),
+        *(("extra", value) for value in (["doppler"], {"doppler": [1]}, {"doppler": None})),
+        ("extra", {"doppler": [1, 0]}),
+        *(("rain_share", value) for value in (1.5, "much")),
+        *(("split", value) for value in (["00"], {"train": "00"}, {"train": [["00"]]})),
+        ("split", {"train": [8]}),  # as YAML reads 010
+        *(("name", {"a": 1}), ("licence", ["free"] * 1000)),
+        *(("simulated", "no"), ("auto_detect", "all"), ("resolution", 5)),
     ],
     ids=shown,
 )
-def test_a_card_that_makes_no_sense_is_refused(card_file: Path, change: dict[str, Any]) -> None:
-    card_file.write_text(yaml.safe_dump({**OWN, **change}))
-    (key,) = change
+def test_a_card_that_makes_no_sense_is_refused(card_file: Path, key: str, value: Any) -> None:
     with pytest.raises(InputError, match=rf"yard\.yaml: {key}.*: ") as refusal:
-        load_card(card_file)
+        written(card_file, **{key: value})
     assert len(str(refusal.value)) < len(str(card_file)) + 300
-
-
-def test_a_sequence_that_yaml_reads_as_a_number_is_refused(card_file: Path) -> None:
-    text = yaml.safe_dump({**OWN, "split": {}}).replace("split: {}", "split: {train: [010]}")
-    card_file.write_text(text)
-    with pytest.raises(InputError, match=r"split\.train\[0\]: 8 is no text\. Put it in quotes"):
-        load_card(card_file)
 
 
 @pytest.mark.parametrize("text", ["", "name only", "a: [1", "name: x", "\x00"], ids=repr)
@@ -190,51 +148,27 @@ def test_a_file_that_is_no_card_is_refused_in_one_line(card_file: Path, text: st
     assert "\n" not in str(refusal.value)
 
 
-def test_a_file_that_is_not_text_is_refused(card_file: Path) -> None:
-    card_file.write_bytes(b"\xff\xfe\x00\x01")
-    with pytest.raises(InputError, match=r"yard\.yaml: cannot be read"):
-        load_card(card_file)
-
-
-def test_rain_is_every_class_that_the_card_says(card_file: Path) -> None:
-    card_file.write_text(yaml.safe_dump(OWN))
-    scan = Scan.of(np.ones((4, 4)), name="a.bin")
-    rain = load_card(card_file).rain_of(scan.with_label(np.array([0, 3, 4, 3])))
-    assert rain.tolist() == [False, True, True, True]
-    with pytest.raises(InputError, match=r"a\.bin: it has no labels"):
-        load_card(card_file).rain_of(scan)
-
-
-def test_an_unknown_class_is_neither_rain_nor_not(card_file: Path) -> None:
-    card_file.write_text(yaml.safe_dump({**OWN, "rain": [3], "unknown": [4]}))
-    card = load_card(card_file)
-    scan = Scan.of(np.ones((3, 4)), name="a.bin").with_label(np.array([0, 3, 4]))
-    assert card.rain_of(scan).tolist() == [False, True, False]
-    assert card.unknown_of(scan).tolist() == [False, False, True]
-    assert not replace(card, unknown=()).unknown_of(scan).any()
-
-
 def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
     with pytest.raises(InputError, match=r"rehearse: no such data card\. .*rehearse3d.*wads"):
         load_card("rehearse")
 
 
-def test_the_class_shares_of_a_card_are_of_all_points() -> None:
-    # data_cfg.yaml of the published SalsaNext run: rain has 0.0664 of the points.
-    share = load_card("rehearse3d").rain_share
-    assert share is not None
-    assert math.isclose(share, 0.06638644365199696, rel_tol=1e-6)
-
-
-def test_a_card_of_clean_data_says_that_it_has_no_rain(card_file: Path) -> None:
-    card_file.write_text(yaml.safe_dump({**OWN, "rain": []}))
-    card = load_card(card_file)
-    scan = Scan.of(np.ones((2, 4))).with_label(np.array([0, 3]))
-    assert card.rain == ()
-    assert not card.rain_of(scan).any()
-    card_file.write_text(yaml.safe_dump({k: v for k, v in OWN.items() if k != "rain"}))
+def test_classes_are_rain_unknown_or_neither(card_file: Path) -> None:
+    scan = Scan.of(np.arange(16.0).reshape(4, 4), name="a.bin")
+    card = written(card_file, rain=[3], unknown=[4])
+    labelled = scan.with_label(np.array([0, 3, 4, 3]))
+    assert written(card_file).rain_of(labelled).tolist() == [False, True, True, True]
+    assert card.rain_of(labelled).tolist() == [False, True, False, True]
+    assert card.unknown_of(labelled).tolist() == [False, False, True, False]
+    known, rain = card.known_points(labelled)
+    np.testing.assert_array_equal(known.xyz, scan.xyz[[0, 1, 3]])
+    assert rain.tolist() == [False, True, True]
+    assert not replace(card, unknown=()).unknown_of(labelled).any()
+    assert not written(card_file, rain=[]).rain_of(labelled).any()
+    with pytest.raises(InputError, match=r"a\.bin: it has no labels"):
+        card.rain_of(scan)
     with pytest.raises(InputError, match="rain is missing"):
-        load_card(card_file)
+        written(card_file, "rain")
 
 
 def test_semantickitti_has_the_classes_of_wads_but_for_its_snow() -> None:
@@ -252,11 +186,3 @@ def test_a_card_takes_the_normalisation_of_another_and_stays_itself() -> None:
     for channel in ("x", "y", "z", "intensity", "range"):
         assert both.statistics(channel) == wads.statistics(channel)
     assert replace(both, mean=None, std=None, range=None) == rehearse
-
-
-def test_known_points_are_those_that_are_rain_or_not() -> None:
-    card = DataCard("ours", {0: "ground", 3: "rain", 9: "haze"}, rain=(3,), unknown=(9,))
-    scan = Scan(np.arange(12, dtype=np.float32).reshape(4, 3)).with_label(np.array([3, 9, 0, 9]))
-    known, rain = card.known_points(scan)
-    np.testing.assert_array_equal(known.xyz, scan.xyz[[0, 2]])
-    assert rain.tolist() == [True, False]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
-from derain.files.formats.pcd.header import ENCODINGS
+from derain.files.formats.pcd import ENCODINGS
 from derain.scan import Scan
 
 

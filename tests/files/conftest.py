@@ -1,8 +1,5 @@
 """What the tests of all formats share."""
 
-from collections.abc import Callable
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +8,6 @@ from numpy.typing import NDArray
 
 from derain import Scan
 from derain.errors import InputError
-from derain.files import read_scan, write_scan
 from derain.system.open3d_import import import_open3d
 
 Columns = dict[str, NDArray[Any]]
@@ -46,15 +42,3 @@ def open3d() -> Any:
         return import_open3d()
     except InputError as error:
         pytest.skip(str(error))
-
-
-@pytest.fixture
-def copied(tmp_path: Path) -> Callable[[Scan, str, object], Scan]:
-    """Writes a scan as if it came from a file with this header, and reads it."""
-
-    def copy(scan: Scan, suffix: str, header: object = None) -> Scan:
-        path = tmp_path / f"scan{suffix}"
-        write_scan(path, replace(scan, header=header))
-        return read_scan(path)
-
-    return copy

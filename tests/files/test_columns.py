@@ -71,6 +71,31 @@ def test_two_columns_that_differ_in_case_alone_are_refused(
     assert str(path) in str(refused.value)
 
 
+@pytest.mark.parametrize("suffix", [".pcd", ".ply"])
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [
+        *((name, np.zeros(5)) for name in ("two words", "")),
+        *(("half", np.zeros(5, kind)) for kind in (np.float16, np.complex64, "U3")),
+        ("nothing", np.zeros((5, 0))),
+    ],
+)
+def test_columns_that_a_header_cannot_describe_are_refused(
+    tmp_path: Path, scan: Scan, suffix: str, name: str, column: np.ndarray
+) -> None:
+    path = tmp_path / f"scan{suffix}"
+    with pytest.raises(InputError, match=rf"\{suffix} has no place for the column '{name}'"):
+        write_scan(path, replace(scan, fields={**scan.fields, name: column}))
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("suffix", WITH_NAMES)
+def test_a_file_without_coordinates_is_refused(tmp_path: Path, suffix: str) -> None:
+    path = written(tmp_path / f"scan{suffix}", ("x", "y", "depth", "ring"))
+    with pytest.raises(InputError, match=r"no coordinates|no x, y and z .* \(x, y, depth, ring\)"):
+        read_scan(path)
+
+
 def written(path: Path, names: tuple[str, ...]) -> Path:
     """A file of ten points, whose first holds the place of each column, from 1."""
     rows = np.arange(1, len(names) + 1, dtype=np.float32) + np.arange(10, dtype=np.float32)[:, None]

@@ -18,13 +18,8 @@ from derain.files import count_points, find_scans, read_scan, write_scan
 from derain.files.format import FORMATS, Format, format_of
 from derain.filters import FilterDerainer, filter_from
 
+ALL = ("--most-removed", "1")  # a filter calls much of a made-up scan rain
 MODULE = Path(__file__).with_name("points_format.py")
-
-# A filter calls much of a made-up scan rain.
-RUN = ("run", "dror", "--most-removed", "1")
-
-# What stands in the file of a wheel that names its entry points.
-ENTRY_POINTS = "[derain.formats]\npoints = points_format\n"
 
 
 @pytest.fixture
@@ -47,38 +42,6 @@ def _decorated(monkeypatch: pytest.MonkeyPatch) -> None:
     spec.loader.exec_module(importlib.util.module_from_spec(spec))
 
 
-@pytest.fixture
-def installed(tmp_path: Path) -> Path:
-    """A folder in which a package is installed that brings the format."""
-    folder = tmp_path / "site-packages"
-    metadata = folder / "points_format-1.0.dist-info"
-    metadata.mkdir(parents=True)
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: points_format\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text(ENTRY_POINTS)
-    shutil.copy(MODULE, folder)
-    return folder
-
-
-def derain(*arguments: str | Path, path: Path) -> subprocess.CompletedProcess[str]:
-    """The command in a process of its own that finds further packages in a folder."""
-    code = "import sys; from derain.cli.main import main; sys.exit(main(sys.argv[1:]))"
-    return subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        env={**os.environ, "PYTHONPATH": str(path)},
-        capture_output=True,
-        text=True,
-    )
-
-
-def assert_cleaned(file: Path, out: Path) -> None:
-    """Whether DROR was run on the file: all points that are no rain are there, bit for bit."""
-    rain = FilterDerainer(filter_from("dror", {}), threads=1)(Scan.of(scene(200)))
-    assert 0 < rain.sum() < 200
-    np.testing.assert_array_equal(np.fromfile(out / "scan.label", "<u4"), rain)
-    kept = np.array(file.read_text().splitlines()[1:201])[~rain].tolist()
-    assert (out / "scan.pts").read_text().splitlines() == [str(len(kept)), *kept]
-
-
 @pytest.mark.usefixtures("_decorated")
 def test_a_decorated_format_is_read_written_found_and_cleaned(
     file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -94,41 +57,29 @@ def test_a_decorated_format_is_read_written_found_and_cleaned(
     assert find_scans([file.parent]) == [file]
     with pytest.raises(InputError, match=r"holds x, y, z and intensity alone"):
         write_scan(file, Scan(scan.xyz))
-    assert main([*RUN, str(file.parent), "--out", str(tmp_path / "out")]) == 0
-    assert_cleaned(file, tmp_path / "out")
+    assert main(["run", "dror", str(file.parent), "--out", str(tmp_path / "out"), *ALL]) == 0
+    rain = FilterDerainer(filter_from("dror", {}), threads=1)(Scan.of(scene(200)))
+    assert 0 < rain.sum() < 200
+    np.testing.assert_array_equal(np.fromfile(tmp_path / "out/scan.label", "<u4"), rain)
+    kept = np.array(file.read_text().splitlines()[1:201])[~rain].tolist()
+    assert (tmp_path / "out/scan.pts").read_text().splitlines() == [str(len(kept)), *kept]
     assert "without its remarks" in capsys.readouterr().err
     with pytest.raises(InputError, match=r"Known are .*\.ply, \.pts, \.txt"):
         format_of(Path("scan.e57"))
 
 
-def test_an_installed_format_is_known_to_the_commands(
-    file: Path, installed: Path, tmp_path: Path
-) -> None:
-    run = derain(*RUN, file.parent, "--out", tmp_path / "out", path=installed)
-    assert run.returncode == 0, run.stderr
-    assert_cleaned(file, tmp_path / "out")
-    assert "without its remarks" in run.stderr
-    told = derain("info", "--formats", path=installed).stdout
+def test_an_installed_format_is_known_to_the_commands(tmp_path: Path) -> None:
+    metadata = tmp_path / "points_format-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: points_format\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text("[derain.formats]\npoints = points_format\n")
+    shutil.copy(MODULE, tmp_path)
+    told = subprocess.check_output(
+        [sys.executable, "-c", "from derain.cli.main import main; main(['info', '--formats'])"],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        text=True,
+    )
     assert "  .pts                    points under a line with their number\n" in told
-
-
-def test_a_format_that_cannot_be_imported_is_named(
-    file: Path, installed: Path, tmp_path: Path
-) -> None:
-    (installed / "points_format.py").write_text("import a_module_that_is_not_there\n")
-    run = derain(*RUN, file.parent, "--out", tmp_path / "out", path=installed)
-    assert run.returncode == 2
-    assert "derain.formats: points: points_format cannot be imported" in run.stderr
-    assert "holds no scans" in run.stderr
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_suffix_is_taken_once() -> None:
-    with pytest.raises(InputError, match=r"derain\.formats: \.pcd: is the name of two"):
-
-        @FORMATS.add(".pcd")
-        class Another(FORMATS[".ply"]):
-            """Another format of this suffix."""
 
 
 def test_help_says_which_files_do_not_name_their_columns(

@@ -13,10 +13,21 @@ def written(folder: Path, text: str, *names: str) -> list[Path]:
     return [folder / name for name in names]
 
 
-def test_a_scan_has_the_time_of_the_line_with_its_name(tmp_path: Path) -> None:
-    text = "frame,timestamp\n000002,0.3\n000000,0.1\n000001,1700000000.25\n"
-    scans = written(tmp_path, text, "000000.bin", "000001.bin", "000002.bin")
-    assert read_frame_times(scans).tolist() == [0.1, 1700000000.25, 0.3]
+@pytest.mark.parametrize(
+    ("lines", "names", "times"),
+    [
+        ("2,0.3\n0,0.1\n1,1700000000.25", ("0.bin", "1.bin", "2.bin"), [0.1, 1700000000.25, 0.3]),
+        ("17.25,1\n17.5.pcd,2\n17,3", ("17.25.bin", "17.5.bin", "17.bin"), [1, 2, 3]),
+        ("0,1\n0,1\n1,2", ("0.bin",), [1]),
+        ("12,0.5\n000013.bin.gz,0.7", ("000012.bin.gz", "000013.bin"), [0.5, 0.7]),
+    ],
+    ids=["any order", "named by time", "the same line twice", "compressed"],
+)
+def test_a_scan_has_the_time_of_the_line_with_its_name(
+    tmp_path: Path, lines: str, names: tuple[str, ...], times: list[float]
+) -> None:
+    scans = written(tmp_path, f"frame,timestamp\n{lines}\n", *names)
+    assert read_frame_times(scans).tolist() == times
 
 
 @pytest.mark.parametrize("frame", ["000012.bin", "000012", "12", "000012.pcd", " 12"])
@@ -25,24 +36,9 @@ def test_suffix_and_zeros_before_a_name_make_no_difference(tmp_path: Path, frame
     assert read_frame_times(scans).tolist() == [5, 6]
 
 
-def test_scans_may_be_named_by_their_time(tmp_path: Path) -> None:
-    text = "frame,timestamp\n17.25,1\n17.5.pcd,2\n17,3\n"
-    scans = written(tmp_path, text, "17.25.bin", "17.5.bin", "17.bin")
-    assert read_frame_times(scans).tolist() == [1, 2, 3]
-
-
-def test_the_same_line_may_come_twice(tmp_path: Path) -> None:
-    assert read_frame_times(written(tmp_path, "frame,timestamp\n0,1\n0,1\n", "0.bin")) == [1]
-
-
 def test_columns_of_other_names_can_be_stated(tmp_path: Path) -> None:
     scans = written(tmp_path, "\ufeffstem,camera,seconds\na,1,2.5\n", "a.bin")
     assert read_frame_times(scans, ["stem", "seconds"]).tolist() == [2.5]
-
-
-def test_lines_of_scans_that_are_not_asked_for_do_no_harm(tmp_path: Path) -> None:
-    scans = written(tmp_path, "frame,timestamp\n0,1\n1,2\n", "1.bin")
-    assert read_frame_times(scans).tolist() == [2]
 
 
 @pytest.mark.parametrize(

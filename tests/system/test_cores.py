@@ -18,6 +18,8 @@ CoresIn = Callable[[str, Mapping[str, str]], int]
 def cores_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CoresIn:
     """Says what a process finds that may run on eight cores."""
     monkeypatch.setattr(cores, "_allowed_cores", lambda: 8)
+    monkeypatch.setattr(cores, "MEMBERSHIP", tmp_path / "cgroup")
+    monkeypatch.setattr(cores, "GROUPS", tmp_path / "groups")
 
     def found(membership: str, files: Mapping[str, str]) -> int:
         (tmp_path / "cgroup").write_bytes(membership.encode("latin-1"))
@@ -25,7 +27,7 @@ def cores_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CoresIn:
             path = tmp_path / "groups" / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(content)
-        return usable_cores(tmp_path / "cgroup", tmp_path / "groups")
+        return usable_cores()
 
     return found
 
@@ -71,14 +73,17 @@ def test_a_share_of_time_limits_the_cores(
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system has no affinity")
-def test_where_there_are_no_control_groups_it_is_the_cores_it_may_run_on(tmp_path: Path) -> None:
+def test_where_there_are_no_control_groups_it_is_the_cores_it_may_run_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cores, "MEMBERSHIP", tmp_path / "none")
     before = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(before)})
     try:
-        assert usable_cores(tmp_path / "none", tmp_path / "none") == 1
+        assert usable_cores() == 1
     finally:
         os.sched_setaffinity(0, before)
-    assert usable_cores(tmp_path / "none", tmp_path / "none") == len(before)
+    assert usable_cores() == len(before)
 
 
 def test_no_threads_are_one_for_each_core() -> None:
@@ -92,17 +97,13 @@ def test_what_is_no_number_of_threads_is_refused(threads: Any) -> None:
         threads_of(threads)
 
 
-def test_what_is_imported_inside_is_told_to_sleep_and_nothing_else(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(("user", "inside"), [(None, "passive"), ("active", "active")])
+def test_what_is_imported_inside_is_told_to_sleep_unless_the_user_has_said_otherwise(
+    monkeypatch: pytest.MonkeyPatch, user: str | None, inside: str
 ) -> None:
     monkeypatch.delenv(WAIT_POLICY, raising=False)
-    with pytest.raises(ModuleNotFoundError, match="passive"), sleeping_threads():
+    if user is not None:
+        monkeypatch.setenv(WAIT_POLICY, user)
+    with pytest.raises(ModuleNotFoundError, match=inside), sleeping_threads():
         raise ModuleNotFoundError(os.environ[WAIT_POLICY])
-    assert WAIT_POLICY not in os.environ
-
-
-def test_what_the_user_has_said_holds(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(WAIT_POLICY, "active")
-    with sleeping_threads():
-        assert os.environ[WAIT_POLICY] == "active"
-    assert os.environ[WAIT_POLICY] == "active"
+    assert os.environ.get(WAIT_POLICY) == user

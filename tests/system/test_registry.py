@@ -12,15 +12,6 @@ import pytest
 from derain.errors import InputError
 from derain.system.registry import Registry
 
-# What a module of a package brings: `ITEMS` is the registry in the package's `registry.py`.
-MEMBER = """
-from {package}.registry import ITEMS
-
-@ITEMS.add({names})
-class {title}:
-    pass
-"""
-
 Write = Callable[..., None]
 
 
@@ -45,26 +36,39 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
 @pytest.fixture
 def things(write: Write) -> Registry[type]:
     """The registry of a package of two files, whose names are not in the order of their members."""
+    write("things/first.py", member("pebble"))
+    write("things/second.py", member("brick"))
+    return registry(write, "'things'")
+
+
+def registry(write: Write, arguments: str) -> Registry[type]:
+    """The registry of a package, made with these arguments."""
     write("things/__init__.py")
     write(
         "things/registry.py",
-        "from derain.system.registry import Registry\nITEMS = Registry('things')",
+        f"from derain.system.registry import Registry\nITEMS = Registry({arguments})",
     )
-    write("things/first.py", member("pebble", "Pebble"))
-    write("things/second.py", member("brick", "Brick"))
-    registry: Registry[type] = importlib.import_module("things.registry").ITEMS
-    return registry
+    made: Registry[type] = importlib.import_module("things.registry").ITEMS
+    return made
 
 
-def member(name: str, title: str, package: str = "things") -> str:
-    return MEMBER.format(package=package, names=repr(name), title=title)
+def member(name: str) -> str:
+    """What a module brings: ``ITEMS`` is the registry in the package's ``registry.py``."""
+    return f"""
+from things.registry import ITEMS
+
+@ITEMS.add({name!r})
+class {name.capitalize()}:
+    pass
+"""
 
 
-def installed(write: Write, package: str, **modules: str) -> None:
-    """Writes what an installed package leaves: its name, and entry points to its modules."""
-    entries = "".join(f"{name} = {module}\n" for name, module in modules.items())
-    write(f"{package}-1.0.dist-info/METADATA", f"Name: {package}\nVersion: 1.0\n")
-    write(f"{package}-1.0.dist-info/entry_points.txt", f"[things]\n{entries}")
+def install(write: Write, name: str, content: str) -> None:
+    """Writes a package of one module, with the entry point to it that an installed one leaves."""
+    write(f"foreign_{name}.py", content)
+    metadata = f"foreign_{name}-1.0.dist-info"
+    write(f"{metadata}/METADATA", f"Name: foreign_{name}\nVersion: 1.0\n")
+    write(f"{metadata}/entry_points.txt", f"[things]\n{name} = foreign_{name}\n")
 
 
 def loaded() -> set[str]:
@@ -80,43 +84,24 @@ def test_what_there_is_comes_in_alphabetical_order_whatever_was_imported_first(
     assert len(things) == 2
 
 
-def test_files_are_imported_when_somebody_asks_and_not_before(things: Registry[type]) -> None:
+def test_modules_are_imported_when_somebody_asks_and_other_packages_last(
+    things: Registry[type], write: Write
+) -> None:
+    install(write, "cobble", member("cobble"))
     assert loaded() == {"things.registry"}
     assert "brick" in things
     assert loaded() == {"things.registry", "things.first", "things.second"}
-
-
-def test_other_packages_are_imported_where_derain_does_not_have_the_name(
-    things: Registry[type], write: Write
-) -> None:
-    write("foreign_cobble.py", member("cobble", "Cobble"))
-    installed(write, "foreign_cobble", anything="foreign_cobble")
-    assert "brick" in things
-    assert "foreign_cobble" not in loaded()
     assert things["cobble"].__module__ == "foreign_cobble"
     assert list(things) == ["brick", "cobble", "pebble"]
-
-
-def test_a_list_asks_other_packages_as_well(things: Registry[type], write: Write) -> None:
-    write("foreign_cobble.py", member("cobble", "Cobble"))
-    installed(write, "foreign_cobble", anything="foreign_cobble")
-    assert list(things) == ["brick", "cobble", "pebble"]
-
-
-def test_what_nobody_brings_is_not_there(things: Registry[type]) -> None:
-    assert "boulder" not in things
-    assert things.get("boulder") is None
-    with pytest.raises(KeyError):
-        things["boulder"]
 
 
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
         ("import nothing_of_this_name", "ModuleNotFoundError: No module named 'nothing_of_this_"),
-        ("raise OSError('no\\nlicence')", r"OSError: no licence"),
+        (member("gravel") + "\nraise OSError('no\\nlicence')", r"OSError: no licence"),
         ("def broken(", "SyntaxError: "),
-        (member("brick", "Brick"), "is the name of two, things.second.Brick and foreign_bad.Brick"),
+        (member("brick"), "is the name of two, things.second.Brick and foreign_bad.Brick"),
     ],
 )
 def test_a_package_that_cannot_be_imported_is_warned_of_once_and_keeps_no_other_from_use(
@@ -126,10 +111,8 @@ def test_a_package_that_cannot_be_imported_is_warned_of_once_and_keeps_no_other_
     content: str,
     reason: str,
 ) -> None:
-    write("foreign_bad.py", content)
-    write("foreign_good.py", member("cobble", "Cobble"))
-    installed(write, "foreign_bad", bad="foreign_bad")
-    installed(write, "foreign_good", good="foreign_good")
+    install(write, "bad", content)
+    install(write, "good", member("cobble"))
     assert things["brick"].__module__ == "things.second"
     assert capsys.readouterr().err == ""  # derain's own are found without a look at others
     assert list(things) == ["brick", "cobble", "pebble"]
@@ -137,16 +120,11 @@ def test_a_package_that_cannot_be_imported_is_warned_of_once_and_keeps_no_other_
     assert line.startswith("derain: warning: things: bad: foreign_bad cannot be imported (")
     assert reason in line
     assert line.endswith("Repair or uninstall the package foreign_bad.")
-    assert "boulder" not in things
+    for name in ("boulder", "gravel"):
+        with pytest.raises(KeyError):
+            things[name]
     assert things["brick"].__module__ == "things.second"
     assert capsys.readouterr().err == ""
-
-
-def test_a_package_that_fails_half_way_brings_nothing(things: Registry[type], write: Write) -> None:
-    write("foreign_bad.py", member("cobble", "Cobble") + "\nraise OSError('no licence')")
-    installed(write, "foreign_bad", bad="foreign_bad")
-    assert list(things) == ["brick", "pebble"]
-    assert "cobble" not in things
 
 
 def test_a_file_of_the_package_that_cannot_be_imported_is_an_error_every_time(
@@ -192,8 +170,7 @@ def test_a_class_without_a_method_of_its_base_is_refused_and_the_method_is_named
 def test_a_thread_that_asks_while_another_imports_finds_all_that_there_is(
     things: Registry[type], write: Write
 ) -> None:
-    write("foreign_cobble.py", "import time; time.sleep(0.2)\n" + member("cobble", "Cobble"))
-    installed(write, "foreign_cobble", anything="foreign_cobble")
+    install(write, "cobble", "import time; time.sleep(0.2)\n" + member("cobble"))
     with ThreadPoolExecutor(4) as threads:
         found = list(threads.map(lambda _: list(things), range(4)))
     assert found == 4 * [["brick", "cobble", "pebble"]]
@@ -231,22 +208,15 @@ def test_what_is_no_class_may_be_a_member(things: Registry[object], value: objec
 def test_a_module_may_ask_what_there_is_while_it_is_imported(
     things: Registry[type], write: Write
 ) -> None:
-    write("things/third.py", member("tile", "Tile") + "\nKNOWN = list(ITEMS)")
-    write("foreign_cobble.py", member("cobble", "Cobble") + "\nKNOWN = list(ITEMS)")
-    installed(write, "foreign_cobble", cobble="foreign_cobble")
+    write("things/third.py", member("tile") + "\nKNOWN = list(ITEMS)")
+    install(write, "cobble", member("cobble") + "\nKNOWN = list(ITEMS)")
     assert list(things) == ["brick", "cobble", "pebble", "tile"]
     assert "tile" in sys.modules["things.third"].KNOWN
     assert list(things) == sys.modules["foreign_cobble"].KNOWN
 
 
 def test_entry_points_may_be_of_another_name_than_the_package(write: Write) -> None:
-    write("things/__init__.py")
-    write(
-        "things/registry.py",
-        "from derain.system.registry import Registry\nITEMS = Registry('things', 'things of all')",
-    )
-    registry: Registry[type] = importlib.import_module("things.registry").ITEMS
-    write("foreign_cobble.py", member("cobble", "Cobble"))
-    installed(write, "foreign_cobble", cobble="foreign_cobble")
-    assert list(registry) == []
+    items = registry(write, "'things', 'things of all'")
+    install(write, "cobble", member("cobble"))
+    assert list(items) == []
     assert "foreign_cobble" not in loaded()

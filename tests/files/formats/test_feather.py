@@ -6,14 +6,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from pyarrow import feather
 
 from derain import InputError, Scan
 from derain.files import read_scan, write_scan
-from derain.files.columns import scan_of
 
 COMPRESSIONS = ("uncompressed", "lz4", "zstd")
 
@@ -38,7 +34,7 @@ def table() -> pyarrow.Table:
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_a_file_is_read_and_comes_back_byte_for_byte(
+def test_a_file_comes_back_byte_for_byte_and_cleaned_without_the_other_rows(
     tmp_path: Path, table: pyarrow.Table, compression: str
 ) -> None:
     path = tmp_path / "scan.feather"
@@ -53,18 +49,9 @@ def test_a_file_is_read_and_comes_back_byte_for_byte(
     assert set(scan.fields) == set(table.column_names) - {"name", "wet", "beams"}
     write_scan(tmp_path / "copy.feather", scan)
     assert (tmp_path / "copy.feather").read_bytes() == path.read_bytes()
-
-
-@pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_a_cleaned_file_holds_the_other_rows_of_every_column(
-    tmp_path: Path, table: pyarrow.Table, compression: str
-) -> None:
-    path = tmp_path / "scan.feather"
-    feather.write_feather(table, str(path), compression)
     stay = np.array([True, False, True, True, False, True, True])
-    write_scan(path, read_scan(path).take(stay))
-    cleaned = feather.read_table(str(path))
-    assert cleaned.equals(table.filter(stay), check_metadata=True)
+    write_scan(path, scan.take(stay))
+    assert feather.read_table(str(path)).equals(table.filter(stay), check_metadata=True)
 
 
 def test_columns_that_were_changed_are_written_and_others_kept(
@@ -81,42 +68,6 @@ def test_columns_that_were_changed_are_written_and_others_kept(
     assert copy["x"].to_pylist() == [0.0] * 7
     assert copy["new"].to_pylist() == [1] * 7
     assert copy.drop(["x", "new"]).equals(table.drop(["x"]))
-
-
-@st.composite
-def scans(draw: st.DrawFn) -> Scan:
-    """A scan of up to six points with columns of random bits."""
-    points = draw(st.integers(0, 6))
-    kinds = ("f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8")
-    names = draw(st.lists(st.text("abä _", min_size=2, max_size=5), max_size=4, unique=True))
-    columns = [(axis, draw(st.sampled_from(kinds[:3]))) for axis in "xyz"]
-    columns += [(name, draw(st.sampled_from(kinds))) for name in names]
-    return scan_of(
-        Path("drawn"),
-        {
-            name: draw(arrays(f"u{kind[1]}", points)).view(kind)
-            for name, kind in draw(st.permutations(columns))
-        },
-    )
-
-
-@settings(
-    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-@given(scan=scans(), data=st.data(), suffix=st.sampled_from((".feather", ".feather.gz")))
-def test_every_bit_comes_back_in_order(
-    tmp_path: Path, scan: Scan, data: st.DataObject, suffix: str
-) -> None:
-    path = tmp_path / f"scan{suffix}"
-    write_scan(path, scan)
-    stay = data.draw(arrays(bool, len(scan)))
-    write_scan(tmp_path / f"clean{suffix}", read_scan(path).take(stay))
-    for expected, written in ((scan, path), (scan.take(stay), tmp_path / f"clean{suffix}")):
-        copy = read_scan(written)
-        assert list(copy.fields) == list(expected.fields)
-        for name, column in expected.fields.items():
-            assert copy.fields[name].dtype == column.dtype
-            assert copy.fields[name].tobytes() == column.tobytes()
 
 
 def test_what_is_no_feather_of_points_is_refused(tmp_path: Path, table: pyarrow.Table) -> None:

@@ -1,9 +1,9 @@
 """NumPy's own files."""
 
 import pickle
+import re
 import zipfile
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +30,13 @@ def organised() -> dict[str, np.ndarray]:
     }
 
 
-def test_organised_arrays_are_flattened_row_by_row(
+def test_organised_arrays_are_flattened_row_by_row_and_come_back_as_they_were(
     tmp_path: Path, organised: dict[str, np.ndarray]
 ) -> None:
-    np.savez(tmp_path / "scan.npz", **{k: v for k, v in organised.items() if k != "file"})
+    with zipfile.ZipFile(tmp_path / "scan.npz", "w") as archive:
+        for name, array in organised.items():
+            with archive.open(f"{name}.npy", "w") as file:
+                np.lib.format.write_array(file, array)
     scan = read_scan(tmp_path / "scan.npz")
     assert scan.shape == (HEIGHT, WIDTH)
     row, column = 2, 5
@@ -41,51 +44,26 @@ def test_organised_arrays_are_flattened_row_by_row(
     np.testing.assert_array_equal(scan.xyz[point], organised["xyz"][row, column])
     assert scan.fields["signal"][point] == organised["signal"][row, column]
     assert scan.fields["timestamp"][point] == organised["timestamp"][column]
-    assert scan.fields["timestamp"].dtype == np.uint64
     assert "beam_angles" not in scan.fields
+    write_scan(tmp_path / "copy.npz", scan)
+    with np.load(tmp_path / "copy.npz", allow_pickle=False) as copy:
+        assert sorted(copy) == sorted(organised)
+        for name, array in organised.items():
+            expected = np.tile(array, (HEIGHT, 1)) if name == "timestamp" else array
+            np.testing.assert_array_equal(copy[name], expected, strict=True)
 
 
 def test_reflectivity_comes_before_signal_as_intensity(
     tmp_path: Path, organised: dict[str, np.ndarray]
 ) -> None:
-    for name in ("reflectivity", "signal"):
-        np.savez(tmp_path / "scan.npz", xyz=organised["xyz"], **{name: organised[name]})
-        np.testing.assert_array_equal(
-            read_scan(tmp_path / "scan.npz").intensity, organised[name].ravel()
-        )
-    np.savez(tmp_path / "scan.npz", **{k: organised[k] for k in ("signal", "reflectivity", "xyz")})
-    np.testing.assert_array_equal(
-        read_scan(tmp_path / "scan.npz").intensity, organised["reflectivity"].ravel()
-    )
-
-
-def test_an_npz_comes_back_with_its_grid_and_the_arrays_that_are_not_per_point(
-    tmp_path: Path, organised: dict[str, np.ndarray]
-) -> None:
-    with zipfile.ZipFile(tmp_path / "scan.npz", "w") as archive:
-        for name, array in organised.items():
-            with archive.open(f"{name}.npy", "w") as file:
-                np.lib.format.write_array(file, array)
-    write_scan(tmp_path / "copy.npz", read_scan(tmp_path / "scan.npz"))
-    with np.load(tmp_path / "copy.npz", allow_pickle=False) as copy:
-        assert sorted(copy) == sorted(organised)
-        for name, array in organised.items():
-            expected = np.tile(array, (HEIGHT, 1)) if name == "timestamp" else array
-            np.testing.assert_array_equal(copy[name], expected)
-            assert copy[name].dtype == array.dtype
-
-
-def test_a_cleaned_npz_holds_the_remaining_points_of_every_array(
-    tmp_path: Path, organised: dict[str, np.ndarray]
-) -> None:
-    np.savez(tmp_path / "scan.npz", xyz=organised["xyz"], timestamp=organised["timestamp"])
-    keep = np.arange(HEIGHT * WIDTH) % 3 > 0
-    write_scan(tmp_path / "clean.npz", read_scan(tmp_path / "scan.npz").take(keep))
-    with np.load(tmp_path / "clean.npz") as clean:
-        np.testing.assert_array_equal(clean["xyz"], organised["xyz"].reshape(-1, 3)[keep])
-        np.testing.assert_array_equal(
-            clean["timestamp"], np.tile(organised["timestamp"], HEIGHT)[keep]
-        )
+    for names, found in (
+        (["signal"], "signal"),
+        (["reflectivity"], "reflectivity"),
+        (["signal", "reflectivity"], "reflectivity"),
+    ):
+        np.savez(tmp_path / "scan.npz", **{name: organised[name] for name in (*names, "xyz")})
+        scan = read_scan(tmp_path / "scan.npz")
+        np.testing.assert_array_equal(scan.intensity, organised[found].ravel())
 
 
 def test_separate_coordinates_are_read(tmp_path: Path) -> None:
@@ -95,19 +73,6 @@ def test_separate_coordinates_are_read(tmp_path: Path) -> None:
     assert scan.shape is None
     np.testing.assert_array_equal(scan.xyz, np.stack([x, y, z], axis=1))
     assert list(scan.fields) == ["X", "Y", "Z"]
-
-
-def test_coordinates_in_one_array_are_split_for_formats_that_need_it(
-    tmp_path: Path, organised: dict[str, np.ndarray]
-) -> None:
-    np.savez(tmp_path / "scan.npz", xyz=organised["xyz"], signal=organised["signal"])
-    scan = read_scan(tmp_path / "scan.npz")
-    for suffix in (".pcd", ".ply", ".npy", ".bin"):
-        write_scan(tmp_path / f"scan{suffix}", scan)
-        copy = read_scan(tmp_path / f"scan{suffix}", ("x", "y", "z", "signal"))
-        assert list(copy.fields) == ["x", "y", "z", "signal"]
-        np.testing.assert_array_equal(copy.xyz, scan.xyz)
-        np.testing.assert_array_equal(copy.intensity, scan.intensity)
 
 
 def test_a_table_needs_its_columns_stated(tmp_path: Path) -> None:
@@ -120,44 +85,37 @@ def test_a_table_needs_its_columns_stated(tmp_path: Path) -> None:
     assert scan.fields["speed"].dtype == np.float64
 
 
-def test_a_table_comes_back_as_a_table_and_a_grid_as_a_grid(tmp_path: Path) -> None:
-    for shape in ((6, 4), (2, 3, 4), (0, 4)):
-        rows = np.arange(np.prod(shape), dtype=">f8").reshape(shape)
-        np.save(tmp_path / "scan.npy", rows)
-        scan = read_scan(tmp_path / "scan.npy")
-        assert scan.shape == (shape[:2] if len(shape) == 3 else None)
-        write_scan(tmp_path / "copy.npy", scan)
-        np.testing.assert_array_equal(np.load(tmp_path / "copy.npy"), rows, strict=True)
-
-
-def test_a_structured_array_keeps_names_types_and_grid(tmp_path: Path) -> None:
-    for row in (
+@pytest.mark.parametrize("suffix", [".npy", ".npz"])
+@pytest.mark.parametrize(
+    "row",
+    [
         [("x", "f4"), ("y", "f4"), ("z", "f4"), ("i", "u2"), ("normal", "f4", (3,))],
         [("x", "f4"), ("y", "f4"), ("z", "f4"), ("i", "f4")],
         [("xyz", "f4", (3,)), ("i", "f4")],
-    ):
-        table = np.zeros((2, 3), row)
-        table["i"] = np.arange(6).reshape(2, 3)
-        np.save(tmp_path / "scan.npy", table)
-        scan = read_scan(tmp_path / "scan.npy")
-        assert scan.intensity is not None
-        assert scan.intensity.tolist() == [0, 1, 2, 3, 4, 5]
-        write_scan(tmp_path / "copy.npy", scan)
-        np.testing.assert_array_equal(np.load(tmp_path / "copy.npy"), table, strict=True)
+    ],
+)
+def test_a_structured_array_keeps_names_types_and_grid(
+    tmp_path: Path, suffix: str, row: list[Any]
+) -> None:
+    table = np.zeros((2, 3), row)
+    table["i"] = np.arange(6).reshape(2, 3)
+    path = tmp_path / f"scan{suffix}"
+    np.save(path, table) if suffix == ".npy" else np.savez(path, points=table)
+    scan = read_scan(path)
+    np.testing.assert_array_equal(scan.intensity, np.arange(6))
+    write_scan(path, scan)
+    copy = np.load(path) if suffix == ".npy" else np.load(path)["points"]
+    np.testing.assert_array_equal(copy, table, strict=True)
 
 
-def test_columns_of_several_values_become_a_structured_array(tmp_path: Path, scan: Scan) -> None:
-    fields = {axis: scan.fields[axis] for axis in "xyz"} | {"normal": scan.xyz}
-    write_scan(tmp_path / "scan.npy", Scan(scan.xyz, fields=fields))
+def test_columns_of_several_values_or_types_become_a_structured_array(
+    tmp_path: Path, scan: Scan
+) -> None:
+    write_scan(tmp_path / "scan.npy", Scan(scan.xyz, fields={**scan.fields, "normal": scan.xyz}))
     table = np.load(tmp_path / "scan.npy")
-    np.testing.assert_array_equal(table["normal"], scan.xyz, strict=True)
-
-
-def test_columns_of_several_types_become_a_structured_array(tmp_path: Path, scan: Scan) -> None:
-    write_scan(tmp_path / "scan.npy", scan)
-    table = np.load(tmp_path / "scan.npy")
-    assert table.dtype.names == tuple(scan.fields)
+    assert table.dtype.names == (*scan.fields, "normal")
     np.testing.assert_array_equal(table["time"], scan.fields["time"], strict=True)
+    np.testing.assert_array_equal(table["normal"], scan.xyz, strict=True)
 
 
 class Fuse:
@@ -195,19 +153,12 @@ def test_truncated_files_are_refused(tmp_path: Path, scan: Scan, suffix: str) ->
 
 
 @pytest.mark.parametrize(
-    "array",
-    [np.float64(3), np.arange(4.0), np.zeros((2, 2, 2, 4)), np.zeros(3, [("a", "f4")])],
-    ids=["number", "line", "four axes", "no coordinates"],
-)
-def test_arrays_that_are_no_points_are_refused(tmp_path: Path, array: np.ndarray) -> None:
-    np.save(tmp_path / "scan.npy", array)
-    with pytest.raises(InputError, match=r"scan\.npy: "):
-        read_scan(tmp_path / "scan.npy")
-
-
-@pytest.mark.parametrize(
     "arrays",
     [
+        np.float64(3),
+        np.arange(4.0),
+        np.zeros((2, 2, 2, 4)),
+        np.zeros(3, [("a", "f4")]),
         {"points": np.zeros((5, 3))},
         {"xyz": np.zeros((5, 2))},
         {"xyz": np.zeros((5, 3), "U1")},
@@ -217,28 +168,30 @@ def test_arrays_that_are_no_points_are_refused(tmp_path: Path, array: np.ndarray
         {"xyz": np.zeros(3)},
     ],
 )
-def test_archives_without_coordinates_are_refused(
-    tmp_path: Path, arrays: dict[str, np.ndarray]
-) -> None:
-    np.savez(tmp_path / "scan.npz", **arrays)
-    with pytest.raises(InputError, match=r"scan\.npz: "):
-        read_scan(tmp_path / "scan.npz")
+def test_arrays_that_are_no_points_are_refused(tmp_path: Path, arrays: Any) -> None:
+    if isinstance(arrays, dict):
+        np.savez(path := tmp_path / "scan.npz", **arrays)
+    else:
+        np.save(path := tmp_path / "scan.npy", arrays)
+    with pytest.raises(InputError, match=re.escape(f"{path}: ")):
+        read_scan(path)
 
 
-@pytest.mark.parametrize("name", ["points", "Points", "arr_0", "cloud"])
+@pytest.mark.parametrize("name", ["", "points", "Points", "arr_0", "cloud"])
 @pytest.mark.parametrize("shape", [(6, 4), (2, 3, 4), (0, 4)])
-def test_an_npz_of_one_table_is_read_and_comes_back(
+def test_a_table_alone_is_read_and_comes_back_with_its_grid(
     tmp_path: Path, name: str, shape: tuple[int, ...]
 ) -> None:
     rows = np.arange(np.prod(shape), dtype=">f8").reshape(shape)
-    np.savez(tmp_path / "scan.npz", **{name: rows})
-    scan = read_scan(tmp_path / "scan.npz", ("z", "y", "x", "ring"))
+    path = tmp_path / ("scan.npz" if name else "scan.npy")
+    np.savez(path, **{name: rows}) if name else np.save(path, rows)
+    scan = read_scan(path, ("z", "y", "x", "ring"))
     assert scan.shape == (shape[:2] if len(shape) == 3 else None)
     np.testing.assert_array_equal(scan.xyz, rows.reshape(-1, 4)[:, 2::-1])
-    write_scan(tmp_path / "copy.npz", scan)
-    with np.load(tmp_path / "copy.npz") as copy:
-        assert list(copy) == [name]
-        np.testing.assert_array_equal(copy[name], rows, strict=True)
+    write_scan(path, scan)
+    copy = np.load(path)
+    assert not name or list(copy) == [name]
+    np.testing.assert_array_equal(copy[name] if name else copy, rows, strict=True)
 
 
 def test_points_may_have_further_arrays_beside_them(tmp_path: Path) -> None:
@@ -262,25 +215,18 @@ def test_points_may_have_further_arrays_beside_them(tmp_path: Path) -> None:
         read_scan(tmp_path / "scan.npz")
 
 
-def test_a_structured_table_in_an_npz_needs_no_columns_stated(tmp_path: Path) -> None:
-    table = np.zeros((2, 3), [("x", "f4"), ("y", "f4"), ("z", "f4"), ("i", "u2")])
-    table["i"] = np.arange(6).reshape(2, 3)
-    np.savez(tmp_path / "scan.npz", points=table)
-    scan = read_scan(tmp_path / "scan.npz")
-    np.testing.assert_array_equal(scan.intensity, np.arange(6))
-    write_scan(tmp_path / "copy.npz", scan)
-    with np.load(tmp_path / "copy.npz") as copy:
-        np.testing.assert_array_equal(copy["points"], table, strict=True)
-
-
-def test_a_scan_made_in_memory_is_written(tmp_path: Path) -> None:
-    xyz = np.arange(6, dtype=np.float32).reshape(2, 3)
-    scan = Scan(xyz, np.array([7, 8], np.float32))
-    for suffix in (".npy", ".npz", ".bin", ".pcd", ".ply"):
-        for source in (scan, replace(scan, intensity=None)):
-            names = ("x", "y", "z", "intensity")[: 3 + (source.intensity is not None)]
-            write_scan(tmp_path / f"scan{suffix}", source)
-            copy = read_scan(tmp_path / f"scan{suffix}", names)
-            assert list(copy.fields) == list(names)
-            np.testing.assert_array_equal(copy.xyz, xyz)
-            np.testing.assert_array_equal(copy.intensity, source.intensity)
+@pytest.mark.parametrize("suffix", [".npy", ".npz", ".bin", ".pcd", ".ply"])
+@pytest.mark.parametrize("names", [("x", "y", "z"), ("x", "y", "z", "intensity")])
+@pytest.mark.parametrize("from_file", [False, True])
+def test_coordinates_in_one_array_and_scans_from_no_file_are_written_in_every_format(
+    tmp_path: Path, suffix: str, names: tuple[str, ...], from_file: bool
+) -> None:
+    xyz, intensity = np.arange(6, dtype=np.float32).reshape(2, 3), np.array([7, 8], np.float32)
+    arrays = {"xyz": xyz, **({"intensity": intensity} if "intensity" in names else {})}
+    np.savez(tmp_path / "scan.npz", **arrays)
+    scan = read_scan(tmp_path / "scan.npz") if from_file else Scan(**arrays)
+    write_scan(tmp_path / f"copy{suffix}", scan)
+    copy = read_scan(tmp_path / f"copy{suffix}", names)
+    assert copy.fields.keys() == (arrays.keys() if suffix == ".npz" and from_file else set(names))
+    np.testing.assert_array_equal(copy.xyz, xyz)
+    np.testing.assert_array_equal(copy.intensity, scan.intensity)

@@ -2,7 +2,6 @@
 
 import math
 import struct
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import pytest
 
 from derain import InputError, Scan
 from derain.files import read_scan, write_scan
-from derain.files.formats.pcd.header import ENCODINGS, PcdHeader
+from derain.files.formats.pcd import ENCODINGS, PcdHeader
 
 HEADER = """\
 # .PCD v.7 - Point Cloud Data file format
@@ -53,6 +52,13 @@ def column_by_column() -> bytes:
     return b"".join(struct.pack(f"<2{kind}", *values) for kind, values in columns)
 
 
+ENCODED = {
+    "binary": DATA,
+    "ascii": b"1.5 -2 .25 7\nnan inf -0 65535\n",
+    "binary_compressed": compress(column_by_column()),
+}
+
+
 def check_points(scan: Scan) -> None:
     expected = np.array([point[:3] for point in POINTS], np.float32)
     np.testing.assert_array_equal(scan.xyz, expected, strict=True)
@@ -63,10 +69,9 @@ def check_points(scan: Scan) -> None:
 @pytest.mark.parametrize(
     ("encoding", "data"),
     [
-        ("binary", DATA),
-        ("ascii", b"1.5 -2 .25 7\nnan inf -0 65535\n"),
+        *ENCODED.items(),
         ("ascii", b"  1.5\t-2e0 +0.25 7\r\n\r\nNaN Infinity -0.0 65535"),
-        ("binary_compressed", compress(column_by_column())),
+        ("binary", DATA + b"\n"),
     ],
 )
 def test_every_encoding_is_read(file: Path, encoding: str, data: bytes) -> None:
@@ -110,42 +115,21 @@ def test_padding_is_passed_over_in_every_encoding(file: Path) -> None:
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
-def test_columns_of_several_values_stay_together(
-    copied: Callable[[Scan, str, object], Scan], scan: Scan, encoding: str
-) -> None:
-    histogram = np.arange(15, dtype=np.int16).reshape(5, 3)
-    wide = replace(scan, fields={**scan.fields, "histogram": histogram})
-    copy = copied(wide, ".pcd", PcdHeader((), 0, 0, 0, encoding))
-    np.testing.assert_array_equal(copy.fields["histogram"], histogram, strict=True)
-
-
-@pytest.mark.parametrize("encoding", ENCODINGS)
-def test_encoding_viewpoint_grid_and_order_of_columns_survive(
+def test_encoding_viewpoint_and_order_of_columns_survive_and_the_grid_until_it_is_cleaned(
     file: Path, scan: Scan, encoding: str
 ) -> None:
     header = PcdHeader((), 0, 0, 0, encoding, "1 2 3 0.5 0.5 0.5 0.5")
-    grid = scan.take(np.array([0, 1, 2, 3]))
-    write_scan(file, replace(grid, shape=(2, 2), header=header))
+    write_scan(file, replace(scan.take(np.arange(4)), shape=(2, 2), header=header))
     first = file.read_bytes()
-    assert b"VIEWPOINT 1 2 3 0.5 0.5 0.5 0.5\n" in first
-    assert b"WIDTH 2\nHEIGHT 2\n" in first
-    assert f"DATA {encoding}\n".encode() in first
+    stated = f"VIEWPOINT 1 2 3 0.5 0.5 0.5 0.5\nPOINTS {{}}\nDATA {encoding}\n"
+    assert f"WIDTH 2\nHEIGHT 2\n{stated.format(4)}".encode() in first
     copy = read_scan(file)
     assert copy.shape == (2, 2)
     assert list(copy.fields) == list(scan.fields)
     write_scan(file, copy)
     assert file.read_bytes() == first
-
-
-def test_a_cleaned_organised_cloud_is_a_list_in_the_same_encoding(file: Path, scan: Scan) -> None:
-    header = PcdHeader((), 0, 0, 0, "ascii")
-    write_scan(file, replace(scan.take(np.array([0, 1, 2, 3])), shape=(2, 2), header=header))
-    cleaned = read_scan(file).take(np.array([True, False, True, True]))
-    write_scan(file, cleaned)
-    assert b"WIDTH 3\nHEIGHT 1\n" in file.read_bytes()
-    assert b"DATA ascii\n" in file.read_bytes()
-    copy = read_scan(file)
-    np.testing.assert_array_equal(copy.fields["time"], scan.fields["time"][[0, 2, 3]])
+    write_scan(file, copy.take(np.array([True, False, True, True])))
+    assert f"WIDTH 3\nHEIGHT 1\n{stated.format(3)}".encode() in file.read_bytes()
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
@@ -169,12 +153,10 @@ def test_what_open3d_writes_is_read(
         cloud.point[name] = columns[name][:, None]
     open3d.t.io.write_point_cloud(str(file), cloud, ascii_data, compressed)
     copy = read_scan(file)
-    exact = not ascii_data  # Open3D writes ten decimals
-    np.testing.assert_allclose(copy.xyz, scan.xyz, rtol=0 if exact else 1e-6)
+    tolerances = (1e-6, 1e-9) if ascii_data else (0, 0)  # Open3D writes ten decimals
+    np.testing.assert_allclose(copy.xyz, scan.xyz, *tolerances)
     for name in columns.keys() - set("xyz"):
-        np.testing.assert_allclose(
-            copy.fields[name], columns[name], rtol=0 if exact else 1e-6, atol=0 if exact else 1e-9
-        )
+        np.testing.assert_allclose(copy.fields[name], columns[name], *tolerances)
 
 
 @pytest.mark.parametrize(
@@ -191,45 +173,42 @@ def test_a_wrong_number_of_points_is_overruled_by_the_data(
     file: Path, stated: str, shape: tuple[int, int] | None
 ) -> None:
     header = HEADER.replace("HEIGHT 1\n", "").replace("POINTS 2\n", "").replace("WIDTH 2", stated)
-    for encoding, data in (
-        ("binary", DATA),
-        ("ascii", b"1.5 -2 .25 7\nnan inf -0 65535\n"),
-        ("binary_compressed", compress(column_by_column())),
-    ):
+    for encoding, data in ENCODED.items():
         scan = read_scan(write(file, header.replace("DATA binary", f"DATA {encoding}"), data))
         check_points(scan)
         assert scan.shape == shape
 
 
-def test_a_line_feed_behind_the_data_is_passed_over(file: Path) -> None:
-    check_points(read_scan(write(file, HEADER, DATA + b"\n")))
-
-
 @pytest.mark.parametrize(
-    ("header", "data"),
+    ("encoding", "data"),
     [
-        (HEADER, DATA[:-1]),
-        (HEADER, DATA[:14]),
-        (HEADER, DATA + b"garbage"[:5] * 3),
-        (HEADER.replace("POINTS 2", "POINTS 9"), DATA * 3),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n"),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3\n"),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3 4 5\n"),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 three 4\n"),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3 65536\n"),
-        (HEADER.replace("binary", "ascii"), b"1 2 3 4\n1 2 3 4 # 5\n"),
-        (HEADER.replace("binary", "binary_compressed"), b""),
-        (HEADER.replace("binary", "binary_compressed"), compress(column_by_column())[:-3]),
-        (HEADER.replace("binary", "binary_compressed"), compress(column_by_column()[:-2])),
-        (HEADER.replace("binary", "binary_compressed"), struct.pack("<II", 9, 28) + b"\xff" * 9),
-        (HEADER.replace("binary", "binary_compressed"), struct.pack("<II", 2, 28) + b"\0A"),
+        *(("binary", data) for data in (DATA[:-1], DATA[:14], DATA + b"garba" * 3)),
+        *(
+            ("ascii", b"1 2 3 4\n" + line)
+            for line in (
+                b"",
+                b"1 2 3",
+                b"1 2 3 4 5",
+                b"1 2 three 4",
+                b"1 2 3 65536",
+                b"1 2 3 4 # 5",
+            )
+        ),
+        ("binary_compressed", b""),
+        ("binary_compressed", compress(column_by_column())[:-3]),
+        ("binary_compressed", compress(column_by_column()[:-2])),
+        ("binary_compressed", struct.pack("<II", 9, 28) + b"\xff" * 9),
+        ("binary_compressed", struct.pack("<II", 2, 28) + b"\0A"),
     ],
 )
 def test_data_that_do_not_match_the_header_are_refused(
-    file: Path, header: str, data: bytes
+    file: Path, encoding: str, data: bytes
 ) -> None:
+    header = HEADER.replace("DATA binary", f"DATA {encoding}")
     with pytest.raises(InputError, match=r"scan\.pcd: cannot be read as \.pcd \(.*write it again"):
         read_scan(write(file, header, data))
+    with pytest.raises(InputError, match="points where the header states 99"):
+        read_scan(write(file, HEADER.replace("POINTS 2", "POINTS 99"), DATA * 3))
 
 
 @pytest.mark.parametrize(
@@ -262,50 +241,11 @@ def test_headers_that_make_no_sense_are_refused(file: Path, old: str, new: str) 
         read_scan(write(file, HEADER.replace(old, new), DATA))
 
 
-def test_a_count_beyond_all_memory_is_refused(file: Path) -> None:
-    header = HEADER.replace("COUNT 1", "COUNT 99999999999999999999")
-    with pytest.raises(InputError, match=r"cannot be read as \.pcd"):
-        read_scan(write(file, header, DATA))
-
-
-def test_a_cloud_without_coordinates_is_refused(file: Path) -> None:
-    with pytest.raises(InputError, match=r"no x, y and z among its columns \(x, y, depth, "):
-        read_scan(write(file, HEADER.replace("x y z", "x y depth"), DATA))
-
-
 @pytest.mark.parametrize("content", [b"", b"ply\n", bytes(range(256)) * 9])
 def test_files_that_are_no_pcd_are_refused(file: Path, content: bytes) -> None:
     file.write_bytes(content)
     with pytest.raises(InputError, match="the header has no DATA line"):
         read_scan(file)
-
-
-@pytest.mark.parametrize("encoding", ENCODINGS)
-def test_a_cloud_of_no_points_comes_back(file: Path, scan: Scan, encoding: str) -> None:
-    write_scan(file, replace(scan.take(np.array([], int)), header=PcdHeader((), 0, 0, 0, encoding)))
-    copy = read_scan(file)
-    assert len(copy) == 0
-    assert {name: column.dtype for name, column in copy.fields.items()} == {
-        name: column.dtype for name, column in scan.fields.items()
-    }
-
-
-@pytest.mark.parametrize(
-    ("name", "column"),
-    [
-        ("two words", np.zeros(5)),
-        ("", np.zeros(5)),
-        ("half", np.zeros(5, np.float16)),
-        ("word", np.zeros(5, "U3")),
-        ("nothing", np.zeros((5, 0))),
-    ],
-)
-def test_columns_that_no_pcd_can_hold_are_refused(
-    file: Path, scan: Scan, name: str, column: np.ndarray
-) -> None:
-    with pytest.raises(InputError, match=rf"\.pcd has no place for the column '{name}'"):
-        write_scan(file, replace(scan, fields={**scan.fields, name: column}))
-    assert not file.exists()
 
 
 def test_truth_values_and_foreign_byte_orders_are_written_as_pcd_spells_them(

@@ -7,19 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from derain import InputError, Scan
-from derain.files import find_scans, read_scan, write_scan
-from derain.files.columns import scan_of
+from derain.files import read_scan, write_scan
 
-KINDS = ("b1", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8")
-# Names with what CSV itself is made of, and with bytes that are not UTF-8.
-NAMES = st.text("ab;,\"' äλ\udce4", min_size=2, max_size=6).filter(
-    lambda name: name == name.strip()
-)
 EXTENDED_RADAR = """\
 x,y,z,intensity,cross_section,velocity,confidence
 12.5,-3.25,0.5,21,7.5,-1.25,0.99
@@ -166,62 +157,12 @@ def test_lines_whose_numbers_were_changed_are_written_anew(file: Path) -> None:
     assert file.read_text() == "x y z intensity ring\n0.5 1 2 7 1\n3.0 4 5 8 2\n"
 
 
-@st.composite
-def scans(draw: st.DrawFn) -> Scan:
-    """A scan of up to six points with columns of random bits."""
-    points = draw(st.integers(0, 6))
-    further = draw(st.lists(NAMES, max_size=4, unique=True))
-    columns = [(axis, draw(st.sampled_from(("f4", "f8")))) for axis in "xyz"]
-    columns += [(name, draw(st.sampled_from(KINDS))) for name in further]
-    fields = {}
-    for name, kind in draw(st.permutations(columns)):
-        if kind == "b1":
-            fields[name] = draw(arrays(bool, points))
-        else:
-            fields[name] = draw(arrays(f"u{kind[1]}", points)).view(kind)
-    return scan_of(Path("drawn"), fields)
-
-
-@settings(
-    max_examples=200,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],  # one file serves all examples
-)
-@given(scan=scans(), suffix=st.sampled_from((".csv", ".csv.gz")))
-def test_every_value_comes_back(tmp_path: Path, scan: Scan, suffix: str) -> None:
-    file = tmp_path / f"scan{suffix}"
-    write_scan(file, scan)
-    copy = read_scan(file)
-    assert list(copy.fields) == list(scan.fields)
-    for name, column in scan.fields.items():
-        other = copy.fields[name]
-        whole = len(scan) > 0 and column.dtype.kind != "f"
-        assert other.dtype.kind in ("iu" if whole else "f")
-        assert other.dtype.itemsize == 8
-        # Compared as the type that was written: int64 and uint64 have no common one without loss.
-        np.testing.assert_array_equal(other.astype(column.dtype), column, strict=True)
-        if column.dtype.kind == "f":
-            np.testing.assert_array_equal(other, column.astype(np.float64))
-            known = ~np.isnan(column)
-            np.testing.assert_array_equal(np.signbit(other[known]), np.signbit(column[known]))
-    np.testing.assert_array_equal(copy.xyz, scan.xyz)
-
-
 def test_another_program_reads_the_values_too(file: Path, scan: Scan) -> None:
     write_scan(file, scan)
     with file.open(newline="") as lines:
         rows = list(csv.DictReader(lines))
     for name, column in scan.fields.items():
         assert [float(row[name]) for row in rows] == column.tolist()
-
-
-@pytest.mark.parametrize("separator", [",", ";"])
-def test_a_cleaned_table_holds_the_other_lines_as_they_were(file: Path, separator: str) -> None:
-    lines = ["x,y,z,cross section", "0.1,2.0,-3.5,7", "1e-07,nan,inf,8", "0.3,-0.0,5.0,9"]
-    text = [line.replace(",", separator) + "\n" for line in lines]
-    scan = read(file, "".join(text))
-    write_scan(file, scan.take(np.array([True, False, True])))
-    assert file.read_text() == "".join([text[0], text[1], text[3]])
 
 
 @pytest.mark.parametrize(
@@ -240,11 +181,3 @@ def test_what_would_not_come_back_is_not_written(file: Path, name: str, column: 
     with pytest.raises(InputError, match="has no place for the column"):
         write_scan(file, scan)
     assert not list(file.parent.iterdir())
-
-
-def test_the_times_beside_scans_are_no_scan(tmp_path: Path) -> None:
-    (tmp_path / "metadata.csv").write_text("frame,timestamp\n000000,0.0\n")
-    with pytest.raises(InputError, match="holds no scans"):
-        find_scans([tmp_path])
-    (tmp_path / "000000.csv").touch()
-    assert [scan.name for scan in find_scans([tmp_path])] == ["000000.csv"]

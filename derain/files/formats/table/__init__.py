@@ -6,8 +6,8 @@ RFC 4180.
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,56 +18,11 @@ from derain.errors import InputError
 from derain.files.columns import columns_of, name_columns, scan_of
 from derain.files.content import Content
 from derain.files.format import FORMATS, Format
-from derain.files.formats.table.text import Line, parse_lines, parse_table
+from derain.files.formats.table.text import TableHeader, parse_table
 from derain.files.names import scan_suffix
 from derain.files.reading import reading
-from derain.files.text import decode, encode
+from derain.files.text import encode
 from derain.scan import Scan
-
-
-@dataclass(frozen=True, eq=False)
-class TableHeader:
-    """A table as it was written.
-
-    Attributes:
-        separator: What stands between the values of a line; None for white space.
-        columns: Names of the columns.
-        named: Whether a line of the file names them.
-        text: The whole file.
-        begin: Where its lines of points begin.
-        spans: Where each point's line begins and ends in the text, in bytes, int64 (N, 2).
-    """
-
-    separator: str | None
-    columns: tuple[str, ...]
-    named: bool
-    text: bytes
-    begin: int
-    spans: NDArray[np.int64]
-
-    def take(self, rows: NDArray[Any]) -> "TableHeader":
-        """The table of some of the points only."""
-        return replace(self, spans=self.spans[rows])
-
-    def says(self, columns: Mapping[str, NDArray[Any]]) -> bool:
-        """Whether the lines hold just these columns, with these numbers."""
-        if tuple(columns) != self.columns:
-            return False
-        lines = (
-            Line(0, begin, end, decode(self.text[begin:end])) for begin, end in self.spans.tolist()
-        )
-        written, _ = parse_lines(lines, self.separator, self.columns)
-        return all(
-            np.array_equal(ours, theirs, equal_nan=True)
-            for ours, theirs in zip(written, columns.values(), strict=True)
-        )
-
-    def lines(self) -> bytes:
-        """The line of names, if there is one, and the lines of the points, as they were written."""
-        newline = b"\r\n" if b"\r\n" in self.text else b"\n"
-        names = [self.text[: self.begin]] if self.named else []
-        points = (self.text[begin:end] for begin, end in self.spans.tolist())
-        return b"".join(line + newline for line in (*names, *points))
 
 
 @FORMATS.add(".asc", ".xyz")
@@ -98,17 +53,13 @@ class Table(Format):
         """
         path = content.path
         with reading(path, ValueError, csv.Error):
-            table = parse_table(content.data)
-        if table.names is None:
-            none = [np.empty(0)] * len(columns)
-            fields = name_columns(path, table.columns if len(table.spans) else none, columns)
+            header, numbers = parse_table(content.data)
+        if header.named:
+            fields = dict(zip(header.columns, numbers, strict=True))
         else:
-            fields = dict(zip(table.names, table.columns, strict=True))
-        named = table.names is not None
-        header = TableHeader(
-            table.separator, tuple(fields), named, content.data, table.begin, table.spans
-        )
-        return scan_of(path, fields, header=header)
+            numbers = numbers or [np.empty(0)] * len(columns)
+            fields = name_columns(path, numbers, columns)
+        return scan_of(path, fields, header=replace(header, columns=tuple(fields)))
 
     def encode(self, path: Path, scan: Scan) -> bytes:
         """A scan's columns as text.

@@ -3,8 +3,8 @@
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain, islice
 from typing import Any, NamedTuple
 
@@ -33,29 +33,59 @@ class Line(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class TableText:
-    """A parsed table.
+class TableHeader:
+    """A table as it was written.
 
     Attributes:
         separator: What stands between the values of a line; None for white space.
-        names: Names of the columns; None where no line names them.
-        begin: Where the lines of numbers begin.
-        columns: Numbers, a column (N,) each.
-        spans: Where each line of numbers begins and ends, int64 (N, 2).
+        columns: Names of the columns.
+        named: Whether a line of the file names them.
+        text: The whole file.
+        begin: Where its lines of points begin.
+        spans: Where each point's line begins and ends in the text, in bytes, int64 (N, 2).
     """
 
     separator: str | None
-    names: tuple[str, ...] | None
+    columns: tuple[str, ...]
+    named: bool
+    text: bytes
     begin: int
-    columns: list[NDArray[Any]]
     spans: NDArray[np.int64]
 
+    def take(self, rows: NDArray[Any]) -> "TableHeader":
+        """The table of some of the points only."""
+        return replace(self, spans=self.spans[rows])
 
-def parse_table(text: bytes) -> TableText:
+    def says(self, columns: Mapping[str, NDArray[Any]]) -> bool:
+        """Whether the lines hold just these columns, with these numbers."""
+        if tuple(columns) != self.columns:
+            return False
+        lines = (
+            Line(0, begin, end, decode(self.text[begin:end])) for begin, end in self.spans.tolist()
+        )
+        written, _ = parse_lines(lines, self.separator, self.columns)
+        return all(
+            np.array_equal(ours, theirs, equal_nan=True)
+            for ours, theirs in zip(written, columns.values(), strict=True)
+        )
+
+    def lines(self) -> bytes:
+        """The line of names, if there is one, and the lines of the points, as they were written."""
+        newline = b"\r\n" if b"\r\n" in self.text else b"\n"
+        names = [self.text[: self.begin]] if self.named else []
+        points = (self.text[begin:end] for begin, end in self.spans.tolist())
+        return b"".join(line + newline for line in (*names, *points))
+
+
+def parse_table(text: bytes) -> tuple[TableHeader, list[NDArray[Any]]]:
     """Reads lines of numbers; empty lines are passed over.
 
     Values are separated by commas if there is one in the first line, else by semicolons, else by
     white space. The first line names the columns if any of its values is no number.
+
+    Returns:
+        The table as it was written, without names of columns where no line names them, and the
+        numbers, a column (N,) each.
 
     Raises:
         ValueError: Lines of different lengths, values that are not numbers, or two columns of one
@@ -65,18 +95,19 @@ def parse_table(text: bytes) -> TableText:
     lines = filled_lines(text)
     first = next(lines, None)
     if first is None:
-        return TableText(",", None, 0, [], np.empty((0, 2), np.int64))
+        return TableHeader(",", (), False, text, 0, np.empty((0, 2), np.int64)), []
     separator = next((each for each in ",;" if each in first.text), None)
     (values,) = _rows([_COMMENT.sub("", first.text)], separator)
     check_columns(len(values))
-    names = None if all(map(_is_number, values)) else tuple(name.strip() for name in values)
-    if names is None:
+    names = () if all(map(_is_number, values)) else tuple(name.strip() for name in values)
+    if not names:
         lines = chain([first], lines)
     elif len(set(names)) < len(names):
         raise ValueError(f"line {first.number} names two columns alike: {', '.join(names)}")
     titles = names or [f"column {number}" for number, _ in enumerate(values, 1)]
     columns, spans = parse_lines(lines, separator, titles)
-    return TableText(separator, names, first.end if names else 0, columns, spans)
+    begin = first.end if names else 0
+    return TableHeader(separator, names, bool(names), text, begin, spans), columns
 
 
 def filled_lines(text: bytes) -> Iterator[Line]:
@@ -102,7 +133,7 @@ def parse_lines(
         titles: What the columns are called, for messages.
 
     Returns:
-        The columns, and where each line begins and ends, as in TableText.
+        The columns, and where each line begins and ends, as in TableHeader.
 
     Raises:
         ValueError: Lines of different lengths, or values that are not numbers.

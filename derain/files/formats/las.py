@@ -1,6 +1,7 @@
 """Point clouds of laser surveys (`.las`, compressed `.laz`), read and written by laspy.
 
-Source: ASPRS, "LAS Specification", version 1.4 R15.
+Source: ASPRS, "LAS Specification", version 1.4 R15; LASzip, "LASzip compressed point data", the
+record of user id "laszip encoded" and the layered chunks of point formats 6 to 10.
 """
 
 import io
@@ -20,7 +21,6 @@ from derain.errors import InputError
 from derain.files.columns import columns_of, scan_of
 from derain.files.content import Content
 from derain.files.format import FORMATS, Format
-from derain.files.formats.las.laz_chunks import check_chunks
 from derain.files.names import scan_suffix
 from derain.files.reading import reading
 from derain.files.text import encode
@@ -39,6 +39,12 @@ _FAR = 1e5
 # Types of extra dimensions, in NumPy's spelling, and bytes of their names.
 EXTRA_TYPES = ("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8")
 LONGEST_NAME = 32
+
+# Layers of an item of a point, by the item's type: a point, colours, near infrared, waveforms.
+_LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}
+
+# Further bytes have a layer each.
+_EXTRA_BYTES = 14
 
 # No survey is finer than this, in metres.
 _FINEST_SCALE = 1e-12
@@ -106,9 +112,8 @@ class Las(Format):
         if not isinstance(scan.header, LasHeader):
             raise _refused(path)
         header, origin = scan.header.header, scan.header.origin
-        stored = {
-            name.lower() if name in ("X", "Y", "Z") else name for name in _stored_names(header)
-        }
+        names: tuple[str, ...] = header.point_format.dtype().names
+        stored = {name.lower() if name in ("X", "Y", "Z") else name for name in names}
         further = {name: column for name, column in columns.items() if name not in stored}
         header = _with_dimensions(laspy, path, header, further)
         points = laspy.ScaleAwarePointRecord.zeros(len(scan), header=header)
@@ -136,12 +141,6 @@ def _panics_as_errors() -> Iterator[None]:
         if type(error).__name__ != "PanicException":
             raise
         raise ValueError(str(error)) from error
-
-
-def _stored_names(header: Any) -> tuple[str, ...]:
-    """Names of what the points of a file store."""
-    names: tuple[str, ...] = header.point_format.dtype().names
-    return names
 
 
 def _with_dimensions(
@@ -177,7 +176,7 @@ def _points(laspy: ModuleType, content: Content) -> tuple[Any, NDArray[Any]]:
         if header.are_points_compressed:
             (record,) = header.vlrs.get("LasZipVlr")
             begin = header.offset_to_point_data
-            check_chunks(content, record.record_data, header.point_format.size, begin)
+            _check_chunks(content, record.record_data, header.point_format.size, begin)
         raw = file.read().points.array
     if not np.isfinite(header.offsets).all():
         raise ValueError(f"the offsets of the coordinates are {header.offsets}")
@@ -217,6 +216,53 @@ def _check_counts(content: Content) -> None:
     if records * _RECORD + extended * _EXTENDED_RECORD > len(data):
         raise ValueError(f"{records + extended:,} records in the header")
     content.budget.reserve(points * size)
+
+
+def _check_chunks(content: Content, record: bytes, size: int, begin: int) -> None:
+    """Refuses a LAZ file whose chunks do not lie in it, for laspy allocates whatever they state.
+
+    Args:
+        content: The file.
+        record: The variable-length record that says how the points are compressed.
+        size: Bytes of a point.
+        begin: Where the compressed points begin.
+
+    Raises:
+        ValueError: Points of another size than the header's, more chunks than the file can hold, or
+            a layer that is not in it.
+        struct.error: A file that is cut off.
+    """
+    items = list(struct.iter_unpack("<HHH", record[34:]))
+    (stated,) = struct.unpack_from("<H", record, 32)
+    if stated != len(items) or sum(item_size for _, item_size, _ in items) != size:
+        raise ValueError("compressed points of another size than the header's")
+    data = content.data
+    (table,) = struct.unpack_from("<q", data, begin)
+    if table == -1:  # the file was written as a stream
+        (table,) = struct.unpack_from("<q", data, len(data) - 8)
+    if not begin < table < len(data):
+        raise ValueError("the table of chunks is not in the file")
+    _, chunks = struct.unpack_from("<II", data, table)
+    if chunks > len(data):
+        raise ValueError(f"{chunks:,} chunks in the header")
+    layers = sum(
+        item_size if kind == _EXTRA_BYTES else _LAYERS.get(kind, 0) for kind, item_size, _ in items
+    )
+    if layers:
+        _check_layers(data, begin + 8, table, size, layers)
+
+
+def _check_layers(data: bytes, begin: int, end: int, size: int, layers: int) -> None:
+    """Refuses chunks whose layers are not in the file.
+
+    A chunk is its first point, the number of its points, the sizes of its layers, and the layers.
+    """
+    while begin < end:
+        place = begin + size + 4
+        sizes = struct.unpack_from(f"<{layers}I", data, place)
+        begin = place + 4 * layers + sum(sizes)
+    if begin > end:
+        raise ValueError("a chunk that is not in the file")
 
 
 def _origin(whole: NDArray[np.int64], scales: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -1,8 +1,11 @@
 """Columns in Arrow's file format (`.feather`, version 2), read and written by PyArrow; Argoverse 2.
 
-Source: Apache Arrow, "Arrow Columnar Format", version 1.5, section on IPC.
+Source: Apache Arrow, "Arrow Columnar Format", version 1.5, section on IPC, and its
+format/Message.fbs: the numbers of the tables' members, and the eight bytes before a compressed
+buffer that say its size.
 """
 
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +17,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.columns import columns_of, scan_of
-from derain.files.content import Content, check_columns
+from derain.files.content import Content, MemoryBudget, check_columns
 from derain.files.format import FORMATS, Format
 from derain.files.reading import reading
 from derain.scan import Scan
@@ -22,6 +25,17 @@ from derain.system.extras import FLATBUFFERS, PYARROW, require
 
 # What the file begins with; what follows is a stream of messages.
 _MAGIC = b"ARROW1\0\0"
+
+# Members of tables, by their place in Message.fbs.
+_MESSAGE_HEADER = 2
+_DICTIONARY_DATA = 1
+_BATCH_BUFFERS = 2
+_BATCH_COMPRESSION = 3
+_COMPRESSION_CODEC = 0
+
+_CODECS = ("lz4", "zstd")
+_BUFFER = struct.Struct("<qq")  # where a buffer begins in the message's body, and its length
+_SIZE = struct.Struct("<q")
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +78,12 @@ class Feather(Format):
         """
         arrow = PYARROW.load(content.path)
         require(content.path, FLATBUFFERS)
-        from derain.files.formats.feather.arrow_messages import check_messages
-
         with reading(content.path, Exception):
             if not content.data.startswith(_MAGIC):
                 raise ValueError("it does not begin as Feather version 2 does")
             # As a stream, so that what is read are the messages that were checked.
             stream = content.data[len(_MAGIC) :]
-            compression = check_messages(arrow, stream, content.budget)
+            compression = _check_messages(arrow, stream, content.budget)
             with arrow.ipc.open_stream(stream) as messages:
                 table = messages.read_all()
             table.validate(full=True)
@@ -79,8 +91,11 @@ class Feather(Format):
             content.budget.reserve(table.nbytes)
             if len(set(table.column_names)) < table.num_columns:
                 raise ValueError("two columns have one name")
-            numbers = [name for name in table.column_names if _has_numbers(arrow, table[name])]
-            fields = {name: table[name].to_numpy() for name in numbers}
+            fields = {
+                name: column.to_numpy()
+                for name, column in zip(table.column_names, table.columns, strict=True)
+                if arrow.types.is_integer(column.type) or arrow.types.is_floating(column.type)
+            }
         return scan_of(content.path, fields, header=FeatherHeader(table, compression))
 
     def encode(self, path: Path, scan: Scan) -> bytes:
@@ -113,6 +128,59 @@ class Feather(Format):
         return bytes(sink.getvalue())
 
 
-def _has_numbers(arrow: ModuleType, column: Any) -> bool:
-    kinds = arrow.types
-    return bool(kinds.is_integer(column.type) or kinds.is_floating(column.type))
+def _check_messages(arrow: ModuleType, stream: bytes, budget: MemoryBudget) -> str:
+    """Takes room for what compressed messages of a stream expand to.
+
+    PyArrow allocates whatever they state.
+
+    Args:
+        arrow: PyArrow.
+        stream: The messages.
+        budget: What there is.
+
+    Returns:
+        How they are compressed: "uncompressed", "lz4" or "zstd".
+
+    Raises:
+        ValueError: There is no room for them.
+    """
+    from flatbuffers import number_types
+    from flatbuffers.table import Table
+
+    compression = "uncompressed"
+    for message in arrow.ipc.MessageReader.open_stream(stream):
+        if message.type not in ("record batch", "dictionary"):
+            continue
+        root = Table(memoryview(message.metadata), 0)
+        batch = _member(Table(root.Bytes, root.Indirect(0)), _MESSAGE_HEADER)
+        if batch is not None and message.type == "dictionary":
+            batch = _member(batch, _DICTIONARY_DATA)
+        codec = None if batch is None else _member(batch, _BATCH_COMPRESSION)
+        if batch is not None and codec is not None:
+            _take(batch, memoryview(message.body), budget)
+            compression = _CODECS[
+                codec.GetSlot(_slot(_COMPRESSION_CODEC), 0, number_types.Int8Flags)
+            ]
+    return compression
+
+
+def _take(batch: Any, body: memoryview, budget: MemoryBudget) -> None:
+    """Takes room for the buffers of a compressed batch."""
+    place = batch.Offset(_slot(_BATCH_BUFFERS))
+    first, count = batch.Vector(place), batch.VectorLen(place)
+    for number in range(count):
+        begin, length = _BUFFER.unpack_from(batch.Bytes, first + number * _BUFFER.size)
+        if length > 0:
+            (size,) = _SIZE.unpack_from(body, begin)
+            budget.reserve(max(size, 0))  # -1 says that the buffer is not compressed
+
+
+def _member(table: Any, number: int) -> Any:
+    """A table that is a member of another; None where it is missing."""
+    place = table.Offset(_slot(number))
+    return type(table)(table.Bytes, table.Indirect(table.Pos + place)) if place else None
+
+
+def _slot(number: int) -> int:
+    """Where the place of a member stands in a table's index, behind two sizes of two bytes."""
+    return 4 + 2 * number
