@@ -26,7 +26,7 @@ from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
 from derain.export.runtimes.session import FLOAT32_PRECISION
 from derain.files import DEFAULT_COLUMNS
 from derain.filters import PointFilter
-from derain.filters.filter_view import filter_view, rain_among
+from derain.filters.point_filter import filter_view, rain_among
 from derain.scan import Scan
 from derain.sources.given import GivenScans, source_of
 from derain.sources.spread import evenly_spaced
