@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
-from derain.evaluation.counts import Counts, ratio
+from derain.evaluation.counts import Counts, ratio, table_of
 from derain.evaluation.range_bands import RANGE_EDGES, band_names, band_of
 from derain.evaluation.text_tables import number_text, plain_table
 from derain.scan import Scan
@@ -65,8 +65,7 @@ class Answers:
         student = np.zeros(len(scan), np.int64) if called_rain is None else called_rain
         valid = scan.valid
         band = band_of(scan.range[valid], FINE_EDGES)
-        cell = np.ravel_multi_index((band, answer[valid], student[valid].astype(int)), _SHAPE)
-        return cls(np.bincount(cell, minlength=int(np.prod(_SHAPE))).reshape(_SHAPE))
+        return cls(table_of((band, answer[valid], student[valid].astype(np.int64)), _SHAPE))
 
     @classmethod
     def none(cls) -> "Answers":

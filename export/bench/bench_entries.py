@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError, printable
-from derain.evaluation.baselines import PositionPrior, all_points, no_points
-from derain.evaluation.intensity_rule import IntensityRule
+from derain.evaluation.baselines import IntensityRule, PositionPrior, all_points, no_points
 from derain.export.bench.other_runtime import OtherRuntime, with_runtime, with_runtime_variants
 from derain.export.methods import (
     load_method_of_one_scan,

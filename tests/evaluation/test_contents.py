@@ -122,20 +122,6 @@ def test_a_scan_without_labels_gives_its_points(tmp_path: Path) -> None:
         assert contents.as_dict({})["class_share"] == {}
 
 
-def test_labels_beside_a_scan_are_found(tmp_path: Path) -> None:
-    write_scan(tmp_path / "scan.pcd", Scan.of(scene(40)))
-    write_labels(tmp_path / "scan.label", np.full(40, 110))
-    assert count_frame(frame_of(tmp_path / "scan.pcd")).labelled == {110: 40}
-
-
-def test_labels_of_another_scan_are_refused(tmp_path: Path) -> None:
-    add_scan(tmp_path, REHEARSE3D, "0", [3, 0, 3])
-    columns = ["x", "y", "z", "intensity", "ring", "time"]
-    (sequence,) = find_sequences(tmp_path, REHEARSE3D, columns)
-    with pytest.raises(InputError, match="3 labels of 4 bytes for a scan of 2 points"):
-        count_frame(sequence.frames[0])
-
-
 def test_real_scans_are_counted_as_numpy_counts_them(shared: Path) -> None:
     root = shared / "data" / "wads"
     assert find_layout(root) == Layout()
