@@ -85,27 +85,19 @@ def scan_loader(
         run_seed(),
         room // max(loading.workers, 1),
     )
+    sampler: Sampler[Pick] = (
+        TrainingOrder(dataset, dataset.seed, processes, process, draws)
+        if part == "train"
+        else MeasuringOrder(dataset, loading.batch_size, processes, process)
+    )
     return LateLoader(
         dataset,
         batch_size=loading.batch_size,
-        sampler=_order(dataset, part, loading.batch_size, processes, process, draws),
+        sampler=sampler,
         num_workers=loading.workers,
         persistent_workers=loading.workers > 0,
         collate_fn=packed,
     )
-
-
-def _order(
-    dataset: ScanDataset,
-    part: Part,
-    batch_size: int,
-    processes: int,
-    process: int,
-    draws: Draws | None,
-) -> Sampler[Pick]:
-    if part != "train":
-        return MeasuringOrder(dataset, batch_size, processes, process)
-    return TrainingOrder(dataset, dataset.seed, processes, process, draws)
 
 
 class LateLoader(DataLoader[Sample | InputError]):

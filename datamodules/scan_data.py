@@ -10,12 +10,11 @@ from pathlib import Path
 from derain.annotation.held_out import FEWEST_SCANS
 from derain.annotation.manifest import CARD, HELD_OUT_PART, TRAINING_PART, Manifest
 from derain.cards.card import DataCard, load_card
-from derain.cards.known import layouts_for
 from derain.cards.layout import Layout
 from derain.datamodules.loading import Loading, Part
 from derain.errors import InputError
 from derain.scan import Scan
-from derain.sources.folders import named_frames, sequence_frames
+from derain.sources.folders import sequence_frames
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
@@ -83,32 +82,6 @@ class ScanData(ABC):
     @property
     def _reader(self) -> FrameReader:
         return FrameReader(self.card, self.loading.intensity_scale)
-
-
-class NamedScans(ScanData):
-    """Scans named one by one or by their folders, the same ones for every part.
-
-    A scan's labels are ``<stem>.label`` beside it or in the sibling folder of labels.
-
-    Args:
-        paths: Scans, folders with scans directly in them, and sequences.
-        card: Data card of the scans. Its layout is the first to be searched for sequences and
-            labels.
-        loading: How the scans are read.
-    """
-
-    def __init__(self, paths: Sequence[Path], card: DataCard, loading: Loading) -> None:
-        super().__init__(card, loading)
-        self.paths = paths
-
-    def source(self, part: Part) -> Source:
-        """The scans, in the order of their names on the command line; a folder's sorted by name.
-
-        Raises:
-            InputError: A path that does not exist, or a folder without scans.
-        """
-        layouts = layouts_for(self.card)
-        return named_frames(self.paths, self.loading.columns, labelled=True, layouts=layouts)
 
 
 class SequenceData(ScanData):

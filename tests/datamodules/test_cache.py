@@ -41,7 +41,7 @@ def test_what_came_first_stays_as_long_as_it_fits() -> None:
         made.append(number)
         return scan_of(100 if number != 1 else 1000)
 
-    kept = Cache[Scan](3 * bytes_of(scan_of(100)))
+    kept = Cache(3 * bytes_of(scan_of(100)))
     for _ in range(2):
         for number in range(5):
             assert len(kept.get(number, lambda n=number: item(n))) == len(item(number))
