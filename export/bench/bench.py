@@ -283,7 +283,7 @@ def _facts(
 ) -> dict[str, Any]:
     """Everything that a bench depends on besides its methods, as JSON-able primitives."""
     card, frames = data.card, data.frames
-    others = [method.by_other.runtime.name for method in methods if method.by_other]
+    others = [method.runtime.name for method in methods if method.usual]
     scans = "1 scan" if len(frames) == 1 else f"{len(frames):,} scans"
     files = []
     for frame in frames:

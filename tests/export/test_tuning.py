@@ -18,8 +18,8 @@ from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export import tuning
-from derain.export.labelled_neighbourhoods import LabelledNeighbourhoods
 from derain.export.tuning import (
+    LabelledNeighbourhoods,
     Search,
     neighbours_to_find,
     pooled_iou,
