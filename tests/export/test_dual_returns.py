@@ -11,7 +11,6 @@ import torch
 
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
-from derain.evaluation.hard_cases import hard_cases
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.files import write_scan
@@ -55,17 +54,14 @@ def derainer(checkpoint: Path) -> Derainer:
     return Derainer(checkpoint.with_suffix(".onnx"), threads=1)
 
 
-def test_the_spec_has_its_unit_and_its_statistics(derainer: Derainer) -> None:
+def test_the_file_answers_as_the_network_of_the_same_channel(
+    checkpoint: Path, derainer: Derainer
+) -> None:
     places = np.concatenate([channel_of(recorded(seed), DUAL_RETURN) for seed in range(2)])
     spec = derainer.spec
     assert spec.units == ("m", "m", "m", "-1, 0 or 1")
     assert spec.mean[-1] == pytest.approx(places.mean(), abs=1e-6)
     assert spec.std[-1] == pytest.approx(places.std(), rel=1e-5)
-
-
-def test_the_file_answers_as_the_network_of_the_same_channel(
-    checkpoint: Path, derainer: Derainer
-) -> None:
     scan = recorded(7)
     model = load_model(checkpoint)
     view = model.spec.make_view()(scan)
@@ -91,10 +87,3 @@ def test_a_sensor_of_single_returns_is_told_of(
     assert "no dual_return: the mean of" in outcome.err
     written = read_labels(tmp_path / "out" / "single.label", len(single))
     np.testing.assert_array_equal(written, derainer(single))
-
-
-@pytest.mark.parametrize(("name", "scan"), list(hard_cases(largest=2000)))
-def test_hard_cases_have_probabilities(derainer: Derainer, name: str, scan: Scan) -> None:
-    probability = derainer.probability(scan)
-    assert np.isfinite(probability).all()
-    assert not probability[~scan.valid].any()

@@ -95,19 +95,18 @@ def from_pytorch(checkpoint: Path, scan: Scan) -> NDArray[np.float32]:
     return view.back(logits.softmax(dim=1)[:, 1].numpy())
 
 
-def test_the_file_says_what_the_network_sees_and_in_what_units(derainer: Derainer) -> None:
+def test_the_file_says_what_the_network_sees_and_in_what_units(
+    trained: Path, derainer: Derainer
+) -> None:
     spec = derainer.spec
+    first = onnx.load(trained.with_suffix(".onnx")).graph.input[0].type.tensor_type.shape
+    assert first.dim[1].dim_value == len(spec.channels)
     assert set(EXTRA) < set(spec.channels)
     units = dict(zip(spec.channels, spec.units, strict=True))
     assert [units[name] for name in EXTRA] == ["0 or 1", "m/s", "dBsm"]
     means = dict(zip(spec.channels, spec.mean, strict=True))
     assert means["radar"] == pytest.approx(DETECTIONS / POINTS)
     assert means["doppler"] == pytest.approx(-2, abs=1.5)
-
-
-def test_the_networks_input_is_as_wide_as_its_channels(trained: Path, derainer: Derainer) -> None:
-    first = onnx.load(trained.with_suffix(".onnx")).graph.input[0].type.tensor_type.shape
-    assert first.dim[1].dim_value == len(derainer.spec.channels)
 
 
 def test_an_extra_channel_that_is_normalised_wrongly_fails_the_proof(
@@ -134,25 +133,15 @@ def test_a_scan_gets_the_answer_of_pytorch_whatever_columns_it_has(
     assert set(derainer.spec.missing_channels(scan)) == set(EXTRA) - set(kept)
 
 
-def test_the_columns_make_a_difference(derainer: Derainer) -> None:
-    scan = fused(7)
-    without = Scan(scan.xyz, scan.intensity)
-    assert (derainer.probability(scan) != derainer.probability(without)).mean() > 0.1
-
-
-def test_missing_columns_are_as_good_as_columns_of_the_mean(derainer: Derainer) -> None:
+def test_columns_make_a_difference_and_missing_ones_are_as_good_as_their_mean(
+    derainer: Derainer,
+) -> None:
     scan = fused(7)
     means = dict(zip(derainer.spec.channels, derainer.spec.mean, strict=True))
-    filled = {name: np.full(POINTS, means[name]) for name in EXTRA}
-    absent = Scan(scan.xyz, scan.intensity)
-    np.testing.assert_array_equal(
-        derainer.probability(Scan(scan.xyz, scan.intensity, fields=filled)),
-        derainer.probability(absent),
-    )
-    np.testing.assert_array_equal(
-        derainer.probability(np.column_stack([scan.xyz, scan.intensity])),
-        derainer.probability(absent),
-    )
+    filled = Scan(scan.xyz, scan.intensity, fields={n: np.full(POINTS, means[n]) for n in EXTRA})
+    absent = derainer.probability(np.column_stack([scan.xyz, scan.intensity]))
+    np.testing.assert_array_equal(derainer.probability(filled), absent)
+    assert (derainer.probability(scan) != absent).mean() > 0.1
 
 
 def test_scans_of_both_kinds_are_cleaned_with_every_column_kept(

@@ -61,8 +61,8 @@ def test_a_flipped_bit_is_refused_or_changes_no_answer(exported: bytes, path: Pa
     # Anywhere, and then in the metadata, of which the file has less than of weights.
     start = exported.index(b'"spec"')
     bits = [
-        *rng.integers(8 * len(exported), size=600),
-        *rng.integers(8 * start, 8 * len(exported), size=200),
+        *rng.integers(8 * len(exported), size=250),
+        *rng.integers(8 * start, 8 * len(exported), size=100),
     ]
     refused = 0
     for bit in bits:

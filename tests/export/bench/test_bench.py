@@ -154,8 +154,6 @@ def test_what_cannot_be_benched_is_refused(labelled: LabelledFrames, tmp_path: P
         bench([DSOR], [scan], card)  # type: ignore[list-item]
     with pytest.raises(InputError, match="methods: int is no method"):
         bench([3], [scan], card)  # type: ignore[list-item]
-    with pytest.raises(InputError, match="position: it has no scans to learn from"):
-        bench(["position"], [scan], card)
     with pytest.raises(InputError, match="scans: there are none"):
         bench(["all"], [], card)
     with pytest.raises(InputError, match="scans: int is no scan"):
@@ -165,8 +163,6 @@ def test_what_cannot_be_benched_is_refused(labelled: LabelledFrames, tmp_path: P
     labelled.frames[0].label_path.unlink()
     with pytest.raises(InputError, match="its labels are not at"):
         bench(["all"], labelled.frames, card)
-    with pytest.raises(InputError, match="all: two methods are called so"):
-        bench(["all", "all"], [scan], card)
 
 
 def test_a_loaded_model_of_another_threshold_is_made_anew_in_its_process(

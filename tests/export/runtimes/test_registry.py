@@ -1,12 +1,15 @@
 """A runtime is found by its name, opens what has been looked at, and is refused in one line."""
 
+import platform
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import onnxruntime
 import pytest
 
+import derain
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export.machine import versions
@@ -117,6 +120,12 @@ def test_a_method_is_run_by_the_runtime_that_is_named_and_a_filter_by_none() -> 
 def test_the_versions_name_each_package_that_ran_once(
     rainy: type[Session], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    for version in (
+        f"; derain {derain.__version__}, onnxruntime {onnxruntime.__version__}, ",
+        f"NumPy {np.__version__}, Python {platform.python_version()}",
+    ):
+        assert version in versions()
+    assert not versions().startswith(";")
     assert versions(["onnxruntime", "rainy"]) == versions()
     monkeypatch.setattr(rainy, "PACKAGE", "numpy")
     assert versions(["rainy"]).count(np.__version__) == 2
