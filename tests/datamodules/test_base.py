@@ -19,7 +19,6 @@ from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.models.lisnownet import LiSnowNet
 from derain.scan import Scan
-from derain.sources.file_frame import FileFrame
 from derain.views.neighbours import NeighbourView
 
 Write = Callable[..., None]
@@ -73,6 +72,7 @@ def test_what_is_not_trained_on_comes_in_order_and_untouched(
             for number, scan in enumerate(scans(data, part)):
                 points = scene(40 + number, seed=number)
                 np.testing.assert_array_equal(np.c_[scan.xyz, scan.intensity], points)
+    assert {batch.target for batch in batches(data, "predict")} == {None}
 
 
 def test_scans_are_packed_in_batches_of_the_size_asked_for(
@@ -93,10 +93,6 @@ def test_the_target_is_one_where_the_card_says_rain(
         expected = measured.scan.label[NeighbourView()(measured.scan).first] == SNOW
         np.testing.assert_array_equal(batch.target.numpy(), expected)
         assert 0 < expected.sum() < len(expected)
-
-
-def test_prediction_scans_have_no_target(folder: Callable[..., Folder], connect: Connect) -> None:
-    assert {batch.target for batch in batches(connect(folder()), "predict")} == {None}
 
 
 @pytest.mark.parametrize("neighbours", [3, 9])
@@ -181,6 +177,9 @@ def test_statistics_are_taken_from_the_training_scans_where_the_card_has_none(
     np.testing.assert_allclose(data.card.mean, points.mean(axis=0))
     np.testing.assert_allclose(data.card.std, points.std(axis=0))
     assert data.card.rain_share == 0.25
+    card = data.card
+    data.complete_card()
+    assert data.card is card  # what it says is left alone
 
 
 @pytest.fixture
@@ -244,33 +243,6 @@ def test_range_images_of_a_batch_have_one_size(
     for number, measured in enumerate(batch.measured):
         image = torch.from_numpy(view(measured.scan).image)
         assert torch.equal(batch.inputs["image"][number], image)
-
-
-def test_the_statistics_of_a_card_are_left_alone(folder: Callable[..., Folder]) -> None:
-    data = folder()
-    card = data.card
-    data.complete_card()
-    assert data.card is card
-
-
-def test_columns_are_as_stated(tmp_path: Path) -> None:
-    rows = np.arange(10, dtype=np.float32).reshape(2, 5)
-    rows.tofile(tmp_path / "a.bin")
-    loading = Loading(columns=("x", "y", "z", "ring", "intensity"))
-    data = Folder(str(tmp_path), "wads", test=["a.bin"], loading=loading)
-    scan = data.read(data.frames("predict")[0])
-    np.testing.assert_array_equal(scan.xyz, rows[:, :3])
-    np.testing.assert_array_equal(scan.intensity, rows[:, 4])
-
-
-def test_the_instance_of_a_label_is_not_its_class(tmp_path: Path, write: Write) -> None:
-    write(tmp_path / "a.bin", points=scene(3))
-    write_labels(tmp_path / "a.label", np.array([0, SNOW, 40]), np.array([7, 8, 65535]))
-    data = Folder(str(tmp_path), "wads")
-    label, scan_path = tmp_path / "a.label", tmp_path / "a.bin"
-    scan = data.read(FileFrame(key="a", path=scan_path, label_path=label))
-    assert scan.label is not None
-    assert scan.label.tolist() == [0, SNOW, 40]
 
 
 @pytest.mark.parametrize("workers", [0, 1])
