@@ -12,8 +12,7 @@ from derain.annotation.manifest import CARD, is_taught
 from derain.cards.card import DataCard, load_card, packaged_cards
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
-from derain.datamodules.loading import Loading, Part
-from derain.datamodules.scan_data import ScanData, SequenceData, TaughtData
+from derain.datamodules.scan_data import Loading, Part, ScanData, SequenceData, TaughtData
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.simulation.manifest import RAIN_RATE, manifest_of, rates_of_sequences, read_manifest

@@ -6,9 +6,8 @@ from typing import Any
 
 from torch.utils.data import DataLoader, Sampler
 
-from derain.datamodules.loading import Loading, Part
 from derain.datamodules.order import Draws, MeasuringOrder, Pick, TrainingOrder
-from derain.datamodules.scan_data import with_needed_labels
+from derain.datamodules.scan_data import Loading, Part, with_needed_labels
 from derain.datamodules.scan_dataset import MEGABYTE, ScanDataset
 from derain.errors import InputError
 from derain.learning.batch import VIEW, Batch, Sample, summed_times

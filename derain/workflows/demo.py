@@ -11,8 +11,7 @@ import yaml
 from numpy.typing import NDArray
 
 from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
-from derain.datamodules.loading import Loading
-from derain.datamodules.scan_data import ScanData
+from derain.datamodules.scan_data import Loading, ScanData
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.export.bench.bench import Bench, Effort, run_bench

@@ -1,6 +1,7 @@
 """From files to batches: what a model gets to see, and what is said of files it cannot see."""
 
 import pickle
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,6 @@ from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.folder import Folder
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.models.lisnownet import LiSnowNet
 from derain.scan import Scan
@@ -247,29 +247,30 @@ def test_range_images_of_a_batch_have_one_size(
 
 @pytest.mark.parametrize("workers", [0, 1])
 @pytest.mark.parametrize(
-    ("damage", "message"),
+    # The last of the scans, for a worker that is left in the middle takes seconds to end.
+    ("file", "content", "message"),
     [
-        ("unknown class", r"5\.label: ids \[777, 778\] are no classes of WADS\. Name them"),
-        ("short labels", r"5\.label: holds 2 labels of 4 bytes for a scan of 45 points"),
-        ("half a row", r"5\.bin: 6 bytes are not whole rows of 16 bytes"),
+        (
+            "5.label",
+            np.resize([778, 0, 777], 45),
+            r"ids \[777, 778\] are no classes of WADS",
+        ),
+        ("5.label", np.zeros(2), "holds 2 labels of 4 bytes for a scan of 45 points"),
+        ("5.bin", np.zeros(1), "4 bytes are not whole rows of 16 bytes"),
     ],
+    ids=["unknown class", "short labels", "half a row"],
 )
 def test_a_file_that_cannot_be_used_is_named_from_a_worker_as_well(
     folder: Callable[..., Folder],
     connect: Connect,
     tmp_path: Path,
-    damage: str,
+    file: str,
+    content: np.ndarray,
     message: str,
     workers: int,
 ) -> None:
     data = connect(folder(workers=workers))
-    # The last of the scans, for a worker that is left in the middle takes seconds to end.
-    if damage == "unknown class":
-        write_labels(tmp_path / "5.label", np.resize([778, 0, 777], 45))
-    elif damage == "short labels":
-        write_labels(tmp_path / "5.label", np.zeros(2, np.int64))
-    else:
-        (tmp_path / "5.bin").write_bytes(b"abcdef")
-    with pytest.raises(InputError, match=message) as refusal:
+    content.astype("<u4").tofile(tmp_path / file)
+    with pytest.raises(InputError, match=f"{re.escape(file)}: {message}") as refusal:
         batches(data, "val")
     assert "Traceback" not in str(refusal.value)

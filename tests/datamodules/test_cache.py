@@ -12,7 +12,7 @@ from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.datamodules.loader import scan_loader
-from derain.datamodules.loading import Part
+from derain.datamodules.scan_data import Part
 from derain.datamodules.scan_dataset import Cache, bytes_of
 from derain.evaluation.hard_cases import scene
 from derain.learning.batch import Batch
