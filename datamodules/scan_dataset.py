@@ -129,7 +129,7 @@ class Cache:
     def get(self, number: int, make: Callable[[], Item]) -> Item:
         """The item of a number, made where it is not kept."""
         if number in self._items:
-            return self._items[number]  # type: ignore[no-any-return]
+            return self._items[number]
         made = make()
         size = bytes_of(made)
         if size <= self._left:

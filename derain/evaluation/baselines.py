@@ -7,7 +7,7 @@ are dim and near.
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +77,9 @@ class PositionPrior:
         """
         if not (voxel > 0 and math.isfinite(voxel)):
             raise InputError("voxel", f"{voxel:g} m", "Give a finite length above 0.")
-        number, points, hits = np.zeros(0, np.int64), np.zeros(0), np.zeros(0)
+        number = np.zeros(0, np.int64)
+        points: NDArray[Any] = np.zeros(0)
+        hits: NDArray[Any] = np.zeros(0)
         for scan, rain in scans:
             own = _voxel_of(scan.xyz[scan.valid], voxel)
             number, row = np.unique(np.append(number, own), return_inverse=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.errors import InputError
-from derain.evaluation.hard_cases import scene
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
@@ -29,6 +29,8 @@ from derain.scan import Scan
 EXTRA = ("radar", "doppler", "rcs")
 CARD = "name: fused\nclasses: {0: other, 3: rain}\nrain: [3]\n"
 POINTS, DETECTIONS = 400, 40
+NAMES = ("empty", "one point", "40 % duplicates", "NaN and infinite rows", "no intensity")
+CASES = [(name, scan) for name, scan in hard_cases() if name in NAMES]
 
 
 def fused(seed: int) -> Scan:
@@ -82,6 +84,7 @@ def trained(
 @pytest.fixture(scope="module")
 def derainer(trained: Path) -> Derainer:
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(onnx_file, "hard_cases", lambda: CASES)
         patch.setattr("derain.models.outdet.deployed.BLOCKS", 1)  # traced several times as quickly
         export(load_model(trained), trained.with_suffix(".onnx"))
     return Derainer(trained.with_suffix(".onnx"), threads=1)
@@ -116,6 +119,7 @@ def test_an_extra_channel_that_is_normalised_wrongly_fails_the_proof(
     wrong.std[wrong.channels.index("doppler")] *= 2
     graph = onnx.load(trained.with_suffix(".onnx"))
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: graph)
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: CASES)
     with pytest.raises(InputError, match="the exported model differs"):
         export(wrong, tmp_path / "model.onnx")
 
