@@ -26,10 +26,9 @@ from benchmarks.batchnorm_memory import remembered_intensity
 from derain.cards.card import load_card
 from derain.datamodules.simulated import Simulated
 from derain.errors import InputError
-from derain.evaluation.baselines import PositionPrior, all_points
+from derain.evaluation.baselines import IntensityRule, PositionPrior, all_points
 from derain.evaluation.contents import find_sequences
 from derain.evaluation.counts import Counts
-from derain.evaluation.intensity_rule import IntensityRule
 from derain.evaluation.text_tables import markdown_table, number_text
 from derain.files import read_scan
 from derain.models.outdet import OutDet

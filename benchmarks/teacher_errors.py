@@ -29,7 +29,7 @@ from derain.annotation.taught_labels import (
 from derain.cards.card import DataCard, load_card
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.in_memory import InMemory
-from derain.datamodules.loading import Loading
+from derain.datamodules.scan_data import Loading
 from derain.models.measured import MONITOR
 from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNext

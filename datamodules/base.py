@@ -7,9 +7,8 @@ from torch.utils.data import DataLoader
 
 from derain.cards.card import DataCard
 from derain.datamodules.loader import scan_loader
-from derain.datamodules.loading import Loading, Part
 from derain.datamodules.order import Draws
-from derain.datamodules.scan_data import ScanData, with_needed_labels
+from derain.datamodules.scan_data import Loading, Part, ScanData, with_needed_labels
 from derain.datamodules.statistics import with_statistics
 from derain.errors import InputError
 from derain.learning.batch import Sample

@@ -12,12 +12,38 @@ from derain.annotation.manifest import CARD, is_taught
 from derain.cards.card import DataCard, load_card, packaged_cards
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
-from derain.datamodules.loading import Loading
-from derain.datamodules.scan_data import NamedScans, ScanData, SequenceData, TaughtData
+from derain.datamodules.scan_data import Loading, Part, ScanData, SequenceData, TaughtData
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.simulation.manifest import RAIN_RATE, manifest_of, rates_of_sequences, read_manifest
-from derain.sources.folders import find_layout
+from derain.sources.folders import find_layout, named_frames
+from derain.sources.source import Source
+
+
+class NamedScans(ScanData):
+    """Scans named one by one or by their folders, the same ones for every part.
+
+    A scan's labels are ``<stem>.label`` beside it or in the sibling folder of labels.
+
+    Args:
+        paths: Scans, folders with scans directly in them, and sequences.
+        card: Data card of the scans. Its layout is the first to be searched for sequences and
+            labels.
+        loading: How the scans are read.
+    """
+
+    def __init__(self, paths: Sequence[Path], card: DataCard, loading: Loading) -> None:
+        super().__init__(card, loading)
+        self.paths = paths
+
+    def source(self, part: Part) -> Source:
+        """The scans, in the order of their names on the command line; a folder's sorted by name.
+
+        Raises:
+            InputError: A path that does not exist, or a folder without scans.
+        """
+        layouts = layouts_for(self.card)
+        return named_frames(self.paths, self.loading.columns, labelled=True, layouts=layouts)
 
 
 def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> ScanData:

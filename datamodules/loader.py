@@ -6,9 +6,8 @@ from typing import Any
 
 from torch.utils.data import DataLoader, Sampler
 
-from derain.datamodules.loading import Loading, Part
 from derain.datamodules.order import Draws, MeasuringOrder, Pick, TrainingOrder
-from derain.datamodules.scan_data import with_needed_labels
+from derain.datamodules.scan_data import Loading, Part, with_needed_labels
 from derain.datamodules.scan_dataset import MEGABYTE, ScanDataset
 from derain.errors import InputError
 from derain.learning.batch import VIEW, Batch, Sample, summed_times
@@ -85,27 +84,19 @@ def scan_loader(
         run_seed(),
         room // max(loading.workers, 1),
     )
+    sampler: Sampler[Pick] = (
+        TrainingOrder(dataset, dataset.seed, processes, process, draws)
+        if part == "train"
+        else MeasuringOrder(dataset, loading.batch_size, processes, process)
+    )
     return LateLoader(
         dataset,
         batch_size=loading.batch_size,
-        sampler=_order(dataset, part, loading.batch_size, processes, process, draws),
+        sampler=sampler,
         num_workers=loading.workers,
         persistent_workers=loading.workers > 0,
         collate_fn=packed,
     )
-
-
-def _order(
-    dataset: ScanDataset,
-    part: Part,
-    batch_size: int,
-    processes: int,
-    process: int,
-    draws: Draws | None,
-) -> Sampler[Pick]:
-    if part != "train":
-        return MeasuringOrder(dataset, batch_size, processes, process)
-    return TrainingOrder(dataset, dataset.seed, processes, process, draws)
 
 
 class LateLoader(DataLoader[Sample | InputError]):

@@ -74,7 +74,8 @@ class Mixture(ScanDataModule):
             )
         super().__init__(mixed_card(_cards(parts)), loading)
         self.parts = parts
-        self.weights = {**dict.fromkeys(parts, 1.0), **_checked_weights(parts, weights or {})}
+        _check_weights(parts, weights or {})
+        self.weights = {name: float((weights or {}).get(name, 1)) for name in parts}
         if scans_per_epoch is not None and scans_per_epoch < 1:
             raise InputError("scans_per_epoch", f"is {scans_per_epoch}", "Give 1 or more.")
         self.scans_per_epoch = scans_per_epoch
@@ -216,9 +217,7 @@ def _check_parts(parts: Mapping[str, ScanDataModule]) -> None:
         )
 
 
-def _checked_weights(
-    parts: Mapping[str, ScanDataModule], weights: Mapping[str, float]
-) -> dict[str, float]:
+def _check_weights(parts: Mapping[str, ScanDataModule], weights: Mapping[str, float]) -> None:
     _refuse_strangers("weights", weights, parts)
     for name, weight in weights.items():
         if not (math.isfinite(weight) and weight > 0):
@@ -227,7 +226,6 @@ def _checked_weights(
                 f"its weight is {weight:g}",
                 "Give a number greater than 0, or leave the part out.",
             )
-    return {name: float(weight) for name, weight in weights.items()}
 
 
 def _refuse_strangers(

@@ -5,21 +5,65 @@ Nothing here loads torch.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from derain.annotation.held_out import FEWEST_SCANS
 from derain.annotation.manifest import CARD, HELD_OUT_PART, TRAINING_PART, Manifest
 from derain.cards.card import DataCard, load_card
-from derain.cards.known import layouts_for
 from derain.cards.layout import Layout
-from derain.datamodules.loading import Loading, Part
+from derain.datamodules.augmentation import Augmentation
 from derain.errors import InputError
+from derain.files import DEFAULT_COLUMNS
 from derain.scan import Scan
-from derain.sources.folders import named_frames, sequence_frames
+from derain.sources.folders import sequence_frames
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.sources.training_record import record_of_scans, record_of_sequences
+
+Part = Literal["train", "validation", "test", "predict"]
+
+
+@dataclass(frozen=True)
+class Loading:
+    """How scans are read and batched.
+
+    Attributes:
+        batch_size: Scans in a batch.
+        workers: Processes that read and view scans; 0 does it in the training process.
+        columns: Names of the columns of files that do not name them.
+        intensity_scale: Factor from the scans' intensities to the unit of the data card, e.g. 255.
+        deduplicate: Whether points at one position are measured once; None follows the data card.
+            Predictions cover every row in any case.
+        augmentation: How training changes its scans.
+        cache_mb: Memory in which training scans are kept from epoch to epoch, so that they
+            are not read again, and as much for validation scans. Workers divide it among them.
+
+    Raises:
+        InputError: Fewer scans, processes or megabytes than there can be.
+    """
+
+    batch_size: int = 1
+    workers: int = 0
+    columns: tuple[str, ...] = DEFAULT_COLUMNS
+    intensity_scale: float = 1.0
+    deduplicate: bool | None = None
+    augmentation: Augmentation = field(default_factory=Augmentation)
+    cache_mb: int = 512
+
+    def __post_init__(self) -> None:
+        least = {"batch_size": 1, "workers": 0, "cache_mb": 0}
+        for name, fewest in least.items():
+            if getattr(self, name) < fewest:
+                raise InputError(
+                    name, f"{getattr(self, name)} is too few", f"Give {fewest} or more."
+                )
+
+    def counts_once(self, card: DataCard) -> bool:
+        """Whether points at one position are measured once."""
+        return card.deduplicate if self.deduplicate is None else self.deduplicate
 
 
 class ScanData(ABC):
@@ -83,32 +127,6 @@ class ScanData(ABC):
     @property
     def _reader(self) -> FrameReader:
         return FrameReader(self.card, self.loading.intensity_scale)
-
-
-class NamedScans(ScanData):
-    """Scans named one by one or by their folders, the same ones for every part.
-
-    A scan's labels are ``<stem>.label`` beside it or in the sibling folder of labels.
-
-    Args:
-        paths: Scans, folders with scans directly in them, and sequences.
-        card: Data card of the scans. Its layout is the first to be searched for sequences and
-            labels.
-        loading: How the scans are read.
-    """
-
-    def __init__(self, paths: Sequence[Path], card: DataCard, loading: Loading) -> None:
-        super().__init__(card, loading)
-        self.paths = paths
-
-    def source(self, part: Part) -> Source:
-        """The scans, in the order of their names on the command line; a folder's sorted by name.
-
-        Raises:
-            InputError: A path that does not exist, or a folder without scans.
-        """
-        layouts = layouts_for(self.card)
-        return named_frames(self.paths, self.loading.columns, labelled=True, layouts=layouts)
 
 
 class SequenceData(ScanData):

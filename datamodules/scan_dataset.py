@@ -2,13 +2,12 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Generic, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
 from torch.utils.data import Dataset
 
-from derain.cards.card import DataCard
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.order import Pick
 from derain.errors import InputError
@@ -59,13 +58,7 @@ class ScanDataset(Dataset[Sample | InputError]):
         self.reader = reader
         self.augmentation = augmentation
         self.seed = seed
-        self._scans = Cache[Scan](room)
-        self._samples = Cache[Sample](room)
-
-    @property
-    def card(self) -> DataCard:
-        """The data card, which names the labels of rain."""
-        return self.reader.card
+        self._kept = Cache(room)
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -99,9 +92,9 @@ class ScanDataset(Dataset[Sample | InputError]):
 
         with stopwatch.stage(VIEW):
             if self.augmentation is None:
-                made = self._samples.get(number, lambda: self._viewed(read(), number, stopwatch))
+                made = self._kept.get(number, lambda: self._viewed(read(), number, stopwatch))
             else:
-                scan = self._scans.get(number, read)
+                scan = self._kept.get(number, read)
                 # A scan that is drawn once is augmented the same, whether or not others repeat.
                 drawn = (number, pick.again) if pick.again else (number,)
                 generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, *drawn)
@@ -116,10 +109,10 @@ class ScanDataset(Dataset[Sample | InputError]):
                 return self.reader.read_unlabelled(frame)
 
         view = view_in_window(self.view, scan, self.frames, number, read_around)
-        return Sample.of(scan, view, self.card, key=self.frames[number].key)
+        return Sample.of(scan, view, self.reader.card, key=self.frames[number].key)
 
 
-class Cache(Generic[Item]):
+class Cache:
     """Items by number, as many as there is room for.
 
     The first items stay. Every epoch asks for each item once: a cache that evicted the oldest would
@@ -131,13 +124,12 @@ class Cache(Generic[Item]):
 
     def __init__(self, room: int) -> None:
         self._left = room
-        self._items: dict[int, Item] = {}
+        self._items: dict[int, Any] = {}
 
     def get(self, number: int, make: Callable[[], Item]) -> Item:
         """The item of a number, made where it is not kept."""
-        kept = self._items.get(number)
-        if kept is not None:
-            return kept
+        if number in self._items:
+            return self._items[number]
         made = make()
         size = bytes_of(made)
         if size <= self._left:

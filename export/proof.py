@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -227,24 +226,16 @@ def _proof(
     scans: Iterable[tuple[str, Scan]],
     bounds: Bounds,
 ) -> Proof:
+    def compared(named: tuple[str, Scan]) -> list[Case]:
+        name, scan = named
+        view = derainers[0].view(scan)
+        expected = expect(view)
+        # Cells with a return are those that would be rain if every point of the scan were.
+        returned = view.target(np.ones(len(scan), bool)) == 1
+        return [_case(name, view, returned, expected, derainer, bounds) for derainer in derainers]
+
     # Mapped, for a loop would hold on to one scan while the next is read.
-    cases = map(partial(_compared, expect, derainers, bounds), scans)
-    return Proof(tuple(chain.from_iterable(cases)))
-
-
-def _compared(
-    expect: Callable[[ViewedScan], NDArray[np.float32]],
-    derainers: Sequence[Derainer],
-    bounds: Bounds,
-    named: tuple[str, Scan],
-) -> list[Case]:
-    """One scan, by what the scores are expected of and by each of the derainers."""
-    name, scan = named
-    view = derainers[0].view(scan)
-    expected = expect(view)
-    # Cells with a return are those that would be rain if every point of the scan were.
-    returned = view.target(np.ones(len(scan), bool)) == 1
-    return [_case(name, view, returned, expected, derainer, bounds) for derainer in derainers]
+    return Proof(tuple(chain.from_iterable(map(compared, scans))))
 
 
 def _case(

@@ -1,16 +1,26 @@
 """Timed runs of a method, from file to mask, stage by stage."""
 
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.evaluation.hard_cases import scene
+from derain.export.machine import versions
+from derain.export.runtime import Derainer
+from derain.export.runtimes.registry import Runtime
+from derain.files import DEFAULT_COLUMNS
 from derain.scan import Scan
+from derain.sources.folders import frame_of
 from derain.sources.frame import Frame
 from derain.system.stopwatch import Stopwatch
 
 STAGES = ("read", "view", "network", "back")
+
+PERCENTILES = (50, 90, 99)
 
 # Runs before any is timed: the first ones fill caches, and have libraries allocate their memory.
 WARM_UP = 3
@@ -79,3 +89,63 @@ def timed_runs(
         timed(frames[0])
     runs = [timed(frame) for _ in range(repeats) for frame in frames]
     return RunTimes({stage: np.array([run.get(stage, 0.0) for run in runs]) for stage in STAGES})
+
+
+@dataclass(frozen=True)
+class Latency:
+    """Times of an exported model; as text, a table of their percentiles.
+
+    Attributes:
+        times: Milliseconds of every run.
+        points: Points of the scan.
+        threads: Threads of view and network.
+        versions: The processor, and the software that ran.
+    """
+
+    times: RunTimes
+    points: int
+    threads: int
+    versions: str
+
+    def __str__(self) -> str:
+        runs = len(self.times.total)
+        lines = [
+            f"{self.points:,} points, {self.threads} threads, {runs} runs, milliseconds",
+            "stage   " + "".join(f"{f'p{percentage}':>9}" for percentage in PERCENTILES),
+        ]
+        for name, stage in (*((stage, stage) for stage in self.times.stages), ("total", None)):
+            values = (self.times.percentile(percentage, stage) for percentage in PERCENTILES)
+            lines.append(f"{name:8}" + "".join(f"{value:9.1f}" for value in values))
+        return "\n".join([*lines, self.versions])
+
+
+def measure_latency(
+    model: Path,
+    scan: Path | None = None,
+    columns: Sequence[str] = DEFAULT_COLUMNS,
+    threads: int = 0,
+    repeats: int = 30,
+    runtime: Runtime = Runtime(),
+) -> Latency:
+    """Times an exported model from file to mask.
+
+    Args:
+        model: ONNX file.
+        scan: Scan to time it on; None takes a made-up one of 100,000 points.
+        columns: Names of the columns of a scan that does not name them.
+        threads: Threads; 0 takes every core this process may use.
+        repeats: Timed runs.
+        runtime: What runs the network.
+
+    Raises:
+        InputError: A model or scan that cannot be read.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        if scan is None:
+            scan, columns = Path(folder) / "scene.bin", DEFAULT_COLUMNS
+            scene(100_000).tofile(scan)
+        derainer = Derainer(model, threads, runtime.name, runtime.precision)
+        frame = frame_of(scan, columns)
+        times = timed_runs(derainer.probability, [frame], repeats)
+        software = versions([runtime.name])
+        return Latency(times, frame.count_points(), derainer.threads, software)

@@ -8,13 +8,60 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.counts import Counts, intersection_over_union
-from derain.export.labelled_neighbourhoods import LabelledNeighbourhoods
-from derain.filters import FILTERS, PointFilter, Span, filter_from
+from derain.filters import FILTERS, PointFilter, Span, filter_from, filter_view
+from derain.scan import Scan
+from derain.views.candidates import Candidates
+from derain.views.neighbours import Neighbourhoods
 
 if TYPE_CHECKING:
     import optuna
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledNeighbourhoods:
+    """What filters see of a scan, and its truth: found once, and judged in every trial.
+
+    Attributes:
+        view: Its neighbourhoods, M points with as many neighbours as any trial looks at.
+        rain: Points of rain, bool (M,).
+        solid: Points of what is not rain, bool (M,). Points whose class is not known are neither.
+        candidate: Points that may be called rain, bool (M,).
+    """
+
+    view: Neighbourhoods
+    rain: NDArray[np.bool_]
+    solid: NDArray[np.bool_]
+    candidate: NDArray[np.bool_]
+
+    @classmethod
+    def of(
+        cls,
+        scan: Scan,
+        card: DataCard,
+        neighbours: int,
+        threads: int,
+        candidates: Candidates | None = None,
+    ) -> "LabelledNeighbourhoods":
+        """Finds the neighbours of a labelled scan's distinct valid positions.
+
+        Args:
+            scan: The scan.
+            card: Says which of its labels are rain.
+            neighbours: How many of each point, the point itself included; see
+                :func:`neighbours_to_find`.
+            threads: Threads of the search; 0 takes every core this process may use.
+            candidates: Bounds outside which nothing is called rain; None where anything may be.
+
+        Raises:
+            InputError: A scan without labels.
+        """
+        view = filter_view(neighbours, threads)(scan)
+        rain, unknown = card.rain_of(scan)[view.first], card.unknown_of(scan)[view.first]
+        among = np.ones(len(scan), bool) if candidates is None else candidates.among(scan)
+        return cls(view, rain, ~(rain | unknown), among[view.first])
 
 
 @dataclass(frozen=True)
@@ -142,7 +189,13 @@ def tune_filter(name: str, scans: Sequence[LabelledNeighbourhoods], search: Sear
                 stored.add_trial(study.trials[-1])
                 search.done()
     except (optuna.exceptions.OptunaError, SQLAlchemyError) as error:
-        raise _unusable(search.storage, error) from error
+        # What SQLAlchemy says goes on for lines, with the statement and a link.
+        reason = str(error).splitlines()[0]
+        raise InputError(
+            str(search.storage),
+            f"cannot be used as storage ({reason})",
+            "Name a new file that can be written.",
+        ) from error
     best = filter_from(name, study.best_params)
     return Tuned(best.as_dict(), study.best_value, pooled_iou(default, scans))
 
@@ -248,13 +301,3 @@ def _distributions(
         else FloatDistribution(low, high, log=True)
         for name, (low, high) in space.items()
     }
-
-
-def _unusable(storage: Path | None, error: Exception) -> InputError:
-    # What SQLAlchemy says goes on for lines, with the statement and a link.
-    reason = str(error).splitlines()[0]
-    return InputError(
-        str(storage),
-        f"cannot be used as storage ({reason})",
-        "Name a new file that can be written.",
-    )

@@ -21,8 +21,7 @@ from derain.evaluation.published_tables import (
 from derain.files.atomic import replacing, require_writable
 
 if TYPE_CHECKING:
-    from derain.datamodules.loading import Part
-    from derain.datamodules.scan_data import ScanData
+    from derain.datamodules.scan_data import Part, ScanData
     from derain.export.bench.bench import Bench
     from derain.export.bench.bench_entries import BenchEntry, LearnFrom
     from derain.export.bench.labelled_frames import LabelledFrames

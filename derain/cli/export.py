@@ -83,8 +83,8 @@ def main(arguments: argparse.Namespace) -> int:
     require("export", *EXPORT_LIBRARIES)
     from derain.bags.names import split
     from derain.errors import InputError
-    from derain.export.latency import measure_latency
     from derain.export.onnx_file import export
+    from derain.export.timing import measure_latency
     from derain.files.reading import is_file
     from derain.models.checkpoint import load_model
 

@@ -50,7 +50,7 @@ def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanData":
         InputError: Data whose labels nothing explains, or a root without sequences.
     """
     from derain.datamodules.labelled import card_of, labelled_scans
-    from derain.datamodules.loading import Loading
+    from derain.datamodules.scan_data import Loading
 
     loading = Loading(
         columns=arguments.columns,

@@ -112,8 +112,7 @@ def _tuned_filter(
     frames: list["Frame"],
     notices: Notices,
 ) -> "Tuned":
-    from derain.export.labelled_neighbourhoods import LabelledNeighbourhoods
-    from derain.export.tuning import Search, neighbours_to_find, tune_filter
+    from derain.export.tuning import LabelledNeighbourhoods, Search, neighbours_to_find, tune_filter
 
     neighbours = neighbours_to_find(arguments.method)
     read = partial(_read, data, filter_from(arguments.method, {}), notices)

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
-from derain.evaluation.counts import Counts, ratio
-from derain.evaluation.range_bands import RANGE_EDGES, band_names, band_of
+from derain.evaluation.counts import Counts, ratio, table_of
+from derain.evaluation.range_bands import band_names, band_of
 from derain.evaluation.text_tables import number_text, plain_table
 from derain.scan import Scan
 
@@ -65,8 +65,7 @@ class Answers:
         student = np.zeros(len(scan), np.int64) if called_rain is None else called_rain
         valid = scan.valid
         band = band_of(scan.range[valid], FINE_EDGES)
-        cell = np.ravel_multi_index((band, answer[valid], student[valid].astype(int)), _SHAPE)
-        return cls(np.bincount(cell, minlength=int(np.prod(_SHAPE))).reshape(_SHAPE))
+        return cls(table_of((band, answer[valid], student[valid].astype(np.int64)), _SHAPE))
 
     @classmethod
     def none(cls) -> "Answers":
@@ -76,12 +75,6 @@ class Answers:
     def __add__(self, other: "Answers") -> "Answers":
         """Counts of the points of both."""
         return Answers(self.table + other.table)
-
-    def between(self, nearest: float, farthest: float) -> "Answers":
-        """Counts of the bands that start from one range and before another, metres."""
-        start = np.array(FINE_EDGES)
-        inside = (start >= nearest) & (start < farthest)
-        return Answers(np.where(inside[:, None, None], self.table, 0))
 
     @property
     def points(self) -> int:
@@ -151,6 +144,8 @@ def total(answers: Sequence[Answers]) -> Answers:
 
 def coarse_bands(answers: Answers) -> dict[str, Answers]:
     """The answers in each band of ``RANGE_EDGES``, by its name."""
-    ends = (*RANGE_EDGES[1:], np.inf)
-    bands = zip(band_names(), RANGE_EDGES, ends, strict=True)
-    return {name: answers.between(start, end) for name, start, end in bands}
+    wide = band_of(np.array(FINE_EDGES))
+    return {
+        name: Answers(np.where((wide == band)[:, None, None], answers.table, 0))
+        for band, name in enumerate(band_names())
+    }

@@ -1,7 +1,5 @@
 """Confidence intervals of scores, by the bootstrap over scans."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,25 +11,12 @@ CONFIDENCE = 0.95
 Interval = tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Bootstrap:
-    """95 % intervals of every method's pooled IoU.
-
-    Attributes:
-        iou: Interval of each method's IoU; None where no draw has an IoU.
-        behind_best: Interval of the best method's IoU minus each method's, on the same draws. Where
-            it contains 0, these scans do not show which of the two is better. None where no draw
-            has an IoU of both.
-    """
-
-    iou: list[Interval | None]
-    behind_best: list[Interval | None]
-
-
 def bootstrap(
     found: NDArray[np.int64], errors: NDArray[np.int64], generator: np.random.Generator
-) -> Bootstrap:
-    """Draws as many scans as there are, with replacement, ``DRAWS`` times.
+) -> tuple[list[Interval | None], list[Interval | None]]:
+    """95 % intervals of every method's pooled IoU, and of what it is behind the best method's.
+
+    Draws as many scans as there are, with replacement, ``DRAWS`` times.
 
     Every method is scored on the same draws: a hard scan lowers the IoU of all of them and hardly
     changes the difference between two. Consecutive scans of a sequence are alike, so that intervals
@@ -42,6 +27,11 @@ def bootstrap(
         errors: False positives and false negatives together, of the same shape.
         generator: Draws the scans.
 
+    Returns:
+        The interval of each method's IoU, None where no draw has an IoU; and that of the best
+        method's IoU minus each method's, on the same draws. Where the latter contains 0, these
+        scans do not show which of the two is better. It is None where no draw has an IoU of both.
+
     Source: B. Efron, "Bootstrap Methods: Another Look at the Jackknife", Annals of Statistics,
         1979; percentile intervals.
     """
@@ -51,7 +41,7 @@ def bootstrap(
     iou = intersection_over_union(found @ times.T, errors @ times.T)
     pooled = intersection_over_union(found.sum(axis=1), errors.sum(axis=1))
     best = np.argmax(np.nan_to_num(pooled, nan=-1))
-    return Bootstrap(_intervals(iou), _intervals(iou[best] - iou))
+    return _intervals(iou), _intervals(iou[best] - iou)
 
 
 def _intervals(draws: NDArray[np.float64]) -> list[Interval | None]:

@@ -33,6 +33,17 @@ def intersection_over_union(hits: ArrayLike, errors: ArrayLike) -> NDArray[np.fl
     return ratio(hits, np.add(hits, errors))
 
 
+def table_of(cells: Sequence[NDArray[np.integer]], shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """Number of points in each cell of a table, int64 of its shape.
+
+    Args:
+        cells: Place of each point along each axis of the table, whole numbers (N,) each.
+        shape: Shape of the table.
+    """
+    places = np.ravel_multi_index(tuple(cells), shape)
+    return np.bincount(places, minlength=math.prod(shape)).reshape(shape)
+
+
 @dataclass(frozen=True)
 class Counts:
     """Points by truth and by answer; rain is the positive class.

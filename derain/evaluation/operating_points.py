@@ -11,7 +11,7 @@ from torch import Tensor
 from torchmetrics import Metric
 
 from derain.errors import InputError
-from derain.evaluation.counts import Counts, intersection_over_union, ratio
+from derain.evaluation.counts import Counts, intersection_over_union, ratio, table_of
 
 # Thresholds from 0 to 1 in equal steps; TensorBoard's curves take no more than 127.
 CURVE_THRESHOLDS = np.linspace(0, 1, 101)
@@ -139,8 +139,7 @@ class ThresholdCounts(Metric):
         """
         # A threshold is compared with probabilities in their own precision.
         exceeded = np.searchsorted(self.thresholds.astype(probability.dtype), probability)
-        cell = rain * self.bins.shape[1] + exceeded
-        counted = np.bincount(cell, minlength=self.bins.numel()).reshape(self.bins.shape)
+        counted = table_of((rain.astype(np.int64), exceeded), tuple(self.bins.shape))
         self.bins += torch.from_numpy(counted).to(self.device)
 
     def compute(self) -> dict[str, Tensor]:

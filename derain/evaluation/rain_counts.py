@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.evaluation.counts import Counts, ratio
+from derain.evaluation.counts import Counts, ratio, table_of
 from derain.evaluation.range_bands import RANGE_EDGES, band_names, band_of
 from derain.scan import Scan
 
@@ -96,12 +96,8 @@ class RainCounts:
         if scan.label is None:
             raise InputError(scan.name, "it has no labels", "Give its label file.")
         known = ~np.isin(scan.label, self.unknown)
-        row = self._class_rows(scan.label[known])
-        called = called_rain[known]
-        cell = np.ravel_multi_index(
-            (row, band_of(scan.range[known]), called.astype(int)), self.cells.shape
-        )
-        counted = np.bincount(cell, minlength=self.cells.size).reshape(self.cells.shape)
+        row, band = self._class_rows(scan.label[known]), band_of(scan.range[known])
+        counted = table_of((row, band, called_rain[known].astype(np.int64)), self.cells.shape)
         self.cells += counted
         self.per_scan.append(self._counts(counted))
 

@@ -10,14 +10,10 @@ from numpy.typing import NDArray
 RANGE_EDGES = (0, 10, 20, 40, 80)
 
 
-def band_names(edges: Sequence[float] = RANGE_EDGES) -> list[str]:
-    """Names of the bands, such as ``0-10 m`` and, for the last, ``80+ m``.
-
-    Args:
-        edges: Where the bands start, metres, rising from 0.
-    """
-    names = [f"{start:g}-{end:g} m" for start, end in pairwise(edges)]
-    return [*names, f"{edges[-1]:g}+ m"]
+def band_names() -> list[str]:
+    """Names of the bands of ``RANGE_EDGES``, such as ``0-10 m`` and, for the last, ``80+ m``."""
+    names = [f"{start}-{end} m" for start, end in pairwise(RANGE_EDGES)]
+    return [*names, f"{RANGE_EDGES[-1]}+ m"]
 
 
 def band_of(range: NDArray[np.floating], edges: Sequence[float] = RANGE_EDGES) -> NDArray[np.int64]:

@@ -12,30 +12,16 @@ A file of this folder enters by ``@FILTERS.add("its name")``, and needs to be na
 :class:`PointFilter` says what it brings with it.
 """
 
-from derain.filters.crf import CRF
-from derain.filters.derainer import FilterDerainer
-from derain.filters.dror import DROR
-from derain.filters.dsor import DSOR
-from derain.filters.filter_view import filter_view
-from derain.filters.parameters import read_parameters
-from derain.filters.point_filter import PointFilter, Span
-from derain.filters.registry import FILTERS, filter_from
-from derain.filters.ror import ROR
-from derain.filters.sor import SOR
-from derain.filters.ssr import SSR
-
-__all__ = [
-    "CRF",
-    "DROR",
-    "DSOR",
-    "FILTERS",
-    "ROR",
-    "SOR",
-    "SSR",
-    "FilterDerainer",
-    "PointFilter",
-    "Span",
-    "filter_from",
-    "filter_view",
-    "read_parameters",
-]
+from derain.filters.crf import CRF as CRF
+from derain.filters.derainer import FilterDerainer as FilterDerainer
+from derain.filters.distance_filters import DSOR as DSOR
+from derain.filters.distance_filters import SOR as SOR
+from derain.filters.parameters import read_parameters as read_parameters
+from derain.filters.point_filter import FILTERS as FILTERS
+from derain.filters.point_filter import PointFilter as PointFilter
+from derain.filters.point_filter import Span as Span
+from derain.filters.point_filter import filter_from as filter_from
+from derain.filters.point_filter import filter_view as filter_view
+from derain.filters.radius_filters import DROR as DROR
+from derain.filters.radius_filters import ROR as ROR
+from derain.filters.ssr import SSR as SSR

@@ -60,14 +60,15 @@ class RainBounds:
             intensity: Of each point, float32 (M,), in the scan's unit.
             distance: From the sensor, (M,), metres.
         """
-        return self._on_its_side(intensity) & (distance <= self.range)
-
-    def _on_its_side(self, intensity: NDArray[np.float32]) -> NDArray[np.bool_]:
-        return intensity > self.intensity if self.is_bright else intensity <= self.intensity
+        bright = intensity > self.intensity
+        return (bright if self.is_bright else intensity <= self.intensity) & (
+            distance <= self.range
+        )
 
 
 def fit_rain_bounds(
     xyz: NDArray[np.float64],
+    distance: NDArray[np.float64],
     intensity: NDArray[np.float32],
     may_be: NDArray[np.bool_],
     around: Around,
@@ -84,6 +85,7 @@ def fit_rain_bounds(
 
     Args:
         xyz: Distinct positions along a Morton curve, float64 (M, 3), metres.
+        distance: Their distances from the sensor, float64 (M,), metres.
         intensity: Their intensities, float32 (M,); not numbers where the scan has none.
         may_be: Points that may be rain, such as those above the ground, bool (M,).
         around: Finds neighbourhoods.
@@ -94,7 +96,6 @@ def fit_rain_bounds(
         The bounds; None where no intensity was measured, nothing is in the air, or what is differs
         from the rest in nothing.
     """
-    distance = np.sqrt(np.square(xyz).sum(axis=1))
     may_tell = may_be & (distance < FARTHEST_RAIN) & ~np.isnan(intensity)
     rows = evenly(np.flatnonzero(may_tell), SAMPLE)
     if len(rows) < FEWEST_AIRBORNE:

@@ -3,19 +3,23 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files.documents import shown
 from derain.filters.airborne import Around, fit_rain_bounds
-from derain.filters.filter_view import filter_view, rows_of
 from derain.filters.ground import find_ground
-from derain.filters.point_filter import PointFilter, RainAndJudged, Span
+from derain.filters.point_filter import (
+    FILTERS,
+    PointFilter,
+    RainAndJudged,
+    Span,
+    filter_view,
+    rows_of,
+)
 from derain.filters.random_field import decide_sequentially
-from derain.filters.registry import FILTERS
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
@@ -25,8 +29,6 @@ from derain.views.neighbour_search import NeighbourSearch
 from derain.views.neighbours import Neighbourhoods
 from derain.views.scan_issues import ScanIssue, intensity_of_another_scale, missing_intensity
 from derain.views.scatter import scatter_through_space
-
-Variant = Literal["fitted", "published"]
 
 # Added to every range, metres, so that none is 0.
 # Source: CRFOR.
@@ -111,7 +113,7 @@ class CRF(PointFilter):
     FULL_SCALE: ClassVar[float] = 255.0
 
     neighbours: int = 8
-    variant: Variant = "fitted"
+    variant: Literal["fitted", "published"] = "fitted"
     vote: float = 2.0
     sparseness: float = 3.0
     reach: float = 2.0
@@ -121,12 +123,6 @@ class CRF(PointFilter):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.variant not in get_args(Variant):
-            raise InputError(
-                self.name,
-                f"variant is {shown(self.variant)}",
-                f"Give one of {', '.join(get_args(Variant))}.",
-            )
         if self.variant == "fitted" and self.neighbours < FEWEST_NEIGHBOURS:
             raise InputError(
                 self.name,
@@ -136,11 +132,11 @@ class CRF(PointFilter):
 
     def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
         """Says which points are rain; see :class:`PointFilter`."""
-
-        def around(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-            return view.neighbours.take(rows, axis=0), view.distances.take(rows, axis=0)
-
-        return self._rain(view.points, around)
+        size = min(self.neighbours, view.size)  # where there are fewer, the rest are stand-ins
+        neighbours, distances = view.neighbours[:, :size], view.distances[:, :size]
+        return self._rain(
+            view.points, lambda rows: (neighbours.take(rows, axis=0), distances.take(rows, axis=0))
+        )
 
     def judge_scan(
         self, scan: Scan, threads: int, candidates: Candidates | None, stopwatch: Stopwatch
@@ -152,7 +148,7 @@ class CRF(PointFilter):
             points = filled_values(scan, first, view.channels, view.fill_value)
             search = NeighbourSearch(points[:, :3], rank=first, threads=threads)
         with stopwatch.stage("network"):
-            rain = self._rain(points, partial(search, self.neighbours))
+            rain = self._rain(points, partial(search, min(self.neighbours, len(points))))
             if candidates is not None:
                 rain &= candidates.among(scan)[first]
         with stopwatch.stage("back"):
@@ -164,22 +160,16 @@ class CRF(PointFilter):
         if self.variant == "published":
             yield from intensity_of_another_scale(scan, self.FULL_SCALE, self.name)
 
-    def _rain(self, points: NDArray[np.float32], wider: Around) -> NDArray[np.bool_]:
+    def _rain(self, points: NDArray[np.float32], around: Around) -> NDArray[np.bool_]:
         """Which points are rain, bool (M,).
 
         Args:
             points: Distinct x, y and z in metres along a Morton curve, and intensity,
                 float32 (M, 4).
-            wider: Finds neighbourhoods, of as many points as the filter looks at or more.
+            around: Finds neighbourhoods of as many points as the filter looks at, or as there are.
         """
-        size = min(self.neighbours, len(points))  # where there are fewer, the rest are stand-ins
-
-        def around(rows: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-            neighbours, distances = wider(rows)
-            return neighbours[:, :size], distances[:, :size]
-
         xyz, intensity = points[:, :3].astype(np.float64), points[:, 3]
-        distance = _length(xyz)
+        distance = np.sqrt(np.square(xyz).sum(axis=1))
         rows = np.flatnonzero(self._is_candidate(xyz, intensity, distance, around))
         if not len(rows):
             return np.zeros(len(points), bool)
@@ -205,7 +195,9 @@ class CRF(PointFilter):
             return is_near & (intensity <= self.intensity)
         ground = find_ground(xyz)
         above = np.ones(len(xyz), bool) if ground is None else ground.is_above(xyz)
-        bounds = fit_rain_bounds(xyz, intensity, above, around, self.sparseness, self.reach)
+        bounds = fit_rain_bounds(
+            xyz, distance, intensity, above, around, self.sparseness, self.reach
+        )
         if bounds is None:
             return np.zeros(len(xyz), bool)
         return above & bounds.hold(intensity, distance)
@@ -227,13 +219,6 @@ class CRF(PointFilter):
             return np.full(len(feature), -1.0)
         scaled: NDArray[np.float64] = 2 * (feature - least) / (largest - least) - 1
         return scaled
-
-
-def _length(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distances from the sensor, float64 (M,)."""
-    x, y, z = xyz.T
-    length: NDArray[np.float64] = np.sqrt(x * x + y * y + z * z)
-    return length
 
 
 def _along_the_sweep(xyz: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -59,23 +59,17 @@ class Ground:
     slope_y: float
     offset: float
 
-    def height(self, xyz: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-        """Height above the plane along z, float64 (M,), metres.
-
-        Args:
-            xyz: Coordinates, (M, 3), metres, sensor frame.
-        """
-        x, y, z = np.array(xyz.T, np.float64, order="C")
-        height: NDArray[np.float64] = z - (self.slope_x * x + self.slope_y * y + self.offset)
-        return height
-
     def is_above(self, xyz: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
         """True for points that stand out of the ground, bool (M,).
 
         Args:
             xyz: Coordinates, (M, 3), metres, sensor frame.
         """
-        return self.height(xyz) > IN_PLANE
+        x, y, z = np.array(xyz.T, np.float64, order="C")
+        is_above: NDArray[np.bool_] = (
+            z - (self.slope_x * x + self.slope_y * y + self.offset) > IN_PLANE
+        )
+        return is_above
 
 
 def find_ground(xyz: NDArray[np.floating[Any]]) -> Ground | None:

@@ -1,24 +1,27 @@
 """What every filter is: a few numbers, and a verdict on each point from its neighbourhood."""
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from numbers import Integral, Real
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.errors import InputError
-from derain.files.documents import shown
-from derain.filters.filter_view import filter_view, rain_among
-from derain.filters.registry import FILTERS
+from derain.errors import InputError, did_you_mean
+from derain.files.documents import short, shown
 from derain.scan import Scan
+from derain.system.registry import Registry, from_parameters
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
-from derain.views.neighbours import Neighbourhoods
+from derain.views.neighbours import Neighbourhoods, NeighbourView
 from derain.views.scan_issues import ScanIssue
+
+# Filters by name: those of this folder, and those that other packages bring.
+FILTERS: Registry[type["PointFilter"]] = Registry("derain.filters")
 
 # The most that a filter may look at. No published one looks at more than 51, and a search for
 # thousands would fill the memory.
@@ -67,8 +70,8 @@ class PointFilter(ABC):
             included.
 
     Raises:
-        InputError: ``neighbours`` that is not a whole number from 2 to 200, or another number that
-            is negative, not finite or above 1e100.
+        InputError: ``neighbours`` that is not a whole number from 2 to 200, another number that is
+            negative, not finite or above 1e100, or none of the names that a ``Literal`` lists.
     """
 
     HELP: ClassVar[str] = ""
@@ -79,8 +82,11 @@ class PointFilter(ABC):
     def __post_init__(self) -> None:
         _check_neighbours(self.name, self.neighbours)
         for parameter in fields(self):
+            value = getattr(self, parameter.name)
             if parameter.type in (float, "float"):  # the text, where annotations are put off
-                _check_number(self.name, parameter.name, getattr(self, parameter.name))
+                _check_number(self.name, parameter.name, value)
+            elif get_origin(parameter.type) is Literal:
+                _check_choice(self.name, parameter.name, value, get_args(parameter.type))
 
     @property
     def name(self) -> str:
@@ -136,6 +142,69 @@ class PointFilter(ABC):
         return asdict(self)
 
 
+def filter_from(name: str, parameters: Mapping[str, Any]) -> PointFilter:
+    """Makes a filter.
+
+    Args:
+        name: One of ``FILTERS``.
+        parameters: Its parameters by name; those not given have their defaults.
+
+    Raises:
+        InputError: No such filter, no such parameter, or a value that it cannot have.
+    """
+    if name not in FILTERS:
+        remedy = f"{did_you_mean(name, FILTERS)}Give one of {', '.join(FILTERS)}."
+        raise InputError(short(name), "no such filter", remedy)
+    return from_parameters(FILTERS[name], name, parameters)
+
+
+def filter_view(neighbours: int, threads: int = 0) -> NeighbourView:
+    """How filters see a scan.
+
+    One view serves several filters: each looks at no more than its own number of neighbours.
+
+    Args:
+        neighbours: Size of a neighbourhood, the point itself included; the largest that any of the
+            filters looks at.
+        threads: Threads of the search; 0 takes every core this process may use.
+    """
+    # In a scan without intensity every point has NaN for it, and no comparison with NaN is true: a
+    # filter that judges by intensity finds nothing there.
+    return NeighbourView(neighbours, fill_value={"intensity": math.nan}, threads=threads)
+
+
+def rain_among(
+    filter: PointFilter, view: Neighbourhoods, scan: Scan, candidates: Candidates | None
+) -> NDArray[np.bool_]:
+    """What a filter calls rain among candidates.
+
+    A filter looks at all points to say what is usual, whether or not they are candidates. So what
+    it says of a candidate is what it says without bounds.
+
+    Args:
+        filter: The filter.
+        view: What it sees of the scan, M points.
+        scan: The scan.
+        candidates: Bounds outside which nothing is rain; None where anything may be.
+
+    Returns:
+        True for rain, bool (M,).
+    """
+    rain = filter.judge(view)
+    return rain if candidates is None else rain & candidates.among(scan)[view.first]
+
+
+def rows_of(points: NDArray[np.bool_], inverse: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Gives every row of a scan the verdict on its point.
+
+    Args:
+        points: The verdicts, bool (M,).
+        inverse: Point of each row, int64 (N,); -1 for invalid rows, which are not rain.
+    """
+    # The last place is for rows at no point, whose number is -1.
+    return np.append(points, False).take(inverse)
+
+
 def _check_neighbours(filter_name: str, value: Any) -> None:
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not (whole and 2 <= value <= MOST_FILTER_NEIGHBOURS):
@@ -154,4 +223,11 @@ def _check_number(filter_name: str, parameter: str, value: Any) -> None:
             filter_name,
             f"{parameter} is {shown(value)}",
             f"Give a finite number that is not negative, {LARGEST_NUMBER:g} at most.",
+        )
+
+
+def _check_choice(filter_name: str, parameter: str, value: Any, choices: Sequence[str]) -> None:
+    if value not in choices:
+        raise InputError(
+            filter_name, f"{parameter} is {shown(value)}", f"Give one of {', '.join(choices)}."
         )

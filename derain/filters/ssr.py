@@ -8,8 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.filters.point_filter import TUNED_NEIGHBOURS, PointFilter, Span
-from derain.filters.registry import FILTERS
+from derain.filters.point_filter import FILTERS, TUNED_NEIGHBOURS, PointFilter, Span
 from derain.scan import Scan
 from derain.views.neighbours import Neighbourhoods
 from derain.views.scan_issues import ScanIssue, intensity_of_another_scale, missing_intensity

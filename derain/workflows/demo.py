@@ -11,17 +11,15 @@ import yaml
 from numpy.typing import NDArray
 
 from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
-from derain.datamodules.loading import Loading
-from derain.datamodules.scan_data import ScanData
+from derain.datamodules.scan_data import Loading, ScanData
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.export.bench.bench import Bench, Effort, run_bench
 from derain.export.bench.bench_entries import bench_entries
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.report import SHORT, main_table
-from derain.export.labelled_neighbourhoods import LabelledNeighbourhoods
 from derain.export.methods import load_method
-from derain.export.tuning import Search, neighbours_to_find, tune_filter
+from derain.export.tuning import LabelledNeighbourhoods, Search, neighbours_to_find, tune_filter
 from derain.files import DEFAULT_COLUMNS
 from derain.files.atomic import replacing, require_writable
 from derain.pictures.comparison import comparison_figure

@@ -4,7 +4,7 @@ import platform
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
 from derain.export.runtimes.session import FLOAT32_PRECISION
 from derain.files import DEFAULT_COLUMNS
 from derain.filters import PointFilter
-from derain.filters.filter_view import filter_view, rain_among
+from derain.filters.point_filter import filter_view, rain_among
 from derain.scan import Scan
 from derain.sources.given import GivenScans, source_of
 from derain.sources.spread import evenly_spaced
@@ -219,36 +219,22 @@ def scored_methods(bench_entries: Sequence[BenchEntry], threads: int) -> list[Sc
         bench_entries: The methods.
         threads: Threads of views and networks; 0 takes every core this process may use.
     """
-    shared = SharedSearch([row.filter for row in bench_entries if row.filter], threads)
+    most = max((row.filter.neighbours for row in bench_entries if row.filter), default=0)
+    seen_by_filters = lru_cache(maxsize=1)(filter_view(most, threads))
+
+    def filtered(
+        filter: PointFilter, candidates: Candidates | None, scan: Scan
+    ) -> NDArray[np.bool_]:
+        seen = seen_by_filters(scan)
+        rain = rain_among(filter, seen, scan, candidates)
+        return seen.back(rain.astype(np.float32)) > 0
+
     return [
-        partial(shared.judge, row.filter, row.candidates)
+        partial(filtered, row.filter, row.candidates)
         if row.filter
         else partial(_untimed, row.ready(threads))
         for row in bench_entries
     ]
-
-
-class SharedSearch:
-    """Searches each scan once, for as many neighbours as any of some filters needs.
-
-    Args:
-        filters: The filters.
-        threads: Threads of the search; 0 takes every core this process may use.
-    """
-
-    def __init__(self, filters: Sequence[PointFilter], threads: int) -> None:
-        most = max((filter.neighbours for filter in filters), default=0)
-        self._view = filter_view(most, threads)
-        self._scan: Scan | None = None
-
-    def judge(
-        self, filter: PointFilter, candidates: Candidates | None, scan: Scan
-    ) -> NDArray[np.bool_]:
-        """The points that one of the filters calls rain among candidates, bool (N,)."""
-        if scan is not self._scan:
-            self._scan, self._seen = scan, self._view(scan)
-        rain = rain_among(filter, self._seen, scan, candidates)
-        return self._seen.back(rain.astype(np.float32)) > 0
 
 
 def _untimed(method: TimedMethod, scan: Scan) -> NDArray[np.bool_]:
@@ -283,7 +269,7 @@ def _facts(
 ) -> dict[str, Any]:
     """Everything that a bench depends on besides its methods, as JSON-able primitives."""
     card, frames = data.card, data.frames
-    others = [method.by_other.runtime.name for method in methods if method.by_other]
+    others = [method.runtime.name for method in methods if method.usual]
     scans = "1 scan" if len(frames) == 1 else f"{len(frames):,} scans"
     files = []
     for frame in frames:

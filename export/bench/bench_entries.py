@@ -15,9 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError, printable
-from derain.evaluation.baselines import PositionPrior, all_points, no_points
-from derain.evaluation.intensity_rule import IntensityRule
-from derain.export.bench.other_runtime import OtherRuntime, with_runtime, with_runtime_variants
+from derain.evaluation.baselines import IntensityRule, PositionPrior, all_points, no_points
 from derain.export.methods import (
     load_method_of_one_scan,
     named_method,
@@ -30,6 +28,7 @@ from derain.export.runtimes.registry import Runtime
 from derain.filters import FilterDerainer, PointFilter
 from derain.filters.parameters import CANDIDATES
 from derain.scan import Scan
+from derain.spec import Spec
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Candidates
 from derain.views.scan_issues import ScanChecker
@@ -65,7 +64,8 @@ class BenchEntry:
         filter: The filter, where it is one: filters share one search for neighbours.
         candidates: Bounds outside which that filter calls nothing rain, if it has any.
         spec_or_filter: Checks whether a scan suits the method: a model's Spec or a filter.
-        by_other: The runtime of a model, where that is not onnxruntime in float32.
+        runtime: The runtime of a model.
+        usual: Makes the same model in onnxruntime in float32, where it has another runtime.
     """
 
     title: str
@@ -75,7 +75,8 @@ class BenchEntry:
     filter: PointFilter | None = None
     candidates: Candidates | None = None
     spec_or_filter: ScanChecker | None = None
-    by_other: OtherRuntime | None = None
+    runtime: Runtime = field(default_factory=Runtime)
+    usual: Callable[[int], TimedMethod] | None = None
 
     @cached_property
     def is_picklable(self) -> bool:
@@ -117,7 +118,7 @@ def bench_entries(
         ]
     else:
         rows = [_bench_entry(method, learn_from) for method in methods]
-    rows = with_runtime_variants(rows, runtime)
+    rows = _with_runtime_variants(rows, runtime)
     titles = [row.title for row in rows]
     for title in titles:
         if titles.count(title) > 1:
@@ -125,6 +126,41 @@ def bench_entries(
                 title, "two methods are called so", "Give titles, as in `first=a.onnx second=dror`."
             )
     return rows
+
+
+def _with_runtime_variants(rows: Sequence[BenchEntry], runtime: Runtime) -> list[BenchEntry]:
+    """The methods, each model followed by the same in another runtime.
+
+    Args:
+        rows: The methods.
+        runtime: The other runtime; the default one adds nothing.
+
+    Raises:
+        InputError: A runtime that cannot run one of the models, or no model.
+    """
+    if runtime.is_default:
+        return list(rows)
+    beside = []
+    for row in rows:
+        beside.append(row)
+        if isinstance(row.spec_or_filter, Spec) and row.usual is None:
+            beside.append(replace(_with_runtime(row, runtime), title=f"{row.title} ({runtime})"))
+    if len(beside) == len(rows):
+        raise InputError(f"runtime {runtime}", "none of the methods is a model", "Leave it out.")
+    return beside
+
+
+def _with_runtime(row: BenchEntry, runtime: Runtime) -> BenchEntry:
+    """A model in another runtime.
+
+    Raises:
+        InputError: A runtime that cannot run the model.
+    """
+    make: Callable[..., TimedMethod] = row.ready  # a model's takes a runtime
+    ready = partial(make, runtime=runtime)
+    ready(1)  # refused before any work
+    facts = {**row.facts, "runtime": str(runtime)}  # one text, because precision is also a score
+    return replace(row, ready=ready, facts=facts, runtime=runtime, usual=row.ready)
 
 
 def _bench_entry(method: GivenMethod, learn_from: LearnFrom | None) -> BenchEntry:
@@ -141,7 +177,7 @@ def _bench_entry(method: GivenMethod, learn_from: LearnFrom | None) -> BenchEntr
             known = {"threshold": spec.threshold}
             ready = partial(load_method_of_one_scan, name, known)
             row = _model(printable(Path(name).stem), name, method, ready)
-            return row if method.runtime.is_default else with_runtime(row, method.runtime)
+            return row if method.runtime.is_default else _with_runtime(row, method.runtime)
         case _ if callable(method) and not isinstance(method, type):
             return _function(method)
     kind = f"the class {method.__name__}" if isinstance(method, type) else type(method).__name__

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from derain.evaluation.bootstrap import Bootstrap, Interval, bootstrap
+from derain.evaluation.bootstrap import Interval, bootstrap
 from derain.evaluation.counts import SCORES, Counts, mean_over_scans, or_none
 from derain.evaluation.scores import Scores
 from derain.export.bench.bench_entries import BenchEntry
@@ -108,8 +108,7 @@ def _intervals(
     per_scan = [row.per_scan for row in scores]
     found = np.array([[c.true_positive for c in scans] for scans in per_scan])
     errors = np.array([[c.false_positive + c.false_negative for c in scans] for scans in per_scan])
-    drawn: Bootstrap = bootstrap(found, errors, generator)
-    return drawn.iou, drawn.behind_best
+    return bootstrap(found, errors, generator)
 
 
 def _scores(counts: Counts) -> dict[str, float | None]:

@@ -1,6 +1,8 @@
 """OpenVINO, which computes in bfloat16 too where the processor does."""
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from threading import Lock
 from typing import Any
 
@@ -9,11 +11,14 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.export.model_file import ModelFile
-from derain.export.runtimes.openvino_import import import_openvino
 from derain.export.runtimes.registry import RUNTIMES
 from derain.export.runtimes.session import FLOAT32_PRECISION, Session, TensorType
+from derain.system.extras import OPENVINO
 
 DEVICE = "CPU"
+
+# The package by which OpenVINO reports that it was imported.
+TELEMETRY = "openvino_telemetry"
 
 # What OpenVINO calls a precision, and which of the processor's capabilities that takes. Asked for
 # bfloat16 where there is none, it imitates it with AVX-512, which takes twice as long as float32,
@@ -85,3 +90,42 @@ class OpenVinoSession(Session):
 def _type_of(port: Any) -> TensorType:
     sizes = tuple(size.get_length() if size.is_static else None for size in port.partial_shape)
     return TensorType(port.element_type.to_dtype().name, sizes)
+
+
+def import_openvino() -> Any:
+    """Imports OpenVINO where it is needed; nothing else in derain imports it.
+
+    Returns:
+        The module openvino.
+
+    Raises:
+        MissingExtraError: OpenVINO is not installed.
+        InputError: A library that it links against is missing.
+    """
+    with _without_telemetry():
+        return OPENVINO.load("this runtime")
+
+
+@contextmanager
+def _without_telemetry() -> Iterator[None]:
+    """Keeps the package openvino-telemetry from being imported meanwhile.
+
+    OpenVINO depends on it and, with it in place, reports every import of itself over the network
+    unless the user has opted out; without it OpenVINO is content with a stub. Whoever has imported
+    it before has it back afterwards.
+
+    Source: openvino/tools/ovc/__init__.py of OpenVINO 2026.4.1, which sends "general_import".
+    """
+    former = {name: module for name, module in sys.modules.items() if _is_telemetry(name)}
+    for name in former:
+        del sys.modules[name]
+    sys.modules[TELEMETRY] = None  # type: ignore[assignment]  # importing it is an ImportError
+    try:
+        yield
+    finally:
+        del sys.modules[TELEMETRY]
+        sys.modules.update(former)
+
+
+def _is_telemetry(name: str) -> bool:
+    return name == TELEMETRY or name.startswith(f"{TELEMETRY}.")

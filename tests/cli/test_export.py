@@ -76,7 +76,7 @@ def test_scans_that_candidates_are_fitted_to_count_once_and_are_warned_of(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(onnx_file, "export", lambda _, path, *__: path.touch())
-    monkeypatch.setattr("derain.export.latency.measure_latency", lambda *_: "times")
+    monkeypatch.setattr("derain.export.timing.measure_latency", lambda *_: "times")
     scan, label = tmp_path / "scans/0.bin", tmp_path / "scans/0.label"
     write_labelled(scan, label, rain=110)
     options = ["--candidates", scan, "--card", "wads", "--inside", "0.9"]
@@ -179,7 +179,7 @@ def test_calibration_scans_of_another_unit_are_warned_of_once_and_scaled(
         return "proof"
 
     monkeypatch.setattr(onnx_file, "export", export)
-    monkeypatch.setattr("derain.export.latency.measure_latency", lambda *_: "times")
+    monkeypatch.setattr("derain.export.timing.measure_latency", lambda *_: "times")
     save_model(random_salsanext, tmp_path / "model.ckpt")
     options = ["--out", tmp_path / "int8.onnx", "--int8", "--calibration", scans]
     assert run_derain("export", tmp_path / "model.ckpt", *options).said == []

@@ -22,7 +22,6 @@ MIRROR = Augmentation(0, 0, mirror_probability=1)
 SECTOR = Augmentation(0, 0, sector_probability=1, sector=70)
 DROP = Augmentation(0, 0, dropping_probability=1)
 BOTH = Augmentation(rotation_probability=1, jitter_probability=1)
-NEITHER = Augmentation(rotation_probability=0, jitter_probability=0)
 
 
 def street() -> Scan:
@@ -56,12 +55,13 @@ def test_jitter_is_in_metres_and_the_same_in_every_direction() -> None:
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_each_happens_to_its_share_of_scans(share: float) -> None:
-    scan = Scan.of(scene(10))
+    scan = Scan.of(scene(300))
     rng = np.random.default_rng(0)
     mirror = Augmentation(0, 0, mirror_probability=share)
-    for augmentation in (Augmentation(share, 0), Augmentation(0, share), mirror):
-        changed = [bool((augmentation(scan, rng).xyz != scan.xyz).any()) for _ in range(400)]
-        assert np.mean(changed) == pytest.approx(share, abs=0.1 if share == 0.5 else 0)
+    drop = Augmentation(0, 0, dropping_probability=share)
+    for augmentation in (Augmentation(share, 0), Augmentation(0, share), mirror, drop):
+        changed = [not np.array_equal(augmentation(scan, rng).xyz, scan.xyz) for _ in range(400)]
+        assert np.mean(changed) == pytest.approx(share, abs=0.1 if share == 0.5 else 0.01)
 
 
 def test_a_mirror_changes_left_and_right_and_nothing_else() -> None:
@@ -90,14 +90,6 @@ def test_a_scan_loses_any_share_of_its_points_up_to_the_largest(dropping: float)
     assert lost.max() <= dropping + 0.03
     assert lost.mean() == pytest.approx(dropping / 2, abs=0.02)
     assert lost.std() == pytest.approx(dropping / 12**0.5, abs=0.02)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
-def test_points_are_dropped_from_their_share_of_scans(share: float) -> None:
-    scan, rng = Scan.of(scene(1000)), np.random.default_rng(0)
-    drop = Augmentation(0, 0, dropping_probability=share)
-    lost = [len(drop(scan, rng)) < len(scan) for _ in range(400)]
-    assert np.mean(lost) == pytest.approx(share, abs=0.1 if share == 0.5 else 0.01)
 
 
 @given(st.floats(-180, 180), st.floats(0, 350), st.integers(0, 2**32), st.booleans(), st.booleans())
@@ -137,28 +129,18 @@ def test_everything_else_stays() -> None:
     np.testing.assert_array_equal(scan.xyz, before)
 
 
-def test_the_same_generator_gives_the_same_scan() -> None:
-    one, other = (BOTH(street(), np.random.default_rng(7)).xyz for _ in range(2))
-    np.testing.assert_array_equal(one, other)
-
-
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
 def test_points_that_cannot_be_judged_stay_as_they_are(scan: Scan) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        changed = BOTH(scan, np.random.default_rng(0))
-        mirrored = MIRROR(scan, np.random.default_rng(0))
-        dropped = DROP(scan, np.random.default_rng(0))
+        changed, mirrored, dropped = (
+            each(scan, np.random.default_rng(0)) for each in (BOTH, MIRROR, DROP)
+        )
     np.testing.assert_array_equal(mirrored.valid, scan.valid)
     assert dropped.valid.sum() <= scan.valid.sum()
     np.testing.assert_array_equal(changed.valid, scan.valid)
     np.testing.assert_array_equal(changed.xyz[~scan.valid], scan.xyz[~scan.valid])
     assert (changed.xyz[scan.valid] != scan.xyz[scan.valid]).any() or not scan.valid.any()
-
-
-def test_with_neither_a_scan_stays_as_it_is() -> None:
-    scan = street()
-    np.testing.assert_array_equal(NEITHER(scan, np.random.default_rng(0)).xyz, scan.xyz)
 
 
 @given(st.integers(0, 2**32))

@@ -1,6 +1,7 @@
 """From files to batches: what a model gets to see, and what is said of files it cannot see."""
 
 import pickle
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,9 @@ from derain.datamodules.base import Loading, ScanDataModule
 from derain.datamodules.folder import Folder
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.models.lisnownet import LiSnowNet
 from derain.scan import Scan
-from derain.sources.file_frame import FileFrame
 from derain.views.neighbours import NeighbourView
 
 Write = Callable[..., None]
@@ -73,6 +72,7 @@ def test_what_is_not_trained_on_comes_in_order_and_untouched(
             for number, scan in enumerate(scans(data, part)):
                 points = scene(40 + number, seed=number)
                 np.testing.assert_array_equal(np.c_[scan.xyz, scan.intensity], points)
+    assert {batch.target for batch in batches(data, "predict")} == {None}
 
 
 def test_scans_are_packed_in_batches_of_the_size_asked_for(
@@ -93,10 +93,6 @@ def test_the_target_is_one_where_the_card_says_rain(
         expected = measured.scan.label[NeighbourView()(measured.scan).first] == SNOW
         np.testing.assert_array_equal(batch.target.numpy(), expected)
         assert 0 < expected.sum() < len(expected)
-
-
-def test_prediction_scans_have_no_target(folder: Callable[..., Folder], connect: Connect) -> None:
-    assert {batch.target for batch in batches(connect(folder()), "predict")} == {None}
 
 
 @pytest.mark.parametrize("neighbours", [3, 9])
@@ -181,6 +177,9 @@ def test_statistics_are_taken_from_the_training_scans_where_the_card_has_none(
     np.testing.assert_allclose(data.card.mean, points.mean(axis=0))
     np.testing.assert_allclose(data.card.std, points.std(axis=0))
     assert data.card.rain_share == 0.25
+    card = data.card
+    data.complete_card()
+    assert data.card is card  # what it says is left alone
 
 
 @pytest.fixture
@@ -246,58 +245,32 @@ def test_range_images_of_a_batch_have_one_size(
         assert torch.equal(batch.inputs["image"][number], image)
 
 
-def test_the_statistics_of_a_card_are_left_alone(folder: Callable[..., Folder]) -> None:
-    data = folder()
-    card = data.card
-    data.complete_card()
-    assert data.card is card
-
-
-def test_columns_are_as_stated(tmp_path: Path) -> None:
-    rows = np.arange(10, dtype=np.float32).reshape(2, 5)
-    rows.tofile(tmp_path / "a.bin")
-    loading = Loading(columns=("x", "y", "z", "ring", "intensity"))
-    data = Folder(str(tmp_path), "wads", test=["a.bin"], loading=loading)
-    scan = data.read(data.frames("predict")[0])
-    np.testing.assert_array_equal(scan.xyz, rows[:, :3])
-    np.testing.assert_array_equal(scan.intensity, rows[:, 4])
-
-
-def test_the_instance_of_a_label_is_not_its_class(tmp_path: Path, write: Write) -> None:
-    write(tmp_path / "a.bin", points=scene(3))
-    write_labels(tmp_path / "a.label", np.array([0, SNOW, 40]), np.array([7, 8, 65535]))
-    data = Folder(str(tmp_path), "wads")
-    label, scan_path = tmp_path / "a.label", tmp_path / "a.bin"
-    scan = data.read(FileFrame(key="a", path=scan_path, label_path=label))
-    assert scan.label is not None
-    assert scan.label.tolist() == [0, SNOW, 40]
-
-
 @pytest.mark.parametrize("workers", [0, 1])
 @pytest.mark.parametrize(
-    ("damage", "message"),
+    # The last of the scans, for a worker that is left in the middle takes seconds to end.
+    ("file", "content", "message"),
     [
-        ("unknown class", r"5\.label: ids \[777, 778\] are no classes of WADS\. Name them"),
-        ("short labels", r"5\.label: holds 2 labels of 4 bytes for a scan of 45 points"),
-        ("half a row", r"5\.bin: 6 bytes are not whole rows of 16 bytes"),
+        (
+            "5.label",
+            np.resize([778, 0, 777], 45),
+            r"ids \[777, 778\] are no classes of WADS",
+        ),
+        ("5.label", np.zeros(2), "holds 2 labels of 4 bytes for a scan of 45 points"),
+        ("5.bin", np.zeros(1), "4 bytes are not whole rows of 16 bytes"),
     ],
+    ids=["unknown class", "short labels", "half a row"],
 )
 def test_a_file_that_cannot_be_used_is_named_from_a_worker_as_well(
     folder: Callable[..., Folder],
     connect: Connect,
     tmp_path: Path,
-    damage: str,
+    file: str,
+    content: np.ndarray,
     message: str,
     workers: int,
 ) -> None:
     data = connect(folder(workers=workers))
-    # The last of the scans, for a worker that is left in the middle takes seconds to end.
-    if damage == "unknown class":
-        write_labels(tmp_path / "5.label", np.resize([778, 0, 777], 45))
-    elif damage == "short labels":
-        write_labels(tmp_path / "5.label", np.zeros(2, np.int64))
-    else:
-        (tmp_path / "5.bin").write_bytes(b"abcdef")
-    with pytest.raises(InputError, match=message) as refusal:
+    content.astype("<u4").tofile(tmp_path / file)
+    with pytest.raises(InputError, match=f"{re.escape(file)}: {message}") as refusal:
         batches(data, "val")
     assert "Traceback" not in str(refusal.value)

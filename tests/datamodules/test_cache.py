@@ -12,7 +12,7 @@ from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.datamodules.loader import scan_loader
-from derain.datamodules.loading import Part
+from derain.datamodules.scan_data import Part
 from derain.datamodules.scan_dataset import Cache, bytes_of
 from derain.evaluation.hard_cases import scene
 from derain.learning.batch import Batch
@@ -41,7 +41,7 @@ def test_what_came_first_stays_as_long_as_it_fits() -> None:
         made.append(number)
         return scan_of(100 if number != 1 else 1000)
 
-    kept = Cache[Scan](3 * bytes_of(scan_of(100)))
+    kept = Cache(3 * bytes_of(scan_of(100)))
     for _ in range(2):
         for number in range(5):
             assert len(kept.get(number, lambda n=number: item(n))) == len(item(number))

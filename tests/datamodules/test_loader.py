@@ -1,6 +1,5 @@
 """Loaders without a data module give what a data module's give."""
 
-import doctest
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,6 @@ from typing import Any
 import pytest
 import torch
 
-from derain.datamodules import loader
 from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
@@ -51,9 +49,3 @@ def test_two_processes_share_the_scans(data: Folder) -> None:
     ]
     keys = [[m.key for batch in loader for m in batch.measured] for loader in loaders]
     assert keys == [["0", "1", "4"], ["2", "3"]]
-
-
-def test_its_example_is_true() -> None:
-    tried = doctest.testmod(loader)
-    assert tried.attempted
-    assert not tried.failed

@@ -114,9 +114,6 @@ def test_a_sequence_that_is_not_there_is_named(
     data = data_set(root=str(root), split={"train": ["003", "099"]})
     with pytest.raises(InputError, match=f"099/{FOLDERS[data_set][0]}: no such folder, though"):
         data.frames("train")
-
-
-def test_a_root_that_is_not_there_is_named(data_set: Callable[..., SequenceDataModule]) -> None:
     with pytest.raises(InputError, match=r"nowhere/sequences/.*: no such folder"):
         data_set(root="nowhere").frames("train")
 

@@ -47,13 +47,6 @@ def test_every_part_has_its_sequences_and_every_scan_its_labels(root: Path) -> N
     assert (scan.label == 3).any()
 
 
-def test_what_is_there_is_not_made_again(root: Path) -> None:
-    files = [file for file in root.rglob("*") if file.is_file()]
-    before = [file.stat().st_mtime_ns for file in files]
-    Simulated(str(root), TINY).prepare_data()
-    assert [file.stat().st_mtime_ns for file in files] == before
-
-
 def test_the_card_gets_its_statistics_from_the_training_scans(root: Path) -> None:
     data = Simulated(str(root), TINY)
     assert not data.card.has_statistics
@@ -62,8 +55,9 @@ def test_the_card_gets_its_statistics_from_the_training_scans(root: Path) -> Non
     assert 0 < data.card.rain_share < 0.5
 
 
-def test_a_data_set_that_is_there_is_taken_as_it_is(root: Path) -> None:
-    data = Simulated(str(root), make=False)
+@pytest.mark.parametrize("make", [True, False])
+def test_a_data_set_that_is_there_is_taken_as_it_is(root: Path, make: bool) -> None:
+    data = Simulated(str(root), TINY) if make else Simulated(str(root), make=False)
     before = {file: file.stat().st_mtime_ns for file in root.rglob("*")}
     data.prepare_data()
     assert {file: file.stat().st_mtime_ns for file in root.rglob("*")} == before

@@ -1,4 +1,4 @@
-"""The baselines: places alone against a search through all choices of voxels."""
+"""The baselines, against a search through all choices of voxels and through all rules."""
 
 from itertools import combinations
 from pathlib import Path
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.evaluation.baselines import PositionPrior, all_points, no_points
+from derain.evaluation.baselines import IntensityRule, PositionPrior, all_points, no_points
 from derain.evaluation.counts import Counts
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.scan import Scan
@@ -33,13 +33,8 @@ def in_voxels(voxels: list[int], rain: list[bool]) -> Truth:
 @st.composite
 def truths(draw: st.DrawFn) -> list[Truth]:
     """Scans of few voxels, with some rain among them."""
-    scans = draw(
-        st.lists(
-            st.lists(st.tuples(st.integers(-4, 4), st.booleans()), max_size=12),
-            min_size=1,
-            max_size=4,
-        )
-    )
+    of_scan = st.lists(st.tuples(st.integers(-4, 4), st.booleans()), max_size=12)
+    scans = draw(st.lists(of_scan, min_size=1, max_size=4))
     return [in_voxels([v for v, _ in points], [r for _, r in points]) for points in scans]
 
 
@@ -79,14 +74,10 @@ def test_a_few_points_prove_less_than_many() -> None:
     many = in_voxels([1] * 50 + [2] * 50, [True] * 45 + [False] * 5 + [False] * 50)
     one = in_voxels([0], [True])
     prior = PositionPrior.learn([many, one])
-    assert prior(in_voxels([1, 0, 2], [False] * 3)[0]).tolist() == [True, True, False]
+    seen = in_voxels([1, 0, 2, 3, 10**9], [False] * 5)[0]  # the last two by no training scan
+    assert prior(seen).tolist() == [True, True, False, False, False]
     rival = in_voxels([0] + [3] * 9, [True] + [False] * 9)
     assert PositionPrior.learn([many, rival])(in_voxels([3], [False])[0]).tolist() == [False]
-
-
-def test_places_that_no_training_scan_has_seen_are_not_rain() -> None:
-    prior = PositionPrior.learn([in_voxels([1, 2], [True, True])])
-    assert prior(in_voxels([1, 3, 10**9], [False] * 3)[0]).tolist() == [True, False, False]
 
 
 def test_voxels_end_at_their_edges_on_either_side_of_the_sensor() -> None:
@@ -109,18 +100,13 @@ def test_hard_scans_get_an_answer_and_points_that_cannot_be_judged_teach_nothing
 ) -> None:
     rain = np.random.default_rng(0).random(len(scan)) < 0.5
     prior = PositionPrior.learn([(scan, rain)])
-    for predicted in (prior(scan), all_points(scan), no_points(scan)):
-        assert predicted.shape == (len(scan),)
-        assert predicted.dtype == bool
-        assert not predicted[~scan.valid].any()
+    assert prior(scan).shape == (len(scan),)
+    assert prior(scan).dtype == bool
+    assert not prior(scan)[~scan.valid].any()
+    np.testing.assert_array_equal(all_points(scan), scan.valid)
+    np.testing.assert_array_equal(no_points(scan), np.zeros(len(scan), bool))
     whole = PositionPrior.learn([(scan.take(scan.valid), rain[scan.valid])])
     np.testing.assert_array_equal(prior.rain, whole.rain)
-
-
-def test_everything_and_nothing_are_what_they_say() -> None:
-    scan = HARD_CASES["NaN and infinite rows"]
-    np.testing.assert_array_equal(all_points(scan), scan.valid)
-    assert not no_points(scan).any()
 
 
 @pytest.mark.parametrize("voxel", [0.0, -0.5, float("nan"), float("inf")])
@@ -143,3 +129,67 @@ def test_on_real_snow_places_do_well_in_their_sequence_and_worse_elsewhere(share
     prior = PositionPrior.learn(train)
     elsewhere, other_snow = read(data / "sample.bin", data / "sample.label")
     assert iou(prior(elsewhere), other_snow) < 0.5 < iou(prior(scan), snow)
+
+
+def random_scan(seed: int, points: int, levels: int = 1000) -> tuple[Scan, NDArray[np.bool_]]:
+    """Points of so many different ranges and intensities, and their rain: more of the near."""
+    generator = np.random.default_rng(seed)
+    columns = np.zeros((points, 4))
+    columns[:, 0] = generator.integers(1, levels + 1, points) * 0.7
+    columns[:, 3] = generator.integers(0, levels, points) * 0.1
+    share = 0.8 - 0.7 * columns[:, 0] / columns[:, 0].max()
+    return Scan.of(columns), generator.random(points) < share
+
+
+@given(st.integers(0, 2**32), st.integers(1, 30), st.integers(1, 3), st.sampled_from([6, 1000]))
+@settings(deadline=None)
+def test_no_other_rule_is_better_than_the_best(
+    seed: int, points: int, scans: int, levels: int
+) -> None:
+    truth = [random_scan(seed + number, points, levels) for number in range(scans)]
+    whole = Scan.of(np.concatenate([np.c_[scan.xyz, scan.intensity] for scan, _ in truth]))
+    rain = np.concatenate([rain for _, rain in truth])
+    dim, near = (column <= column[:, None] for column in (whole.intensity, whole.range))
+    found = IntensityRule.best(truth)(whole)
+    if rain.any():
+        assert iou(found, rain) == max(iou(rule, rain) for row in dim for rule in row & near)
+    else:
+        assert not found.any()
+
+
+def test_dim_and_near_points_that_can_be_judged_are_rain() -> None:
+    points = [[1, 0, 0, 5], [0, 3, 0, 5], [0, 0, 2, 6], [2, 0, 0, 5.5], [np.nan, 0, 0, 0]]
+    rain = IntensityRule(intensity=5.5, range=2)(Scan.of(np.array([*points, [0] * 4, [-1] * 4])))
+    assert rain.tolist() == [True, False, False, True, False, False, False]
+
+
+def test_points_that_cannot_be_judged_teach_the_rule_nothing() -> None:
+    scan, rain = random_scan(seed=1, points=60)
+    broken = np.full((500, 4), np.nan, np.float32)
+    broken[::2] = 0
+    padded = Scan.of(np.concatenate([np.c_[scan.xyz, scan.intensity], broken]))
+    everywhere = np.concatenate([rain, np.ones(500, bool)])
+    assert IntensityRule.best([(padded, everywhere)]) == IntensityRule.best([(scan, rain)])
+
+
+def test_a_scan_without_intensity_has_no_dim_points_and_teaches_nothing() -> None:
+    bare = Scan(np.ones((4, 3), np.float32))
+    assert not IntensityRule(intensity=np.inf, range=np.inf)(bare).any()
+    taught = random_scan(seed=2, points=60)
+    assert IntensityRule.best([(bare, np.ones(4, bool)), taught]) == IntensityRule.best([taught])
+
+
+@pytest.mark.parametrize("scans", [[], ["no intensity"], ["empty"], ["nothing valid"]], ids=str)
+def test_where_there_is_no_rain_to_learn_from_nothing_is_found(scans: list[str]) -> None:
+    cases = [HARD_CASES[name] for name in scans]
+    rule = IntensityRule.best((scan, np.ones(len(scan), bool)) for scan in cases)
+    assert not rule(random_scan(seed=3, points=60)[0]).any()
+
+
+def test_on_real_snow_the_rule_reaches_its_published_quality(shared: Path) -> None:
+    points = np.fromfile(shared / "data/wads/sample.bin", np.float32).reshape(-1, 4)
+    snow = np.fromfile(shared / "data/wads/sample.label", np.uint32) & 0xFFFF == 110
+    scan = Scan.of(points)
+    stated = iou(IntensityRule(intensity=0, range=20)(scan), snow)
+    assert stated == pytest.approx(0.72, abs=0.005)
+    assert iou(IntensityRule.best([(scan, snow)])(scan), snow) > stated

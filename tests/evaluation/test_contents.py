@@ -37,7 +37,7 @@ def record(sequence: Path, text: str, stem: str = "000000") -> None:
 def test_sequences_are_found_from_the_root_to_the_sequence(
     tmp_path: Path, layout: Layout, root: str
 ) -> None:
-    for name in ("001", "000"):
+    for name in ("001", "000", ".002"):  # the last is not finished, and not counted
         add_scan(tmp_path / "sequences" / name, layout, "000001", [0] * 10)
         add_scan(tmp_path / "sequences" / name, layout, "000000", [0] * 10)
     folder = tmp_path / root.format(scans=layout.scans)
@@ -47,12 +47,6 @@ def test_sequences_are_found_from_the_root_to_the_sequence(
     assert [sequence.name for sequence in sequences] == expected
     assert [frame.key for frame in sequences[0].frames] == ["000000", "000001"]
     assert sequences[0].rain_rate is None
-
-
-def test_a_sequence_that_is_not_finished_is_not_counted(tmp_path: Path) -> None:
-    for name in ("000", ".001"):
-        add_scan(tmp_path / "sequences" / name, REHEARSE3D, "000000", [0])
-    assert [sequence.name for sequence in find_sequences(tmp_path, REHEARSE3D)] == ["000"]
 
 
 def test_a_folder_of_scans_is_one_sequence(tmp_path: Path) -> None:
@@ -83,16 +77,14 @@ def test_the_manifest_states_rain_rates_before_the_weather_does(tmp_path: Path) 
     assert rates == [10, 11, None]
 
 
-def test_a_rain_gauge_that_fails_is_not_heeded(tmp_path: Path) -> None:
+def test_a_rain_gauge_that_fails_is_not_heeded_and_a_damaged_record_is_named(
+    tmp_path: Path,
+) -> None:
     for name, rates in {"000": "nan\n9\ninf", "001": "nan"}.items():
         add_scan(tmp_path / name, REHEARSE3D, "000000", [0])
         record(tmp_path / name, f"rain_rate_mm_h\n{rates}\n")
     rates = [sequence.rain_rate for sequence in find_sequences(tmp_path, REHEARSE3D)]
     assert rates == [9, None]
-
-
-def test_a_damaged_weather_record_is_named(tmp_path: Path) -> None:
-    add_scan(tmp_path / "000", REHEARSE3D, "000000", [0])
     record(tmp_path / "000", "rain_rate_mm_h\nwet\n")
     with pytest.raises(InputError, match=r"000000\.csv: cannot be read"):
         find_sequences(tmp_path, REHEARSE3D)
@@ -120,20 +112,6 @@ def test_a_scan_without_labels_gives_its_points(tmp_path: Path) -> None:
         contents = count_frame(frame_of(tmp_path / f"scan.{suffix}"))
         assert (contents.points, contents.labelled.total()) == (40, 0)
         assert contents.as_dict({})["class_share"] == {}
-
-
-def test_labels_beside_a_scan_are_found(tmp_path: Path) -> None:
-    write_scan(tmp_path / "scan.pcd", Scan.of(scene(40)))
-    write_labels(tmp_path / "scan.label", np.full(40, 110))
-    assert count_frame(frame_of(tmp_path / "scan.pcd")).labelled == {110: 40}
-
-
-def test_labels_of_another_scan_are_refused(tmp_path: Path) -> None:
-    add_scan(tmp_path, REHEARSE3D, "0", [3, 0, 3])
-    columns = ["x", "y", "z", "intensity", "ring", "time"]
-    (sequence,) = find_sequences(tmp_path, REHEARSE3D, columns)
-    with pytest.raises(InputError, match="3 labels of 4 bytes for a scan of 2 points"):
-        count_frame(sequence.frames[0])
 
 
 def test_real_scans_are_counted_as_numpy_counts_them(shared: Path) -> None:

@@ -76,17 +76,6 @@ def test_some_of_the_thresholds_alone_keep_their_counts() -> None:
         assert even.counts(number) == points.counts(points.at(threshold))
 
 
-def test_memory_does_not_grow_and_nothing_is_left_after_a_reset() -> None:
-    metric = counted(drawn(5))
-    size = metric.bins.shape
-    for _ in range(3):
-        metric.update(*drawn(6))
-    assert metric.bins.shape == size
-    assert int(metric.bins.sum()) == 2000
-    metric.reset()
-    assert int(metric.bins.sum()) == 0
-
-
 @pytest.mark.parametrize("threshold", [-0.1, 1.5, float("nan")])
 def test_a_threshold_that_is_no_probability_is_refused(threshold: float) -> None:
     with pytest.raises(InputError, match="not within 0 and 1"):

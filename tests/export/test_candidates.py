@@ -30,7 +30,9 @@ def judging_candidates(random_outdet: OutDet, made_once: Callable[..., Path]) ->
     """The same network as ``onnx_model``, exported with candidates."""
     model = deepcopy(random_outdet)
     model.adopt(replace(model.spec, candidates=NEAR_AND_DIM))
-    return made_once("candidates.onnx", partial(export, model))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("derain.models.outdet.deployed.BLOCKS", 2)
+        return made_once("candidates.onnx", partial(export, model))
 
 
 @pytest.mark.parametrize("threads", [1, 2])

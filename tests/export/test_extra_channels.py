@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.errors import InputError
-from derain.evaluation.hard_cases import scene
+from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file
 from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
@@ -29,6 +29,8 @@ from derain.scan import Scan
 EXTRA = ("radar", "doppler", "rcs")
 CARD = "name: fused\nclasses: {0: other, 3: rain}\nrain: [3]\n"
 POINTS, DETECTIONS = 400, 40
+NAMES = ("empty", "one point", "40 % duplicates", "NaN and infinite rows", "no intensity")
+CASES = [(name, scan) for name, scan in hard_cases() if name in NAMES]
 
 
 def fused(seed: int) -> Scan:
@@ -82,6 +84,7 @@ def trained(
 @pytest.fixture(scope="module")
 def derainer(trained: Path) -> Derainer:
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(onnx_file, "hard_cases", lambda: CASES)
         patch.setattr("derain.models.outdet.deployed.BLOCKS", 1)  # traced several times as quickly
         export(load_model(trained), trained.with_suffix(".onnx"))
     return Derainer(trained.with_suffix(".onnx"), threads=1)
@@ -95,19 +98,18 @@ def from_pytorch(checkpoint: Path, scan: Scan) -> NDArray[np.float32]:
     return view.back(logits.softmax(dim=1)[:, 1].numpy())
 
 
-def test_the_file_says_what_the_network_sees_and_in_what_units(derainer: Derainer) -> None:
+def test_the_file_says_what_the_network_sees_and_in_what_units(
+    trained: Path, derainer: Derainer
+) -> None:
     spec = derainer.spec
+    first = onnx.load(trained.with_suffix(".onnx")).graph.input[0].type.tensor_type.shape
+    assert first.dim[1].dim_value == len(spec.channels)
     assert set(EXTRA) < set(spec.channels)
     units = dict(zip(spec.channels, spec.units, strict=True))
     assert [units[name] for name in EXTRA] == ["0 or 1", "m/s", "dBsm"]
     means = dict(zip(spec.channels, spec.mean, strict=True))
     assert means["radar"] == pytest.approx(DETECTIONS / POINTS)
     assert means["doppler"] == pytest.approx(-2, abs=1.5)
-
-
-def test_the_networks_input_is_as_wide_as_its_channels(trained: Path, derainer: Derainer) -> None:
-    first = onnx.load(trained.with_suffix(".onnx")).graph.input[0].type.tensor_type.shape
-    assert first.dim[1].dim_value == len(derainer.spec.channels)
 
 
 def test_an_extra_channel_that_is_normalised_wrongly_fails_the_proof(
@@ -117,6 +119,7 @@ def test_an_extra_channel_that_is_normalised_wrongly_fails_the_proof(
     wrong.std[wrong.channels.index("doppler")] *= 2
     graph = onnx.load(trained.with_suffix(".onnx"))
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: graph)
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: CASES)
     with pytest.raises(InputError, match="the exported model differs"):
         export(wrong, tmp_path / "model.onnx")
 
@@ -134,25 +137,15 @@ def test_a_scan_gets_the_answer_of_pytorch_whatever_columns_it_has(
     assert set(derainer.spec.missing_channels(scan)) == set(EXTRA) - set(kept)
 
 
-def test_the_columns_make_a_difference(derainer: Derainer) -> None:
-    scan = fused(7)
-    without = Scan(scan.xyz, scan.intensity)
-    assert (derainer.probability(scan) != derainer.probability(without)).mean() > 0.1
-
-
-def test_missing_columns_are_as_good_as_columns_of_the_mean(derainer: Derainer) -> None:
+def test_columns_make_a_difference_and_missing_ones_are_as_good_as_their_mean(
+    derainer: Derainer,
+) -> None:
     scan = fused(7)
     means = dict(zip(derainer.spec.channels, derainer.spec.mean, strict=True))
-    filled = {name: np.full(POINTS, means[name]) for name in EXTRA}
-    absent = Scan(scan.xyz, scan.intensity)
-    np.testing.assert_array_equal(
-        derainer.probability(Scan(scan.xyz, scan.intensity, fields=filled)),
-        derainer.probability(absent),
-    )
-    np.testing.assert_array_equal(
-        derainer.probability(np.column_stack([scan.xyz, scan.intensity])),
-        derainer.probability(absent),
-    )
+    filled = Scan(scan.xyz, scan.intensity, fields={n: np.full(POINTS, means[n]) for n in EXTRA})
+    absent = derainer.probability(np.column_stack([scan.xyz, scan.intensity]))
+    np.testing.assert_array_equal(derainer.probability(filled), absent)
+    assert (derainer.probability(scan) != absent).mean() > 0.1
 
 
 def test_scans_of_both_kinds_are_cleaned_with_every_column_kept(

@@ -1,16 +1,12 @@
 """The runtime gives PyTorch's answers, for any array and in its order, without torch."""
 
-import json
 import pickle
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnx
 import pytest
 import torch
 from hypothesis import given, settings
@@ -33,6 +29,7 @@ def derainer(onnx_model: Path) -> Derainer:
 
 
 def test_the_answers_are_those_of_pytorch(derainer: Derainer, random_outdet: OutDet) -> None:
+    assert 0.4 < derainer(scene()).mean() < 0.6  # what the tests compare is worth comparing
     for name, scan in hard_cases(largest=3000):
         view = random_outdet.spec.make_view()(scan)
         inputs = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
@@ -41,11 +38,6 @@ def test_the_answers_are_those_of_pytorch(derainer: Derainer, random_outdet: Out
         probability = derainer.probability(scan)
         np.testing.assert_allclose(probability, view.back(expected), atol=2e-5, err_msg=name)
         np.testing.assert_array_equal(derainer(scan), probability > 0.5, err_msg=name)
-
-
-def test_about_half_of_the_scene_is_called_rain(derainer: Derainer) -> None:
-    # What the other tests compare is worth comparing.
-    assert 0.4 < derainer(scene()).mean() < 0.6
 
 
 @pytest.mark.parametrize(
@@ -70,17 +62,7 @@ def test_points_come_in_any_form(derainer: Derainer, convert: Callable[[Points],
     probability = derainer.probability(given_points)
     assert probability.dtype == np.float32
     np.testing.assert_array_equal(probability, derainer.probability(points))
-
-
-def test_the_points_given_are_left_as_they_were(derainer: Derainer) -> None:
-    points = scene()
-    derainer(points)
-    np.testing.assert_array_equal(points, scene())
-
-
-def test_an_empty_scan_gets_an_empty_answer(derainer: Derainer) -> None:
-    assert derainer(np.zeros((0, 4))).shape == (0,)
-    assert derainer(np.zeros((0, 4))).dtype == bool
+    np.testing.assert_array_equal(points, scene())  # which are left as they were
 
 
 def test_points_without_intensity_get_the_mean_of_the_training_data(derainer: Derainer) -> None:
@@ -154,21 +136,6 @@ def test_the_threshold_is_that_of_the_file(
     assert 0 < stricter(scene()).sum() < Derainer(onnx_model)(scene()).sum()
 
 
-def test_a_model_runs_where_there_is_no_torch(onnx_model: Path, derainer: Derainer) -> None:
-    script = """
-import sys
-for name in ("torch", "lightning", "open3d", "onnx", "matplotlib", "scipy", "sklearn"):
-    sys.modules[name] = None  # importing it is an error
-from derain.export.runtime import Derainer
-from derain.evaluation.hard_cases import scene
-print(Derainer(sys.argv[1], threads=1)(scene()).nonzero()[0].tolist())
-"""
-    printed = subprocess.run(
-        [sys.executable, "-c", script, onnx_model], check=True, capture_output=True, text=True
-    ).stdout
-    assert json.loads(printed) == derainer(scene()).nonzero()[0].tolist()
-
-
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
@@ -191,27 +158,16 @@ def test_a_spec_that_cannot_be_used_is_refused(
         Derainer(model)
 
 
-def test_an_onnx_file_of_another_maker_is_refused(onnx_model: Path, tmp_path: Path) -> None:
-    proto = onnx.load(onnx_model)
-    del proto.metadata_props[:]
-    onnx.save(proto, tmp_path / "plain.onnx")
-    with pytest.raises(InputError, match=r"plain\.onnx: it has no Spec.*Export it with `derain"):
-        Derainer(tmp_path / "plain.onnx")
-
-
-@pytest.mark.parametrize("kept", [0, 10, 1000, 20_000])
-def test_a_damaged_file_is_refused(onnx_model: Path, tmp_path: Path, kept: int) -> None:
+@pytest.mark.parametrize("kept", [0, 10, 1000, 20_000, None])
+def test_a_damaged_file_is_refused_in_one_line(
+    onnx_model: Path, tmp_path: Path, kept: int | None
+) -> None:
+    noise = np.random.default_rng(0).bytes(5000)
     damaged = tmp_path / "damaged.onnx"
-    damaged.write_bytes(onnx_model.read_bytes()[:kept])
-    with pytest.raises(InputError, match=r"damaged\.onnx: (not an ONNX model|it has no Spec)"):
+    damaged.write_bytes(noise if kept is None else onnx_model.read_bytes()[:kept])
+    message = r"damaged\.onnx: (not an ONNX model|it has no Spec)"
+    with pytest.raises(InputError, match=message) as error:
         Derainer(damaged)
-
-
-def test_bytes_that_are_no_model_are_refused_in_one_line(tmp_path: Path) -> None:
-    path = tmp_path / "noise.onnx"
-    path.write_bytes(np.random.default_rng(0).bytes(5000))
-    with pytest.raises(InputError, match=r"noise\.onnx: not an ONNX model") as error:
-        Derainer(path)
     assert "\n" not in str(error.value)
 
 
@@ -237,10 +193,6 @@ def test_what_is_no_model_is_refused_with_what_to_use_instead(given_: Any, hint:
         Derainer(given_)
 
 
-def test_default_is_the_model_that_comes_with_derain() -> None:
-    assert Derainer("default").path == Derainer().path
-
-
 def test_a_derainer_can_be_pickled(onnx_model: Path) -> None:
     derainer = Derainer(onnx_model, threads=2)
     derainer.spec, derainer.warns = replace(derainer.spec, threshold=0.9), False
@@ -249,3 +201,4 @@ def test_a_derainer_can_be_pickled(onnx_model: Path) -> None:
     assert (again.spec, again.warns) == (derainer.spec, False)
     np.testing.assert_array_equal(again(scene()), derainer(scene()))
     assert pickle.loads(pickle.dumps(Derainer())).name == "default"
+    assert Derainer("default").path == Derainer().path

@@ -1,4 +1,4 @@
-"""Timed runs: which scans are read, how often, in what order, and what is kept."""
+"""Timed runs: which scans are read, how often and in what order; and the report of them."""
 
 from pathlib import Path
 
@@ -7,9 +7,16 @@ import pytest
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.export.timing import STAGES, WARM_UP, RunTimes, timed_runs
+from derain.export import timing
+from derain.export.timing import (
+    STAGES,
+    WARM_UP,
+    Latency,
+    RunTimes,
+    measure_latency,
+    timed_runs,
+)
 from derain.scan import Scan
-from derain.sources.file_frame import FileFrame
 from derain.sources.folders import named_frames
 from derain.system.stopwatch import Stopwatch
 
@@ -52,6 +59,41 @@ def test_times_of_no_runs_are_not_known() -> None:
     assert np.isnan([times.percentile(50), *(times.percentile(95, s) for s in STAGES)]).all()
 
 
-def test_a_scan_that_cannot_be_read_is_reported(tmp_path: Path) -> None:
+def test_every_run_is_timed_by_stage_and_in_total(onnx_model: Path, tmp_path: Path) -> None:
+    wide = np.column_stack([scene(400), np.zeros(400, np.float32)])
+    wide.tofile(tmp_path / "wide.bin")
+    stated = ["x", "y", "z", "intensity", "ring"]
+    report = measure_latency(onnx_model, tmp_path / "wide.bin", stated, threads=1, repeats=4)
+    times = np.array(list(report.times.stages.values()))
+    assert times.shape == (len(STAGES), 4)
+    assert (times > 0).all()
+    table = str(report).splitlines()[2:-1]
+    assert [line.split()[0] for line in table] == [*STAGES, "total"]
+    assert (report.points, report.threads) == (400, 1)
+
+
+def test_without_a_scan_a_made_up_one_of_100_000_points_is_timed(
+    onnx_model: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(timing, "WARM_UP", 0)
+    assert measure_latency(onnx_model, repeats=1).points == 100_000
+
+
+def test_the_report_is_a_table_of_percentiles() -> None:
+    times = RunTimes({"read": np.full(101, 2.0), "network": np.arange(101.0)})
+    report = Latency(times, 115_881, 2, "a processor; versions")
+    assert str(report).splitlines() == [
+        "115,881 points, 2 threads, 101 runs, milliseconds",
+        "stage         p50      p90      p99",
+        "read          2.0      2.0      2.0",
+        "network      50.0     90.0     99.0",
+        "total        52.0     92.0    101.0",
+        "a processor; versions",
+    ]
+
+
+def test_what_cannot_be_read_is_reported(onnx_model: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.bin: there is no such file"):
-        timed_runs(Recorder(), [FileFrame(key="none", path=tmp_path / "none.bin")], repeats=1)
+        measure_latency(onnx_model, tmp_path / "none.bin")
+    with pytest.raises(InputError, match=r"none\.onnx: there is no such file"):
+        measure_latency(tmp_path / "none.onnx")

@@ -52,10 +52,3 @@ def test_sor_removes_what_open3d_removes(
     assert 0.02 < expected.mean() < 0.95
     derainer = FilterDerainer(SOR(neighbours, deviations))
     np.testing.assert_array_equal(derainer(points), expected)
-
-
-def test_copies_do_not_keep_each_other_here_as_they_do_in_open3d(open3d: ModuleType) -> None:
-    drop = np.array([[5, 0, 0, 1]] * 4, np.float32)
-    _, kept = cloud(open3d, drop).remove_radius_outlier(3, 0.1)
-    assert len(kept) == 4
-    assert FilterDerainer(ROR(neighbours=4, radius=0.1))(drop).all()

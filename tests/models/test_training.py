@@ -18,8 +18,8 @@ from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
 from derain.datamodules.simulated import Simulated
 from derain.errors import InputError
+from derain.evaluation.baselines import IntensityRule
 from derain.evaluation.hard_cases import scene
-from derain.evaluation.intensity_rule import IntensityRule
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch
 from derain.learning.losses import class_weights

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from derain.cards.card import load_card
+from derain.evaluation.baselines import IntensityRule
 from derain.evaluation.hard_cases import scene
-from derain.evaluation.intensity_rule import IntensityRule
 from derain.files import read_scan
 from derain.filters import DROR, SSR, FilterDerainer
 from derain.models.outdet import OutDet

@@ -12,14 +12,17 @@ import pytest
 from derain.errors import InputError
 from derain.evaluation.baselines import all_points
 from derain.evaluation.counts import Counts
+from derain.evaluation.scores import score
 from derain.export.bench import bench as module
-from derain.export.bench.bench import bench
+from derain.export.bench.bench import bench, scored_methods
+from derain.export.bench.bench_entries import bench_entries
 from derain.export.bench.cost import measure_in_process
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.methods import load_method
 from derain.export.runtime import Derainer
-from derain.filters import DSOR, FilterDerainer
+from derain.filters import DSOR, FILTERS, FilterDerainer
 from derain.scan import Scan
+from derain.views.neighbours import NeighbourView
 
 
 @pytest.fixture
@@ -154,8 +157,6 @@ def test_what_cannot_be_benched_is_refused(labelled: LabelledFrames, tmp_path: P
         bench([DSOR], [scan], card)  # type: ignore[list-item]
     with pytest.raises(InputError, match="methods: int is no method"):
         bench([3], [scan], card)  # type: ignore[list-item]
-    with pytest.raises(InputError, match="position: it has no scans to learn from"):
-        bench(["position"], [scan], card)
     with pytest.raises(InputError, match="scans: there are none"):
         bench(["all"], [], card)
     with pytest.raises(InputError, match="scans: int is no scan"):
@@ -165,8 +166,6 @@ def test_what_cannot_be_benched_is_refused(labelled: LabelledFrames, tmp_path: P
     labelled.frames[0].label_path.unlink()
     with pytest.raises(InputError, match="its labels are not at"):
         bench(["all"], labelled.frames, card)
-    with pytest.raises(InputError, match="all: two methods are called so"):
-        bench(["all", "all"], [scan], card)
 
 
 def test_a_loaded_model_of_another_threshold_is_made_anew_in_its_process(
@@ -193,3 +192,23 @@ def test_a_bench_without_rain_warns_unless_its_data_are_clean(
     name = labelled.card.classes[9]
     assert (f"no point of these scans is {name}" in capsys.readouterr().err) == warned
     assert found["none"].scores.pooled.false_positive == 0
+
+
+def test_filters_share_one_search_and_score_as_they_would_alone(
+    labelled: LabelledFrames, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searches = []
+    view = NeighbourView.__call__
+
+    def counted(self: NeighbourView, scan: Scan) -> object:
+        searches.append(self.neighbours)
+        return view(self, scan)
+
+    rows = bench_entries(list(FILTERS))
+    monkeypatch.setattr(NeighbourView, "__call__", counted)
+    scans = list(map(labelled.read, labelled.frames))
+    together = score(scored_methods(rows, threads=1), scans, labelled.card)
+    assert searches == [9, 9, 9]  # SSR looks at the most
+    monkeypatch.undo()
+    alone = [FilterDerainer(row.filter, threads=1) for row in rows]
+    assert together == score(alone, scans, labelled.card)

@@ -38,13 +38,13 @@ def test_every_model_is_followed_by_itself_by_the_other_runtime(tmp_path: Path) 
     ]
     assert [row.facts.get("threshold") for row in rows] == [0.5, 0.5, None, 0.25, 0.25]
     assert rows[4].ready(1).runtime == Runtime("rainy", "bf16")
-    assert rows[4].by_other.usual(1).runtime == Runtime()
+    assert rows[4].usual(1).runtime == Runtime()
     assert rows[4].ready(1).spec.threshold == 0.25
 
 
 def test_without_another_runtime_nothing_is_added() -> None:
     (row,) = bench_entries([str(KEPT)])
-    assert row.by_other is None
+    assert row.usual is None
     assert "runtime" not in row.facts
 
 

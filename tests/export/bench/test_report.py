@@ -106,15 +106,6 @@ def test_a_score_that_is_undefined_is_a_dash(rows: list[Row]) -> None:
     assert all(line.split()[-2] == "-" for line in by_range.splitlines() if "dror" in line)
 
 
-def test_the_picture_leaves_out_methods_without_an_iou(
-    rows: list[Row], tmp_path: Path, saved_figures: list[Figure]
-) -> None:
-    dry = [replace(row, scores=replace(row.scores, pooled=Counts())) for row in rows]
-    draw_speed_error(dry, FACTS, tmp_path / "picture.png")
-    ((axes,),) = [figure.axes for figure in saved_figures]
-    assert not axes.texts
-
-
 def test_simulated_data_are_called_so(rows: list[Row]) -> None:
     assert SIMULATED_IS_EASY not in as_markdown(rows, FACTS)
     assert SIMULATED_IS_EASY in as_markdown(rows, {**FACTS, "simulated": True})
@@ -128,24 +119,18 @@ def test_one_scan_has_no_interval(labelled: LabelledFrames) -> None:
     assert row.as_dict()["iou_behind_best_interval"] is None
 
 
-def test_the_picture_says_how_large_files_are(
+def test_the_picture_shows_methods_with_a_time_and_an_iou_and_how_large_files_are(
     rows: list[Row], tmp_path: Path, saved_figures: list[Figure]
 ) -> None:
-    bench_entry = replace(rows[0].bench_entry, facts={FILE_SIZE: 67_535})
-    draw_speed_error([replace(rows[0], bench_entry=bench_entry)], FACTS, tmp_path / "picture.png")
+    filter_, baseline, failed = rows
+    of_file = replace(filter_, bench_entry=replace(filter_.bench_entry, facts={FILE_SIZE: 67_535}))
+    dry = replace(filter_, scores=replace(filter_.scores, pooled=Counts()))
+    draw_speed_error([of_file, baseline, failed, dry], FACTS, tmp_path / "speed_error.png")
     ((axes,),) = [figure.axes for figure in saved_figures]
-    assert [text.get_text() for text in axes.texts] == ["dror · 68 kB"]
-
-
-def test_the_picture_leaves_out_what_could_not_be_timed(
-    rows: list[Row], tmp_path: Path, saved_figures: list[Figure]
-) -> None:
-    draw_speed_error(rows, FACTS, tmp_path / "speed_error.png")
-    ((axes,),) = [figure.axes for figure in saved_figures]
-    assert [text.get_text() for text in axes.texts] == ["dror", "all"]
+    assert [text.get_text() for text in axes.texts] == ["dror · 68 kB", "all"]
     assert axes.get_title() == "made up, 3 scans, abacus"
     shown = {dots.get_label(): dots.get_offsets().tolist() for dots in axes.collections}
-    dror, everything, _ = (1 - row.scores.pooled.iou for row in rows)
+    dror, everything = (1 - row.scores.pooled.iou for row in (filter_, baseline))
     assert 0 < dror < 1
     assert shown == {"filter": [[40, dror]], "baseline": [[4, everything]]}
     height, width, _ = imread(tmp_path / "speed_error.png").shape

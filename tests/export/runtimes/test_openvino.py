@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import onnx
 import pytest
-from onnx import TensorProto, helper
+from onnx import helper
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
@@ -124,20 +124,6 @@ def test_a_graph_that_it_cannot_run_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"odd\.onnx: not an ONNX model that openvino") as refusal:
         Derainer(tmp_path / "odd.onnx", 1, "openvino")
     assert "\n" not in str(refusal.value)
-
-
-def test_a_network_of_another_view_is_refused(tmp_path: Path) -> None:
-    kept = onnx.load(KEPT / "outdet.onnx")
-    value = helper.make_tensor_value_info("points", TensorProto.FLOAT, ["points", 2])
-    logits = helper.make_tensor_value_info("logits", TensorProto.FLOAT, ["points", 2])
-    node = helper.make_node("Identity", ["points"], ["logits"])
-    graph = helper.make_graph([node], "other", [value], [logits])
-    proto = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
-    metadata = {entry.key: entry.value for entry in kept.metadata_props}
-    helper.set_model_props(proto, {METADATA_KEY: metadata[METADATA_KEY]})
-    onnx.save(proto, tmp_path / "other.onnx")
-    with pytest.raises(InputError, match=r"other\.onnx: its network takes"):
-        Derainer(tmp_path / "other.onnx", 1, "openvino")
 
 
 def test_inputs_that_a_network_has_no_use_for_may_be_among_those_of_its_view(

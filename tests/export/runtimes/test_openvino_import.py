@@ -20,7 +20,7 @@ import sys
 if {before}:
     import openvino_telemetry.backend
 former = sys.modules.get("openvino_telemetry.backend")
-from derain.export.runtimes.openvino_import import import_openvino
+from derain.export.runtimes.openvino import import_openvino
 assert not import_openvino().REPORTED
 assert sys.modules.get("openvino_telemetry.backend") is former
 import openvino_telemetry.backend  # whoever wants it has it
@@ -54,7 +54,7 @@ def test_an_installation_that_is_broken_is_one_line(
     (tmp_path / "openvino.py").write_text(content)
     code = f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n" + (
         "from derain.errors import InputError\n"
-        "from derain.export.runtimes.openvino_import import import_openvino\n"
+        "from derain.export.runtimes.openvino import import_openvino\n"
         "try:\n    import_openvino()\nexcept InputError as error:\n    print(error)"
     )
     finished = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

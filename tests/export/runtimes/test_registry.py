@@ -1,18 +1,25 @@
 """A runtime is found by its name, opens what has been looked at, and is refused in one line."""
 
+import os
+import platform
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import onnxruntime
 import pytest
+from onnxruntime.capi.onnxruntime_pybind11_state import NotImplemented as NoKernel
 
+import derain
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export.machine import versions
 from derain.export.methods import load_method
 from derain.export.model_file import ModelFile
 from derain.export.runtime import Derainer
+from derain.export.runtimes.onnx_runtime import WRONG_FUSION
 from derain.export.runtimes.registry import RUNTIMES, Runtime
 from derain.export.runtimes.session import Session, TensorType
 
@@ -80,6 +87,9 @@ def test_a_runtime_of_another_package_is_given_threads_and_precision(rainy: type
         lambda session: ("inputs", {**session.inputs, "more": SCORES[0]}),
         lambda session: ("inputs", {**session.inputs, "points": TensorType("float64", (None, 4))}),
         lambda session: ("inputs", {**session.inputs, "points": TensorType("float32", (None, 5))}),
+        lambda session: ("inputs", {**session.inputs, "points": TensorType("float32", (4,))}),
+        lambda session: ("inputs", {"points": session.inputs["points"]}),
+        lambda session: ("inputs", {"image": TensorType("float32", (1, 5, 64, 2048))}),
         lambda session: ("outputs", [TensorType("float16", (None, 2))]),
         lambda session: ("outputs", SCORES * 2),
     ],
@@ -117,9 +127,34 @@ def test_a_method_is_run_by_the_runtime_that_is_named_and_a_filter_by_none() -> 
 def test_the_versions_name_each_package_that_ran_once(
     rainy: type[Session], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    for version in (
+        f"; derain {derain.__version__}, onnxruntime {onnxruntime.__version__}, ",
+        f"NumPy {np.__version__}, Python {platform.python_version()}",
+    ):
+        assert version in versions()
+    assert not versions().startswith(";")
     assert versions(["onnxruntime", "rainy"]) == versions()
     monkeypatch.setattr(rainy, "PACKAGE", "numpy")
     assert versions(["rainy"]).count(np.__version__) == 2
     assert "onnxruntime" not in versions(["rainy"])
     monkeypatch.setattr(rainy, "PACKAGE", "rain-under-another-name")
     assert "rain-under-another-name, NumPy" in versions(["rainy"])
+
+
+def test_a_network_that_earlier_versions_fuse_wrongly_is_opened_without_that(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rain = Derainer(threads=1)(scene(300))
+    usual = onnxruntime.InferenceSession
+
+    def earlier(*arguments: Any, disabled_optimizers: tuple[str, ...] = (), **options: Any) -> Any:
+        if WRONG_FUSION not in disabled_optimizers:
+            raise NoKernel("Failed to find kernel for com.microsoft.FusedMatMul(1)")
+        return usual(*arguments, disabled_optimizers=disabled_optimizers, **options)
+
+    monkeypatch.setattr(onnxruntime, "InferenceSession", earlier)
+    np.testing.assert_array_equal(Derainer(threads=1)(scene(300)), rain)
+
+
+def test_it_tells_nobody_of_the_models_that_are_opened() -> None:
+    assert os.environ["ORT_DISABLE_TELEMETRY"] == "1"

@@ -10,7 +10,7 @@ import torch
 
 from derain.cards.card import load_card
 from derain.datamodules.in_memory import InMemory
-from derain.datamodules.loading import Loading
+from derain.datamodules.scan_data import Loading
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export.candidates import fit_network_candidates
