@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain import __version__
 from derain.errors import InputError
 from derain.files.documents import shown
+from derain.simulation.arrays import Floats
 from derain.simulation.drive import Drive
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.manifest import MAKER, RAIN_RATE, SPLIT_PARTS
@@ -169,7 +169,7 @@ class Campaign(SplitSequences):
         write_sequence(folder, self, name)
 
     @property
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Floats:
         """When the scans of a sequence are taken, float64 (scans,), seconds from 0 on."""
         return np.arange(self.scans) / self.lidar.frame_rate
 

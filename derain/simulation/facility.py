@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import objects
 from derain.simulation.classes import TrackClass
@@ -24,7 +25,7 @@ from derain.simulation.track import Track
 # stand at 10 to 112 m. Within that, the distances are chosen so that every class has about the
 # share of the points that it has in REHEARSE-3D.
 # Source: REHEARSE-3D, section III.A.
-ROAD_USERS: tuple[tuple[Callable[[np.random.Generator], Surface], tuple[float, float]], ...] = (
+ROAD_USERS: tuple[tuple[Callable[[Generator], Surface], tuple[float, float]], ...] = (
     (objects.car, (30, 80)),
     (objects.pedestrian, (35, 85)),
     (objects.pedestrian, (35, 85)),
@@ -54,7 +55,7 @@ LEAVES = (0.03, 0.6)
 ROUGHNESS = 0.6
 
 
-def lay_out_facility(generator: np.random.Generator) -> Track:
+def lay_out_facility(generator: Generator) -> Track:
     """Lays out a facility.
 
     A road 6.8 to 7.6 m wide leads straight away from the sensor, turned by up to 2 degrees and
@@ -76,9 +77,7 @@ def lay_out_facility(generator: np.random.Generator) -> Track:
     return on_slope(surfaces, 0, heading, generator.uniform(-0.01, 0.01, 2))
 
 
-def _paved(
-    surfaces: Iterable[Surface], material_generator: np.random.Generator
-) -> Iterator[Surface]:
+def _paved(surfaces: Iterable[Surface], material_generator: Generator) -> Iterator[Surface]:
     for surface in surfaces:
         span = ASPHALT_REFLECTIVITY if surface.label is TrackClass.ROAD else GROUND
         yield replace(surface, reflectivity=material_generator.uniform(*span), roughness=ROUGHNESS)
@@ -87,8 +86,8 @@ def _paved(
 def _foliage(
     radii: tuple[float, float, float],
     height: float,
-    generator: np.random.Generator,
-    material_generator: np.random.Generator,
+    generator: Generator,
+    material_generator: Generator,
 ) -> Surface:
     foliage = objects.foliage(radii, height, generator)
     return replace(
@@ -96,7 +95,7 @@ def _foliage(
     )
 
 
-def _road_users(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _road_users(half_width: float, generator: Generator) -> Iterator[Surface]:
     taken = np.array([])
     for make, distances in ROAD_USERS:
         x = generator.uniform(*distances)
@@ -106,14 +105,14 @@ def _road_users(half_width: float, generator: np.random.Generator) -> Iterator[S
         yield make(generator).placed(x, generator.uniform(1.2 - half_width, half_width - 1.2))
 
 
-def _sprinklers(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _sprinklers(half_width: float, generator: Generator) -> Iterator[Surface]:
     for x in MASTS:
         yield objects.sprinkler(generator).placed(x, half_width + 0.7)
         yield objects.sprinkler(generator).placed(x, -half_width - 0.7, np.pi)
 
 
 def _verges(
-    half_width: float, generator: np.random.Generator, material_generator: np.random.Generator
+    half_width: float, generator: Generator, material_generator: Generator
 ) -> Iterator[Surface]:
     for side in (-1, 1):
         for _ in range(generator.integers(10, 20)):
@@ -125,7 +124,7 @@ def _verges(
 
 
 def _horizon(
-    half_width: float, generator: np.random.Generator, material_generator: np.random.Generator
+    half_width: float, generator: Generator, material_generator: Generator
 ) -> Iterator[Surface]:
     for side in (-1, 1):
         for x in np.arange(30.0, 110, 10):

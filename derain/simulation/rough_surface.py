@@ -1,10 +1,9 @@
 """The light that a rough surface returns to its source."""
 
-import numpy as np
-from numpy.typing import NDArray
+from derain.simulation.arrays import Floats
 
 
-def backscatter(cosine: NDArray[np.float64], roughness: NDArray[np.float64]) -> NDArray[np.float64]:
+def backscatter(cosine: Floats, roughness: Floats) -> Floats:
     """Apparent reflectivity of surfaces over their reflectivity, float64 (N,).
 
     A smooth matt surface returns as Lambert's: in proportion to the cosine of the angle of

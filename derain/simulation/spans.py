@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Self, get_args, get_type_hints
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
@@ -178,7 +179,7 @@ LOGARITHMIC_SPANS = frozenset(
 )
 
 
-def draw(spans: Any, name: str, generator: np.random.Generator) -> float:
+def draw(spans: Any, name: str, generator: Generator) -> float:
     """Draws a value from a span.
 
     Args:
@@ -192,7 +193,7 @@ def draw(spans: Any, name: str, generator: np.random.Generator) -> float:
     return float(generator.uniform(*span))
 
 
-def draw_kind(weights: Mapping[str, float], generator: np.random.Generator) -> str:
+def draw_kind(weights: Mapping[str, float], generator: Generator) -> str:
     """Draws a name by weights, which need not add up to 1."""
     share = np.array(list(weights.values())) / sum(weights.values())
     return str(generator.choice(list(weights), p=share))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.simulation.arrays import Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
 from derain.simulation.rough_surface import backscatter
@@ -29,9 +30,9 @@ class Track:
     """
 
     triangles: NDArray[np.float32]
-    reflectivity: NDArray[np.float64]
-    label: NDArray[np.int64]
-    roughness: NDArray[np.float64] | float = 0.0
+    reflectivity: Floats
+    label: Ints
+    roughness: Floats | float = 0.0
 
     @classmethod
     def of(cls, surfaces: Iterable[Surface]) -> "Track":
@@ -66,7 +67,7 @@ class Track:
         added = list(surfaces)
         return Track.joined([self, Track.of(added)]) if added else self
 
-    def cast(self, sensor: Sensor, pose: NDArray[np.float64] | None = None) -> Returns:
+    def cast(self, sensor: Sensor, pose: Floats | None = None) -> Returns:
         """What every beam of a sensor would return through clear air to a perfect detector.
 
         A beam is one ray. Smooth surfaces scatter like Lambert's: their apparent reflectivity falls

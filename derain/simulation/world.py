@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
+from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
@@ -123,7 +123,7 @@ def load_world(name: str | Path) -> World:
     return World.of(Entry.of_yaml(packaged_or_own(name, packaged_worlds(), "world")))
 
 
-def draw_scan(world: World, generator: np.random.Generator) -> DrawnScan:
+def draw_scan(world: World, generator: Generator) -> DrawnScan:
     """Draws a place, a sensor and the weather, and takes a scan.
 
     Args:
@@ -143,7 +143,7 @@ def draw_scan(world: World, generator: np.random.Generator) -> DrawnScan:
     raise InputError("world", "its scans are empty or nothing but rain", "Draw less rain.")
 
 
-def _drawn(world: World, generator: np.random.Generator) -> DrawnScan:
+def _drawn(world: World, generator: Generator) -> DrawnScan:
     sensor = draw_sensor(world.sensors, generator)
     place = draw_kind(world.places, generator)
     track = _laid_out(place, world, sensor, generator)
@@ -152,7 +152,7 @@ def _drawn(world: World, generator: np.random.Generator) -> DrawnScan:
     return DrawnScan(sensor.measure(detected, generator), place, sensor, precipitation)
 
 
-def _laid_out(place: str, world: World, sensor: Sensor, generator: np.random.Generator) -> Track:
+def _laid_out(place: str, world: World, sensor: Sensor, generator: Generator) -> Track:
     track = LAYOUTS[place](generator)
     if place not in INDOORS and generator.random() < world.horizon:
         track = track.with_surfaces(lay_out_horizon(generator))

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from derain.simulation.arrays import Floats
 from derain.simulation.flying.precipitation import Precipitation
 from derain.simulation.sensor import Sensor
 
@@ -51,11 +51,11 @@ class Optics:
         farthest = min(precipitation.cut_off, sensor.maximum_range)
         return cls(aperture, spread, brightness, sensor.detection_threshold, farthest)
 
-    def width(self, range: NDArray[np.float64]) -> NDArray[np.float64]:
+    def width(self, range: Floats) -> Floats:
         """Width of a beam at distances in metres, in metres."""
         return self.aperture + self.spread * range
 
-    def smallest_visible(self, range: NDArray[np.float64]) -> NDArray[np.float64]:
+    def smallest_visible(self, range: Floats) -> Floats:
         """Diameter of the smallest particle that is seen at distances in metres, in metres.
 
         Infinite where not even one that fills the beam is.

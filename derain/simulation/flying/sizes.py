@@ -4,8 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
+from derain.simulation.arrays import Floats
 from derain.simulation.flying.optics import Optics
 from derain.simulation.flying.precipitation import SMALLEST
 
@@ -23,8 +24,8 @@ class Sizes:
         share: Share of the particles that have each, float64 (CELLS,), with the sum 1.
     """
 
-    diameter: NDArray[np.float64]
-    share: NDArray[np.float64]
+    diameter: Floats
+    share: Floats
 
     @classmethod
     def gamma(cls, mean: float, shape: float, largest: float) -> "Sizes":
@@ -87,13 +88,11 @@ class Slices:
         self._diameter = sizes.diameter
 
     @property
-    def met(self) -> NDArray[np.float64]:
+    def met(self) -> Floats:
         """Particles met in each slice for one per cubic metre, float64 (SLICES,), at most."""
         return np.asarray(self._cumulative[:, -1] * (self.far - self.near))
 
-    def draw_diameters(
-        self, slice_number: int, count: int, generator: np.random.Generator
-    ) -> NDArray[np.float64]:
+    def draw_diameters(self, slice_number: int, count: int, generator: Generator) -> Floats:
         """Diameters of particles that a beam meets in a slice, float64 (count,), metres."""
         cumulative = self._cumulative[slice_number]
         # The first cell that is above: those that are not visible add nothing, and are never it.

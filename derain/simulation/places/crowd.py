@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import objects
 from derain.simulation.objects import Surface
@@ -25,7 +26,7 @@ NEAR_AND_FAR = (2.2, 70.0)
 
 
 def users(
-    generator: np.random.Generator,
+    generator: Generator,
     allowed: Allowed = anywhere,
     *,
     walkers: Counts = (6, 16),
@@ -47,9 +48,7 @@ def users(
         generator,
     )
     on_foot = choose(
-        [(people.person, 9), (objects.pedestrian, 1)],
-        int(generator.integers(*walkers)),
-        generator,
+        [(people.person, 9), (objects.pedestrian, 1)], int(generator.integers(*walkers)), generator
     )
     bikes = choose(
         [(people.cyclist, 9), (objects.bike, 1)], int(generator.integers(*cyclists)), generator
@@ -66,7 +65,7 @@ def users(
 
 
 def ragged_things(
-    generator: np.random.Generator,
+    generator: Generator,
     allowed: Allowed = anywhere,
     *,
     count: Counts = (10, 30),
@@ -101,11 +100,11 @@ def ragged_things(
     yield from scatter(makes, places, generator)
 
 
-def _bush(generator: np.random.Generator) -> Surface:
+def _bush(generator: Generator) -> Surface:
     length, width, height = generator.uniform(0.2, 1.5, 3)
     return plants.bush((length, width, height), generator)
 
 
-def _tufts(generator: np.random.Generator) -> Surface:
+def _tufts(generator: Generator) -> Surface:
     spread = generator.uniform(0.3, 2.5)
     return plants.grass(generator.normal(0, spread, (generator.integers(5, 60), 2)), generator)

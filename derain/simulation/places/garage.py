@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.drawing import log_uniform
@@ -43,7 +44,7 @@ class Hall(Walls):
     MARGIN = 0.7
 
 
-def lay_out_garage(generator: np.random.Generator) -> Track:
+def lay_out_garage(generator: Generator) -> Track:
     """Lays out a garage.
 
     A hall with rough walls, pillars and a ceiling under which pipes, cables, lamps and nets hang;
@@ -64,7 +65,7 @@ def lay_out_garage(generator: np.random.Generator) -> Track:
     return assemble(floor, standing, uneven, generator, [_ceiling(hall, generator)])
 
 
-def _hall(generator: np.random.Generator) -> Hall:
+def _hall(generator: Generator) -> Hall:
     """Draws a hall, from a private garage's yard to a whole storey."""
     return Hall(
         (-generator.uniform(4, 25), generator.uniform(10, 45)),
@@ -74,13 +75,13 @@ def _hall(generator: np.random.Generator) -> Hall:
     )
 
 
-def _ceiling(hall: Hall, generator: np.random.Generator) -> Surface:
+def _ceiling(hall: Hall, generator: Generator) -> Surface:
     length, width = hall.x[1] - hall.x[0], hall.y[1] - hall.y[0]
     rough = walls.rough_wall(length, width, generator, cell=0.6)
     return walls.laid_flat(rough, (hall.x[0], hall.y[0]), hall.height)
 
 
-def _under_the_ceiling(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _under_the_ceiling(hall: Hall, generator: Generator) -> Iterator[Surface]:
     """Pipes, trays, lamps, and loose cables that hang down."""
     top = hall.height - 0.05
     for _ in range(generator.integers(3, 12)):
@@ -103,7 +104,7 @@ def _under_the_ceiling(hall: Hall, generator: np.random.Generator) -> Iterator[S
         yield threads.cable(start, end, generator.uniform(0.1, 0.9), (0.004, 0.03), generator)
 
 
-def _pillars(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _pillars(hall: Hall, generator: Generator) -> Iterator[Surface]:
     side, rounded = generator.uniform(0.25, 0.7), generator.random() < 0.3
     shift = generator.uniform(0, hall.bay, 2)
     for x, y in product(
@@ -116,7 +117,7 @@ def _pillars(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
             yield frames.made([shapes.placed(pillar, float(x), float(y))], generator)
 
 
-def _walls(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _walls(hall: Hall, generator: Generator) -> Iterator[Surface]:
     (behind, ahead), (right, left) = hall.x, hall.y
     for number, (x, y) in enumerate(hall.corners):
         length = (ahead - behind) if number % 2 == 0 else (left - right)
@@ -130,7 +131,7 @@ def _walls(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
         yield from place(wall, x, y, number * np.pi / 2)
 
 
-def _parked(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _parked(hall: Hall, generator: Generator) -> Iterator[Surface]:
     full = generator.uniform(0.2, 0.9)
     for y, nose in ((hall.y[0] + 3, 1), (hall.y[1] - 3, -1)):
         for x in np.arange(hall.x[0] + 2, hall.x[1] - 2, 2.7):
@@ -139,7 +140,7 @@ def _parked(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
                 yield from place(vehicles.glazed_car(generator), float(x), float(y), heading)
 
 
-def _about(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _about(hall: Hall, generator: Generator) -> Iterator[Surface]:
     """People and small things on the floor."""
     makes: list[Make] = [people.person] * int(generator.integers(3, 11))
     small: list[tuple[Make, float]] = [
@@ -156,7 +157,7 @@ def _about(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
     yield from scatter(shuffled(makes, generator), places, generator)
 
 
-def _cages(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _cages(hall: Hall, generator: Generator) -> Iterator[Surface]:
     """Walls of mesh, nets and railings that part the hall."""
     kinds: list[Piece] = [
         threads.chain_link,

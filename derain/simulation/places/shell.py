@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.drawing import Span, log_uniform
@@ -41,7 +42,7 @@ class Walls:
     MARGIN: ClassVar[float] = 0.35
 
     @classmethod
-    def draw(cls, shortest: Span, longest: Span, generator: np.random.Generator) -> "Walls":
+    def draw(cls, shortest: Span, longest: Span, generator: Generator) -> "Walls":
         """Draws walls by the spans of the length of the shorter side and of the longer one."""
         sides = [log_uniform(span, generator) for span in (shortest, longest)]
         along, across = (sides[which] for which in generator.permutation(2))
@@ -66,7 +67,7 @@ class Walls:
         return inside and self.y[0] + self.MARGIN < y < self.y[1] - self.MARGIN
 
 
-def shell(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
+def shell(room: Walls, generator: Generator) -> Iterator[Surface]:
     """Floor, ceiling and walls, closed but for windows and doorways."""
     yield from _floor_and_ceiling(room, generator)
     yield from _walls(room, generator)
@@ -77,7 +78,7 @@ def moved(surface: Surface, x: float, y: float, z: float) -> Surface:
     return replace(surface, triangles=surface.triangles + np.array([x, y, z]))
 
 
-def _floor_and_ceiling(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
+def _floor_and_ceiling(room: Walls, generator: Generator) -> Iterator[Surface]:
     length, width = room.x[1] - room.x[0], room.y[1] - room.y[0]
     for height, bumps in ((0.0, SMOOTH), (room.height, -SMOOTH)):
         rough = walls.rough_wall(length + 2 * OVERLAP, width + 2 * OVERLAP, generator, cell=0.5)
@@ -86,7 +87,7 @@ def _floor_and_ceiling(room: Walls, generator: np.random.Generator) -> Iterator[
         yield replace(lying, reflectivity=log_uniform(FLOOR, generator))
 
 
-def _walls(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
+def _walls(room: Walls, generator: Generator) -> Iterator[Surface]:
     """Four walls, each whole, or with a band of glass or a doorway in it and a wall behind."""
     for number, (start, end) in enumerate(pairwise([*room.corners, room.corners[0]])):
         length = float(np.hypot(end[0] - start[0], end[1] - start[1]))
@@ -106,16 +107,13 @@ def _walls(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
         yield from place(wall, *start, number * np.pi / 2)
 
 
-def _beyond(generator: np.random.Generator) -> float:
+def _beyond(generator: Generator) -> float:
     """How far behind a window or a door the next wall is, metres."""
     return log_uniform((1.0, 40.0), generator)
 
 
 def _pierced(
-    length: float,
-    height: float,
-    opening: tuple[float, float, float],
-    generator: np.random.Generator,
+    length: float, height: float, opening: tuple[float, float, float], generator: Generator
 ) -> Iterator[Surface]:
     """A wall with an opening in the middle, by its width, lower and upper edge, and its frame."""
     wide, low, high = opening
@@ -133,7 +131,7 @@ def _pierced(
 
 
 def _panes(
-    length: float, opening: tuple[float, float, float], generator: np.random.Generator
+    length: float, opening: tuple[float, float, float], generator: Generator
 ) -> Iterator[Surface]:
     """Glass in an opening, frames between the panes, blinds or a curtain before some of them."""
     wide, low, high = opening
@@ -149,7 +147,7 @@ def _panes(
             )
 
 
-def _on_the_wall(length: float, height: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _on_the_wall(length: float, height: float, generator: Generator) -> Iterator[Surface]:
     """Pictures, boards, pipes, a radiator, coats on hooks, cables; the room lies at positive y."""
     for _ in range(generator.integers(0, 4)):
         x, z = generator.uniform(0, length), generator.uniform(0.8, 2.0)

@@ -5,9 +5,11 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from derain.simulation import shapes
+from derain.simulation.arrays import Floats
 from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places.relief import Relief
@@ -17,13 +19,13 @@ from derain.simulation.track import Track
 Allowed = Callable[[float, float], bool]
 
 # Something made at the origin, of one surface or of several.
-Make = Callable[[np.random.Generator], Surface | Iterable[Surface]]
+Make = Callable[[Generator], Surface | Iterable[Surface]]
 
 # Made piece by piece along a line, by the length of a piece in metres.
-Piece = Callable[[float, np.random.Generator], Surface | Iterable[Surface]]
+Piece = Callable[[float, Generator], Surface | Iterable[Surface]]
 
 # A line on the ground: its y at each x.
-Line = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Line = Callable[[Floats], Floats]
 
 # What stands in a place is farther from the sensor's axis, metres. Only the ground reaches it.
 AXIS_CLEARANCE = 1.6
@@ -40,11 +42,7 @@ def anywhere(x: float, y: float) -> bool:
 
 
 def free_places(
-    count: int,
-    distances: Span,
-    apart: float,
-    generator: np.random.Generator,
-    allowed: Allowed = anywhere,
+    count: int, distances: Span, apart: float, generator: Generator, allowed: Allowed = anywhere
 ) -> list[tuple[float, float]]:
     """Places about the sensor, as many within each doubling of the distance.
 
@@ -69,9 +67,7 @@ def free_places(
 
 
 def scatter(
-    makes: Iterable[Make],
-    places: Iterable[tuple[float, float]],
-    generator: np.random.Generator,
+    makes: Iterable[Make], places: Iterable[tuple[float, float]], generator: Generator
 ) -> Iterator[Surface]:
     """One thing at each place, turned at random.
 
@@ -90,7 +86,7 @@ def of_size(make: Callable[..., Surface | Iterable[Surface]], *sizes: Span) -> M
     return lambda generator: make(*(generator.uniform(*size) for size in sizes), generator)
 
 
-def shuffled(makes: Iterable[Make], generator: np.random.Generator) -> list[Make]:
+def shuffled(makes: Iterable[Make], generator: Generator) -> list[Make]:
     """Makers of things in another order."""
     ordered = list(makes)
     return [ordered[which] for which in generator.permutation(len(ordered))]
@@ -110,12 +106,7 @@ def place(
 
 
 def line_up(
-    make: Piece,
-    line: Line,
-    x: Span,
-    piece: float,
-    generator: np.random.Generator,
-    gaps: float = 0.0,
+    make: Piece, line: Line, x: Span, piece: float, generator: Generator, gaps: float = 0.0
 ) -> Iterator[Surface]:
     """Pieces of a hedge, a fence or a wall, end to end along a line.
 
@@ -135,9 +126,7 @@ def line_up(
             yield from place(make(length, generator), float(before), float(left), heading)
 
 
-def choose(
-    options: Iterable[tuple[Make, float]], count: int, generator: np.random.Generator
-) -> list[Make]:
+def choose(options: Iterable[tuple[Make, float]], count: int, generator: Generator) -> list[Make]:
     """So many of several makers of things, each with the probability of its share in the sum."""
     makes, shares = zip(*options, strict=True)
     chosen = generator.choice(len(makes), count, p=np.array(shares) / np.sum(shares))
@@ -148,7 +137,7 @@ def assemble(
     ground: Iterable[Surface],
     standing: Iterable[Surface],
     relief: Relief,
-    generator: np.random.Generator,
+    generator: Generator,
     over: Iterable[Surface] = (),
 ) -> Track:
     """A track of what is laid out on a plane: cleared about the sensor, on uneven ground, tilted.
@@ -168,7 +157,7 @@ def assemble(
     return replace(track, triangles=tilted.astype(np.float32))
 
 
-def _tilt(generator: np.random.Generator) -> NDArray[np.float64]:
+def _tilt(generator: Generator) -> Floats:
     """Turns rows of coordinates by up to 9 degrees, and raises them by up to 2 % either way."""
     axes = np.eye(3)[:, None]
     turned = shapes.placed(axes, 0, 0, generator.uniform(-0.15, 0.15))
@@ -187,9 +176,7 @@ def _cleared(track: Track) -> Track:
     return Track(track.triangles[far], track.reflectivity[far], track.label[far])
 
 
-def _bounds(
-    corners: NDArray[np.float32],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _bounds(corners: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Least and greatest coordinates of each triangle of corners (T, 3, 2), (T, 2) both."""
     first, second, third = corners.transpose(1, 0, 2)
     least = np.minimum(np.minimum(first, second), third)
