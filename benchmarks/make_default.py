@@ -28,7 +28,7 @@ from derain.export.onnx_file import export
 from derain.export.runtime import Derainer
 from derain.models.checkpoint import load_model, save_model
 from derain.scan import Scan
-from derain.simulation.world_campaign import WorldCampaign
+from derain.simulation.world import WorldCampaign
 from derain.sources.folders import named_frames
 
 # Thresholds to choose from.

@@ -131,8 +131,7 @@ class Defects:
 def _single(beam: Ints) -> Bools:
     """Whether each row is the only one of its beam, bool (N,), beams ascending."""
     changes = np.diff(beam, prepend=-1, append=-1) != 0
-    single: Bools = changes[1:] & changes[:-1]
-    return single
+    return np.asarray(changes[1:] & changes[:-1])
 
 
 def _borders(returns: Returns, columns: int) -> tuple[Ints, Ints]:

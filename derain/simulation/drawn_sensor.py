@@ -177,8 +177,7 @@ def draw_row_table(
 def _spaced(corners: Floats, density: Floats, count: int) -> Floats:
     """So many places from the first corner to the last, spaced by the density between corners."""
     passed = np.concatenate([[0.0], np.cumsum(density * np.diff(corners))])
-    places: Floats = np.interp(np.linspace(0, passed[-1], count), passed, corners)
-    return places
+    return np.asarray(np.interp(np.linspace(0, passed[-1], count), passed, corners))
 
 
 def draw_row_azimuths(rows: int, most: float, generator: Generator) -> tuple[float, ...]:

@@ -144,5 +144,4 @@ class Course:
         place["x"] += self.speed * time
         vehicle = Extrinsics.of_pose(**place).matrix
         above = Extrinsics.of_pose(0, 0, sensor.mounting_height, 0, 0, 0).matrix
-        mounted: Floats = vehicle @ above @ self.mounting
-        return mounted
+        return np.asarray(vehicle @ above @ self.mounting)

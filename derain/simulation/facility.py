@@ -9,7 +9,7 @@ which decides by intensity; it then finds the simulated rain. `benchmarks/facili
 `benchmarks/batchnorm_memory.py` show it.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -67,7 +67,7 @@ def lay_out_facility(generator: Generator) -> Track:
     # Materials have a generator of their own, so that a seed's places stay where they are.
     (material_generator,) = generator.spawn(1)
     surfaces = [
-        *_paved(road_and_ground(half_width, generator), material_generator),
+        *(_paved(part, material_generator) for part in road_and_ground(half_width, generator)),
         *_road_users(half_width, generator),
         *_sprinklers(half_width, generator),
         *_verges(half_width, generator, material_generator),
@@ -77,10 +77,9 @@ def lay_out_facility(generator: Generator) -> Track:
     return on_slope(surfaces, 0, heading, generator.uniform(-0.01, 0.01, 2))
 
 
-def _paved(surfaces: Iterable[Surface], material_generator: Generator) -> Iterator[Surface]:
-    for surface in surfaces:
-        span = ASPHALT_REFLECTIVITY if surface.label is TrackClass.ROAD else GROUND
-        yield replace(surface, reflectivity=material_generator.uniform(*span), roughness=ROUGHNESS)
+def _paved(surface: Surface, material_generator: Generator) -> Surface:
+    span = ASPHALT_REFLECTIVITY if surface.label is TrackClass.ROAD else GROUND
+    return replace(surface, reflectivity=material_generator.uniform(*span), roughness=ROUGHNESS)
 
 
 def _foliage(

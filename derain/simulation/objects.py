@@ -25,7 +25,7 @@ class Surface:
         triangles: Corners, float64 (T, 3, 3), metres.
         label: Class of all of them.
         reflectivity: Of each triangle, float64 (T,), or of all of them, in 0..1.
-        roughness: Of all of them, radians, see :mod:`derain.simulation.rough_surface`.
+        roughness: Of all of them, radians, see :func:`derain.simulation.track.backscatter`.
     """
 
     triangles: Triangles
@@ -36,6 +36,10 @@ class Surface:
     def placed(self, x: float, y: float, heading: float = 0.0) -> "Surface":
         """The same surface, turned by a heading in radians, then moved to (x, y)."""
         return replace(self, triangles=shapes.placed(self.triangles, x, y, heading))
+
+    def moved(self, x: float, y: float, z: float) -> "Surface":
+        """The same surface, moved by metres along the three axes."""
+        return replace(self, triangles=self.triangles + np.array([x, y, z]))
 
 
 def of_material(

@@ -58,7 +58,8 @@ def rain_on_scan(scan: Scan, rain: RainField, sensor: Sensor, generator: Generat
         whose other columns are those of the return before it in its row of the sensor's grid.
     """
     beams = find_beams(scan, generator)
-    exposed = _exposed(scan, beams, sensor)
+    too_near = beams.returned & (scan.range[beams.row] < sensor.minimum_range)
+    exposed = np.flatnonzero(np.isfinite(beams.direction[:, 0]) & ~too_near)  # to the rain
     row, direction = beams.row[exposed], beams.direction[exposed]
     measured = _with_measured_intensity(scan, beams)
     clear = _clear_air(measured, row, beams.returned[exposed], sensor, generator)
@@ -77,12 +78,6 @@ def rain_on_scan(scan: Scan, rain: RainField, sensor: Sensor, generator: Generat
         return rained.take(np.delete(np.arange(len(rained)), exposed[~detected.returned]))
     lost = exposed[clear.returned & ~detected.returned]
     return replace(_emptied(rained, lost, scan), shape=scan.shape)
-
-
-def _exposed(scan: Scan, beams: RecordedBeams, sensor: Sensor) -> Ints:
-    """Numbers of the beams that it rains on, int64 (E,)."""
-    too_near = beams.returned & (scan.range[beams.row] < sensor.minimum_range)
-    return np.flatnonzero(np.isfinite(beams.direction[:, 0]) & ~too_near)
 
 
 def _with_measured_intensity(scan: Scan, beams: RecordedBeams) -> Scan:

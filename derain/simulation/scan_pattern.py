@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from derain.files.extrinsics import Extrinsics
 from derain.simulation.arrays import Floats
 
 
@@ -59,8 +58,3 @@ def rosette(
     swing = (highest - lowest) / 4 * (np.sin(first) + np.sin(second))
     middle = (highest + lowest) / 2 + (np.array(offsets)[:, None] if offsets else 0.0)
     return azimuth, middle + swing
-
-
-def tilt_matrix(roll: float, pitch: float) -> Floats:
-    """Turns from the frame of a tilted sensor into the level one, float64 (4, 4); in degrees."""
-    return Extrinsics.of_pose(0, 0, 0, roll, pitch, 0).matrix

@@ -11,7 +11,7 @@ from numpy.random import Generator
 from derain.simulation.arrays import Floats
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import packed
-from derain.simulation.drive import Course, Drive
+from derain.simulation.drive import Course
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.objects import Surface
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
@@ -56,8 +56,12 @@ class SimulatedScene:
         weather = Weather.of(nominal, at_sensor, wind)
         if campaign.drive is None:
             return cls(LAYOUTS[campaign.layout](generator), rain, weather)
-        course, track, traffic = _drawn(campaign.drive, campaign.times, generator)
-        return cls(track, rain, weather, course, traffic, campaign.drive.skew)
+        drive, times = campaign.drive, campaign.times
+        street = Street.draw(drive.length(times[-1]), generator)
+        course = Course.draw(drive.speed, generator)
+        traffic = draw_traffic(drive.traffic, street, drive.speed, times, generator)
+        track = Track.of(lay_out_street(street, generator))
+        return cls(track, rain, weather, course, traffic, drive.skew)
 
     def cast(self, sensor: Sensor, times: Floats) -> Iterator[Returns]:
         """What every beam of a sensor would return through clear air, scan after scan.
@@ -109,15 +113,6 @@ def _followed(pose: Floats, sent: Floats, velocity: Floats) -> Floats:
     seen = pose.copy()
     seen[..., :2, 3] -= sent[..., None] * velocity
     return seen
-
-
-def _drawn(
-    drive: Drive, times: Floats, generator: Generator
-) -> tuple[Course, Track, list[MovingThing]]:
-    street = Street.draw(drive.length(times[-1]), generator)
-    course = Course.draw(drive.speed, generator)
-    traffic = draw_traffic(drive.traffic, street, drive.speed, times, generator)
-    return course, Track.of(lay_out_street(street, generator)), traffic
 
 
 def _nearer(first: Returns, second: Returns) -> Returns:

@@ -9,11 +9,12 @@ from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.files.documents import shown
+from derain.files.extrinsics import Extrinsics
 from derain.scan import Scan
-from derain.simulation.arrays import Bools, Floats, Ints
+from derain.simulation.arrays import Floats, Ints
 from derain.simulation.defects import Defects
 from derain.simulation.returns import Returns as Returns
-from derain.simulation.scan_pattern import rosette, tilt_matrix, unit_vectors
+from derain.simulation.scan_pattern import rosette, unit_vectors
 from derain.views.spherical_grid import FULL_CIRCLE
 
 FULL_SCALE_INTENSITY = 255.0
@@ -129,23 +130,18 @@ class Sensor:
             "tilt": all(abs(angle) <= 90 for angle in self.tilt),
             "minimum_range": self.minimum_range > 0,
             "maximum_range": self.minimum_range < self.maximum_range < math.inf,
-            "aperture": 0 <= self.aperture < math.inf,
             "beam_divergence": 0 < self.beam_divergence < math.pi,
             "detection_threshold": 0 < self.detection_threshold < math.inf,
-            "range_noise": 0 <= self.range_noise < math.inf,
-            "range_noise_growth": 0 <= self.range_noise_growth < math.inf,
-            "weak_range_noise": 0 <= self.weak_range_noise < math.inf,
             "encoder_noise": 0 <= self.encoder_noise < FULL_CIRCLE,
-            "intensity_noise": 0 <= self.intensity_noise < math.inf,
-            "mounting_height": 0 <= self.mounting_height < math.inf,
             "returns": self.returns in get_args(ReturnMode),
             "frame_rate": 0 < self.frame_rate < math.inf,
+            "defects": True,  # which check themselves
         }
-        for name, is_possible in possible.items():
-            if not is_possible:
-                raise InputError(
-                    f"sensor: {name}", f"{shown(getattr(self, name))} is impossible", "Correct it."
-                )
+        for name, value in vars(self).items():
+            if name not in possible:
+                possible[name] = 0 <= value < math.inf
+            if not possible[name]:
+                raise InputError(f"sensor: {name}", f"{shown(value)} is impossible", "Correct it.")
 
     def beams(self) -> Floats:
         """Unit vectors along the beams, float64 (rows · columns, 3), frame of the level sensor.
@@ -159,7 +155,7 @@ class Sensor:
     @property
     def mounting(self) -> Floats:
         """Turns points of a scan into the frame of the level sensor, float64 (4, 4)."""
-        return tilt_matrix(*self.tilt)
+        return Extrinsics.of_pose(0, 0, 0, *self.tilt, 0).matrix
 
     def _angles(self) -> tuple[Floats, Floats]:
         """Azimuth and inclination of the beams in the sensor's own frame, degrees.
@@ -213,7 +209,8 @@ class Sensor:
         """
         dual = self.returns == "dual"
         returns = self.defects.at_borders(returns, self.columns, dual=dual, generator=generator)
-        seen = returns.take(np.flatnonzero(self._received(returns, generator)))
+        received = self.defects.received(returns, (self.rows, self.columns), generator)
+        seen = returns.take(received & returns.returned)
         distance = self.measured_range(seen.range, generator, seen.power)
         intensity = self.measured_intensity(seen.reflectivity, generator)
         direction = self._measured_directions(seen.beam, generator)
@@ -223,10 +220,6 @@ class Sensor:
             seen.label,
         )
         return scan.take(self.defects.reported(seen.beam, generator))
-
-    def _received(self, returns: Returns, generator: Generator) -> Bools:
-        received = self.defects.received(returns, (self.rows, self.columns), generator)
-        return received & returns.returned
 
     def _measured_directions(self, beam: Ints, generator: Generator) -> Floats:
         """Unit vectors in the sensor's own frame, float64 (N, 3), as the encoder measures them."""

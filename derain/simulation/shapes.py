@@ -60,21 +60,17 @@ def placed(triangles: Triangles, x: float, y: float, heading: float = 0.0) -> Tr
     """Turns a shape by a heading in radians about the z axis, then moves it to (x, y)."""
     cosine, sine = np.cos(heading), np.sin(heading)
     turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
-    moved: Triangles = triangles @ turn + (x, y, 0)
-    return moved
+    return np.asarray(triangles @ turn + (x, y, 0))
 
 
 def raised(triangles: Triangles, height: float) -> Triangles:
     """Moves a shape up by a height in metres."""
-    lifted: Triangles = triangles + np.array([0, 0, height])
-    return lifted
+    return np.asarray(triangles + np.array([0, 0, height]))
 
 
 def sloped(triangles: Triangles, ahead: float, left: float) -> Triangles:
     """Raises a shape by a share of its x and of its y, as on sloping ground."""
-    shear = np.array([[1, 0, ahead], [0, 1, left], [0, 0, 1]])
-    leaning: Triangles = triangles @ shear
-    return leaning
+    return np.asarray(triangles @ np.array([[1, 0, ahead], [0, 1, left], [0, 0, 1]]))
 
 
 def leaves(centres: Floats, size: float, generator: Generator) -> Triangles:
@@ -180,5 +176,4 @@ def nearest_to_axis(triangles: NDArray[np.floating[Any]]) -> Floats:
     share = np.clip(-(first * edge).sum(axis=-1) / length, 0, 1)
     places = first + share[..., None] * edge
     nearest = (places * places).sum(axis=-1).argmin(axis=1)
-    there: Floats = places[np.arange(len(places)), nearest].T
-    return there
+    return np.asarray(places[np.arange(len(places)), nearest].T)

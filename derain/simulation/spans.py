@@ -211,17 +211,11 @@ def _impossible(subject: str, spans: Any, name: str, remedy: str) -> InputError:
     return InputError(f"{subject}: {name}", f"{shown(getattr(spans, name))} is impossible", remedy)
 
 
-def _rows(entry: Entry) -> tuple[int, ...]:
-    return tuple(item.whole(2, MOST_ROWS) for item in entry.items())
-
-
-def _weights(entry: Entry) -> dict[str, float]:
-    return {name: member.number() for name, member in entry.members().items()}
-
-
 # What reads a property, by its type.
 _PARSERS = PARSERS | {
-    tuple[int, ...]: _rows,
-    Mapping[str, float]: _weights,
+    tuple[int, ...]: lambda entry: tuple(item.whole(2, MOST_ROWS) for item in entry.items()),
+    Mapping[str, float]: lambda entry: {
+        name: one.number() for name, one in entry.members().items()
+    },
     DefectSpans: DefectSpans.of,
 }

@@ -108,9 +108,7 @@ def test_the_manifest_has_the_checksum_of_every_other_file(track: Path) -> None:
     assert read_manifest(track)["files"] == there
 
 
-def test_the_manifest_describes_the_campaign_and_names_no_folder(
-    track: Path,
-) -> None:
+def test_the_manifest_describes_the_campaign_and_names_no_folder(track: Path) -> None:
     manifest = read_manifest(track)
     assert set(manifest) == set(TINY.description) | {"keep", "files"}
     assert manifest.items() >= TINY.description.items()

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.special import spherical_jn, spherical_yn
 
@@ -104,7 +105,7 @@ def test_the_echo_of_a_plate_is_in_proportion_to_its_area_at_any_distance() -> N
 
 
 def test_a_car_returns_more_than_a_bike_and_a_bike_more_than_a_pedestrian() -> None:
-    def mean_dbsm(make: Callable[[np.random.Generator], Surface]) -> float:
+    def mean_dbsm(make: Callable[[Generator], Surface]) -> float:
         echoes = [
             surface_echoes(Track.of([make(np.random.default_rng(seed)).placed(20, 0)]), Radar())[0]
             for seed in range(3)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from derain.simulation import rain as rain_module
@@ -79,9 +80,7 @@ def test_surfaces_fade_with_the_way_there_and_back() -> None:
     assert (detected.range[kept] == distance).all()
 
 
-def crowded(
-    clear: Returns, generator: np.random.Generator, monkeypatch: pytest.MonkeyPatch
-) -> Drops:
+def crowded(clear: Returns, generator: Generator, monkeypatch: pytest.MonkeyPatch) -> Drops:
     """Lets ten times the drops fall, so that many beams hold several visible ones."""
     some = draw_drops(25, np.minimum(clear.range, 15), SENSOR, generator)
     diameter = draw_diameters(25, 10 * len(some.beam), generator)
@@ -211,7 +210,7 @@ def test_a_scan_without_beams_stays_empty() -> None:
         assert len(rained(open_air(0), UniformRain(25), 0, sensor).range) == 0
 
 
-def random_beams(count: int, generator: np.random.Generator) -> NDArray[np.float64]:
+def random_beams(count: int, generator: Generator) -> NDArray[np.float64]:
     beams = generator.normal(size=(count, 3))
     return beams / np.linalg.norm(beams, axis=1, keepdims=True)
 

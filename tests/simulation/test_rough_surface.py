@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from derain.simulation.rough_surface import backscatter
+from derain.simulation.track import backscatter
 
 ANGLES = np.radians(np.linspace(0, 89, 90))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.simulation.sensor import SELDOM_STATED, Returns, Sensor
@@ -16,7 +17,7 @@ SENSOR = Sensor(rows=20, columns=50)
 BEAMS = SENSOR.rows * SENSOR.columns
 
 
-def returns(generator: np.random.Generator) -> Returns:
+def returns(generator: Generator) -> Returns:
     seen = generator.random(BEAMS) < 0.8
     return Returns(
         np.where(seen, generator.uniform(2, 100, BEAMS), SENSOR.maximum_range),

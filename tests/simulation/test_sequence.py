@@ -106,9 +106,7 @@ def test_the_radar_sees_what_the_lidar_sees(folder: Path) -> None:
     assert np.median(nearest) < 1
 
 
-def test_the_extended_radar_has_the_same_points_and_what_was_measured_of_them(
-    folder: Path,
-) -> None:
+def test_the_extended_radar_has_the_same_points_and_what_was_measured_of_them(folder: Path) -> None:
     extended = table(folder / "ext_radar/000001.csv")
     names = ["x", "y", "z", "intensity", "cross_section", "velocity", "confidence"]
     assert list(extended) == names
@@ -155,9 +153,7 @@ def test_poses_and_times_of_a_drive_are_found_beside_its_scans(drive: Path) -> N
             assert np.linalg.norm(pose[:3, 3]) == pytest.approx(travelled, abs=0.1)
 
 
-def test_the_poses_take_the_road_and_the_walls_of_every_scan_to_the_same_place(
-    drive: Path,
-) -> None:
+def test_the_poses_take_the_road_and_the_walls_of_every_scan_to_the_same_place(drive: Path) -> None:
     road = []
     for frame in named_frames([drive / "innoviz"]):
         scan, pose = frame.read(), frame.pose

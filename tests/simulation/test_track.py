@@ -5,6 +5,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from derain.simulation import objects, shapes
@@ -12,11 +13,10 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_facility
 from derain.simulation.layout import lay_out_track
 from derain.simulation.objects import Surface
-from derain.simulation.rough_surface import backscatter
 from derain.simulation.sensor import Sensor
-from derain.simulation.track import Track
+from derain.simulation.track import Track, backscatter
 
-LayOut = Callable[[np.random.Generator], Track]
+LayOut = Callable[[Generator], Track]
 
 SENSOR = Sensor(rows=16, columns=40)
 ON_THE_TRACK = set(TrackClass) - {TrackClass.RAIN}

@@ -10,8 +10,7 @@ from derain.files.documents import Entry
 from derain.simulation.classes import TrackClass
 from derain.simulation.dataset import simulate_track
 from derain.simulation.layouts import LAYOUTS
-from derain.simulation.world import World, draw_scan, load_world
-from derain.simulation.world_campaign import WorldCampaign
+from derain.simulation.world import World, WorldCampaign, draw_scan, load_world
 from derain.system.open3d_import import import_open3d
 
 # Quick to simulate: a bare street, seen by few beams.

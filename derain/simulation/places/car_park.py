@@ -22,7 +22,6 @@ from derain.simulation.places.standing import (
     shuffled,
     straight,
 )
-from derain.simulation.shapes import placed
 from derain.simulation.track import Track
 
 # Rows of lots on either side of lanes, metres: how long a lot is, how wide, and a lane.
@@ -145,5 +144,4 @@ def _sapling(generator: Generator) -> Iterable[Surface]:
     yield frames.thin_pole(generator)
     crown = generator.uniform(0.2, 0.6, 3)
     leaves = plants.bush((crown[0], crown[1], crown[2]), generator)
-    shift = placed(leaves.triangles, 0.1, 0) + np.array([0, 0, generator.uniform(0.8, 1.8)])
-    yield Surface(shift, leaves.label, leaves.reflectivity)
+    yield leaves.moved(0.1, 0, generator.uniform(0.8, 1.8))

@@ -85,8 +85,7 @@ def pot_plant(generator: Generator) -> Iterator[Surface]:
         leaves = plants.bush((0.5 * size, 0.5 * size, 0.7 * size), generator)
     else:
         leaves = plants.brushwood(size, generator)
-    raised = shapes.raised(leaves.triangles, height)
-    yield Surface(raised, leaves.label, leaves.reflectivity)
+    yield leaves.moved(0, 0, height)
 
 
 def standing_lamp(generator: Generator) -> Surface:

@@ -74,13 +74,10 @@ def _driving(lanes: int, own: int, median: float, generator: Generator) -> Itera
             if lane == own and abs(x) < 12:
                 continue
             slow = lane in (0, 2 * lanes - 1)
-            make: Make = vehicles.lorry if generator.random() < 0.15 + 0.45 * slow else _car(x)
+            car = vehicles.glazed_car if abs(x) < 35 else objects.car
+            make: Make = vehicles.lorry if generator.random() < 0.15 + 0.45 * slow else car
             heading = 0 if own_carriageway else np.pi
             yield from place(make(generator), x, y + generator.normal(0, 0.2), heading)
-
-
-def _car(x: float) -> Make:
-    return vehicles.glazed_car if abs(x) < 35 else objects.car
 
 
 def _breakdown(right: float, generator: Generator) -> Iterator[Surface]:
@@ -128,15 +125,10 @@ def _gantries(edges: tuple[float, float], generator: Generator) -> Iterator[Surf
 def _embankments(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
     """Beyond the road: a noise wall, a fence and scrub, or a bank with trees."""
     for y, side in zip(edges, (-1, 1), strict=True):
-        kind = generator.choice(["wall", "fence", "bank"])
+        make, out, piece, gaps = EMBANKMENTS[generator.integers(len(EMBANKMENTS))]
         away = y + side * generator.uniform(0.5, 4)
-        kinds: dict[str, tuple[Piece, float, float, float]] = {
-            "wall": (_noise_wall, away, 13, 0.05),
-            "fence": (threads.chain_link, away, 13, 0.1),
-            "bank": (heaps.bank, away + 2 * side, 10, 0.0),
-        }
-        make, line, piece, gaps = kinds[kind]
-        yield from line_up(make, straight(line), MOTORWAY_SIGHT, piece, generator, gaps)
+        line = straight(away + out * side)
+        yield from line_up(make, line, MOTORWAY_SIGHT, piece, generator, gaps)
         for x in along(*MOTORWAY_SIGHT, (5, 18), generator):
             y = away + side * generator.uniform(1, 12)
             yield from place(plants.tree(generator.random() < 0.4, generator), x, y)
@@ -149,3 +141,12 @@ def _noise_wall(length: float, generator: Generator) -> Iterator[Surface]:
     height = generator.uniform(2, 5)
     yield walls.rough_wall(length, height, generator)
     yield frames.made([frames.bars([((0, -0.1, 0), (0, -0.1, height + 0.1))], 0.12)], generator)
+
+
+# What makes a piece of an embankment, how much farther out it stands and how long a piece is,
+# metres, and the share of gaps.
+EMBANKMENTS: tuple[tuple[Piece, float, float, float], ...] = (
+    (_noise_wall, 0, 13, 0.05),
+    (threads.chain_link, 0, 13, 0.1),
+    (heaps.bank, 2, 10, 0.0),
+)

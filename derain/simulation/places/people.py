@@ -19,9 +19,9 @@ def person(generator: Generator) -> Surface:
     """Somebody of 0.9 to 1.95 m who stands or strides along x, perhaps with something in hand."""
     height = generator.uniform(0.9, 1.95)
     parts = [_body(height, generator)]
-    carried = generator.choice(["nothing", "bag", "umbrella", "pushchair", "stick", "dog"])
-    if carried != "nothing" and height > 1.4:
-        parts.append(CARRIED[carried](height, generator))
+    carried = CARRIED[generator.integers(len(CARRIED))]
+    if carried and height > 1.4:
+        parts.append(carried(height, generator))
     return _clothed(parts, TrackClass.PEDESTRIAN, generator)
 
 
@@ -116,13 +116,8 @@ def _dog(height: float, generator: Generator) -> Triangles:
     return np.concatenate([_limbs(ends, radius) for ends, radius in parts])
 
 
-CARRIED = {
-    "bag": _bag,
-    "umbrella": _umbrella,
-    "pushchair": _pushchair,
-    "stick": _stick,
-    "dog": _dog,
-}
+# What somebody has in hand; one of six has nothing.
+CARRIED = (None, _bag, _umbrella, _pushchair, _stick, _dog)
 
 
 def _wheel(x: float, generator: Generator) -> Triangles:

@@ -140,5 +140,4 @@ def _rings() -> Floats:
 def _furrows(corners: Floats, generator: Generator) -> Floats:
     direction = generator.uniform(0, np.pi)
     over = corners[..., 0] * np.cos(direction) + corners[..., 1] * np.sin(direction)
-    furrows: Floats = np.sin(2 * np.pi / generator.uniform(0.4, 1) * over)
-    return furrows
+    return np.asarray(np.sin(2 * np.pi / generator.uniform(0.4, 1) * over))

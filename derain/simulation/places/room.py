@@ -13,7 +13,7 @@ from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places import furniture, people, plants, threads
 from derain.simulation.places.frames import bars, made, railing
-from derain.simulation.places.shell import Walls, moved, shell
+from derain.simulation.places.shell import Walls, shell
 from derain.simulation.places.specks import mirrored
 from derain.simulation.places.standing import Make, choose, free_places, of_size, place, scatter
 from derain.simulation.track import Track
@@ -135,7 +135,7 @@ def _people(room: Walls, most: int, generator: Generator) -> Iterator[Surface]:
 def _twigs(generator: Generator) -> Surface:
     """Dry twigs, wires or tinsel on the floor or on a stand."""
     twigs = plants.brushwood(generator.uniform(0.2, 1.0), generator)
-    return moved(twigs, 0, 0, generator.choice([0.0, generator.uniform(0, 1)]))
+    return twigs.moved(0, 0, generator.choice([0.0, generator.uniform(0, 1)]))
 
 
 def _along_a_corridor(room: Walls, generator: Generator) -> Iterator[Surface]:
@@ -168,7 +168,7 @@ def _stairs(room: Walls, generator: Generator) -> Iterator[Surface]:
         rail = railing(12 * tread, generator)
         parts = [made(steps, generator)]
         for y in (-width / 2, width / 2):
-            sloped = shapes.sloped(moved(rail, 0, y, 0).triangles, rise / tread, 0)
+            sloped = shapes.sloped(rail.moved(0, y, 0).triangles, rise / tread, 0)
             parts.append(replace(rail, triangles=shapes.raised(sloped, level + rise)))
         turned = -6 * tread if heading else 0.8
         yield from place(parts, turned * np.cos(heading), 0.6 * np.sign(heading), heading)

@@ -24,6 +24,9 @@ SMOOTH = 0.2
 # Walls, floors and ceilings overlap by so much, metres: bumps leave no slit between them.
 OVERLAP = 0.1
 
+# How far behind a window or a door the next wall is, metres.
+BEYOND = (1.0, 40.0)
+
 
 @dataclass(frozen=True)
 class Walls:
@@ -73,16 +76,11 @@ def shell(room: Walls, generator: Generator) -> Iterator[Surface]:
     yield from _walls(room, generator)
 
 
-def moved(surface: Surface, x: float, y: float, z: float) -> Surface:
-    """A surface moved by metres along the three axes."""
-    return replace(surface, triangles=surface.triangles + np.array([x, y, z]))
-
-
 def _floor_and_ceiling(room: Walls, generator: Generator) -> Iterator[Surface]:
     length, width = room.x[1] - room.x[0], room.y[1] - room.y[0]
     for height, bumps in ((0.0, SMOOTH), (room.height, -SMOOTH)):
         rough = walls.rough_wall(length + 2 * OVERLAP, width + 2 * OVERLAP, generator, cell=0.5)
-        rough = moved(rough, -OVERLAP, 0, -OVERLAP)
+        rough = rough.moved(-OVERLAP, 0, -OVERLAP)
         lying = walls.laid_flat(rough, (room.x[0], room.y[0]), height, bumps)
         yield replace(lying, reflectivity=log_uniform(FLOOR, generator))
 
@@ -94,7 +92,7 @@ def _walls(room: Walls, generator: Generator) -> Iterator[Surface]:
         kind = generator.choice(["whole", "glass", "doorway"], p=[0.5, 0.3, 0.2])
         if length < 1.5 or kind == "whole":
             whole = walls.rough_wall(length + 2 * OVERLAP, room.height, generator, cell=0.5)
-            wall = [moved(whole, -OVERLAP, 0, 0)]
+            wall = [whole.moved(-OVERLAP, 0, 0)]
         else:
             sill, lintel = (generator.choice([0.0, 0.9]), 2.1) if kind == "glass" else (0.0, 2.0)
             wide = length - 0.4 if kind == "glass" else 0.9
@@ -102,14 +100,9 @@ def _walls(room: Walls, generator: Generator) -> Iterator[Surface]:
             if kind == "glass":
                 wall += [*_panes(length, (wide, sill, lintel), generator)]
             behind = walls.rough_wall(length + 8, room.height + 2, generator, cell=0.8)
-            wall.append(moved(behind, -4, -_beyond(generator), -1))
+            wall.append(behind.moved(-4, -log_uniform(BEYOND, generator), -1))
         wall += [*_on_the_wall(length, room.height, generator)]
         yield from place(wall, *start, number * np.pi / 2)
-
-
-def _beyond(generator: Generator) -> float:
-    """How far behind a window or a door the next wall is, metres."""
-    return log_uniform((1.0, 40.0), generator)
 
 
 def _pierced(
@@ -124,7 +117,7 @@ def _pierced(
     for (begin, end), (bottom, top) in pieces:
         if top - bottom > 0.01:
             piece = walls.rough_wall(end - begin, top - bottom, generator, cell=0.5)
-            yield replace(moved(piece, begin, 0, bottom), reflectivity=shine)
+            yield replace(piece.moved(begin, 0, bottom), reflectivity=shine)
     edges: list[tuple[Point, Point]] = [((x, 0, low), (x, 0, high)) for x in (left, right)]
     edges += [((left, 0, z), (right, 0, z)) for z in (low, high)]
     yield made([bars(edges, generator.uniform(0.02, 0.08))], generator)

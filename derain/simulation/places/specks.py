@@ -45,8 +45,7 @@ def specks(surface: Triangles, sensor: Floats, count: int, generator: Generator)
     corners = generator.normal(0, 1, (len(places), 3, 3))
     small = places[:, None] + size[:, None, None] * np.clip(corners, -2, 2)
     away = np.linalg.norm(small - sensor, axis=2).min(axis=1)
-    kept: Triangles = small[away > NEAREST_SPECK]
-    return kept
+    return np.asarray(small[away > NEAREST_SPECK])
 
 
 def mirrored(
@@ -74,5 +73,4 @@ def on_surface(surface: Triangles, count: int, generator: Generator) -> Floats:
     u, v = generator.random((2, count, 1))
     beyond = u + v > 1
     u, v = np.where(beyond, 1 - u, u), np.where(beyond, 1 - v, v)
-    places: Floats = first[which] + u * (second - first)[which] + v * (third - first)[which]
-    return places
+    return np.asarray(first[which] + u * (second - first)[which] + v * (third - first)[which])

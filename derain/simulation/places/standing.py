@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from derain.simulation import shapes
 from derain.simulation.arrays import Floats
@@ -167,17 +166,10 @@ def _tilt(generator: Generator) -> Floats:
 
 def _cleared(track: Track) -> Track:
     """A track without those of its triangles that are too near to the sensor's axis."""
-    lowest, greatest = _bounds(track.triangles[..., :2])
-    near = (lowest < AXIS_CLEARANCE) & (greatest > -AXIS_CLEARANCE)
-    about = near[:, 0] & near[:, 1]
+    level = track.triangles[..., :2]
+    lowest, greatest = level.min(axis=1), level.max(axis=1)
+    about = ((lowest < AXIS_CLEARANCE) & (greatest > -AXIS_CLEARANCE)).all(axis=1)
     far = ~about
     x, y = shapes.nearest_to_axis(track.triangles[about])
     far[about] = np.hypot(x, y) > AXIS_CLEARANCE
     return Track(track.triangles[far], track.reflectivity[far], track.label[far])
-
-
-def _bounds(corners: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Least and greatest coordinates of each triangle of corners (T, 3, 2), (T, 2) both."""
-    first, second, third = corners.transpose(1, 0, 2)
-    least = np.minimum(np.minimum(first, second), third)
-    return least, np.maximum(np.maximum(first, second), third)

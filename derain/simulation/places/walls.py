@@ -43,9 +43,8 @@ def pane(corners: Floats, generator: Generator) -> Triangles:
 def _between(corners: Floats, u: Floats, v: Floats) -> Floats:
     """Places by their shares of the way from the first corner to the second and to the fourth."""
     first, second, third, fourth = corners
-    lower: Floats = (1 - u) * first + u * second
-    upper: Floats = (1 - u) * fourth + u * third
-    return (1 - v) * lower + v * upper
+    lower, upper = (1 - u) * first + u * second, (1 - u) * fourth + u * third
+    return np.asarray((1 - v) * lower + v * upper)
 
 
 STONE = (0.08, 0.7)

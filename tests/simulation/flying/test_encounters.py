@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.random import Generator
 
 from derain.simulation.flying.gusts import Gusts
 from derain.simulation.flying.meeting import Encounters, Population, encounter
@@ -34,7 +35,7 @@ def met(diameter: float, number: float, seed: int) -> Encounters:
     return encounter([Population(number, sizes, AIR)], beams, 0, np.random.default_rng(seed))
 
 
-def random_encounters(generator: np.random.Generator) -> Encounters:
+def random_encounters(generator: Generator) -> Encounters:
     """Of thirty beams, in order, those that are divisible by five with none."""
     beam = generator.choice([row for row in range(30) if row % 5], 200)
     part = Encounters(
