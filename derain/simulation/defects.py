@@ -55,16 +55,11 @@ class Defects:
     copies: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("dropped", "dropped_rows", "dropped_sectors", "mixed", "copies"):
-            self._check(name, 0 <= getattr(self, name) <= 1, "Give a share of 0 to 1.")
-        for name in ("merging", "range_step"):
-            possible = 0 <= getattr(self, name) < math.inf
-            self._check(name, possible, "Give metres, 0 or more.")
-
-    def _check(self, name: str, possible: bool, remedy: str) -> None:
-        if not possible:
-            reason = f"{shown(getattr(self, name))} is impossible"
-            raise InputError(f"defects: {name}", reason, remedy)
+        for name, value in vars(self).items():
+            metres = name in ("merging", "range_step")
+            if not (0 <= value < math.inf if metres else 0 <= value <= 1):
+                remedy = "Give metres, 0 or more." if metres else "Give a share of 0 to 1."
+                raise InputError(f"defects: {name}", f"{shown(value)} is impossible", remedy)
 
     def at_borders(
         self, returns: Returns, columns: int, *, dual: bool, generator: Generator

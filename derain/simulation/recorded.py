@@ -13,7 +13,7 @@ from derain.simulation.arrays import Bools, Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import RainField
-from derain.simulation.recorded_beams import RecordedBeams, find_beams
+from derain.simulation.recorded_beams import find_beams
 from derain.simulation.sensor import FULL_SCALE_INTENSITY, Returns, Sensor
 from derain.views.full_scale import full_scale
 
@@ -61,7 +61,8 @@ def rain_on_scan(scan: Scan, rain: RainField, sensor: Sensor, generator: Generat
     too_near = beams.returned & (scan.range[beams.row] < sensor.minimum_range)
     exposed = np.flatnonzero(np.isfinite(beams.direction[:, 0]) & ~too_near)  # to the rain
     row, direction = beams.row[exposed], beams.direction[exposed]
-    measured = _with_measured_intensity(scan, beams)
+    returns = scan.take(beams.row[beams.returned])
+    measured = scan if returns.measured_intensity is not None else replace(scan, intensity=None)
     clear = _clear_air(measured, row, beams.returned[exposed], sensor, generator)
     one_return = replace(sensor, returns="last" if sensor.returns == "last" else "strongest")
     detected = rain_on_beams(clear, direction, rain, one_return, generator)
@@ -78,12 +79,6 @@ def rain_on_scan(scan: Scan, rain: RainField, sensor: Sensor, generator: Generat
         return rained.take(np.delete(np.arange(len(rained)), exposed[~detected.returned]))
     lost = exposed[clear.returned & ~detected.returned]
     return replace(_emptied(rained, lost, scan), shape=scan.shape)
-
-
-def _with_measured_intensity(scan: Scan, beams: RecordedBeams) -> Scan:
-    """The scan, without its intensities if those of its beams' returns were not measured."""
-    returns = scan.take(beams.row[beams.returned])
-    return scan if returns.measured_intensity is not None else replace(scan, intensity=None)
 
 
 def _clear_air(

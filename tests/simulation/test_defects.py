@@ -155,16 +155,6 @@ def test_a_drop_takes_no_part_in_a_border_and_nothing_becomes_rain() -> None:
     assert ((mixed.label == TrackClass.RAIN) == rain).all()
 
 
-def test_the_same_seed_gives_the_same_scan() -> None:
-    defects = Defects(0.1, 0.1, 0.1, 0.5, 1.0, 0.01, 0.5)
-    sensor = Sensor(rows=ROWS, columns=COLUMNS, returns="dual", defects=defects)
-    first, again, other = (
-        sensor.measure(posts(), np.random.default_rng(seed)).xyz for seed in (1, 1, 2)
-    )
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first, other)
-
-
 @pytest.mark.parametrize(
     ("name", "value"),
     [

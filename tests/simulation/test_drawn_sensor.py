@@ -83,13 +83,6 @@ def test_columns_that_no_sensor_could_have_are_as_many_as_may_be() -> None:
     assert draw_sensor(spans, np.random.default_rng(0)).columns == 500
 
 
-def test_one_kind_alone_can_be_drawn() -> None:
-    spans = SensorSpans(kinds={"rosette": 1.0})
-    assert all(
-        draw_sensor(spans, np.random.default_rng(seed)).pattern == "rosette" for seed in range(20)
-    )
-
-
 def test_defects_are_drawn_as_often_as_stated() -> None:
     spans, generator = DefectSpans(none=0.4, each=0.25), np.random.default_rng(0)
     found = [draw_defects(spans, generator, dual=False) for _ in range(2000)]

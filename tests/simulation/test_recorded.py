@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.evaluation.hard_cases import hard_cases, scene
+from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan, write_scan
 from derain.files.columns import scan_of
 from derain.scan import Scan
@@ -137,15 +137,12 @@ def test_every_row_of_a_real_scan_is_kept_or_gives_way_to_a_drop_or_is_lost(
     assert appended.sum() > 100
 
 
-def test_more_rain_leaves_less_of_a_real_scan(clear: Scan) -> None:
-    rates = (0, 10, 25, 50)
-    kept = [
-        np.count_nonzero(~is_rain(wet) & wet.valid) for wet in (rained(clear, r) for r in rates)
-    ]
-    gone = clear.valid.sum() - np.array(kept)
-    assert gone[0] == 0
-    assert gone[-1] > 0
-    assert (np.diff(gone) >= -4 * np.sqrt(gone[:-1])).all(), gone
+def test_more_rain_leaves_less_of_a_real_scan(clear: Scan, wet: Scan) -> None:
+    kept = [np.count_nonzero(~is_rain(scan) & scan.valid) for scan in (rained(clear, 10), wet)]
+    less, more = clear.valid.sum() - np.array(kept)
+    assert less >= 0
+    assert more > 0
+    assert more >= less - 4 * np.sqrt(less)
 
 
 def test_a_rained_real_scan_can_be_written_in_its_own_format(clear: Scan, tmp_path: Path) -> None:
@@ -159,7 +156,7 @@ def test_a_rained_real_scan_can_be_written_in_its_own_format(clear: Scan, tmp_pa
         assert equal(again.fields[name], column), name
 
 
-@pytest.mark.parametrize(("name", "scan"), list(hard_cases(5000)))
+@pytest.mark.parametrize(("name", "scan"), list(hard_cases(1000)))
 def test_hard_scans_stay_finite_where_they_were(name: str, scan: Scan) -> None:
     for rain in (UniformRain(0), UniformRain(50), SprinkledRain(50)):
         wet = rain_on_scan(scan, rain, SENSOR, np.random.default_rng(0))
@@ -209,22 +206,16 @@ def test_no_rule_on_intensity_finds_drops_where_the_scan_has_one_throughout(
     assert (wet.intensity[solid] == np.float32(intensity)).all()
 
 
-def test_one_intensity_throughout_is_as_good_as_none() -> None:
-    constant = wall(40.0, 0.0)
-    without = replace(constant, intensity=None)
-    wet, wet_without = rained(constant, 50), rained(without, 50)
+@pytest.mark.parametrize("intensity", [0.0, np.nan])
+def test_one_intensity_throughout_is_as_good_as_none_and_drops_get_it(intensity: float) -> None:
+    constant = wall(40.0, intensity)
+    wet, wet_without = rained(constant, 50), rained(replace(constant, intensity=None), 50)
+    assert is_rain(wet).sum() > 100
+    assert wet.intensity is not None
+    assert np.array_equal(wet.intensity[wet.valid], np.full(wet.valid.sum(), intensity), True)
     assert wet_without.intensity is None
     assert equal(wet.xyz, wet_without.xyz)
     assert equal(wet.label, wet_without.label)
-
-
-def test_intensities_that_are_no_numbers_stay_so_and_drops_get_none() -> None:
-    clear = wall(40.0, np.nan)
-    wet, wet_without = rained(clear, 50), rained(replace(clear, intensity=None), 50)
-    assert is_rain(wet).sum() > 100
-    assert wet.intensity is not None
-    assert np.isnan(wet.intensity[wet.valid]).all()
-    assert equal(wet.xyz, wet_without.xyz)
 
 
 def test_what_a_radar_measured_is_no_intensity_of_the_lidar() -> None:
@@ -311,7 +302,7 @@ def test_what_is_nearer_than_the_sensor_sees_stays() -> None:
 
 
 def test_a_seed_gives_the_same_rain_again() -> None:
-    clear = Scan.of(scene())
+    clear = wall(40.0, 100.0)
     first, again, other = (rained(clear, 50, seed) for seed in (1, 1, 2))
     assert np.array_equal(first.xyz, again.xyz)
     assert np.array_equal(first.intensity, again.intensity)

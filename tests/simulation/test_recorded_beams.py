@@ -98,14 +98,11 @@ def test_an_unreturned_beam_takes_after_a_return_of_its_own_row() -> None:
     beams = beams_of(Scan(xyz))
     unreturned = ~beams.returned
     inclination = np.arcsin(beams.direction[:, 2])
-    same_row = np.isclose(inclination[unreturned], inclination[beams.row[unreturned]], atol=2e-3)
+    before = beams.row[unreturned]
+    same_row = np.isclose(inclination[unreturned], inclination[before], atol=2e-3)
     assert same_row.mean() > 0.98  # the first of a row has no return before it
-    assert (
-        degrees_between(beams.direction[unreturned], beams.direction[beams.row[unreturned]])[
-            same_row
-        ].mean()
-        < 2
-    )
+    apart = degrees_between(beams.direction[unreturned], beams.direction[before])
+    assert apart[same_row].mean() < 2
 
 
 def rosette(shots: int, about: float = 0.0) -> NDArray[np.float64]:
@@ -160,7 +157,7 @@ def test_cells_tell_nothing_of_beams_that_are_not_in_rows_and_columns() -> None:
     assert (np.isfinite(beams.direction).all(axis=1) == returned).all()
 
 
-@pytest.mark.parametrize(("name", "scan"), list(hard_cases(5000)))
+@pytest.mark.parametrize(("name", "scan"), list(hard_cases(1000)))
 def test_hard_scans_have_the_beams_of_their_valid_rows(name: str, scan: Scan) -> None:
     beams = beams_of(scan)
     assert (beams.returned[: len(scan)] == scan.valid).all(), name
@@ -198,8 +195,7 @@ def as_columns(points: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarra
 def test_a_place_is_outside_if_a_line_parts_it_from_every_point(
     points: list[tuple[int, int]], place: tuple[int, int]
 ) -> None:
-    away = np.array(points) - place
     # Hulls of such points have edges in these directions only; so do the lines that part.
-    steps = [(a, b) for a in range(-8, 9) for b in range(-8, 9) if (a, b) != (0, 0)]
-    parted = any((away @ np.array(normal) > 0).all() for normal in steps)
+    normals = np.stack(np.meshgrid(np.arange(-8, 9), np.arange(-8, 9))).reshape(2, -1)
+    parted = ((np.array(points) - place) @ normals > 0).all(axis=0).any()
     assert in_hull(as_columns(points), as_columns([place])).all() == (not parted)

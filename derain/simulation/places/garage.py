@@ -1,7 +1,6 @@
 """A parking garage: a low ceiling with pipes and lamps, pillars, mesh, things near on all sides."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -32,18 +31,6 @@ from derain.simulation.track import Track
 LOWEST_CEILING = 2.9
 
 
-@dataclass(frozen=True)
-class Hall(Walls):
-    """The hall of a garage, with the sensor somewhere in it.
-
-    Attributes:
-        bay: Between pillars, metres.
-    """
-
-    bay: float
-    MARGIN = 0.7
-
-
 def lay_out_garage(generator: Generator) -> Track:
     """Lays out a garage.
 
@@ -51,7 +38,13 @@ def lay_out_garage(generator: Generator) -> Track:
     cars with windows, people, bicycles, cages of mesh, railings, trolleys and dust sheets near on
     all sides, from 2 m on. A wall may be open to the outside, with a railing.
     """
-    hall = _hall(generator)
+    # From a private garage's yard to a whole storey.
+    hall = Walls(
+        (-generator.uniform(4, 25), generator.uniform(10, 45)),
+        (-generator.uniform(4, 20), generator.uniform(4, 20)),
+        generator.uniform(LOWEST_CEILING, 4.5),
+        margin=0.7,
+    )
     standing = [
         *_pillars(hall, generator),
         *_walls(hall, generator),
@@ -65,23 +58,13 @@ def lay_out_garage(generator: Generator) -> Track:
     return assemble(floor, standing, uneven, generator, [_ceiling(hall, generator)])
 
 
-def _hall(generator: Generator) -> Hall:
-    """Draws a hall, from a private garage's yard to a whole storey."""
-    return Hall(
-        (-generator.uniform(4, 25), generator.uniform(10, 45)),
-        (-generator.uniform(4, 20), generator.uniform(4, 20)),
-        generator.uniform(LOWEST_CEILING, 4.5),
-        generator.uniform(4.5, 8),
-    )
-
-
-def _ceiling(hall: Hall, generator: Generator) -> Surface:
+def _ceiling(hall: Walls, generator: Generator) -> Surface:
     length, width = hall.x[1] - hall.x[0], hall.y[1] - hall.y[0]
     rough = walls.rough_wall(length, width, generator, cell=0.6)
     return walls.laid_flat(rough, (hall.x[0], hall.y[0]), hall.height)
 
 
-def _under_the_ceiling(hall: Hall, generator: Generator) -> Iterator[Surface]:
+def _under_the_ceiling(hall: Walls, generator: Generator) -> Iterator[Surface]:
     """Pipes, trays, lamps, and loose cables that hang down."""
     top = hall.height - 0.05
     for _ in range(generator.integers(3, 12)):
@@ -104,12 +87,13 @@ def _under_the_ceiling(hall: Hall, generator: Generator) -> Iterator[Surface]:
         yield threads.cable(start, end, generator.uniform(0.1, 0.9), (0.004, 0.03), generator)
 
 
-def _pillars(hall: Hall, generator: Generator) -> Iterator[Surface]:
+def _pillars(hall: Walls, generator: Generator) -> Iterator[Surface]:
+    bay = generator.uniform(4.5, 8)
     side, rounded = generator.uniform(0.25, 0.7), generator.random() < 0.3
-    shift = generator.uniform(0, hall.bay, 2)
+    shift = generator.uniform(0, bay, 2)
     for x, y in product(
-        np.arange(hall.x[0] + shift[0], hall.x[1], hall.bay),
-        np.arange(hall.y[0] + shift[1], hall.y[1], hall.bay),
+        np.arange(hall.x[0] + shift[0], hall.x[1], bay),
+        np.arange(hall.y[0] + shift[1], hall.y[1], bay),
     ):
         if np.hypot(x, y) > 2.6:
             box = shapes.box(side, side, 0, hall.height)
@@ -117,7 +101,7 @@ def _pillars(hall: Hall, generator: Generator) -> Iterator[Surface]:
             yield frames.made([shapes.placed(pillar, float(x), float(y))], generator)
 
 
-def _walls(hall: Hall, generator: Generator) -> Iterator[Surface]:
+def _walls(hall: Walls, generator: Generator) -> Iterator[Surface]:
     (behind, ahead), (right, left) = hall.x, hall.y
     for number, (x, y) in enumerate(hall.corners):
         length = (ahead - behind) if number % 2 == 0 else (left - right)
@@ -131,7 +115,7 @@ def _walls(hall: Hall, generator: Generator) -> Iterator[Surface]:
         yield from place(wall, x, y, number * np.pi / 2)
 
 
-def _parked(hall: Hall, generator: Generator) -> Iterator[Surface]:
+def _parked(hall: Walls, generator: Generator) -> Iterator[Surface]:
     full = generator.uniform(0.2, 0.9)
     for y, nose in ((hall.y[0] + 3, 1), (hall.y[1] - 3, -1)):
         for x in np.arange(hall.x[0] + 2, hall.x[1] - 2, 2.7):
@@ -140,7 +124,7 @@ def _parked(hall: Hall, generator: Generator) -> Iterator[Surface]:
                 yield from place(vehicles.glazed_car(generator), float(x), float(y), heading)
 
 
-def _about(hall: Hall, generator: Generator) -> Iterator[Surface]:
+def _about(hall: Walls, generator: Generator) -> Iterator[Surface]:
     """People and small things on the floor."""
     makes: list[Make] = [people.person] * int(generator.integers(3, 11))
     small: list[tuple[Make, float]] = [
@@ -157,7 +141,7 @@ def _about(hall: Hall, generator: Generator) -> Iterator[Surface]:
     yield from scatter(shuffled(makes, generator), places, generator)
 
 
-def _cages(hall: Hall, generator: Generator) -> Iterator[Surface]:
+def _cages(hall: Walls, generator: Generator) -> Iterator[Surface]:
     """Walls of mesh, nets and railings that part the hall."""
     kinds: list[Piece] = [
         threads.chain_link,

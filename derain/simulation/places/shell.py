@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import ClassVar
 
 import numpy as np
 from numpy.random import Generator
@@ -36,13 +35,13 @@ class Walls:
         x: From wall to wall along x, metres.
         y: From wall to wall along y, metres.
         height: Of the ceiling, metres.
-        MARGIN: Least distance of the middle of a thing from the walls, metres.
+        margin: Least distance of the middle of a thing from the walls, metres.
     """
 
     x: Span
     y: Span
     height: float
-    MARGIN: ClassVar[float] = 0.35
+    margin: float = 0.35
 
     @classmethod
     def draw(cls, shortest: Span, longest: Span, generator: Generator) -> "Walls":
@@ -66,8 +65,8 @@ class Walls:
 
     def holds(self, x: float, y: float) -> bool:
         """Whether there is room for a thing between the walls."""
-        inside = self.x[0] + self.MARGIN < x < self.x[1] - self.MARGIN
-        return inside and self.y[0] + self.MARGIN < y < self.y[1] - self.MARGIN
+        inside = self.x[0] + self.margin < x < self.x[1] - self.margin
+        return inside and self.y[0] + self.margin < y < self.y[1] - self.margin
 
 
 def shell(room: Walls, generator: Generator) -> Iterator[Surface]:

@@ -80,9 +80,8 @@ def _cabin(
 def _panes(cabin: tuple[Floats, Floats], generator: Generator) -> list[Triangles]:
     """A pane on every side of a cabin; one of them may be open."""
     foot, head = cabin
-    sides = [np.stack([foot[i], foot[j], head[j], head[i]]) for i, j in ((0, 1), (1, 2), (2, 3))]
-    sides.append(np.stack([foot[3], foot[0], head[0], head[3]]))
-    return [pane(side, generator) for side in sides]
+    after = np.roll(foot, -1, axis=0), np.roll(head, -1, axis=0)
+    return [pane(side, generator) for side in np.stack([foot, *after, head], axis=1)]
 
 
 def _seats(length: float, width: float, sill: float, generator: Generator) -> Triangles:
