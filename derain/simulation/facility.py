@@ -69,7 +69,7 @@ def lay_out_facility(generator: Generator) -> Track:
     surfaces = [
         *(_paved(part, material_generator) for part in road_and_ground(half_width, generator)),
         *_road_users(half_width, generator),
-        *_sprinklers(half_width, generator),
+        *objects.sprinklers(MASTS, half_width + 0.7, generator),
         *_verges(half_width, generator, material_generator),
         *_horizon(half_width, generator, material_generator),
     ]
@@ -102,12 +102,6 @@ def _road_users(half_width: float, generator: Generator) -> Iterator[Surface]:
             x = generator.uniform(*distances)
         taken = np.append(taken, x)
         yield make(generator).placed(x, generator.uniform(1.2 - half_width, half_width - 1.2))
-
-
-def _sprinklers(half_width: float, generator: Generator) -> Iterator[Surface]:
-    for x in MASTS:
-        yield objects.sprinkler(generator).placed(x, half_width + 0.7)
-        yield objects.sprinkler(generator).placed(x, -half_width - 0.7, np.pi)
 
 
 def _verges(

@@ -73,9 +73,8 @@ def _traffic(half_width: float, generator: Generator) -> Iterator[Surface]:
 
 
 def _sprinklers(half_width: float, generator: Generator) -> Iterator[Surface]:
-    for x in np.arange(generator.uniform(6, 12), 60, generator.uniform(6, 10)):
-        yield objects.sprinkler(generator).placed(x, half_width + 0.5)
-        yield objects.sprinkler(generator).placed(x, -half_width - 0.5, np.pi)
+    x = np.arange(generator.uniform(6, 12), 60, generator.uniform(6, 10))
+    return objects.sprinklers(x, half_width + 0.5, generator)
 
 
 def _verges(half_width: float, generator: Generator) -> Iterator[Surface]:

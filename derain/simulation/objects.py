@@ -137,6 +137,13 @@ def sprinkler(generator: Generator) -> Surface:
     )
 
 
+def sprinklers(places: Floats, aside: float, generator: Generator) -> Iterator[Surface]:
+    """Sprinklers on both sides of the x axis, so far from it, at places along it, metres."""
+    for x in places:
+        yield sprinkler(generator).placed(x, aside)
+        yield sprinkler(generator).placed(x, -aside, np.pi)
+
+
 def pole(generator: Generator) -> Surface:
     """A thin post: of a fence, a sign or a lamp."""
     post = shapes.cylinder(generator.uniform(0.01, 0.06), 0, generator.uniform(0.8, 6.0))

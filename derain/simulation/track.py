@@ -36,23 +36,14 @@ class Track:
     @classmethod
     def of(cls, surfaces: Iterable[Surface]) -> "Track":
         """Joins surfaces, at least one, into a track."""
-        triangles, reflectivity, label, roughness = zip(
-            *(
-                (
-                    surface.triangles,
-                    np.broadcast_to(surface.reflectivity, len(surface.triangles)),
-                    np.full(len(surface.triangles), surface.label, dtype=np.int64),
-                    np.full(len(surface.triangles), surface.roughness),
-                )
-                for surface in surfaces
-            ),
-            strict=True,
-        )
+        parts = list(surfaces)
+        counts = [len(part.triangles) for part in parts]
+        spread = zip(parts, counts, strict=True)
         return cls(
-            np.concatenate(triangles).astype(np.float32),
-            np.concatenate(reflectivity),
-            np.concatenate(label),
-            np.concatenate(roughness),
+            np.concatenate([part.triangles for part in parts]).astype(np.float32),
+            np.concatenate([np.broadcast_to(part.reflectivity, count) for part, count in spread]),
+            np.repeat(np.array([part.label for part in parts], np.int64), counts),
+            np.repeat([part.roughness for part in parts], counts),
         )
 
     @classmethod

@@ -128,8 +128,7 @@ def test_rows_go_from_top_to_bottom_within_the_field(even: bool) -> None:
         table = np.array(draw_row_table((-25, 15), 64, np.random.default_rng(seed), even=even))
         assert len(table) == 64
         assert (np.diff(table) <= 0).all()
-        assert table.max() <= 15
-        assert table.min() >= -25
+        assert -25 <= table.min() <= table.max() <= 15
         assert table[0] - table[-1] > 39
 
 
@@ -156,8 +155,7 @@ def test_a_field_beside_the_horizon_has_rows_as_well() -> None:
     for field in ((-60.0, -20.0), (5.0, 90.0)):
         table = np.array(draw_row_table(field, 16, np.random.default_rng(0), even=False))
         assert len(table) == 16
-        assert table.min() >= field[0]
-        assert table.max() <= field[1]
+        assert field[0] <= table.min() <= table.max() <= field[1]
 
 
 def test_rows_are_turned_by_no_more_than_stated_if_at_all() -> None:

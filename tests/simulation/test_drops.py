@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.stats import kstest, truncexpon
 
+from derain.simulation.arrays import Floats
 from derain.simulation.marshall_palmer import (
     LARGEST_DROP,
     SMALLEST_DROP,
@@ -36,7 +36,7 @@ class Ramp:
 
     heaviest = 50.0
 
-    def rate(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rate(self, x: Floats, y: Floats) -> Floats:
         return np.clip(4 * x, 0, self.heaviest)
 
 

@@ -150,7 +150,6 @@ def test_poses_and_times_of_a_drive_are_found_beside_its_scans(drive: Path) -> N
         poses = [frame.pose for frame in frames]
         assert np.allclose(poses[0], np.eye(4), atol=1e-12)
         for pose, travelled in zip(poses, (0, 1.3, 2.6), strict=True):
-            assert pose is not None
             assert np.linalg.norm(pose[:3, 3]) == pytest.approx(travelled, abs=0.1)
 
 
@@ -159,7 +158,6 @@ def test_the_poses_take_the_road_and_the_walls_of_every_scan_to_the_same_place(d
     for frame in named_frames([drive / "innoviz"]):
         scan, pose = frame.read(), frame.pose
         label = read_labels(drive / f"lidar_radar_labels/{frame.number:06d}.label", len(scan))
-        assert pose is not None
         world = scan.xyz @ pose[:3, :3].T + pose[:3, 3]
         # The road and what is no higher than it: a plane, and within 20 m the beams meet it well.
         on_road = (semantic(label) == TrackClass.ROAD) & (scan.range < 20)

@@ -5,9 +5,9 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.simulation import objects, shapes
+from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_facility
 from derain.simulation.objects import Surface
@@ -70,7 +70,7 @@ def test_casting_finds_the_nearest_of_all_triangles(open3d: ModuleType) -> None:
     assert np.allclose(clear.reflectivity[hit], (reflectivity[nearest] * cosine)[hit], atol=1e-4)
 
 
-def centres(track: Track, *kinds: TrackClass) -> NDArray[np.float64]:
+def centres(track: Track, *kinds: TrackClass) -> Floats:
     """Ground positions of the triangles of some classes, float64 (T, 2)."""
     return track.triangles[np.isin(track.label, kinds)].mean(axis=1)[:, :2].astype(np.float64)
 

@@ -6,8 +6,8 @@ from numpy.random import Generator
 from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.flying.gusts import Gusts
-from derain.simulation.flying.optics import nearest_seen
 from derain.simulation.flying.precipitation import Precipitation
+from derain.simulation.flying.sizes import nearest_seen
 from derain.simulation.sensor import Returns, Sensor
 
 # Shortest wave of the patches over the view, radians; the longest is four times it.

@@ -13,11 +13,10 @@ from derain.simulation.detection import detected_surfaces, reported
 from derain.simulation.flying.beam_tree import covered_share
 from derain.simulation.flying.gusts import Gusts
 from derain.simulation.flying.haze import draw_haze
-from derain.simulation.flying.optics import Optics, nearest_seen
 from derain.simulation.flying.particles import OpenBeams, Stretch, draw_particles
 from derain.simulation.flying.precipitation import Precipitation
 from derain.simulation.flying.regions import Air, GroundLayer, Region, draw_plumes
-from derain.simulation.flying.sizes import Sizes, Slices
+from derain.simulation.flying.sizes import Optics, Sizes, Slices, nearest_seen
 from derain.simulation.sensor import Returns, Sensor
 
 # A particle leaves at least so much of the light, a modelling choice: a little goes around it.
@@ -161,11 +160,8 @@ def meet(
     )
     extinction = falling * gusts.mean * sizes.extinction
     layer = GroundLayer(-sensor.mounting_height, precipitation.drift_height, gusts)
-    plumes = draw_plumes(
-        *(clear, beams, -sensor.mounting_height),
-        *(precipitation.plumes, precipitation.plume_length),
-        generator,
-    )
+    seen = clear, beams, -sensor.mounting_height
+    plumes = draw_plumes(*seen, precipitation.plumes, precipitation.plume_length, generator)
     met = encounter(
         [
             Population(falling, sizes, Air(gusts)),
@@ -177,16 +173,12 @@ def meet(
         generator,
     )
     transmission = met.transmission(len(beams)) * np.exp(-2 * extinction * clear.range)
-    return reported(
-        Returns.joined(
-            [
-                detected_surfaces(clear, transmission, sensor),
-                _detected_particles(met, extinction, clear, precipitation, sensor, generator),
-                draw_haze(clear, beams, precipitation, sensor, generator),
-            ]
-        ),
-        sensor.returns,
-    )
+    candidates = [
+        detected_surfaces(clear, transmission, sensor),
+        _detected_particles(met, extinction, clear, precipitation, sensor, generator),
+        draw_haze(clear, beams, precipitation, sensor, generator),
+    ]
+    return reported(Returns.joined(candidates), sensor.returns)
 
 
 def uncrowded(precipitation: Precipitation, sensor: Sensor) -> float:

@@ -8,8 +8,7 @@ from numpy.random import Generator
 
 from derain.simulation.arrays import Bools, Columns, Floats, Ints
 from derain.simulation.flying.beam_tree import BeamTree, Meetings
-from derain.simulation.flying.optics import Optics
-from derain.simulation.flying.sizes import Sizes, Slices
+from derain.simulation.flying.sizes import Optics, Sizes, Slices
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,6 @@ from derain.simulation.places.standing import (
     place,
     scatter,
     shuffled,
-    straight,
 )
 from derain.simulation.track import Track
 
@@ -124,9 +123,7 @@ def _edge(winter: bool, generator: Generator) -> Iterator[Surface]:
     for quarter in range(4):
         make = makes[generator.integers(len(makes))]
         piece = 19.0 if make is walls.facade else 9.5
-        for surface in line_up(
-            make, straight(HALF_SIZE), (-HALF_SIZE, HALF_SIZE), piece, generator, 0.15
-        ):
+        for surface in line_up(make, HALF_SIZE, (-HALF_SIZE, HALF_SIZE), piece, generator, 0.15):
             yield surface.placed(0, 0, quarter * np.pi / 2)
 
 

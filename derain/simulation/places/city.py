@@ -20,7 +20,6 @@ from derain.simulation.places.standing import (
     place,
     scatter,
     shuffled,
-    straight,
 )
 from derain.simulation.track import Track
 
@@ -90,8 +89,7 @@ def _ground(section: Section, generator: Generator) -> Iterator[Surface]:
 def _houses(section: Section, generator: Generator) -> Iterator[Surface]:
     for side, front in zip((-1, 1), section.fronts, strict=True):
         gaps, piece = generator.uniform(0, 0.3), generator.uniform(9, 18)
-        line = straight(abs(front))
-        for house in line_up(walls.facade, line, CITY_SIGHT, piece, generator, gaps):
+        for house in line_up(walls.facade, abs(front), CITY_SIGHT, piece, generator, gaps):
             # Houses are seen from the street: those on the right are those on the left, turned.
             yield house if side > 0 else house.placed(CITY_SIGHT[0] + CITY_SIGHT[1], 0, np.pi)
     far = walls.facade(30, generator)

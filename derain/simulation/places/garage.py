@@ -23,7 +23,6 @@ from derain.simulation.places.standing import (
     place,
     scatter,
     shuffled,
-    straight,
 )
 from derain.simulation.track import Track
 
@@ -152,5 +151,5 @@ def _cages(hall: Walls, generator: Generator) -> Iterator[Surface]:
     for x, y in free_places(int(generator.integers(2, 6)), (2.5, 20), 2.5, generator, hall.holds):
         make = kinds[generator.integers(len(kinds))]
         reach = min(generator.uniform(1.5, 7), hall.x[1] - x)
-        pieces = line_up(make, straight(0), (0, reach + 0.1), reach, generator)
+        pieces = line_up(make, 0, (0, reach + 0.1), reach, generator)
         yield from place(pieces, x, y)

@@ -19,7 +19,6 @@ from derain.simulation.places.standing import (
     line_up,
     place,
     scatter,
-    straight,
 )
 from derain.simulation.track import Track
 
@@ -62,7 +61,7 @@ def _ground(right: float, left: float, generator: Generator) -> Iterator[Surface
 def _rails(lines: tuple[float, ...], generator: Generator) -> Iterator[Surface]:
     for y in lines:
         make = frames.guard_rail if generator.random() < 0.7 else threads.wire_fence
-        yield from line_up(make, straight(y), MOTORWAY_SIGHT, 16, generator, gaps=0.05)
+        yield from line_up(make, y, MOTORWAY_SIGHT, 16, generator, gaps=0.05)
 
 
 def _driving(lanes: int, own: int, median: float, generator: Generator) -> Iterator[Surface]:
@@ -127,7 +126,7 @@ def _embankments(edges: tuple[float, float], generator: Generator) -> Iterator[S
     for y, side in zip(edges, (-1, 1), strict=True):
         make, out, piece, gaps = EMBANKMENTS[generator.integers(len(EMBANKMENTS))]
         away = y + side * generator.uniform(0.5, 4)
-        line = straight(away + out * side)
+        line = away + out * side
         yield from line_up(make, line, MOTORWAY_SIGHT, piece, generator, gaps)
         for x in along(*MOTORWAY_SIGHT, (5, 18), generator):
             y = away + side * generator.uniform(1, 12)

@@ -91,11 +91,6 @@ def shuffled(makes: Iterable[Make], generator: Generator) -> list[Make]:
     return [ordered[which] for which in generator.permutation(len(ordered))]
 
 
-def straight(y: float) -> Line:
-    """The line along x at a y."""
-    return lambda x: np.full(np.shape(x), y)
-
-
 def place(
     things: Surface | Iterable[Surface], x: float, y: float, heading: float = 0.0
 ) -> Iterator[Surface]:
@@ -105,20 +100,21 @@ def place(
 
 
 def line_up(
-    make: Piece, line: Line, x: Span, piece: float, generator: Generator, gaps: float = 0.0
+    make: Piece, line: Line | float, x: Span, piece: float, generator: Generator, gaps: float = 0.0
 ) -> Iterator[Surface]:
     """Pieces of a hedge, a fence or a wall, end to end along a line.
 
     Args:
         make: Makes a piece along x from the origin on, by its length in metres.
-        line: Where.
+        line: Where; a number is the line along x at that y, metres.
         x: From where to where, metres.
         piece: Length of a piece, metres.
         generator: Random generator.
         gaps: Share of the pieces that is missing.
     """
     ends = np.arange(*x, piece)
-    for (before, after), (left, right) in zip(pairwise(ends), pairwise(line(ends)), strict=True):
+    y = line(ends) if callable(line) else np.full(len(ends), float(line))
+    for (before, after), (left, right) in zip(pairwise(ends), pairwise(y), strict=True):
         if generator.random() >= gaps:
             length = float(np.hypot(after - before, right - left))
             heading = float(np.arctan2(right - left, after - before))

@@ -21,7 +21,6 @@ from derain.simulation.places.standing import (
     place,
     scatter,
     shuffled,
-    straight,
 )
 from derain.simulation.track import Track
 
@@ -82,7 +81,7 @@ def _lines(winter: bool, generator: Generator) -> Iterator[Surface]:
         make = kinds[generator.integers(len(kinds))]
         piece = generator.uniform(4, 9)
         reach = (0.0, piece * generator.integers(1, 4) + 0.1)
-        line = line_up(make, straight(0), reach, piece, generator, 0.1)
+        line = line_up(make, 0, reach, piece, generator, 0.1)
         # Across the way from the sensor to its beginning, so that it does not lead to the sensor.
         across = np.arctan2(y, x) + np.pi / 2 + generator.normal(0, 0.5)
         yield from place(line, x, y, across)

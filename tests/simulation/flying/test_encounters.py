@@ -6,11 +6,10 @@ from numpy.random import Generator
 
 from derain.simulation.flying.gusts import Gusts
 from derain.simulation.flying.meeting import Encounters, Population, encounter
-from derain.simulation.flying.optics import Optics
 from derain.simulation.flying.particles import OpenBeams, Stretch
 from derain.simulation.flying.precipitation import Precipitation
 from derain.simulation.flying.regions import Air
-from derain.simulation.flying.sizes import Sizes
+from derain.simulation.flying.sizes import Optics, Sizes
 from derain.simulation.sensor import Sensor
 
 # Columns are .87 mrad apart, and beams .3 mrad wide.
