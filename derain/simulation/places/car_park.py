@@ -86,8 +86,8 @@ def _people(aside: float, generator: Generator) -> Iterator[Surface]:
         across = abs(y - aside) % (LANE + 2 * LOT_LENGTH + 0.3)
         return max(abs(x), abs(y)) < HALF_SIZE and across < LANE / 2 + 0.8
 
-    for count, distances in ((generator.integers(6, 16), (2.2, 35)), (6, (15, 50))):
-        makes = choose([(people.person, 8), (people.cyclist, 1)], int(count), generator)
+    for count, distances in (((6, 16), (2.2, 35)), (6, (15, 50))):
+        makes = choose([(people.person, 8), (people.cyclist, 1)], count, generator)
         places = free_places(len(makes), distances, 0.9, generator, in_a_lane)
         yield from scatter(makes, places, generator)
 
@@ -96,7 +96,7 @@ def _between(aside: float, winter: bool, generator: Generator) -> Iterator[Surfa
     """What stands along the lane and where lots meet."""
     small = choose(
         [(frames.trolley, 2), (frames.bollard, 2), (frames.thin_pole, 2), (_sapling, 1)],
-        int(generator.integers(8, 25)),
+        (8, 25),
         generator,
     )
 

@@ -10,6 +10,7 @@ from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, threads, vehicles
 from derain.simulation.places.standing import (
     Allowed,
+    Counts,
     anywhere,
     choose,
     free_places,
@@ -17,9 +18,6 @@ from derain.simulation.places.standing import (
     scatter,
     shuffled,
 )
-
-# Fewest, and one more than the most.
-Counts = tuple[int, int]
 
 # How far from the sensor they are, metres.
 NEAR_AND_FAR = (2.2, 70.0)
@@ -43,16 +41,10 @@ def users(
         cars: The same of vehicles, of which few are lorries.
     """
     wheeled = choose(
-        [(vehicles.glazed_car, 8), (objects.car, 2), (vehicles.lorry, 1)],
-        int(generator.integers(*cars)),
-        generator,
+        [(vehicles.glazed_car, 8), (objects.car, 2), (vehicles.lorry, 1)], cars, generator
     )
-    on_foot = choose(
-        [(people.person, 9), (objects.pedestrian, 1)], int(generator.integers(*walkers)), generator
-    )
-    bikes = choose(
-        [(people.cyclist, 9), (objects.bike, 1)], int(generator.integers(*cyclists)), generator
-    )
+    on_foot = choose([(people.person, 9), (objects.pedestrian, 1)], walkers, generator)
+    bikes = choose([(people.cyclist, 9), (objects.bike, 1)], cyclists, generator)
     far, near = NEAR_AND_FAR[1], NEAR_AND_FAR[0]
     parked = free_places(len(wheeled), (4.5, far), 8.0, generator, allowed)
 
@@ -93,7 +85,7 @@ def ragged_things(
             (plants.crowned_tree if leafy else plants.bare_tree, 1.5),
             (plants.bare_tree, 1),
         ],
-        int(generator.integers(*count)),
+        count,
         generator,
     )
     places = free_places(len(makes), (2.5, 60.0), 0.6, generator, allowed)

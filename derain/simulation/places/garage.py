@@ -135,7 +135,7 @@ def _about(hall: Walls, generator: Generator) -> Iterator[Surface]:
         (heaps.logs, 0.4),
         (of_size(heaps.rubble, (0.3, 1)), 1),
     ]
-    makes += choose(small, int(generator.integers(5, 20)), generator)
+    makes += choose(small, (5, 20), generator)
     places = free_places(len(makes), (2.2, 30), 0.9, generator, hall.holds)
     yield from scatter(shuffled(makes, generator), places, generator)
 

@@ -23,6 +23,9 @@ Make = Callable[[Generator], Surface | Iterable[Surface]]
 # Made piece by piece along a line, by the length of a piece in metres.
 Piece = Callable[[float, Generator], Surface | Iterable[Surface]]
 
+# Fewest, and one more than the most.
+Counts = tuple[int, int]
+
 # A line on the ground: its y at each x.
 Line = Callable[[Floats], Floats]
 
@@ -121,10 +124,19 @@ def line_up(
             yield from place(make(length, generator), float(before), float(left), heading)
 
 
-def choose(options: Iterable[tuple[Make, float]], count: int, generator: Generator) -> list[Make]:
-    """So many of several makers of things, each with the probability of its share in the sum."""
+def choose(
+    options: Iterable[tuple[Make, float]], count: int | Counts, generator: Generator
+) -> list[Make]:
+    """So many of several makers of things, each with the probability of its share in the sum.
+
+    Args:
+        options: The makers and their shares.
+        count: How many, or between which numbers it is drawn.
+        generator: Random generator.
+    """
+    number = count if isinstance(count, int) else int(generator.integers(*count))
     makes, shares = zip(*options, strict=True)
-    chosen = generator.choice(len(makes), count, p=np.array(shares) / np.sum(shares))
+    chosen = generator.choice(len(makes), number, p=np.array(shares) / np.sum(shares))
     return [makes[which] for which in chosen]
 
 
