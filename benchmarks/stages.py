@@ -8,7 +8,7 @@ from pathlib import Path
 
 from benchmarks.installed import DERAIN
 from derain.errors import InputError
-from derain.simulation.world_campaign import WorldCampaign
+from derain.simulation.world import WorldCampaign
 
 # Written into the folder of a training once it has ended: the command that it was.
 RECORD = "command.txt"

@@ -9,7 +9,7 @@ from derain.errors import InputError
 from derain.simulation.campaign import Campaign
 from derain.simulation.dataset import ensure_track
 from derain.simulation.manifest import read_manifest
-from derain.simulation.world_campaign import WorldCampaign
+from derain.simulation.world import WorldCampaign
 from derain.sources.source import Source
 from derain.system.cores import usable_cores
 

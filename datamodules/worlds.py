@@ -2,7 +2,7 @@
 
 from derain.datamodules.base import Loading
 from derain.datamodules.simulated import SimulatedDataModule
-from derain.simulation.world_campaign import WorldCampaign
+from derain.simulation.world import WorldCampaign
 
 
 class Worlds(SimulatedDataModule):

@@ -220,7 +220,7 @@ def _simulate(arguments: argparse.Namespace) -> int:
 def _simulate_worlds(arguments: argparse.Namespace) -> int:
     from derain.simulation.campaign import partition
     from derain.simulation.dataset import simulate_track
-    from derain.simulation.world_campaign import WorldCampaign
+    from derain.simulation.world import WorldCampaign
 
     parts = partition(arguments.sequences)
     campaign = WorldCampaign(*parts, seed=arguments.seed, world=arguments.world)

@@ -1,17 +1,18 @@
 """The description of a simulated data set."""
 
 import json
+from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass, field, replace
 from itertools import cycle, islice
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain import __version__
 from derain.errors import InputError
 from derain.files.documents import shown
+from derain.simulation.arrays import Floats
 from derain.simulation.drive import Drive
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.manifest import MAKER, RAIN_RATE, SPLIT_PARTS
@@ -35,8 +36,8 @@ MOST = 100_000
 HELD_OUT = 0.2
 
 
-class SplitSequences:
-    """Sequences that are drawn by their numbers and split into three parts.
+class SplitSequences(ABC):
+    """A data set of sequences that are drawn by their numbers and split into three parts.
 
     Attributes:
         train: How many to train on, at least one.
@@ -69,6 +70,31 @@ class SplitSequences:
         """Names of the sequences of each part."""
         names = iter(self.names)
         return {part: list(islice(names, getattr(self, part))) for part in SPLIT_PARTS}
+
+    @property
+    @abstractmethod
+    def description(self) -> dict[str, Any]:
+        """Everything that the files depend on, as reading it back from JSON gives it."""
+
+    @abstractmethod
+    def resolved(self) -> Self:
+        """The same with every file that it names read.
+
+        Raises:
+            InputError: A file that is missing or damaged.
+        """
+
+    @abstractmethod
+    def write(self, folder: Path, name: str) -> None:
+        """Simulates a sequence.
+
+        Args:
+            folder: Folder to write.
+            name: Name of the sequence.
+
+        Raises:
+            InputError: A file cannot be written, or Open3D cannot be imported.
+        """
 
     def _described(self, **content: Any) -> dict[str, Any]:
         """A description, as reading it back from JSON gives it."""
@@ -146,7 +172,7 @@ class Campaign(SplitSequences):
         """
         return load_sensor(self.sensor) if isinstance(self.sensor, str) else self.sensor
 
-    def resolved(self) -> "Campaign":
+    def resolved(self) -> Self:
         """The same with its sensor read.
 
         Raises:
@@ -169,7 +195,7 @@ class Campaign(SplitSequences):
         write_sequence(folder, self, name)
 
     @property
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Floats:
         """When the scans of a sequence are taken, float64 (scans,), seconds from 0 on."""
         return np.arange(self.scans) / self.lidar.frame_rate
 

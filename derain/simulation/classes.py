@@ -2,8 +2,7 @@
 
 from enum import IntEnum
 
-import numpy as np
-from numpy.typing import NDArray
+from derain.simulation.arrays import Ints
 
 
 class TrackClass(IntEnum):
@@ -22,7 +21,7 @@ class TrackClass(IntEnum):
     ROAD = 7
 
 
-def packed(kind: NDArray[np.int64], thing: NDArray[np.int64]) -> NDArray[np.int64]:
+def packed(kind: Ints, thing: Ints) -> Ints:
     """Classes with the number of the moving thing in the upper 16 bits, int64 (N,).
 
     Args:
@@ -32,6 +31,6 @@ def packed(kind: NDArray[np.int64], thing: NDArray[np.int64]) -> NDArray[np.int6
     return kind | thing << 16
 
 
-def unpacked(label: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def unpacked(label: Ints) -> tuple[Ints, Ints]:
     """Classes and numbers, int64 (N,) each, of labels from :func:`packed`."""
     return label & 0xFFFF, label >> 16

@@ -16,12 +16,13 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any
 
 from tqdm import tqdm
 
 from derain.errors import InputError
 from derain.files.atomic import lock, remove_abandoned
+from derain.simulation.campaign import SplitSequences
 from derain.simulation.manifest import MANIFEST, checksums, read_manifest, write_manifest
 from derain.system.open3d_import import import_open3d
 from derain.system.workers import worker_pool
@@ -29,33 +30,7 @@ from derain.system.workers import worker_pool
 SEQUENCES = "sequences"
 
 
-class Simulation(Protocol):
-    """A data set that is simulated sequence by sequence."""
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the sequences, in ascending order."""
-
-    @property
-    def description(self) -> dict[str, Any]:
-        """Everything that the files depend on, as reading it back from JSON gives it."""
-
-    def resolved(self) -> Self:
-        """The same with every file that it names read.
-
-        Raises:
-            InputError: A file that is missing or damaged.
-        """
-
-    def write(self, folder: Path, name: str) -> None:
-        """Writes a sequence.
-
-        Raises:
-            InputError: A file cannot be written, or Open3D cannot be imported.
-        """
-
-
-def ensure_track(root: Path, campaign: Simulation, workers: int = 1) -> None:
+def ensure_track(root: Path, campaign: SplitSequences, workers: int = 1) -> None:
     """Simulates a data set for a program's own use, unless the folder already holds this very one.
 
     If the folder holds a data set that this function made of another campaign, it is replaced. One
@@ -82,7 +57,7 @@ def ensure_track(root: Path, campaign: Simulation, workers: int = 1) -> None:
         _simulate(root, campaign, workers, keep=False)
 
 
-def simulate_track(root: Path, campaign: Simulation, workers: int = 1) -> None:
+def simulate_track(root: Path, campaign: SplitSequences, workers: int = 1) -> None:
     """Simulates a data set, or what is missing of it.
 
     Args:
@@ -99,7 +74,7 @@ def simulate_track(root: Path, campaign: Simulation, workers: int = 1) -> None:
         _simulate(root, campaign, workers, keep=True)
 
 
-def _simulate(root: Path, campaign: Simulation, workers: int, *, keep: bool) -> None:
+def _simulate(root: Path, campaign: SplitSequences, workers: int, *, keep: bool) -> None:
     """Simulates the sequences that are missing.
 
     Args:
@@ -170,11 +145,11 @@ def _writing(root: Path) -> Iterator[None]:
         ) from error
 
 
-def _describes(manifest: Mapping[str, Any], campaign: Simulation) -> bool:
+def _describes(manifest: Mapping[str, Any], campaign: SplitSequences) -> bool:
     return manifest.items() >= campaign.description.items()
 
 
-def _refuse_others(root: Path, there: Mapping[str, Any], campaign: Simulation) -> None:
+def _refuse_others(root: Path, there: Mapping[str, Any], campaign: SplitSequences) -> None:
     if there and not _describes(there, campaign):
         raise InputError(
             root,
@@ -188,7 +163,7 @@ def _refuse_others(root: Path, there: Mapping[str, Any], campaign: Simulation) -
 
 
 def _complete_sequences(
-    root: Path, campaign: Simulation, workers: int
+    root: Path, campaign: SplitSequences, workers: int
 ) -> Generator[dict[str, str], None, None]:
     """Checksums of every sequence, made where it is missing, in ascending order."""
     complete = partial(_complete_sequence, root, campaign)
@@ -214,7 +189,7 @@ def _unfinished(root: Path, name: str) -> Path:
     return root / SEQUENCES / f".{name}"
 
 
-def _complete_sequence(root: Path, campaign: Simulation, name: str) -> dict[str, str]:
+def _complete_sequence(root: Path, campaign: SplitSequences, name: str) -> dict[str, str]:
     folder, unfinished = root / SEQUENCES / name, _unfinished(root, name)
     if not folder.exists():
         shutil.rmtree(unfinished, ignore_errors=True)  # left behind by a run that was killed

@@ -8,10 +8,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.files.documents import shown
+from derain.simulation.arrays import Bools, Floats, Ints
 from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.returns import Returns
 
@@ -54,19 +55,14 @@ class Defects:
     copies: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("dropped", "dropped_rows", "dropped_sectors", "mixed", "copies"):
-            self._check(name, 0 <= getattr(self, name) <= 1, "Give a share of 0 to 1.")
-        for name in ("merging", "range_step"):
-            possible = 0 <= getattr(self, name) < math.inf
-            self._check(name, possible, "Give metres, 0 or more.")
-
-    def _check(self, name: str, possible: bool, remedy: str) -> None:
-        if not possible:
-            reason = f"{shown(getattr(self, name))} is impossible"
-            raise InputError(f"defects: {name}", reason, remedy)
+        for name, value in vars(self).items():
+            metres = name in ("merging", "range_step")
+            if not (0 <= value < math.inf if metres else 0 <= value <= 1):
+                remedy = "Give metres, 0 or more." if metres else "Give a share of 0 to 1."
+                raise InputError(f"defects: {name}", f"{shown(value)} is impossible", remedy)
 
     def at_borders(
-        self, returns: Returns, columns: int, *, dual: bool, generator: np.random.Generator
+        self, returns: Returns, columns: int, *, dual: bool, generator: Generator
     ) -> Returns:
         """Lets beams at the border of two surfaces return both, or what lies in between.
 
@@ -91,9 +87,7 @@ class Defects:
             return merged
         return _with_both(merged, row[apart], returns.take(beside[apart]), share[apart])
 
-    def received(
-        self, returns: Returns, shape: tuple[int, int], generator: np.random.Generator
-    ) -> NDArray[np.bool_]:
+    def received(self, returns: Returns, shape: tuple[int, int], generator: Generator) -> Bools:
         """Which returns are not lost, bool (N,).
 
         Args:
@@ -112,13 +106,11 @@ class Defects:
             lost |= (generator.random(SECTORS_OF_A_SCAN) < self.dropped_sectors)[sector]
         return np.asarray(~lost, np.bool_)
 
-    def stepped(self, range: NDArray[np.float64]) -> NDArray[np.float64]:
+    def stepped(self, range: Floats) -> Floats:
         """Distances in metres, float64 (N,), rounded to the step of the sensor."""
         return np.round(range / self.range_step) * self.range_step if self.range_step else range
 
-    def reported(
-        self, beam: NDArray[np.int64], generator: np.random.Generator
-    ) -> NDArray[np.int64]:
+    def reported(self, beam: Ints, generator: Generator) -> Ints:
         """Rows of a scan with its copies, int64 (M,): a row that is reported twice comes twice.
 
         Args:
@@ -131,14 +123,13 @@ class Defects:
         return np.repeat(np.arange(len(beam)), 1 + single)
 
 
-def _single(beam: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _single(beam: Ints) -> Bools:
     """Whether each row is the only one of its beam, bool (N,), beams ascending."""
     changes = np.diff(beam, prepend=-1, append=-1) != 0
-    single: NDArray[np.bool_] = changes[1:] & changes[:-1]
-    return single
+    return np.asarray(changes[1:] & changes[:-1])
 
 
-def _borders(returns: Returns, columns: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _borders(returns: Returns, columns: int) -> tuple[Ints, Ints]:
     """Rows of the beams at a border, int64 (B,), and of the next beam in each one's row.
 
     Both beams return one surface each. Beams with rain are left out: the simulation of rain already
@@ -152,12 +143,7 @@ def _borders(returns: Returns, columns: int) -> tuple[NDArray[np.int64], NDArray
     return row, row + 1
 
 
-def _merged(
-    returns: Returns,
-    row: NDArray[np.int64],
-    beside: NDArray[np.int64],
-    share: NDArray[np.float64],
-) -> Returns:
+def _merged(returns: Returns, row: Ints, beside: Ints, share: Floats) -> Returns:
     """Moves rows towards the range of the beams beside them by a share of the way."""
     nearer = np.where(returns.range[row] <= returns.range[beside], row, beside)
     columns = returns.range.copy(), returns.reflectivity.copy(), returns.label.copy()
@@ -167,9 +153,7 @@ def _merged(
     return Returns(*columns, returns.beam)
 
 
-def _with_both(
-    returns: Returns, row: NDArray[np.int64], second: Returns, share: NDArray[np.float64]
-) -> Returns:
+def _with_both(returns: Returns, row: Ints, second: Returns, share: Floats) -> Returns:
     """Gives the beams of some rows a second return, with a share of what it would be by itself."""
     first = returns.reflectivity.copy()
     first[row] *= 1 - share

@@ -1,13 +1,13 @@
 """Which of the things in its beams a sensor reports."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from derain.simulation.arrays import Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.sensor import ReturnMode, Returns, Sensor
 
 
-def detected_surfaces(clear: Returns, transmission: NDArray[np.float64], sensor: Sensor) -> Returns:
+def detected_surfaces(clear: Returns, transmission: Floats, sensor: Sensor) -> Returns:
     """What the sensor would see of the surfaces if there were no particles in front of them.
 
     Args:
@@ -53,7 +53,7 @@ def reported(candidates: Returns, returns: ReturnMode) -> Returns:
     return candidates.take(chosen)
 
 
-def _greatest(value: NDArray[np.float64], beam: NDArray[np.int64]) -> NDArray[np.int64]:
+def _greatest(value: Floats, beam: Ints) -> Ints:
     """Row of the greatest value of every beam, int64 (N,), where each of N beams has one."""
     ascending = np.argsort(value, kind="stable")
     row = np.empty(beam.max(initial=-1) + 1, np.int64)

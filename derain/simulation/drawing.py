@@ -1,25 +1,27 @@
 """Random numbers between two bounds."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
+
+from derain.simulation.arrays import Floats
 
 # Least and greatest value.
 Span = tuple[float, float]
 
 
-def log_uniform(span: Span, generator: np.random.Generator) -> float:
+def log_uniform(span: Span, generator: Generator) -> float:
     """A number between two positive ones, uniform in its logarithm."""
     low, high = np.log(span)
     return float(np.exp(generator.uniform(low, high)))
 
 
-def log_uniforms(span: Span, count: int, generator: np.random.Generator) -> NDArray[np.float64]:
+def log_uniforms(span: Span, count: int, generator: Generator) -> Floats:
     """Several numbers as of :func:`log_uniform`, float64 (count,)."""
     low, high = np.log(span)
     return np.asarray(np.exp(generator.uniform(low, high, count)))
 
 
-def along(begin: float, end: float, spacing: Span, generator: np.random.Generator) -> list[float]:
+def along(begin: float, end: float, spacing: Span, generator: Generator) -> list[float]:
     """Places along a line, uneven steps apart.
 
     Args:

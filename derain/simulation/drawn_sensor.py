@@ -4,8 +4,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
+from derain.simulation.arrays import Floats
 from derain.simulation.defects import Defects
 from derain.simulation.sensor import Sensor
 from derain.simulation.spans import DefectSpans, SensorSpans, draw, draw_kind
@@ -22,7 +23,7 @@ PRISM_RATIO = (0.4, 0.8)
 LASERS = (1, 4, 6)
 
 
-def draw_sensor(spans: SensorSpans, generator: np.random.Generator) -> Sensor:
+def draw_sensor(spans: SensorSpans, generator: Generator) -> Sensor:
     """Draws a sensor with its defects.
 
     Args:
@@ -48,7 +49,7 @@ def draw_sensor(spans: SensorSpans, generator: np.random.Generator) -> Sensor:
     )
 
 
-def draw_defects(spans: DefectSpans, generator: np.random.Generator, *, dual: bool) -> Defects:
+def draw_defects(spans: DefectSpans, generator: Generator, *, dual: bool) -> Defects:
     """Draws what is wrong with the scans of a sensor.
 
     Args:
@@ -76,7 +77,7 @@ DRAWN_EVENLY = (
 )
 
 
-def _spinning(spans: SensorSpans, generator: np.random.Generator) -> dict[str, Any]:
+def _spinning(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
     rows = int(generator.choice(spans.spinning_rows))
     height = min(draw(spans, "spinning_field", generator) for _ in range(2))
     centre = draw(spans, "spinning_centre", generator)
@@ -94,7 +95,7 @@ def _spinning(spans: SensorSpans, generator: np.random.Generator) -> dict[str, A
     }
 
 
-def _front(spans: SensorSpans, generator: np.random.Generator) -> dict[str, Any]:
+def _front(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
     rows = int(generator.choice(spans.front_rows))
     width, height = (draw(spans, name, generator) for name in ("front_width", "front_height"))
     centre = draw(spans, "spinning_centre", generator) / 2
@@ -106,7 +107,7 @@ def _front(spans: SensorSpans, generator: np.random.Generator) -> dict[str, Any]
     }
 
 
-def _rosette(spans: SensorSpans, generator: np.random.Generator) -> dict[str, Any]:
+def _rosette(spans: SensorSpans, generator: Generator) -> dict[str, Any]:
     radius = draw(spans, "rosette_width", generator) / 2
     lasers = int(generator.choice(LASERS))
     beams = min(round(draw(spans, "rosette_beams", generator)), spans.most_beams)
@@ -122,7 +123,7 @@ def _rosette(spans: SensorSpans, generator: np.random.Generator) -> dict[str, An
     }
 
 
-def _laser_offsets(lasers: int, generator: np.random.Generator) -> tuple[float, ...]:
+def _laser_offsets(lasers: int, generator: Generator) -> tuple[float, ...]:
     """Inclinations of a rosette's lasers off their common direction, degrees; none for half."""
     if lasers == 1 or generator.random() < 0.5:
         return ()
@@ -149,7 +150,7 @@ MISALIGNMENT = 0.05
 
 
 def draw_row_table(
-    field: tuple[float, float], rows: int, generator: np.random.Generator, *, even: bool
+    field: tuple[float, float], rows: int, generator: Generator, *, even: bool
 ) -> tuple[float, ...]:
     """Draws a table of row inclinations.
 
@@ -173,16 +174,13 @@ def draw_row_table(
     return tuple(np.clip(np.sort(table), lowest, highest)[::-1].round(3).tolist())
 
 
-def _spaced(
-    corners: NDArray[np.float64], density: NDArray[np.float64], count: int
-) -> NDArray[np.float64]:
+def _spaced(corners: Floats, density: Floats, count: int) -> Floats:
     """So many places from the first corner to the last, spaced by the density between corners."""
     passed = np.concatenate([[0.0], np.cumsum(density * np.diff(corners))])
-    places: NDArray[np.float64] = np.interp(np.linspace(0, passed[-1], count), passed, corners)
-    return places
+    return np.asarray(np.interp(np.linspace(0, passed[-1], count), passed, corners))
 
 
-def draw_row_azimuths(rows: int, most: float, generator: np.random.Generator) -> tuple[float, ...]:
+def draw_row_azimuths(rows: int, most: float, generator: Generator) -> tuple[float, ...]:
     """Draws by how much the rows of a sensor are turned, degrees.
 
     Lasers lie in one line, in a few columns beside one another which take the rows in turn (Ouster,

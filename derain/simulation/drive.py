@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.files.documents import shown
 from derain.files.extrinsics import POSE, Extrinsics
+from derain.simulation.arrays import Floats
 from derain.simulation.sensor import Sensor
 
 # Fastest vehicle, m/s: 216 km/h.
@@ -107,13 +108,13 @@ class Course:
     """
 
     speed: float
-    amplitude: NDArray[np.float64]
-    frequency: NDArray[np.float64]
-    phase: NDArray[np.float64]
-    mounting: NDArray[np.float64]
+    amplitude: Floats
+    frequency: Floats
+    phase: Floats
+    mounting: Floats
 
     @classmethod
-    def draw(cls, speed: float, generator: np.random.Generator) -> Self:
+    def draw(cls, speed: float, generator: Generator) -> Self:
         """Draws a course at a speed in m/s."""
         sway = min(1.0, speed / SPEED_OF_FULL_SWAY)
         shape = (len(POSE), WAVES)
@@ -128,7 +129,7 @@ class Course:
             Extrinsics.of_pose(0, 0, 0, **turns).matrix,
         )
 
-    def pose(self, time: float, sensor: Sensor) -> NDArray[np.float64]:
+    def pose(self, time: float, sensor: Sensor) -> Floats:
         """Takes points from the frame of a sensor on the vehicle into the scene's.
 
         Args:
@@ -143,5 +144,4 @@ class Course:
         place["x"] += self.speed * time
         vehicle = Extrinsics.of_pose(**place).matrix
         above = Extrinsics.of_pose(0, 0, sensor.mounting_height, 0, 0, 0).matrix
-        mounted: NDArray[np.float64] = vehicle @ above @ self.mounting
-        return mounted
+        return np.asarray(vehicle @ above @ self.mounting)

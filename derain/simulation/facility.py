@@ -9,10 +9,11 @@ which decides by intensity; it then finds the simulated rain. `benchmarks/facili
 `benchmarks/batchnorm_memory.py` show it.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import objects
 from derain.simulation.classes import TrackClass
@@ -24,7 +25,7 @@ from derain.simulation.track import Track
 # stand at 10 to 112 m. Within that, the distances are chosen so that every class has about the
 # share of the points that it has in REHEARSE-3D.
 # Source: REHEARSE-3D, section III.A.
-ROAD_USERS: tuple[tuple[Callable[[np.random.Generator], Surface], tuple[float, float]], ...] = (
+ROAD_USERS: tuple[tuple[Callable[[Generator], Surface], tuple[float, float]], ...] = (
     (objects.car, (30, 80)),
     (objects.pedestrian, (35, 85)),
     (objects.pedestrian, (35, 85)),
@@ -54,7 +55,7 @@ LEAVES = (0.03, 0.6)
 ROUGHNESS = 0.6
 
 
-def lay_out_facility(generator: np.random.Generator) -> Track:
+def lay_out_facility(generator: Generator) -> Track:
     """Lays out a facility.
 
     A road 6.8 to 7.6 m wide leads straight away from the sensor, turned by up to 2 degrees and
@@ -66,9 +67,9 @@ def lay_out_facility(generator: np.random.Generator) -> Track:
     # Materials have a generator of their own, so that a seed's places stay where they are.
     (material_generator,) = generator.spawn(1)
     surfaces = [
-        *_paved(road_and_ground(half_width, generator), material_generator),
+        *(_paved(part, material_generator) for part in road_and_ground(half_width, generator)),
         *_road_users(half_width, generator),
-        *_sprinklers(half_width, generator),
+        *objects.sprinklers(MASTS, half_width + 0.7, generator),
         *_verges(half_width, generator, material_generator),
         *_horizon(half_width, generator, material_generator),
     ]
@@ -76,19 +77,16 @@ def lay_out_facility(generator: np.random.Generator) -> Track:
     return on_slope(surfaces, 0, heading, generator.uniform(-0.01, 0.01, 2))
 
 
-def _paved(
-    surfaces: Iterable[Surface], material_generator: np.random.Generator
-) -> Iterator[Surface]:
-    for surface in surfaces:
-        span = ASPHALT_REFLECTIVITY if surface.label is TrackClass.ROAD else GROUND
-        yield replace(surface, reflectivity=material_generator.uniform(*span), roughness=ROUGHNESS)
+def _paved(surface: Surface, material_generator: Generator) -> Surface:
+    span = ASPHALT_REFLECTIVITY if surface.label is TrackClass.ROAD else GROUND
+    return replace(surface, reflectivity=material_generator.uniform(*span), roughness=ROUGHNESS)
 
 
 def _foliage(
     radii: tuple[float, float, float],
     height: float,
-    generator: np.random.Generator,
-    material_generator: np.random.Generator,
+    generator: Generator,
+    material_generator: Generator,
 ) -> Surface:
     foliage = objects.foliage(radii, height, generator)
     return replace(
@@ -96,7 +94,7 @@ def _foliage(
     )
 
 
-def _road_users(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _road_users(half_width: float, generator: Generator) -> Iterator[Surface]:
     taken = np.array([])
     for make, distances in ROAD_USERS:
         x = generator.uniform(*distances)
@@ -106,14 +104,8 @@ def _road_users(half_width: float, generator: np.random.Generator) -> Iterator[S
         yield make(generator).placed(x, generator.uniform(1.2 - half_width, half_width - 1.2))
 
 
-def _sprinklers(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
-    for x in MASTS:
-        yield objects.sprinkler(generator).placed(x, half_width + 0.7)
-        yield objects.sprinkler(generator).placed(x, -half_width - 0.7, np.pi)
-
-
 def _verges(
-    half_width: float, generator: np.random.Generator, material_generator: np.random.Generator
+    half_width: float, generator: Generator, material_generator: Generator
 ) -> Iterator[Surface]:
     for side in (-1, 1):
         for _ in range(generator.integers(10, 20)):
@@ -125,7 +117,7 @@ def _verges(
 
 
 def _horizon(
-    half_width: float, generator: np.random.Generator, material_generator: np.random.Generator
+    half_width: float, generator: Generator, material_generator: Generator
 ) -> Iterator[Surface]:
     for side in (-1, 1):
         for x in np.arange(30.0, 110, 10):

@@ -5,14 +5,15 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.simulation import objects, shapes
+from derain.simulation.arrays import Floats
 from derain.simulation.objects import Surface
 from derain.simulation.track import Track
 
 
-def lay_out_track(generator: np.random.Generator) -> Track:
+def lay_out_track(generator: Generator) -> Track:
     """Lays out a track.
 
     A road 6 to 12 m wide leads away from the sensor, turned by up to 6 degrees and sloping by up to
@@ -34,9 +35,7 @@ def lay_out_track(generator: np.random.Generator) -> Track:
     return on_slope(surfaces, aside, heading, generator.uniform(-0.04, 0.04, 2))
 
 
-def on_slope(
-    surfaces: Iterable[Surface], aside: float, heading: float, slope: NDArray[np.float64]
-) -> Track:
+def on_slope(surfaces: Iterable[Surface], aside: float, heading: float, slope: Floats) -> Track:
     """Makes a track of surfaces that are laid out along x: turns, moves and tilts all of them.
 
     Args:
@@ -52,7 +51,7 @@ def on_slope(
     )
 
 
-def road_and_ground(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+def road_and_ground(half_width: float, generator: Generator) -> Iterator[Surface]:
     """A road along x in patches, each dry or wet, and the ground on either side of it."""
     yield objects.ground((-10, 130), (-150, 150), generator)
     for x in pairwise([*np.arange(-10, 50, 1.5), 130]):
@@ -60,7 +59,7 @@ def road_and_ground(half_width: float, generator: np.random.Generator) -> Iterat
         yield objects.asphalt(x, (0, half_width), generator)
 
 
-def _traffic(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _traffic(half_width: float, generator: Generator) -> Iterator[Surface]:
     kinds = (
         [objects.car] * generator.integers(1, 4)
         + [objects.pedestrian] * generator.integers(1, 4)
@@ -73,13 +72,12 @@ def _traffic(half_width: float, generator: np.random.Generator) -> Iterator[Surf
         yield kind(generator).placed(x, generator.uniform(1 - half_width, half_width - 1))
 
 
-def _sprinklers(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
-    for x in np.arange(generator.uniform(6, 12), 60, generator.uniform(6, 10)):
-        yield objects.sprinkler(generator).placed(x, half_width + 0.5)
-        yield objects.sprinkler(generator).placed(x, -half_width - 0.5, np.pi)
+def _sprinklers(half_width: float, generator: Generator) -> Iterator[Surface]:
+    x = np.arange(generator.uniform(6, 12), 60, generator.uniform(6, 10))
+    return objects.sprinklers(x, half_width + 0.5, generator)
 
 
-def _verges(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _verges(half_width: float, generator: Generator) -> Iterator[Surface]:
     for side in (-1, 1):
         for _ in range(generator.integers(20, 40)):
             x, y = generator.uniform(3, 25), side * (half_width + generator.uniform(0, 8))
@@ -95,13 +93,13 @@ def _verges(half_width: float, generator: np.random.Generator) -> Iterator[Surfa
             yield objects.pole(generator).placed(x, y)
 
 
-def _boughs(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _boughs(half_width: float, generator: Generator) -> Iterator[Surface]:
     for _ in range(generator.integers(5, 15)):
         x, y = generator.uniform(3, 15), generator.uniform(-half_width, half_width)
         yield objects.bough(1.5, generator).placed(x, y)
 
 
-def _buildings(half_width: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _buildings(half_width: float, generator: Generator) -> Iterator[Surface]:
     for side in (-1, 1):
         for x in range(10, 110, 25):
             y = side * (half_width + generator.uniform(20, 50))

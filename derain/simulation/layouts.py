@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-import numpy as np
+from numpy.random import Generator
 
 from derain.simulation.facility import lay_out_facility
 from derain.simulation.layout import lay_out_track
@@ -17,7 +17,7 @@ from derain.simulation.track import Track
 
 # Each lays out another place of its kind for every state of the generator. The origin of the track
 # is on the ground under the sensor.
-LAYOUTS: dict[str, Callable[[np.random.Generator], Track]] = {
+LAYOUTS: dict[str, Callable[[Generator], Track]] = {
     "car_park": lay_out_car_park,
     "city": lay_out_city,
     "country": lay_out_country,

@@ -6,7 +6,10 @@ Rates are in mm/h, 0 being clear air, and may be arrays of any shape; results ha
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.random import Generator
+from numpy.typing import ArrayLike
+
+from derain.simulation.arrays import Floats
 
 # Drop-size distribution N(D) = INTERCEPT · exp(−slope · D), in m⁻³ mm⁻¹.
 # Source: Marshall and Palmer 1948, "The distribution of raindrops with size".
@@ -23,7 +26,7 @@ LARGEST_DROP = 6.0
 EXTINCTION_EFFICIENCY = 2.0
 
 
-def slope(rate: ArrayLike) -> NDArray[np.float64]:
+def slope(rate: ArrayLike) -> Floats:
     """How fast large drops get rare, Λ in mm⁻¹; infinite without rain.
 
     Source: Marshall and Palmer 1948, Λ = 4.1 R^−0.21.
@@ -32,7 +35,7 @@ def slope(rate: ArrayLike) -> NDArray[np.float64]:
         return np.asarray(4.1 * np.asarray(rate, np.float64) ** -0.21)
 
 
-def extinction(rate: ArrayLike) -> NDArray[np.float64]:
+def extinction(rate: ArrayLike) -> Floats:
     """Share of the light that the rain takes out of a beam per metre, α in m⁻¹.
 
     π/4 · Q ∫ D² N(D) dD over all diameters, in closed form; 1e-6 turns mm² into m².
@@ -51,7 +54,7 @@ def drops_per_cubic_metre(rate: float) -> float:
     return INTERCEPT / steepness * (above_smallest - above_largest)
 
 
-def draw_diameters(rate: float, count: int, generator: np.random.Generator) -> NDArray[np.float64]:
+def draw_diameters(rate: float, count: int, generator: Generator) -> Floats:
     """Draws drop diameters, float64 (count,), millimetres: an exponential, cut at both ends."""
     steepness = float(slope(rate))
     span = -math.expm1(-steepness * (LARGEST_DROP - SMALLEST_DROP))

@@ -8,9 +8,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.simulation import shapes
+from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import Span, log_uniform, log_uniforms
 from derain.simulation.shapes import Triangles
@@ -24,23 +25,27 @@ class Surface:
         triangles: Corners, float64 (T, 3, 3), metres.
         label: Class of all of them.
         reflectivity: Of each triangle, float64 (T,), or of all of them, in 0..1.
-        roughness: Of all of them, radians, see :mod:`derain.simulation.rough_surface`.
+        roughness: Of all of them, radians, see :func:`derain.simulation.track.backscatter`.
     """
 
     triangles: Triangles
     label: TrackClass
-    reflectivity: NDArray[np.float64] | float
+    reflectivity: Floats | float
     roughness: float = 0.0
 
     def placed(self, x: float, y: float, heading: float = 0.0) -> "Surface":
         """The same surface, turned by a heading in radians, then moved to (x, y)."""
         return replace(self, triangles=shapes.placed(self.triangles, x, y, heading))
 
+    def moved(self, x: float, y: float, z: float) -> "Surface":
+        """The same surface, moved by metres along the three axes."""
+        return replace(self, triangles=self.triangles + np.array([x, y, z]))
+
 
 def of_material(
     parts: Sequence[Triangles],
     reflectivity: Span,
-    generator: np.random.Generator,
+    generator: Generator,
     label: TrackClass = TrackClass.BACKGROUND,
 ) -> Surface:
     """Parts as one surface, its reflectivity log-uniform between two values."""
@@ -48,7 +53,7 @@ def of_material(
 
 
 def spotted(
-    triangles: Triangles, reflectivity: Span, spread: float, generator: np.random.Generator
+    triangles: Triangles, reflectivity: Span, spread: float, generator: Generator
 ) -> Surface:
     """A surface of the background whose reflectivity differs from triangle to triangle.
 
@@ -63,23 +68,19 @@ def spotted(
     return Surface(triangles, TrackClass.BACKGROUND, np.clip(spots, 0.003, 1))
 
 
-def asphalt(
-    x: tuple[float, float], y: tuple[float, float], generator: np.random.Generator
-) -> Surface:
+def asphalt(x: tuple[float, float], y: tuple[float, float], generator: Generator) -> Surface:
     """A patch of road, from dry asphalt to a film of water that mirrors most of the light away."""
     reflectivity = log_uniform((0.01, 0.2), generator)
     return Surface(shapes.rectangle(x, y, 0), TrackClass.ROAD, reflectivity)
 
 
-def ground(
-    x: tuple[float, float], y: tuple[float, float], generator: np.random.Generator
-) -> Surface:
+def ground(x: tuple[float, float], y: tuple[float, float], generator: Generator) -> Surface:
     """The ground under and beside the road, a centimetre lower so that the road is on top."""
     plane = shapes.rectangle(x, y, -0.01)
     return Surface(plane, TrackClass.BACKGROUND, generator.uniform(0.05, 0.3))
 
 
-def car(generator: np.random.Generator) -> Surface:
+def car(generator: Generator) -> Surface:
     """A car, from black paint to white."""
     length, width = generator.uniform(3.9, 4.9), generator.uniform(1.7, 1.95)
     bonnet, roof = generator.uniform(0.75, 0.95), generator.uniform(1.4, 1.8)
@@ -93,7 +94,7 @@ def car(generator: np.random.Generator) -> Surface:
     )
 
 
-def pedestrian(generator: np.random.Generator) -> Surface:
+def pedestrian(generator: Generator) -> Surface:
     """A standing child or adult."""
     height = generator.uniform(1.1, 1.9)
     legs = [shapes.placed(shapes.cylinder(0.08, 0, 0.48 * height), 0, y) for y in (-0.1, 0.1)]
@@ -104,7 +105,7 @@ def pedestrian(generator: np.random.Generator) -> Surface:
     )
 
 
-def bike(generator: np.random.Generator) -> Surface:
+def bike(generator: Generator) -> Surface:
     """A bicycle with its rider."""
     wheel = shapes.raised(shapes.on_its_side(shapes.cylinder(0.34, -0.02, 0.02)), 0.34)
     wheels = [shapes.placed(wheel, x, 0) for x in (-0.52, 0.52)]
@@ -115,7 +116,7 @@ def bike(generator: np.random.Generator) -> Surface:
     )
 
 
-def target(generator: np.random.Generator) -> Surface:
+def target(generator: Generator) -> Surface:
     """A calibration plate on a stand, facing the sensor: black, grey or white."""
     width, bottom = generator.uniform(0.5, 1.2), generator.uniform(0.3, 1.0)
     plate = shapes.box(0.03, width, bottom, bottom + width)
@@ -125,7 +126,7 @@ def target(generator: np.random.Generator) -> Surface:
     )
 
 
-def sprinkler(generator: np.random.Generator) -> Surface:
+def sprinkler(generator: Generator) -> Surface:
     """A mast with an arm towards the side −y."""
     height, arm = generator.uniform(3.0, 5.0), generator.uniform(1.0, 2.5)
     mast = shapes.cylinder(generator.uniform(0.04, 0.1), 0, height)
@@ -136,25 +137,32 @@ def sprinkler(generator: np.random.Generator) -> Surface:
     )
 
 
-def pole(generator: np.random.Generator) -> Surface:
+def sprinklers(places: Floats, aside: float, generator: Generator) -> Iterator[Surface]:
+    """Sprinklers on both sides of the x axis, so far from it, at places along it, metres."""
+    for x in places:
+        yield sprinkler(generator).placed(x, aside)
+        yield sprinkler(generator).placed(x, -aside, np.pi)
+
+
+def pole(generator: Generator) -> Surface:
     """A thin post: of a fence, a sign or a lamp."""
     post = shapes.cylinder(generator.uniform(0.01, 0.06), 0, generator.uniform(0.8, 6.0))
     return Surface(post, TrackClass.BACKGROUND, generator.uniform(0.02, 0.5))
 
 
-def trunk(generator: np.random.Generator) -> Surface:
+def trunk(generator: Generator) -> Surface:
     """The trunk of a tree."""
     stem = shapes.cylinder(generator.uniform(0.08, 0.25), 0, 3)
     return Surface(stem, TrackClass.BACKGROUND, generator.uniform(0.05, 0.3))
 
 
-def tree(crown: float, generator: np.random.Generator) -> Iterator[Surface]:
+def tree(crown: float, generator: Generator) -> Iterator[Surface]:
     """A tree with a round crown of a radius in metres."""
     yield trunk(generator)
     yield foliage((crown, crown, crown), 2 + crown, generator)
 
 
-def bough(largest: float, generator: np.random.Generator) -> Surface:
+def bough(largest: float, generator: Generator) -> Surface:
     """Foliage overhead with half-axes of 0.3 m or more.
 
     Args:
@@ -165,16 +173,14 @@ def bough(largest: float, generator: np.random.Generator) -> Surface:
     return foliage((length, width, height), generator.uniform(1.5, 3), generator)
 
 
-def building(generator: np.random.Generator) -> Surface:
+def building(generator: Generator) -> Surface:
     """A flat-roofed building."""
     length, width = generator.uniform(5, 15), generator.uniform(10, 40)
     walls = shapes.box(length, width, 0, generator.uniform(3, 9))
     return Surface(walls, TrackClass.BACKGROUND, generator.uniform(0.1, 0.6))
 
 
-def foliage(
-    radii: tuple[float, float, float], height: float, generator: np.random.Generator
-) -> Surface:
+def foliage(radii: tuple[float, float, float], height: float, generator: Generator) -> Surface:
     """Leaves and twigs in an ellipsoid: many small, scattered returns, most of them weak.
 
     A ray hits a leaf or misses it, while a beam is often filled by it only in part; hence the wide

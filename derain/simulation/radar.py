@@ -11,9 +11,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.scan import Scan
+from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.marshall_palmer import EXTINCTION_EFFICIENCY, extinction
 from derain.simulation.rain_field import RainField
@@ -102,7 +103,7 @@ class Radar:
         height, width = math.radians(highest - lowest), math.radians(left - right)
         return height / self.rows, width / self.columns, self.range_cell
 
-    def centres(self) -> list[NDArray[np.float64]]:
+    def centres(self) -> list[Floats]:
         """Inclinations and azimuths (radians) and ranges (metres) of the cells' centres."""
         top, left = math.radians(self.inclination[1]), math.radians(self.azimuth[1])
         height, width, depth = self.cell
@@ -127,7 +128,7 @@ class Radar:
         )
 
 
-def mean_echoes(track: Track, rain: RainField, radar: Radar) -> NDArray[np.float64]:
+def mean_echoes(track: Track, rain: RainField, radar: Radar) -> Floats:
     """Mean echo of every class in every cell, the same in all frames: nothing on the track moves.
 
     Args:
@@ -148,7 +149,7 @@ def mean_echoes(track: Track, rain: RainField, radar: Radar) -> NDArray[np.float
     return mean
 
 
-def detect(mean: NDArray[np.float64], radar: Radar, generator: np.random.Generator) -> Scan:
+def detect(mean: Floats, radar: Radar, generator: Generator) -> Scan:
     """Makes one frame.
 
     Args:
@@ -183,7 +184,7 @@ def detect(mean: NDArray[np.float64], radar: Radar, generator: np.random.Generat
     return Scan(xyz, label=label, fields=fields, name="radar frame")
 
 
-def surface_echoes(track: Track, radar: Radar) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def surface_echoes(track: Track, radar: Radar) -> tuple[Floats, Floats]:
     """Mean echo of the surfaces in every cell, and how far the radar sees.
 
     Args:
@@ -212,9 +213,7 @@ def surface_echoes(track: Track, radar: Radar) -> tuple[NDArray[np.float64], NDA
     return echoes.reshape(shape), blocks.max(axis=(1, 3))
 
 
-def rain_echoes(
-    rain: RainField, farthest: NDArray[np.float64], radar: Radar
-) -> NDArray[np.float64]:
+def rain_echoes(rain: RainField, farthest: Floats, radar: Radar) -> Floats:
     """Mean echo of the rain in every cell.
 
     The radar looks almost level. So the rain in a cell is taken to be that over the ground at the
@@ -237,7 +236,7 @@ def rain_echoes(
     return np.where(distance < farthest[..., None], echo, 0.0)
 
 
-def volume_reflectivity(rate: NDArray[np.float64]) -> NDArray[np.float64]:
+def volume_reflectivity(rate: Floats) -> Floats:
     """Radar cross-section of a cubic metre of rain at 77 GHz, m² per m³.
 
     The cross-section of all its drops, π/4 ∫ D² N(D) dD, times their backscatter efficiency.
@@ -248,7 +247,7 @@ def volume_reflectivity(rate: NDArray[np.float64]) -> NDArray[np.float64]:
     return BACKSCATTER_EFFICIENCY * extinction(rate) / EXTINCTION_EFFICIENCY
 
 
-def _threshold(echo: NDArray[np.float64], false_alarm_rate: float) -> NDArray[np.float64]:
+def _threshold(echo: Floats, false_alarm_rate: float) -> Floats:
     """What the echo of a cell must exceed: a multiple of the mean of its reference cells.
 
     Source: Finn and Johnson 1968, "Adaptive detection mode with threshold control as a function of

@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
+from derain.simulation.arrays import Columns, Floats, Ints
 from derain.simulation.classes import TrackClass
-from derain.simulation.columns import Columns
 from derain.simulation.detection import detected_surfaces, reported
 from derain.simulation.marshall_palmer import (
     LARGEST_DROP,
@@ -35,14 +35,12 @@ class Drops(Columns):
         diameter: Diameter, float64 (M,), millimetres.
     """
 
-    beam: NDArray[np.int64]
-    range: NDArray[np.float64]
-    diameter: NDArray[np.float64]
+    beam: Ints
+    range: Floats
+    diameter: Floats
 
 
-def draw_drops(
-    rate: float, reach: NDArray[np.float64], sensor: Sensor, generator: np.random.Generator
-) -> Drops:
+def draw_drops(rate: float, reach: Floats, sensor: Sensor, generator: Generator) -> Drops:
     """Draws the drops inside every beam, between the minimum range and the beam's end.
 
     The rain is the same everywhere. The number of drops in a beam is Poisson distributed with a
@@ -68,9 +66,7 @@ def draw_drops(
     return Drops(beam, distance, draw_diameters(rate, len(beam), generator))
 
 
-def thin_out(
-    drops: Drops, beams: NDArray[np.float64], rain: RainField, generator: np.random.Generator
-) -> Drops:
+def thin_out(drops: Drops, beams: Floats, rain: RainField, generator: Generator) -> Drops:
     """Thins drops of a field's heaviest rain out to the rain that falls where they are.
 
     A drop of diameter D stays with the probability exp(−(Λ − Λ of the heaviest rain) D), which is
@@ -90,7 +86,7 @@ def thin_out(
     return drops.take(generator.random(len(drops.beam)) < np.exp(-steeper * drops.diameter))
 
 
-def drop_reflectivity(drops: Drops, sensor: Sensor) -> NDArray[np.float64]:
+def drop_reflectivity(drops: Drops, sensor: Sensor) -> Floats:
     """Apparent reflectivity of drops in clear air, float64 (M,): they cover a share of the beam.
 
     Source: Kilic et al. 2021, "Lidar Light Scattering Augmentation (LISA)".
@@ -139,9 +135,7 @@ class Transmission:
         # between samples is exact where the rain is the same everywhere.
         self._mean = np.concatenate([local[:, :1], depth / distance[1:]], axis=1)
 
-    def __call__(
-        self, beams: NDArray[np.float64], range: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def __call__(self, beams: Floats, range: Floats) -> Floats:
         """Share of the light that survives the way there and back, float64 (N,).
 
         Args:
@@ -160,11 +154,7 @@ class Transmission:
 
 
 def rain_on_beams(
-    clear: Returns,
-    beams: NDArray[np.float64],
-    rain: RainField,
-    sensor: Sensor,
-    generator: np.random.Generator,
+    clear: Returns, beams: Floats, rain: RainField, sensor: Sensor, generator: Generator
 ) -> Returns:
     """Sends beams through rain and keeps what the sensor reports of each.
 
@@ -191,12 +181,12 @@ def rain_on_beams(
 
 
 def _visible_drops(
-    reach: NDArray[np.float64],
-    beams: NDArray[np.float64],
+    reach: Floats,
+    beams: Floats,
     rain: RainField,
     sensor: Sensor,
     transmission: Transmission,
-    generator: np.random.Generator,
+    generator: Generator,
 ) -> Returns:
     """Drops that the sensor would see if there were nothing else in their beams."""
     # A drop that could not be seen even through clear air is left out first, which saves work.

@@ -6,9 +6,9 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from derain.errors import InputError
+from derain.simulation.arrays import Floats
 
 # The facility's supply of water limits the product of rain rate and length of wet track, mm/h · m,
 # and its sprinklers limit that length, metres: it rains 10, 25 and 50 mm/h over 112, 56 and 28 m.
@@ -61,7 +61,7 @@ class RainField(Protocol):
     def heaviest(self) -> float:
         """A rate in mm/h that is exceeded nowhere."""
 
-    def rate(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rate(self, x: Floats, y: Floats) -> Floats:
         """Rain rate in mm/h at ground positions.
 
         Args:
@@ -92,7 +92,7 @@ class UniformRain:
         """The rain rate, in mm/h."""
         return self.nominal
 
-    def rate(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rate(self, x: Floats, y: Floats) -> Floats:
         """The rain rate in mm/h, for each position."""
         return np.full(np.shape(x), float(self.nominal))
 
@@ -137,7 +137,7 @@ class SprinkledRain:
         y = np.arange(-2 * THROW, 2 * THROW, SEARCH_STEP) + drift_y
         return BETWEEN_STEPS * float(self.rate(*np.meshgrid(x, y)).max())
 
-    def rate(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rate(self, x: Floats, y: Floats) -> Floats:
         """Rain rate in mm/h at ground positions.
 
         Args:
@@ -152,7 +152,7 @@ class SprinkledRain:
         on_axis = 2 * math.exp(-0.5) * math.sqrt(2 * math.pi) * THROW / SPACING
         return EXCESS_ON_AXIS * self.nominal / on_axis * density
 
-    def _plumes(self) -> NDArray[np.float64]:
+    def _plumes(self) -> Floats:
         """Where the sprinklers' water comes down, float64 (P, 2), metres."""
         stand = np.arange(FIRST_SPRINKLER, EVEN_SHARE * self.span + BEYOND_EVEN_PART, SPACING)
         phase = 2 * np.pi * (stand - PEAKS[0]) / (PEAKS[1] - PEAKS[0])

@@ -4,14 +4,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from derain.files.columns import INTENSITY_NAMES
 from derain.scan import Scan, to_float32
+from derain.simulation.arrays import Bools, Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import RainField
-from derain.simulation.recorded_beams import RecordedBeams, find_beams
+from derain.simulation.recorded_beams import find_beams
 from derain.simulation.sensor import FULL_SCALE_INTENSITY, Returns, Sensor
 from derain.views.full_scale import full_scale
 
@@ -20,9 +22,7 @@ from derain.views.full_scale import full_scale
 USUAL_REFLECTIVITY = 0.1
 
 
-def rain_on_scan(
-    scan: Scan, rain: RainField, sensor: Sensor, generator: np.random.Generator
-) -> Scan:
+def rain_on_scan(scan: Scan, rain: RainField, sensor: Sensor, generator: Generator) -> Scan:
     """Simulates rain on a scan that was recorded in clear air.
 
     A return stays where it is and gets darker, or a drop in front of it takes its place, or it is
@@ -58,9 +58,11 @@ def rain_on_scan(
         whose other columns are those of the return before it in its row of the sensor's grid.
     """
     beams = find_beams(scan, generator)
-    exposed = _exposed(scan, beams, sensor)
+    too_near = beams.returned & (scan.range[beams.row] < sensor.minimum_range)
+    exposed = np.flatnonzero(np.isfinite(beams.direction[:, 0]) & ~too_near)  # to the rain
     row, direction = beams.row[exposed], beams.direction[exposed]
-    measured = _with_measured_intensity(scan, beams)
+    returns = scan.take(beams.row[beams.returned])
+    measured = scan if returns.measured_intensity is not None else replace(scan, intensity=None)
     clear = _clear_air(measured, row, beams.returned[exposed], sensor, generator)
     one_return = replace(sensor, returns="last" if sensor.returns == "last" else "strongest")
     detected = rain_on_beams(clear, direction, rain, one_return, generator)
@@ -79,24 +81,8 @@ def rain_on_scan(
     return replace(_emptied(rained, lost, scan), shape=scan.shape)
 
 
-def _exposed(scan: Scan, beams: RecordedBeams, sensor: Sensor) -> NDArray[np.int64]:
-    """Numbers of the beams that it rains on, int64 (E,)."""
-    too_near = beams.returned & (scan.range[beams.row] < sensor.minimum_range)
-    return np.flatnonzero(np.isfinite(beams.direction[:, 0]) & ~too_near)
-
-
-def _with_measured_intensity(scan: Scan, beams: RecordedBeams) -> Scan:
-    """The scan, without its intensities if those of its beams' returns were not measured."""
-    returns = scan.take(beams.row[beams.returned])
-    return scan if returns.measured_intensity is not None else replace(scan, intensity=None)
-
-
 def _clear_air(
-    scan: Scan,
-    row: NDArray[np.int64],
-    returned: NDArray[np.bool_],
-    sensor: Sensor,
-    generator: np.random.Generator,
+    scan: Scan, row: Ints, returned: Bools, sensor: Sensor, generator: Generator
 ) -> Returns:
     """What beams returned through clear air, strong enough to have been seen."""
     range_ = np.where(returned, scan.range[row].astype(np.float64), sensor.maximum_range)
@@ -118,11 +104,11 @@ def _clear_air(
 
 def _with_drops(
     scan: Scan,
-    exposed: NDArray[np.int64],
-    direction: NDArray[np.float64],
+    exposed: Ints,
+    direction: Floats,
     detected: Returns,
     sensor: Sensor,
-    generator: np.random.Generator,
+    generator: Generator,
 ) -> Scan:
     """Puts the drops that were detected in the rows of their beams, and labels every row."""
     wet = detected.label == TrackClass.RAIN
@@ -135,13 +121,8 @@ def _with_drops(
 
 
 def _intensity(
-    scan: Scan,
-    row: NDArray[np.int64],
-    clear: Returns,
-    detected: Returns,
-    sensor: Sensor,
-    generator: np.random.Generator,
-) -> NDArray[np.float64]:
+    scan: Scan, row: Ints, clear: Returns, detected: Returns, sensor: Sensor, generator: Generator
+) -> Floats:
     """Intensity of every detected return in the scan's unit, float64 (E,)."""
     assert scan.intensity is not None
     wet = detected.label == TrackClass.RAIN
@@ -155,7 +136,7 @@ def _intensity(
     return intensity
 
 
-def _emptied(rained: Scan, rows: NDArray[np.int64], scan: Scan) -> Scan:
+def _emptied(rained: Scan, rows: Ints, scan: Scan) -> Scan:
     """Makes rows of an organised scan look like the empty cells that it had in clear air."""
     pattern = np.flatnonzero(~scan.valid)[:1]
     xyz = scan.xyz[pattern].astype(np.float64) if len(pattern) else np.full((1, 3), np.nan)
@@ -170,7 +151,7 @@ def _emptied(rained: Scan, rows: NDArray[np.int64], scan: Scan) -> Scan:
 RANGE_NAMES = ("range", "distance")
 
 
-def with_points(scan: Scan, rows: NDArray[np.int64], xyz: NDArray[np.float64]) -> Scan:
+def with_points(scan: Scan, rows: Ints, xyz: Floats) -> Scan:
     """The scan with other coordinates in some rows.
 
     Columns of coordinates, and of range or distance in whatever unit, get the new values in their
@@ -193,7 +174,7 @@ def with_points(scan: Scan, rows: NDArray[np.int64], xyz: NDArray[np.float64]) -
     return replace(scan, xyz=_written(scan.xyz, rows, to_float32(xyz)), fields=fields)
 
 
-def with_intensity(scan: Scan, rows: NDArray[np.int64], intensity: NDArray[np.float64]) -> Scan:
+def with_intensity(scan: Scan, rows: Ints, intensity: Floats) -> Scan:
     """The scan with other intensities in some rows; every other row stays as it is, to the bit.
 
     Args:
@@ -221,7 +202,7 @@ def _unit(column: NDArray[Any], scan: Scan) -> float:
     return float(np.median(column[valid] / scan.range[valid])) if valid.any() else 1.0
 
 
-def _written(column: NDArray[Any], rows: NDArray[np.int64], values: NDArray[Any]) -> NDArray[Any]:
+def _written(column: NDArray[Any], rows: Ints, values: NDArray[Any]) -> NDArray[Any]:
     column = column.copy()
     if column.dtype.kind in "iu":
         limits = np.iinfo(column.dtype)

@@ -4,9 +4,11 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from derain.scan import Scan
+from derain.simulation.arrays import Bools, Floats, Ints
 from derain.simulation.scan_pattern import unit_vectors
 from derain.views.directions import directions
 from derain.views.grid_fit import GridFit, fit_grid
@@ -32,12 +34,12 @@ class RecordedBeams:
         returned: True for the beams that returned, bool (B,).
     """
 
-    row: NDArray[np.int64]
-    direction: NDArray[np.float64]
-    returned: NDArray[np.bool_]
+    row: Ints
+    direction: Floats
+    returned: Bools
 
 
-def find_beams(scan: Scan, generator: np.random.Generator) -> RecordedBeams:
+def find_beams(scan: Scan, generator: Generator) -> RecordedBeams:
     """Finds the beams of a scan.
 
     Every return is a beam of its own, along its own direction, even if several returns lie in one
@@ -80,7 +82,7 @@ def find_beams(scan: Scan, generator: np.random.Generator) -> RecordedBeams:
     )
 
 
-def _cell_directions(scan: Scan, valid: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _cell_directions(scan: Scan, valid: Bools) -> Floats:
     """Usual direction of every cell of an organised scan, float64 (N, 3)."""
     assert scan.shape is not None
     angles = np.full((2, len(scan)), np.nan)
@@ -93,7 +95,7 @@ def _cell_directions(scan: Scan, valid: NDArray[np.bool_]) -> NDArray[np.float64
     return unit_vectors(_polished(azimuth).ravel(), _polished(inclination.T).T.ravel())
 
 
-def _polished(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+def _polished(angle: Floats) -> Floats:
     """Sum of a column's and a row's effect in every cell, of (H, W) angles or NaN.
 
     The effect of the columns is estimated first, and should be the larger one: otherwise rows that
@@ -111,9 +113,7 @@ def _polished(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     return of_row + of_column
 
 
-def _unreturned(
-    scan: Scan, valid: NDArray[np.bool_], generator: np.random.Generator
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _unreturned(scan: Scan, valid: Bools, generator: Generator) -> tuple[Ints, Floats]:
     """Row of the return before, int64 (E,), and direction, float64 (E, 3), of unreturned beams."""
     seen = np.flatnonzero(valid)
     fit = fit_grid([scan.take(seen)])
@@ -130,9 +130,7 @@ def _unreturned(
     return seen[by_pixel[np.maximum(before, 0)]], unit_vectors(*_pixel_angles(fit, chosen))
 
 
-def _looked_at(
-    fit: GridFit, xyz: NDArray[np.float32], pixel: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def _looked_at(fit: GridFit, xyz: NDArray[np.float32], pixel: Ints) -> Bools:
     """Whether pixels lie in the convex hull of the returns, bool (P,)."""
     azimuth, inclination = directions(xyz)
     across, up = _pixel_angles(fit, pixel)
@@ -141,9 +139,7 @@ def _looked_at(
     return in_hull((from_right, inclination), (across - right, up))
 
 
-def _pixel_angles(
-    fit: GridFit, pixel: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _pixel_angles(fit: GridFit, pixel: Ints) -> tuple[Floats, Floats]:
     """Azimuth and inclination of the beam of each pixel, or of its middle, float64 (P,) each."""
     row, column = np.divmod(pixel, fit.grid.columns)
     edges = np.array(fit.grid.edges)
@@ -153,10 +149,7 @@ def _pixel_angles(
     return azimuth, inclination[row]
 
 
-def in_hull(
-    points: tuple[NDArray[np.float64], NDArray[np.float64]],
-    places: tuple[NDArray[np.float64], NDArray[np.float64]],
-) -> NDArray[np.bool_]:
+def in_hull(points: tuple[Floats, Floats], places: tuple[Floats, Floats]) -> Bools:
     """Whether places lie in the convex hull of points, or on its edge.
 
     The hull of the returns never reaches beyond a field of view that is convex, be it a rectangle
@@ -172,15 +165,13 @@ def in_hull(
         True for the places inside, bool (M,).
     """
     (azimuth, inclination), (across, up) = points, places
-    inside: NDArray[np.bool_] = (across >= azimuth.min()) & (across <= azimuth.max())
+    inside: Bools = (across >= azimuth.min()) & (across <= azimuth.max())
     inside &= up <= np.interp(across, *_upper_hull(azimuth, inclination))
     inside &= -up <= np.interp(across, *_upper_hull(azimuth, -inclination))
     return inside
 
 
-def _upper_hull(
-    x: NDArray[np.float64], y: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _upper_hull(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Corners of the upper side of the convex hull, from left to right."""
     order = np.lexsort((y, x))
     x, y = x[order], y[order]

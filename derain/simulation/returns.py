@@ -2,10 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from derain.simulation.columns import Columns
+from derain.simulation.arrays import Bools, Columns, Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,17 +23,17 @@ class Returns(Columns):
             ascending.
     """
 
-    range: NDArray[np.float64]
-    reflectivity: NDArray[np.float64]
-    label: NDArray[np.int64]
-    beam: NDArray[np.int64]
+    range: Floats
+    reflectivity: Floats
+    label: Ints
+    beam: Ints
 
     @property
-    def returned(self) -> NDArray[np.bool_]:
+    def returned(self) -> Bools:
         """True where something returned, bool (N,)."""
         return self.reflectivity > 0
 
     @property
-    def power(self) -> NDArray[np.float64]:
+    def power(self) -> Floats:
         """Received power, float64 (N,), m⁻²: that of reflectivity 1 at 1 m is 1."""
         return self.reflectivity / self.range**2

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from derain.files.extrinsics import Extrinsics
+from derain.simulation.arrays import Floats
 
 
-def unit_vectors(azimuth: ArrayLike, inclination: ArrayLike) -> NDArray[np.float64]:
+def unit_vectors(azimuth: ArrayLike, inclination: ArrayLike) -> Floats:
     """Unit vectors along directions.
 
     Args:
@@ -30,7 +30,7 @@ def rosette(
     shape: tuple[int, int],
     turns: tuple[float, float],
     offsets: Sequence[float],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """Directions of lasers that look through two wedge prisms, which turn at different speeds.
 
     Each prism deflects by half of what the two can do together, towards where it is turned to; the
@@ -58,8 +58,3 @@ def rosette(
     swing = (highest - lowest) / 4 * (np.sin(first) + np.sin(second))
     middle = (highest + lowest) / 2 + (np.array(offsets)[:, None] if offsets else 0.0)
     return azimuth, middle + swing
-
-
-def tilt_matrix(roll: float, pitch: float) -> NDArray[np.float64]:
-    """Turns from the frame of a tilted sensor into the level one, float64 (4, 4); in degrees."""
-    return Extrinsics.of_pose(0, 0, 0, roll, pitch, 0).matrix

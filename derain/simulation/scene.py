@@ -6,11 +6,12 @@ from itertools import repeat
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
+from derain.simulation.arrays import Floats
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import packed
-from derain.simulation.drive import Course, Drive
+from derain.simulation.drive import Course
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.objects import Surface
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
@@ -42,7 +43,7 @@ class SimulatedScene:
     skew: bool = False
 
     @classmethod
-    def of(cls, campaign: Campaign, name: str, generator: np.random.Generator) -> Self:
+    def of(cls, campaign: Campaign, name: str, generator: Generator) -> Self:
         """Draws the scene of a sequence.
 
         Raises:
@@ -55,10 +56,14 @@ class SimulatedScene:
         weather = Weather.of(nominal, at_sensor, wind)
         if campaign.drive is None:
             return cls(LAYOUTS[campaign.layout](generator), rain, weather)
-        course, track, traffic = _drawn(campaign.drive, campaign.times, generator)
-        return cls(track, rain, weather, course, traffic, campaign.drive.skew)
+        drive, times = campaign.drive, campaign.times
+        street = Street.draw(drive.length(times[-1]), generator)
+        course = Course.draw(drive.speed, generator)
+        traffic = draw_traffic(drive.traffic, street, drive.speed, times, generator)
+        track = Track.of(lay_out_street(street, generator))
+        return cls(track, rain, weather, course, traffic, drive.skew)
 
-    def cast(self, sensor: Sensor, times: NDArray[np.float64]) -> Iterator[Returns]:
+    def cast(self, sensor: Sensor, times: Floats) -> Iterator[Returns]:
         """What every beam of a sensor would return through clear air, scan after scan.
 
         Args:
@@ -85,9 +90,7 @@ class SimulatedScene:
                 seen = _nearer(seen, thing.cast(sensor, _followed(pose, sent, velocity)))
             yield seen
 
-    def _moments(
-        self, course: Course, time: float, sensor: Sensor
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _moments(self, course: Course, time: float, sensor: Sensor) -> tuple[Floats, Floats]:
         """When the beams of a scan are sent, and the sensor's pose then: of all at once, or each.
 
         Returns:
@@ -105,22 +108,11 @@ def _numbered(number: int, surface: Surface) -> Track:
     return replace(track, label=packed(track.label, np.full_like(track.label, number)))
 
 
-def _followed(
-    pose: NDArray[np.float64], sent: NDArray[np.float64], velocity: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _followed(pose: Floats, sent: Floats, velocity: Floats) -> Floats:
     """Poses as seen from something that moves, which itself then stays where it is at time 0."""
     seen = pose.copy()
     seen[..., :2, 3] -= sent[..., None] * velocity
     return seen
-
-
-def _drawn(
-    drive: Drive, times: NDArray[np.float64], generator: np.random.Generator
-) -> tuple[Course, Track, list[MovingThing]]:
-    street = Street.draw(drive.length(times[-1]), generator)
-    course = Course.draw(drive.speed, generator)
-    traffic = draw_traffic(drive.traffic, street, drive.speed, times, generator)
-    return course, Track.of(lay_out_street(street, generator)), traffic
 
 
 def _nearer(first: Returns, second: Returns) -> Returns:

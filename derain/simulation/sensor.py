@@ -5,14 +5,16 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.files.documents import shown
+from derain.files.extrinsics import Extrinsics
 from derain.scan import Scan
+from derain.simulation.arrays import Floats, Ints
 from derain.simulation.defects import Defects
 from derain.simulation.returns import Returns as Returns
-from derain.simulation.scan_pattern import rosette, tilt_matrix, unit_vectors
+from derain.simulation.scan_pattern import rosette, unit_vectors
 from derain.views.spherical_grid import FULL_CIRCLE
 
 FULL_SCALE_INTENSITY = 255.0
@@ -128,25 +130,20 @@ class Sensor:
             "tilt": all(abs(angle) <= 90 for angle in self.tilt),
             "minimum_range": self.minimum_range > 0,
             "maximum_range": self.minimum_range < self.maximum_range < math.inf,
-            "aperture": 0 <= self.aperture < math.inf,
             "beam_divergence": 0 < self.beam_divergence < math.pi,
             "detection_threshold": 0 < self.detection_threshold < math.inf,
-            "range_noise": 0 <= self.range_noise < math.inf,
-            "range_noise_growth": 0 <= self.range_noise_growth < math.inf,
-            "weak_range_noise": 0 <= self.weak_range_noise < math.inf,
             "encoder_noise": 0 <= self.encoder_noise < FULL_CIRCLE,
-            "intensity_noise": 0 <= self.intensity_noise < math.inf,
-            "mounting_height": 0 <= self.mounting_height < math.inf,
             "returns": self.returns in get_args(ReturnMode),
             "frame_rate": 0 < self.frame_rate < math.inf,
+            "defects": True,  # which check themselves
         }
-        for name, is_possible in possible.items():
-            if not is_possible:
-                raise InputError(
-                    f"sensor: {name}", f"{shown(getattr(self, name))} is impossible", "Correct it."
-                )
+        for name, value in vars(self).items():
+            if name not in possible:
+                possible[name] = 0 <= value < math.inf
+            if not possible[name]:
+                raise InputError(f"sensor: {name}", f"{shown(value)} is impossible", "Correct it.")
 
-    def beams(self) -> NDArray[np.float64]:
+    def beams(self) -> Floats:
         """Unit vectors along the beams, float64 (rows · columns, 3), frame of the level sensor.
 
         Row-major; in a grid from the highest row and from the left. The frame has the place and
@@ -156,11 +153,11 @@ class Sensor:
         return own @ self.mounting[:3, :3].T if any(self.tilt) else own
 
     @property
-    def mounting(self) -> NDArray[np.float64]:
+    def mounting(self) -> Floats:
         """Turns points of a scan into the frame of the level sensor, float64 (4, 4)."""
-        return tilt_matrix(*self.tilt)
+        return Extrinsics.of_pose(0, 0, 0, *self.tilt, 0).matrix
 
-    def _angles(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _angles(self) -> tuple[Floats, Floats]:
         """Azimuth and inclination of the beams in the sensor's own frame, degrees.
 
         Both can be broadcast to (rows, columns).
@@ -178,7 +175,7 @@ class Sensor:
             azimuth = azimuth + np.array(self.row_azimuths)[:, None]
         return azimuth, rows
 
-    def beam_times(self) -> NDArray[np.float64]:
+    def beam_times(self) -> Floats:
         """When each beam is sent, float64 (rows · columns,), seconds after the scan begins.
 
         Columns follow each other from the left to the right, as of a sensor that spins clockwise.
@@ -191,18 +188,16 @@ class Sensor:
         """Width that a beam gains with distance, metres per metre."""
         return 2 * math.tan(self.beam_divergence / 2)
 
-    def beam_width(self, range: NDArray[np.float64]) -> NDArray[np.float64]:
+    def beam_width(self, range: Floats) -> Floats:
         """Width of a beam at distances in metres, in metres."""
         return self.aperture + self.beam_spread * range
 
-    def beam_volume(
-        self, near: NDArray[np.float64], far: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def beam_volume(self, near: Floats, far: Floats) -> Floats:
         """Volume of a beam's cone between two distances in metres, in cubic metres."""
         widths = self.beam_width(far) ** 3 - self.beam_width(near) ** 3
         return math.pi / 12 / self.beam_spread * widths
 
-    def measure(self, returns: Returns, generator: np.random.Generator) -> Scan:
+    def measure(self, returns: Returns, generator: Generator) -> Scan:
         """Turns the returns into a scan, with the noise of the measurement.
 
         Args:
@@ -214,7 +209,8 @@ class Sensor:
         """
         dual = self.returns == "dual"
         returns = self.defects.at_borders(returns, self.columns, dual=dual, generator=generator)
-        seen = returns.take(np.flatnonzero(self._received(returns, generator)))
+        received = self.defects.received(returns, (self.rows, self.columns), generator)
+        seen = returns.take(received & returns.returned)
         distance = self.measured_range(seen.range, generator, seen.power)
         intensity = self.measured_intensity(seen.reflectivity, generator)
         direction = self._measured_directions(seen.beam, generator)
@@ -225,13 +221,7 @@ class Sensor:
         )
         return scan.take(self.defects.reported(seen.beam, generator))
 
-    def _received(self, returns: Returns, generator: np.random.Generator) -> NDArray[np.bool_]:
-        received = self.defects.received(returns, (self.rows, self.columns), generator)
-        return received & returns.returned
-
-    def _measured_directions(
-        self, beam: NDArray[np.int64], generator: np.random.Generator
-    ) -> NDArray[np.float64]:
+    def _measured_directions(self, beam: Ints, generator: Generator) -> Floats:
         """Unit vectors in the sensor's own frame, float64 (N, 3), as the encoder measures them."""
         azimuth, inclination = self._angles()
         if self.encoder_noise:
@@ -239,11 +229,8 @@ class Sensor:
         return unit_vectors(azimuth, inclination)[beam]
 
     def measured_range(
-        self,
-        range: NDArray[np.float64],
-        generator: np.random.Generator,
-        power: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]:
+        self, range: Floats, generator: Generator, power: Floats | None = None
+    ) -> Floats:
         """Distances in metres, float64 (N,), with the noise of the measurement.
 
         Args:
@@ -257,9 +244,7 @@ class Sensor:
             deviation = np.hypot(deviation, self.weak_range_noise / np.sqrt(excess))
         return range + generator.normal(0, deviation)
 
-    def measured_intensity(
-        self, reflectivity: NDArray[np.float64], generator: np.random.Generator
-    ) -> NDArray[np.float64]:
+    def measured_intensity(self, reflectivity: Floats, generator: Generator) -> Floats:
         """Intensities in 0..255, float64 (N,), with the noise of the measurement.
 
         They are linear in apparent reflectivity, as of a sensor that corrects for distance.

@@ -59,10 +59,6 @@ def read_fields(make: Callable[..., Made], entry: Entry, parsers: Mapping[str, P
         raise entry.fault(f"{error.subject}: {error.reason}", error.remedy) from error
 
 
-def _defects(entry: Entry) -> Defects:
-    return read_fields(Defects, entry, dict.fromkeys(get_type_hints(Defects), Entry.number))
-
-
 # What reads a value, by its type.
 PARSERS: dict[Any, Parser] = {
     tuple[float, float]: lambda entry: entry.numbers(2),
@@ -71,6 +67,8 @@ PARSERS: dict[Any, Parser] = {
     float: Entry.number,
     ReturnMode: Entry.text,
     Pattern: Entry.text,
-    Defects: _defects,
+    Defects: lambda entry: read_fields(
+        Defects, entry, dict.fromkeys(get_type_hints(Defects), Entry.number)
+    ),
 }
 _SENSOR = {name: PARSERS[kind] for name, kind in get_type_hints(Sensor).items()}

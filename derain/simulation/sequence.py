@@ -23,7 +23,8 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import ArrayLike, NDArray
+from numpy.random import Generator
+from numpy.typing import ArrayLike
 
 from derain.cards.card import load_card
 from derain.files import write_scan
@@ -33,6 +34,7 @@ from derain.files.frame_times import FRAME_COLUMNS, METADATA
 from derain.files.labels import write_labels
 from derain.fusion import NO_DETECTIONS, fuse, nearest_in_time
 from derain.scan import Scan, to_float32
+from derain.simulation.arrays import Floats
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import unpacked
 from derain.simulation.radar import Radar, detect, mean_echoes
@@ -97,11 +99,7 @@ def _write_mounting(folder: Path, radar: Radar, sensor: Sensor) -> Extrinsics:
 
 
 def _record_radar(
-    folder: Path,
-    scene: SimulatedScene,
-    radar: Radar,
-    scan_times: NDArray[np.float64],
-    generator: np.random.Generator,
+    folder: Path, scene: SimulatedScene, radar: Radar, scan_times: Floats, generator: Generator
 ) -> list[Scan]:
     """Writes what the radar detects while scans are taken; returns the frame nearest to each."""
     period = 1 / radar.frame_rate
@@ -123,7 +121,7 @@ def _with_intensity(frame: Scan, radar: Radar) -> Scan:
     return replace(frame, intensity=to_float32(frame.fields["rcs"] - weakening))
 
 
-def _extended(frame: Scan) -> dict[str, NDArray[np.float64]]:
+def _extended(frame: Scan) -> dict[str, Floats]:
     """The columns of REHEARSE-3D's extended radar, whose names and units are not published.
 
     Confidence is the probability that noise alone would have been weaker than the echo.
@@ -143,13 +141,13 @@ def _stems(count: int) -> list[str]:
     return [f"{number:06d}" for number in range(count)]
 
 
-def _write_times(folder: Path, times: NDArray[np.float64]) -> None:
+def _write_times(folder: Path, times: Floats) -> None:
     rows = [f"{stem},{time:.6f}" for stem, time in zip(_stems(len(times)), times, strict=True)]
     with replacing(folder / METADATA) as temporary:
         temporary.write_text("\n".join([",".join(FRAME_COLUMNS), *rows]) + "\n", "utf-8")
 
 
-def _write_poses(folder: Path, poses: Sequence[NDArray[np.float64]]) -> None:
+def _write_poses(folder: Path, poses: Sequence[Floats]) -> None:
     """Writes poses in KITTI's form, as seen from the first of them."""
     to_first = np.linalg.inv(poses[0])
     rows = [(to_first @ pose)[:3].ravel() for pose in poses]

@@ -3,9 +3,12 @@
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
-Triangles = NDArray[np.float64]
+from derain.simulation.arrays import Floats
+
+Triangles = Floats
 
 
 def rectangle(x: tuple[float, float], y: tuple[float, float], height: float) -> Triangles:
@@ -14,7 +17,7 @@ def rectangle(x: tuple[float, float], y: tuple[float, float], height: float) -> 
     return corners[[[0, 1, 2], [0, 2, 3]]]
 
 
-def prism(outline: NDArray[np.float64], bottom: float, top: float) -> Triangles:
+def prism(outline: Floats, bottom: float, top: float) -> Triangles:
     """A vertical prism with its ends closed.
 
     Args:
@@ -57,24 +60,20 @@ def placed(triangles: Triangles, x: float, y: float, heading: float = 0.0) -> Tr
     """Turns a shape by a heading in radians about the z axis, then moves it to (x, y)."""
     cosine, sine = np.cos(heading), np.sin(heading)
     turn = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
-    moved: Triangles = triangles @ turn + (x, y, 0)
-    return moved
+    return np.asarray(triangles @ turn + (x, y, 0))
 
 
 def raised(triangles: Triangles, height: float) -> Triangles:
     """Moves a shape up by a height in metres."""
-    lifted: Triangles = triangles + np.array([0, 0, height])
-    return lifted
+    return np.asarray(triangles + np.array([0, 0, height]))
 
 
 def sloped(triangles: Triangles, ahead: float, left: float) -> Triangles:
     """Raises a shape by a share of its x and of its y, as on sloping ground."""
-    shear = np.array([[1, 0, ahead], [0, 1, left], [0, 0, 1]])
-    leaning: Triangles = triangles @ shear
-    return leaning
+    return np.asarray(triangles @ np.array([[1, 0, ahead], [0, 1, left], [0, 0, 1]]))
 
 
-def leaves(centres: NDArray[np.float64], size: float, generator: np.random.Generator) -> Triangles:
+def leaves(centres: Floats, size: float, generator: Generator) -> Triangles:
     """One small triangle, turned at random, about every centre.
 
     Args:
@@ -85,9 +84,7 @@ def leaves(centres: NDArray[np.float64], size: float, generator: np.random.Gener
     return centres[:, None, :] + generator.normal(0, size, (len(centres), 3, 3))
 
 
-def inside_ellipsoid(
-    count: int, radii: tuple[float, float, float], generator: np.random.Generator
-) -> NDArray[np.float64]:
+def inside_ellipsoid(count: int, radii: tuple[float, float, float], generator: Generator) -> Floats:
     """Points uniform in an ellipsoid about the origin, (count, 3), metres.
 
     Args:
@@ -100,7 +97,7 @@ def inside_ellipsoid(
     return direction * np.cbrt(generator.random((count, 1))) * radii
 
 
-def sheet(corners: NDArray[np.float64]) -> Triangles:
+def sheet(corners: Floats) -> Triangles:
     """A surface through a grid of corners, two triangles for each of its cells.
 
     Args:
@@ -109,23 +106,14 @@ def sheet(corners: NDArray[np.float64]) -> Triangles:
     return quads(corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:])
 
 
-def quads(
-    first: NDArray[np.float64],
-    second: NDArray[np.float64],
-    third: NDArray[np.float64],
-    fourth: NDArray[np.float64],
-) -> Triangles:
+def quads(first: Floats, second: Floats, third: Floats, fourth: Floats) -> Triangles:
     """Quadrangles by their corners in order, float64 (..., 3) each: two triangles for each."""
     halves = np.stack([first, second, third, first, third, fourth], axis=-2)
     return halves.reshape(-1, 3, 3)
 
 
 def rods(
-    starts: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    radius: NDArray[np.float64] | float,
-    taper: float = 1.0,
-    sides: int = 3,
+    starts: Floats, ends: Floats, radius: Floats | float, taper: float = 1.0, sides: int = 3
 ) -> Triangles:
     """Thin straight rods without caps.
 
@@ -145,12 +133,7 @@ def rods(
     return quads(lower, lower[:, following], upper[:, following], upper)
 
 
-def blades(
-    starts: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    width: NDArray[np.float64] | float,
-    generator: np.random.Generator,
-) -> Triangles:
+def blades(starts: Floats, ends: Floats, width: Floats | float, generator: Generator) -> Triangles:
     """One flat triangle from each start, where it is wide, to a point: a blade of grass, a twig.
 
     Args:
@@ -166,7 +149,7 @@ def blades(
     return np.stack([starts - aside, starts + aside, ends], axis=1)
 
 
-def across(along: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def across(along: Floats) -> tuple[Floats, Floats]:
     """Two unit vectors at right angles to each vector and to each other, (R, 3) both.
 
     Args:
@@ -182,7 +165,7 @@ def across(along: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     return first.T, second.T
 
 
-def nearest_to_axis(triangles: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def nearest_to_axis(triangles: NDArray[np.floating[Any]]) -> Floats:
     """The x and y, (2, T), where each triangle, seen from above, is nearest to the z axis.
 
     That is a corner or a place on an edge; that the axis goes through a triangle does not count.
@@ -193,5 +176,4 @@ def nearest_to_axis(triangles: NDArray[np.floating[Any]]) -> NDArray[np.float64]
     share = np.clip(-(first * edge).sum(axis=-1) / length, 0, 1)
     places = first + share[..., None] * edge
     nearest = (places * places).sum(axis=-1).argmin(axis=1)
-    there: NDArray[np.float64] = places[np.arange(len(places)), nearest].T
-    return there
+    return np.asarray(places[np.arange(len(places)), nearest].T)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Self, get_args, get_type_hints
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
@@ -178,7 +179,7 @@ LOGARITHMIC_SPANS = frozenset(
 )
 
 
-def draw(spans: Any, name: str, generator: np.random.Generator) -> float:
+def draw(spans: Any, name: str, generator: Generator) -> float:
     """Draws a value from a span.
 
     Args:
@@ -192,7 +193,7 @@ def draw(spans: Any, name: str, generator: np.random.Generator) -> float:
     return float(generator.uniform(*span))
 
 
-def draw_kind(weights: Mapping[str, float], generator: np.random.Generator) -> str:
+def draw_kind(weights: Mapping[str, float], generator: Generator) -> str:
     """Draws a name by weights, which need not add up to 1."""
     share = np.array(list(weights.values())) / sum(weights.values())
     return str(generator.choice(list(weights), p=share))
@@ -210,17 +211,11 @@ def _impossible(subject: str, spans: Any, name: str, remedy: str) -> InputError:
     return InputError(f"{subject}: {name}", f"{shown(getattr(spans, name))} is impossible", remedy)
 
 
-def _rows(entry: Entry) -> tuple[int, ...]:
-    return tuple(item.whole(2, MOST_ROWS) for item in entry.items())
-
-
-def _weights(entry: Entry) -> dict[str, float]:
-    return {name: member.number() for name, member in entry.members().items()}
-
-
 # What reads a property, by its type.
 _PARSERS = PARSERS | {
-    tuple[int, ...]: _rows,
-    Mapping[str, float]: _weights,
+    tuple[int, ...]: lambda entry: tuple(item.whole(2, MOST_ROWS) for item in entry.items()),
+    Mapping[str, float]: lambda entry: {
+        name: one.number() for name, one in entry.members().items()
+    },
     DefectSpans: DefectSpans.of,
 }

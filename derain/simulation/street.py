@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import objects, shapes
 from derain.simulation.classes import TrackClass
@@ -51,7 +52,7 @@ class Street:
     junctions: tuple[float, ...]
 
     @classmethod
-    def draw(cls, length: float, generator: np.random.Generator) -> "Street":
+    def draw(cls, length: float, generator: Generator) -> "Street":
         """Draws the plan of a street for a drive of a length in metres."""
         ahead = length + generator.uniform(*NEXT_JUNCTION)
         junctions = [ahead]
@@ -82,7 +83,7 @@ class Street:
         return any(x.min() < middle + half and x.max() > middle - half for middle in self.junctions)
 
 
-def lay_out_street(street: Street, generator: np.random.Generator) -> Iterator[Surface]:
+def lay_out_street(street: Street, generator: Generator) -> Iterator[Surface]:
     """What stands in a street.
 
     On both sides, all along and on both sides of its pavements: parked cars, bicycles, trees with
@@ -97,7 +98,7 @@ def lay_out_street(street: Street, generator: np.random.Generator) -> Iterator[S
                     yield surface
 
 
-def _ground(street: Street, generator: np.random.Generator) -> Iterator[Surface]:
+def _ground(street: Street, generator: Generator) -> Iterator[Surface]:
     begin, end = street.ends
     yield objects.ground((begin, end), (-150, 150), generator)
     right, left = street.beside(-1, PARKING), street.beside(1, PARKING)
@@ -110,7 +111,7 @@ def _ground(street: Street, generator: np.random.Generator) -> Iterator[Surface]
         yield objects.asphalt(across, (left, 80), generator)
 
 
-def _parked(street: Street, side: int, generator: np.random.Generator) -> Iterator[Surface]:
+def _parked(street: Street, side: int, generator: Generator) -> Iterator[Surface]:
     for x in np.arange(*street.ends, LOT):
         kind = generator.choice([0, 1, 2], p=[0.6, 0.32, 0.08])  # none, a car, a bicycle
         make = (None, objects.car, objects.bike)[kind]
@@ -120,7 +121,7 @@ def _parked(street: Street, side: int, generator: np.random.Generator) -> Iterat
             yield make(generator).placed(x + generator.uniform(-0.4, 0.4), y, heading)
 
 
-def _pavement(street: Street, side: int, generator: np.random.Generator) -> Iterator[Surface]:
+def _pavement(street: Street, side: int, generator: Generator) -> Iterator[Surface]:
     kerb = street.beside(side, (PARKING + KERB) / 2)
     half = street.lane + PAVEMENT - PARKING + 0.01
     middle, width = street.beside(side, (PARKING + PAVEMENT) / 2), PAVEMENT - PARKING
@@ -140,7 +141,7 @@ def _pavement(street: Street, side: int, generator: np.random.Generator) -> Iter
         yield objects.pedestrian(generator).placed(x, y, generator.uniform(0, 2 * np.pi))
 
 
-def _verge(street: Street, side: int, generator: np.random.Generator) -> Iterator[Surface]:
+def _verge(street: Street, side: int, generator: Generator) -> Iterator[Surface]:
     for x in _scattered(street, 0.5, generator):
         length, width, height = generator.uniform(0.3, 1.5, 3)
         bush = objects.foliage((length, width, height), 0.7 * height, generator)
@@ -152,7 +153,7 @@ def _verge(street: Street, side: int, generator: np.random.Generator) -> Iterato
         yield from _tree(x, street.beside(side, PAVEMENT + generator.uniform(2, 12)), generator)
 
 
-def _houses(street: Street, side: int, generator: np.random.Generator) -> Iterator[Surface]:
+def _houses(street: Street, side: int, generator: Generator) -> Iterator[Surface]:
     begin, end = street.ends
     while begin < end:
         house = objects.building(generator)
@@ -162,12 +163,12 @@ def _houses(street: Street, side: int, generator: np.random.Generator) -> Iterat
         begin += length + generator.uniform(0.5, 12)
 
 
-def _tree(x: float, y: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _tree(x: float, y: float, generator: Generator) -> Iterator[Surface]:
     crown = generator.uniform(1, 2.5)
     yield from (part.placed(x, y) for part in objects.tree(crown, generator))
 
 
-def _scattered(street: Street, per_metre: float, generator: np.random.Generator) -> Iterator[float]:
+def _scattered(street: Street, per_metre: float, generator: Generator) -> Iterator[float]:
     """Places along the whole street, as many of them as Poisson's law gives, metres along x."""
     begin, end = street.ends
     count = generator.poisson(per_metre * (end - begin))

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.simulation.arrays import Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface
-from derain.simulation.rough_surface import backscatter
 from derain.simulation.sensor import Returns, Sensor
 from derain.system.open3d_import import import_open3d
 
@@ -25,34 +25,25 @@ class Track:
         reflectivity: Reflectivity of each triangle, float64 (T,), in 0..1.
         label: TrackClass of each triangle, int64 (T,).
         roughness: Roughness of each triangle, float64 (T,), or of all of them, radians, see
-            :mod:`derain.simulation.rough_surface`.
+            :func:`backscatter`.
     """
 
     triangles: NDArray[np.float32]
-    reflectivity: NDArray[np.float64]
-    label: NDArray[np.int64]
-    roughness: NDArray[np.float64] | float = 0.0
+    reflectivity: Floats
+    label: Ints
+    roughness: Floats | float = 0.0
 
     @classmethod
     def of(cls, surfaces: Iterable[Surface]) -> "Track":
         """Joins surfaces, at least one, into a track."""
-        triangles, reflectivity, label, roughness = zip(
-            *(
-                (
-                    surface.triangles,
-                    np.broadcast_to(surface.reflectivity, len(surface.triangles)),
-                    np.full(len(surface.triangles), surface.label, dtype=np.int64),
-                    np.full(len(surface.triangles), surface.roughness),
-                )
-                for surface in surfaces
-            ),
-            strict=True,
-        )
+        parts = list(surfaces)
+        counts = [len(part.triangles) for part in parts]
+        spread = zip(parts, counts, strict=True)
         return cls(
-            np.concatenate(triangles).astype(np.float32),
-            np.concatenate(reflectivity),
-            np.concatenate(label),
-            np.concatenate(roughness),
+            np.concatenate([part.triangles for part in parts]).astype(np.float32),
+            np.concatenate([np.broadcast_to(part.reflectivity, count) for part, count in spread]),
+            np.repeat(np.array([part.label for part in parts], np.int64), counts),
+            np.repeat([part.roughness for part in parts], counts),
         )
 
     @classmethod
@@ -66,12 +57,12 @@ class Track:
         added = list(surfaces)
         return Track.joined([self, Track.of(added)]) if added else self
 
-    def cast(self, sensor: Sensor, pose: NDArray[np.float64] | None = None) -> Returns:
+    def cast(self, sensor: Sensor, pose: Floats | None = None) -> Returns:
         """What every beam of a sensor would return through clear air to a perfect detector.
 
         A beam is one ray. Smooth surfaces scatter like Lambert's: their apparent reflectivity falls
         with the cosine of the angle of incidence. That of rough ones falls less, see
-        :func:`derain.simulation.rough_surface.backscatter`.
+        :func:`backscatter`.
 
         Args:
             sensor: The sensor.
@@ -113,3 +104,29 @@ class Track:
         corners = np.arange(3 * len(self.triangles), dtype=np.uint32).reshape(-1, 3)
         scene.add_triangles(tensor(self.triangles.reshape(-1, 3)), tensor(corners))
         return scene
+
+
+def backscatter(cosine: Floats, roughness: Floats) -> Floats:
+    """Apparent reflectivity of surfaces over their reflectivity, float64 (N,).
+
+    A smooth matt surface returns as Lambert's: in proportion to the cosine of the angle of
+    incidence, so that a road that is lit at a grazing angle is nearly black. The facets of a rough
+    one partly face the light, and it returns a share B of what it does not lose, however flat the
+    light comes in.
+
+    It is Oren and Nayar's qualitative model where light and eye are at one place:
+    A cos θ + B sin² θ, with A = 1 - 0.5 σ² / (σ² + 0.33) and B = 0.45 σ² / (σ² + 0.09).
+
+    Args:
+        cosine: Cosine of the angle of incidence θ, float64 (N,), in 0..1.
+        roughness: Standard deviation σ of the slopes of the facets, float64 (N,), radians; 0 is
+            Lambert's surface.
+
+    Source: Oren and Nayar 1994, "Generalization of Lambert's reflectance model". That it corrects
+        intensities of laser scanners: "Terrestrial Laser Scanning Intensity Correction by Piecewise
+        Fitting and Overlap-Driven Adjustment", Remote Sensing 9(11), 1090, 2017.
+    """
+    variance = roughness**2
+    facing = 1 - 0.5 * variance / (variance + 0.33)
+    grazing = 0.45 * variance / (variance + 0.09)
+    return facing * cosine + grazing * (1 - cosine**2)

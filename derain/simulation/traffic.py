@@ -4,10 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.simulation import objects
+from derain.simulation.arrays import Floats
 from derain.simulation.objects import Surface
 from derain.simulation.street import KERB, PAVEMENT, Street
 
@@ -34,29 +35,17 @@ class MovingThing:
     """
 
     surface: Surface
-    velocity: NDArray[np.float64]
+    velocity: Floats
 
-    def bounds(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    def bounds(self, times: Floats) -> Floats:
         """Its least and greatest x and y at some times, float64 (T, 2, 2), metres."""
         corners = self.surface.triangles[..., :2].reshape(-1, 2)
         box = np.stack([corners.min(axis=0), corners.max(axis=0)])
         return np.asarray(box + (times[:, None] * self.velocity)[:, None, :])
 
 
-@dataclass(frozen=True)
-class _Moment:
-    """Where and when something is near the sensor, which then is at x."""
-
-    time: float
-    x: float
-
-
 def draw_traffic(
-    count: int,
-    street: Street,
-    speed: float,
-    times: NDArray[np.float64],
-    generator: np.random.Generator,
+    count: int, street: Street, speed: float, times: Floats, generator: Generator
 ) -> list[MovingThing]:
     """Draws the cars and pedestrians that move in a street.
 
@@ -80,7 +69,7 @@ def draw_traffic(
         draw = WAYS[number % len(WAYS)]
         for _ in range(TRIES):
             time = generator.uniform(0, times[-1])
-            thing = draw(street, _Moment(time, speed * time), generator)
+            thing = _moving(*draw(street, speed * time, generator), time)
             bounds = thing.bounds(times)
             if not any(_meet(bounds, other) for other in taken):
                 break
@@ -93,7 +82,7 @@ def draw_traffic(
     return things
 
 
-def _meet(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
+def _meet(first: Floats, second: Floats) -> bool:
     """Whether bounds, float64 (T, 2, 2) each, come nearer than the clearance at one time."""
     apart = (first[:, 0] > second[:, 1] + KEPT_APART) | (second[:, 0] > first[:, 1] + KEPT_APART)
     return bool((~apart.any(axis=1)).any())
@@ -108,48 +97,53 @@ def _moving(
     return MovingThing(surface.placed(x, y, heading), velocity)
 
 
-def _car_ahead(street: Street, near: _Moment, generator: np.random.Generator) -> MovingThing:
+# A thing, where it is when it is near the sensor, where it heads, radians, and its speed, m/s.
+Way = tuple[Surface, tuple[float, float], float, float]
+
+
+def _car_ahead(street: Street, x: float, generator: Generator) -> Way:
     # Three of four are ahead, where every sensor looks.
     away = generator.uniform(8, 45) * generator.choice([1, -1], p=[0.75, 0.25])
-    place = near.x + away, generator.uniform(-0.3, 0.3)
-    return _moving(objects.car(generator), place, 0, generator.uniform(*DRIVING), near.time)
+    place = x + away, generator.uniform(-0.3, 0.3)
+    return objects.car(generator), place, 0, generator.uniform(*DRIVING)
 
 
-def _car_oncoming(street: Street, near: _Moment, generator: np.random.Generator) -> MovingThing:
-    place = near.x + generator.uniform(-5, 45), street.lane + generator.uniform(-0.3, 0.3)
-    return _moving(objects.car(generator), place, np.pi, generator.uniform(*DRIVING), near.time)
+def _car_oncoming(street: Street, x: float, generator: Generator) -> Way:
+    place = x + generator.uniform(-5, 45), street.lane + generator.uniform(-0.3, 0.3)
+    return objects.car(generator), place, np.pi, generator.uniform(*DRIVING)
 
 
-def _walker(street: Street, near: _Moment, generator: np.random.Generator) -> MovingThing:
+def _walker(street: Street, x: float, generator: Generator) -> Way:
     side, heading = generator.choice([-1, 1]), np.pi * generator.integers(2)
     y = street.beside(side, generator.uniform(KERB + 0.5, PAVEMENT - 0.4))
-    place, pace = (near.x + generator.uniform(-5, 35), y), generator.uniform(*WALKING)
-    return _moving(objects.pedestrian(generator), place, heading, pace, near.time)
+    place, pace = (x + generator.uniform(-5, 35), y), generator.uniform(*WALKING)
+    return objects.pedestrian(generator), place, heading, pace
 
 
-def _car_crossing(street: Street, near: _Moment, generator: np.random.Generator) -> MovingThing:
+def _car_crossing(street: Street, x: float, generator: Generator) -> Way:
     way = generator.choice([-1, 1])  # to the left or to the right, on the right of its street
-    x = _junction(street, near, generator) + way * street.lane / 2
+    x = _junction(street, x, generator) + way * street.lane / 2
     place, speed = (x, generator.uniform(-12, 12)), generator.uniform(*DRIVING)
-    return _moving(objects.car(generator), place, way * np.pi / 2, speed, near.time)
+    return objects.car(generator), place, way * np.pi / 2, speed
 
 
-def _walker_crossing(street: Street, near: _Moment, generator: np.random.Generator) -> MovingThing:
+def _walker_crossing(street: Street, x: float, generator: Generator) -> Way:
     way, edge = generator.choice([-1, 1]), generator.choice([-1, 1])
-    x = _junction(street, near, generator) + edge * (street.lane + generator.uniform(0.5, 2))
+    x = _junction(street, x, generator) + edge * (street.lane + generator.uniform(0.5, 2))
     place = x, street.axis + generator.uniform(-1, 1) * street.lane
     pace = generator.uniform(*WALKING)
-    return _moving(objects.pedestrian(generator), place, way * np.pi / 2, pace, near.time)
+    return objects.pedestrian(generator), place, way * np.pi / 2, pace
 
 
-def _junction(street: Street, near: _Moment, generator: np.random.Generator) -> float:
+def _junction(street: Street, x: float, generator: Generator) -> float:
     """One of the two junctions nearest to a place 15 m ahead of the sensor, metres along x."""
-    distance = np.abs(np.array(street.junctions) - near.x - 15)
+    distance = np.abs(np.array(street.junctions) - x - 15)
     nearest = np.argsort(distance)[: generator.integers(1, 3)]
     return street.junctions[int(nearest[-1])]
 
 
-WAYS: tuple[Callable[[Street, _Moment, np.random.Generator], MovingThing], ...] = (
+# Ways to move near the sensor, by where it is then, metres along x.
+WAYS: tuple[Callable[[Street, float, Generator], Way], ...] = (
     _car_ahead,
     _car_oncoming,
     _walker,

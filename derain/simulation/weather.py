@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Self
 
-import numpy as np
+from numpy.random import Generator
 
 from derain.simulation.marshall_palmer import INTERCEPT, extinction, slope
 
@@ -22,7 +22,7 @@ MEDIAN_VOLUME_DIAMETER = 3.67
 STRONGEST_WIND = 2.0
 
 
-def draw_wind(generator: np.random.Generator) -> tuple[float, float]:
+def draw_wind(generator: Generator) -> tuple[float, float]:
     """Draws a wind: its velocity towards x (ahead) and y (left), m/s."""
     ahead, left = generator.uniform(-STRONGEST_WIND, STRONGEST_WIND, 2)
     return float(ahead), float(left)

@@ -1,18 +1,26 @@
-"""The training world: what places, sensors and precipitation of a scan are drawn from."""
+"""The training world: what scans are drawn from, and a data set of single scans drawn from one."""
 
+import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+import yaml
+from numpy.random import Generator
 
+from derain.cards.card import load_card
 from derain.errors import InputError
+from derain.files import write_scan
+from derain.files.atomic import replacing
 from derain.files.documents import Entry, shown
+from derain.files.labels import write_labels
 from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
-from derain.simulation.classes import TrackClass
+from derain.simulation.campaign import SplitSequences
+from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.drawn_sensor import draw_sensor
 from derain.simulation.flying.kinds import PrecipitationSpans, draw_precipitation
 from derain.simulation.flying.meeting import meet
@@ -24,6 +32,13 @@ from derain.simulation.sensor import Sensor
 from derain.simulation.sensor_file import read_fields
 from derain.simulation.spans import SensorSpans, draw_kind
 from derain.simulation.track import Track
+
+# What the folders of a sequence are called.
+FOLDERS = load_card("simulated").layout
+
+# Of each sequence.
+STEM = "000000"
+DRAWN_WORLDS = "drawn.yaml"
 
 # A scan with fewer points teaches nothing, and one with a greater share of rain shows weather that
 # no sensor is used in: both are drawn again, at most so many times before the world is refused.
@@ -74,7 +89,7 @@ class World:
             InputError: Another key, or a value of another kind or that is impossible.
         """
         parsers = {
-            "places": _weights_of_places,
+            "places": lambda part: dict(part.record(dict.fromkeys(LAYOUTS, Entry.number))),
             "horizon": lambda part: part.within(0, 1),
             "carrier": lambda part: part.within(0, 1),
             "sensors": SensorSpans.of,
@@ -123,7 +138,7 @@ def load_world(name: str | Path) -> World:
     return World.of(Entry.of_yaml(packaged_or_own(name, packaged_worlds(), "world")))
 
 
-def draw_scan(world: World, generator: np.random.Generator) -> DrawnScan:
+def draw_scan(world: World, generator: Generator) -> DrawnScan:
     """Draws a place, a sensor and the weather, and takes a scan.
 
     Args:
@@ -143,7 +158,7 @@ def draw_scan(world: World, generator: np.random.Generator) -> DrawnScan:
     raise InputError("world", "its scans are empty or nothing but rain", "Draw less rain.")
 
 
-def _drawn(world: World, generator: np.random.Generator) -> DrawnScan:
+def _drawn(world: World, generator: Generator) -> DrawnScan:
     sensor = draw_sensor(world.sensors, generator)
     place = draw_kind(world.places, generator)
     track = _laid_out(place, world, sensor, generator)
@@ -152,7 +167,7 @@ def _drawn(world: World, generator: np.random.Generator) -> DrawnScan:
     return DrawnScan(sensor.measure(detected, generator), place, sensor, precipitation)
 
 
-def _laid_out(place: str, world: World, sensor: Sensor, generator: np.random.Generator) -> Track:
+def _laid_out(place: str, world: World, sensor: Sensor, generator: Generator) -> Track:
     track = LAYOUTS[place](generator)
     if place not in INDOORS and generator.random() < world.horizon:
         track = track.with_surfaces(lay_out_horizon(generator))
@@ -161,5 +176,61 @@ def _laid_out(place: str, world: World, sensor: Sensor, generator: np.random.Gen
     return track
 
 
-def _weights_of_places(entry: Entry) -> dict[str, float]:
-    return dict(entry.record(dict.fromkeys(LAYOUTS, Entry.number)))
+@dataclass(frozen=True)
+class WorldCampaign(SplitSequences):
+    """A data set in which every sequence is one scan, of another place, sensor and weather.
+
+    Attributes:
+        train: Scans to train on, at least one.
+        validation: Scans to choose a model with.
+        test: Scans to judge it on.
+        seed: Seed of everything drawn.
+        world: What they are drawn from, or the name of a packaged file of it, or of one's own.
+
+    Raises:
+        InputError: Too few or too many scans, or a negative seed.
+    """
+
+    train: int = 1000
+    validation: int = 100
+    test: int = 0
+    seed: int = 0
+    world: World | str = field(default_factory=World)
+    DIGITS = 5
+
+    def __post_init__(self) -> None:
+        self._check_counts()
+
+    def resolved(self) -> Self:
+        """The same with its world read.
+
+        Raises:
+            InputError: A file that is missing or damaged.
+        """
+        world = load_world(self.world) if isinstance(self.world, str) else self.world
+        return replace(self, world=world)
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """Everything that the files depend on, as reading it back from JSON gives it."""
+        return self._described(worlds=asdict(self), split=self.split)
+
+    def write(self, folder: Path, name: str) -> None:
+        """Simulates a sequence: one scan, its labels, and what it was drawn as.
+
+        Args:
+            folder: Folder to write.
+            name: Name of the sequence.
+
+        Raises:
+            InputError: A file cannot be written, or Open3D cannot be imported.
+        """
+        assert isinstance(self.world, World)  # after resolved()
+        seed = np.random.SeedSequence(self.seed, spawn_key=(int(name),))
+        drawn = draw_scan(self.world, np.random.default_rng(seed))
+        assert drawn.scan.label is not None
+        write_scan(folder / FOLDERS.scans / f"{STEM}.bin", drawn.scan)
+        write_labels(folder / FOLDERS.labels / f"{STEM}.label", *unpacked(drawn.scan.label))
+        with replacing(folder / DRAWN_WORLDS) as temporary:
+            described = json.loads(json.dumps(drawn.description))
+            temporary.write_text(yaml.safe_dump(described, sort_keys=False), "utf-8")

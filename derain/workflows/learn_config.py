@@ -10,8 +10,8 @@ from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.recordings.posed import ODOMETRY
 from derain.sources.source import Source
-from derain.workflows.configurations import packaged_configs
 from derain.views.channels import INTENSITY_RANK
+from derain.workflows.configurations import packaged_configs
 from derain.workflows.start import checkpoint_of
 
 PERSISTENCE = "persistence"

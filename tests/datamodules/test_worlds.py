@@ -6,7 +6,7 @@ import pytest
 
 from derain.datamodules.worlds import Worlds
 from derain.errors import InputError
-from derain.simulation.world_campaign import WorldCampaign
+from derain.simulation.world import WorldCampaign
 from derain.system.open3d_import import import_open3d
 
 

@@ -1,6 +1,7 @@
 """What beams return through clear air."""
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation.classes import TrackClass
 from derain.simulation.sensor import Returns, Sensor
@@ -20,7 +21,7 @@ def surfaces(
     )
 
 
-def random_surfaces(count: int, generator: np.random.Generator) -> Returns:
+def random_surfaces(count: int, generator: Generator) -> Returns:
     """Surfaces near and far, bright and too dark to be seen, and beams that meet nothing."""
     nothing = generator.random(count) < 0.2
     return Returns(

@@ -46,13 +46,19 @@ def test_the_description_differs_between_campaigns_and_is_json() -> None:
     assert replace(Campaign(), sensor="mems_64").description == plain
 
 
-def test_one_that_has_no_drive_is_described_as_before_there_were_drives() -> None:
+def test_what_few_campaigns_and_sensors_have_is_described_where_one_has_it() -> None:
     assert set(Campaign().description["campaign"]) == {
         *("train", "validation", "test", "scans", "rain_rates", "seed", "sensor", "layout"),
         "radar",
     }
     drive = Campaign(drive=Drive(13, 4)).description["campaign"]["drive"]
     assert drive == {"speed": 13, "traffic": 4, "skew": False}
+    usual = Campaign().description["campaign"]["sensor"]
+    tilted = Campaign(sensor=Sensor(tilt=(0, 5), defects=Defects(copies=1)))
+    described = tilted.description["campaign"]["sensor"]
+    assert set(described) - set(usual) == {"tilt", "defects"}
+    assert described["tilt"] == [0, 5]
+    assert described["defects"]["copies"] == 1
 
 
 def test_scans_are_taken_at_the_frame_rate_of_the_sensor() -> None:
@@ -61,11 +67,12 @@ def test_scans_are_taken_at_the_frame_rate_of_the_sensor() -> None:
     )
 
 
-@pytest.mark.parametrize("sequences", [3, 4, 5, 10, 25, 143])
+@pytest.mark.parametrize("sequences", [1, 2, 3, 4, 5, 10, 25, 143])
 def test_sequences_are_parted_as_those_of_rehearse_3d(sequences: int) -> None:
     train, validation, test = partition(sequences)
     assert train + validation + test == sequences
-    assert validation == test >= 1
+    assert validation == test
+    assert (test >= 1) == (sequences >= 3)  # of one or two none is held out
     if sequences == 143:
         assert (train, validation, test) == (85, 29, 29)
 
@@ -95,19 +102,3 @@ def test_two_of_five_sequences_are_clean() -> None:
 def test_an_impossible_campaign_is_refused(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         Campaign(**wrong)
-
-
-@pytest.mark.parametrize("sequences", [1, 2])
-def test_of_one_or_two_sequences_none_is_held_out(sequences: int) -> None:
-    campaign = Campaign(*partition(sequences))
-    assert campaign.split == {"train": campaign.names, "validation": [], "test": []}
-    assert len(campaign.names) == sequences
-
-
-def test_what_few_sensors_have_is_described_where_one_has_it() -> None:
-    usual = Campaign().description["campaign"]["sensor"]
-    tilted = Campaign(sensor=Sensor(tilt=(0, 5), defects=Defects(copies=1)))
-    described = tilted.description["campaign"]["sensor"]
-    assert set(described) - set(usual) == {"tilt", "defects"}
-    assert described["tilt"] == [0, 5]
-    assert described["defects"]["copies"] == 1

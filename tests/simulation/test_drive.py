@@ -78,13 +78,3 @@ def test_a_vehicle_that_stands_does_not_sway() -> None:
     first = course.pose(0, SENSOR)
     assert first[:3, 3] == pytest.approx((0, 0, SENSOR.mounting_height))
     assert np.array_equal(course.pose(7.3, SENSOR), first)
-
-
-def test_two_sensors_on_a_vehicle_keep_their_places_to_each_other() -> None:
-    course, low = Course.draw(13, np.random.default_rng(0)), Sensor(mounting_height=0.4)
-    between = [
-        np.linalg.inv(course.pose(time, SENSOR)) @ course.pose(time, low) for time in (0, 0.7, 1.9)
-    ]
-    assert np.allclose(between, between[0], atol=1e-12)
-    distance = np.linalg.norm(between[0][:3, 3])
-    assert distance == pytest.approx(SENSOR.mounting_height - low.mounting_height)

@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.special import spherical_jn, spherical_yn
 
 from derain.scan import Scan
 from derain.simulation import objects, shapes
+from derain.simulation.arrays import Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.layout import lay_out_track
 from derain.simulation.objects import Surface
@@ -52,7 +54,7 @@ def frames(track: Track, radar: Radar, count: int, rain: RainField = DRY) -> lis
     return [detect(mean, radar, generator) for _ in range(count)]
 
 
-def labels(scans: list[Scan]) -> NDArray[np.int64]:
+def labels(scans: list[Scan]) -> Ints:
     return np.concatenate([scan.label for scan in scans if scan.label is not None])
 
 
@@ -104,7 +106,7 @@ def test_the_echo_of_a_plate_is_in_proportion_to_its_area_at_any_distance() -> N
 
 
 def test_a_car_returns_more_than_a_bike_and_a_bike_more_than_a_pedestrian() -> None:
-    def mean_dbsm(make: Callable[[np.random.Generator], Surface]) -> float:
+    def mean_dbsm(make: Callable[[Generator], Surface]) -> float:
         echoes = [
             surface_echoes(Track.of([make(np.random.default_rng(seed)).placed(20, 0)]), Radar())[0]
             for seed in range(3)
@@ -235,7 +237,6 @@ def test_a_frame_has_named_columns_and_follows_from_its_seed() -> None:
         ["x", "y", "z", "doppler", "rcs"], np.dtype(np.float32)
     )
     np.testing.assert_array_equal(np.stack([one.fields[axis] for axis in "xyz"], axis=1), one.xyz)
-    assert one.label is not None
     assert (one.label.dtype, one.valid.all()) == (np.int64, True)
     for name in one.fields:
         np.testing.assert_array_equal(one.fields[name], same.fields[name])

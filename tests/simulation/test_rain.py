@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.simulation import rain as rain_module
+from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.marshall_palmer import (
     INTERCEPT,
@@ -79,9 +80,7 @@ def test_surfaces_fade_with_the_way_there_and_back() -> None:
     assert (detected.range[kept] == distance).all()
 
 
-def crowded(
-    clear: Returns, generator: np.random.Generator, monkeypatch: pytest.MonkeyPatch
-) -> Drops:
+def crowded(clear: Returns, generator: Generator, monkeypatch: pytest.MonkeyPatch) -> Drops:
     """Lets ten times the drops fall, so that many beams hold several visible ones."""
     some = draw_drops(25, np.minimum(clear.range, 15), SENSOR, generator)
     diameter = draw_diameters(25, 10 * len(some.beam), generator)
@@ -211,12 +210,12 @@ def test_a_scan_without_beams_stays_empty() -> None:
         assert len(rained(open_air(0), UniformRain(25), 0, sensor).range) == 0
 
 
-def random_beams(count: int, generator: np.random.Generator) -> NDArray[np.float64]:
+def random_beams(count: int, generator: Generator) -> Floats:
     beams = generator.normal(size=(count, 3))
     return beams / np.linalg.norm(beams, axis=1, keepdims=True)
 
 
-def integrated(rain: RainField, beam: NDArray[np.float64], distance: float) -> float:
+def integrated(rain: RainField, beam: Floats, distance: float) -> float:
     way = np.linspace(0, distance, 2001)
     depth = np.trapezoid(extinction(rain.rate(way * beam[0], way * beam[1])), way)
     return float(np.exp(-2 * depth))

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.evaluation.hard_cases import hard_cases, scene
+from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan, write_scan
 from derain.files.columns import scan_of
 from derain.scan import Scan
+from derain.simulation.arrays import Bools
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain import DROP_REFLECTIVITY, farthest_visible_drop
 from derain.simulation.rain_field import SprinkledRain, UniformRain
@@ -39,8 +40,7 @@ def rained(scan: Scan, rate: float, seed: int = 0) -> Scan:
     return rain_on_scan(scan, UniformRain(rate), SENSOR, np.random.default_rng(seed))
 
 
-def is_rain(scan: Scan) -> NDArray[np.bool_]:
-    assert scan.label is not None
+def is_rain(scan: Scan) -> Bools:
     return scan.label == TrackClass.RAIN
 
 
@@ -49,7 +49,7 @@ def numbered(scan: Scan) -> Scan:
     return replace(scan, fields={**scan.fields, "number": np.arange(len(scan))})
 
 
-def in_place(wet: Scan) -> NDArray[np.bool_]:
+def in_place(wet: Scan) -> Bools:
     """True for rows in the order that they had, as far as it goes: appended ones follow."""
     return np.append(True, np.diff(wet.fields["number"]) > 0).cumprod().astype(bool)
 
@@ -137,15 +137,12 @@ def test_every_row_of_a_real_scan_is_kept_or_gives_way_to_a_drop_or_is_lost(
     assert appended.sum() > 100
 
 
-def test_more_rain_leaves_less_of_a_real_scan(clear: Scan) -> None:
-    rates = (0, 10, 25, 50)
-    kept = [
-        np.count_nonzero(~is_rain(wet) & wet.valid) for wet in (rained(clear, r) for r in rates)
-    ]
-    gone = clear.valid.sum() - np.array(kept)
-    assert gone[0] == 0
-    assert gone[-1] > 0
-    assert (np.diff(gone) >= -4 * np.sqrt(gone[:-1])).all(), gone
+def test_more_rain_leaves_less_of_a_real_scan(clear: Scan, wet: Scan) -> None:
+    kept = [np.count_nonzero(~is_rain(scan) & scan.valid) for scan in (rained(clear, 10), wet)]
+    less, more = clear.valid.sum() - np.array(kept)
+    assert less >= 0
+    assert more > 0
+    assert more >= less - 4 * np.sqrt(less)
 
 
 def test_a_rained_real_scan_can_be_written_in_its_own_format(clear: Scan, tmp_path: Path) -> None:
@@ -159,7 +156,7 @@ def test_a_rained_real_scan_can_be_written_in_its_own_format(clear: Scan, tmp_pa
         assert equal(again.fields[name], column), name
 
 
-@pytest.mark.parametrize(("name", "scan"), list(hard_cases(5000)))
+@pytest.mark.parametrize(("name", "scan"), list(hard_cases(1000)))
 def test_hard_scans_stay_finite_where_they_were(name: str, scan: Scan) -> None:
     for rain in (UniformRain(0), UniformRain(50), SprinkledRain(50)):
         wet = rain_on_scan(scan, rain, SENSOR, np.random.default_rng(0))
@@ -180,7 +177,6 @@ def uneven_wall(
 ) -> Scan:
     """A wall whose first return is of another brightness, so that intensity tells something."""
     scan = wall(distance, intensity, shape)
-    assert scan.intensity is not None
     scan.intensity[0] = intensity / 2 if intensity else 255
     return scan
 
@@ -203,38 +199,28 @@ def test_no_rule_on_intensity_finds_drops_where_the_scan_has_one_throughout(
     wet = rained(clear if shape else clear.take(~sky), 50)
     drops = is_rain(wet)
     solid = wet.valid & ~drops
-    assert wet.intensity is not None
     assert min(drops.sum(), solid.sum()) > 100
     assert not distinguishable(wet.intensity[drops], wet.intensity[solid])
     assert (wet.intensity[solid] == np.float32(intensity)).all()
 
 
-def test_one_intensity_throughout_is_as_good_as_none() -> None:
-    constant = wall(40.0, 0.0)
-    without = replace(constant, intensity=None)
-    wet, wet_without = rained(constant, 50), rained(without, 50)
+@pytest.mark.parametrize("intensity", [0.0, np.nan])
+def test_one_intensity_throughout_is_as_good_as_none_and_drops_get_it(intensity: float) -> None:
+    constant = wall(40.0, intensity)
+    wet, wet_without = rained(constant, 50), rained(replace(constant, intensity=None), 50)
+    assert is_rain(wet).sum() > 100
+    assert np.array_equal(wet.intensity[wet.valid], np.full(wet.valid.sum(), intensity), True)
     assert wet_without.intensity is None
     assert equal(wet.xyz, wet_without.xyz)
     assert equal(wet.label, wet_without.label)
 
 
-def test_intensities_that_are_no_numbers_stay_so_and_drops_get_none() -> None:
-    clear = wall(40.0, np.nan)
-    wet, wet_without = rained(clear, 50), rained(replace(clear, intensity=None), 50)
-    assert is_rain(wet).sum() > 100
-    assert wet.intensity is not None
-    assert np.isnan(wet.intensity[wet.valid]).all()
-    assert equal(wet.xyz, wet_without.xyz)
-
-
 def test_what_a_radar_measured_is_no_intensity_of_the_lidar() -> None:
     clear = wall(40.0, 0.0, shape=None)
-    assert clear.intensity is not None
     radar = np.arange(len(clear)) % 4 == 0
     clear.intensity[radar] = np.arange(radar.sum())
     wet = rained(replace(clear, radar=radar), 50)
     assert is_rain(wet).sum() > 100
-    assert wet.intensity is not None
     assert not wet.intensity[is_rain(wet)].any()
 
 
@@ -261,7 +247,6 @@ def test_a_bright_return_is_kept_and_dimmed_by_the_light_that_rain_takes() -> No
     kept[0] = False
     assert wet.valid.all()
     assert kept.sum() > 0.8 * len(kept)
-    assert wet.intensity is not None
     assert wet.intensity[kept] == pytest.approx(200 * np.exp(-2 * 2.771e-3 * 40), rel=1e-3)
 
 
@@ -270,7 +255,6 @@ def test_drops_are_as_bright_as_water_on_the_scale_of_the_scan(full_scale: float
     clear = uneven_wall(40.0, full_scale)
     wet = rained(clear, 50)
     drops = is_rain(wet)
-    assert wet.intensity is not None
     share = wet.intensity[drops] / full_scale
     assert 0.1 * DROP_REFLECTIVITY < share.mean() < DROP_REFLECTIVITY
 
@@ -290,7 +274,6 @@ def test_a_lost_return_looks_like_an_empty_cell_or_is_not_a_number(
 def test_labels_are_kept_where_nothing_happens() -> None:
     clear = uneven_wall(110.0, 0.0)
     wet = rained(clear.with_label(np.full(len(clear), 5)), 50)
-    assert wet.label is not None
     assert set(wet.label[wet.valid]) == {5, TrackClass.RAIN}
     assert set(wet.label[~wet.valid]) == {TrackClass.BACKGROUND}
 
@@ -299,7 +282,6 @@ def test_points_of_a_radar_stay_and_no_drop_is_one() -> None:
     clear = uneven_wall(110.0, 0.0, shape=None)
     radar = np.arange(len(clear)) % 2 == 0
     wet = rained(replace(clear, radar=radar), 50)
-    assert wet.radar is not None
     assert len(wet) < len(clear)
     assert equal(wet.xyz[wet.radar], clear.xyz[radar])
     assert not wet.radar[is_rain(wet)].any()
@@ -311,7 +293,7 @@ def test_what_is_nearer_than_the_sensor_sees_stays() -> None:
 
 
 def test_a_seed_gives_the_same_rain_again() -> None:
-    clear = Scan.of(scene())
+    clear = wall(40.0, 100.0)
     first, again, other = (rained(clear, 50, seed) for seed in (1, 1, 2))
     assert np.array_equal(first.xyz, again.xyz)
     assert np.array_equal(first.intensity, again.intensity)
@@ -381,7 +363,6 @@ def test_intensities_are_rounded_to_what_the_column_holds(coordinates: np.ndarra
     scan = from_parameters(xyz=coordinates, Reflectivity=np.arange(6, dtype=np.uint8))
     relit = with_intensity(scan, ROWS, np.array([12.6, 300.0]))
     assert relit.fields["Reflectivity"].tolist() == [0, 13, 2, 3, 255, 5]
-    assert relit.intensity is not None
     assert relit.intensity.tolist() == [0, 13, 2, 3, 255, 5]
 
 
@@ -398,13 +379,3 @@ def test_the_scan_that_is_given_stays_as_it_is(coordinates: np.ndarray) -> None:
     with_intensity(with_points(scan, ROWS, POINTS), ROWS, np.array([7.0, 8.0]))
     assert (scan.fields["xyz"] == coordinates).all()
     assert (scan.fields["intensity"] == np.arange(6)).all()
-
-
-def test_a_scan_without_a_file_is_rewritten_too(coordinates: np.ndarray, tmp_path: Path) -> None:
-    scan = Scan(coordinates.astype(np.float32), np.zeros(6, np.float32))
-    relit = with_intensity(with_points(scan, ROWS, POINTS), ROWS, np.array([7.0, 8.0]))
-    write_scan(tmp_path / "scan.bin", relit)
-    again = read_scan(tmp_path / "scan.bin")
-    assert (again.xyz == relit.xyz).all()
-    assert again.intensity is not None
-    assert again.intensity.tolist() == [0, 7, 0, 0, 8, 0]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases
 from derain.files import read_scan
 from derain.scan import Scan
+from derain.simulation.arrays import Bools, Floats
 from derain.simulation.recorded_beams import RecordedBeams, find_beams, in_hull
 from derain.simulation.sensor import Sensor
 
@@ -25,7 +25,7 @@ FIELD_OF_VIEW = 70.0
 ORGANISED = ("ouster_os1_128.npz", "ouster_os0_32_dual.npz", "pandaset_pandar64.pcd")
 
 
-def degrees_between(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+def degrees_between(first: Floats, second: Floats) -> Floats:
     return np.degrees(2 * np.arcsin(np.linalg.norm(first - second, axis=1) / 2))
 
 
@@ -33,14 +33,14 @@ def beams_of(scan: Scan) -> RecordedBeams:
     return find_beams(scan, np.random.default_rng(0))
 
 
-def recording(returned: NDArray[np.bool_], nothing: float) -> Scan:
+def recording(returned: Bools, nothing: float) -> Scan:
     """A scan of a sensor whose rows lag behind by steps of half a degree, as lasers are mounted."""
     distance = np.random.default_rng(1).uniform(3, 60, len(returned))
     xyz = np.where(returned[:, None], lagging() * distance[:, None], nothing)
     return Scan(xyz.astype(np.float32), shape=(SENSOR.rows, SENSOR.columns))
 
 
-def lagging() -> NDArray[np.float64]:
+def lagging() -> Floats:
     beams = SENSOR.beams().reshape(SENSOR.rows, SENSOR.columns, 3)
     lag = np.radians(0.5 * (np.arange(SENSOR.rows) % 4))[:, None]
     x = beams[..., 0] * np.cos(lag) - beams[..., 1] * np.sin(lag)
@@ -98,17 +98,14 @@ def test_an_unreturned_beam_takes_after_a_return_of_its_own_row() -> None:
     beams = beams_of(Scan(xyz))
     unreturned = ~beams.returned
     inclination = np.arcsin(beams.direction[:, 2])
-    same_row = np.isclose(inclination[unreturned], inclination[beams.row[unreturned]], atol=2e-3)
+    before = beams.row[unreturned]
+    same_row = np.isclose(inclination[unreturned], inclination[before], atol=2e-3)
     assert same_row.mean() > 0.98  # the first of a row has no return before it
-    assert (
-        degrees_between(beams.direction[unreturned], beams.direction[beams.row[unreturned]])[
-            same_row
-        ].mean()
-        < 2
-    )
+    apart = degrees_between(beams.direction[unreturned], beams.direction[before])
+    assert apart[same_row].mean() < 2
 
 
-def rosette(shots: int, about: float = 0.0) -> NDArray[np.float64]:
+def rosette(shots: int, about: float = 0.0) -> Floats:
     """Unit vectors of a sensor that looks through two turning prisms, as Livox's do.
 
     Each prism bends the beam by as much, in a direction that turns with it, so that the beams draw
@@ -131,7 +128,7 @@ def rosette(shots: int, about: float = 0.0) -> NDArray[np.float64]:
     )
 
 
-def off_axis(direction: NDArray[np.float64], about: float) -> NDArray[np.float64]:
+def off_axis(direction: Floats, about: float) -> Floats:
     """How far unit vectors point from the axis of a rosette, float64 (N,), degrees."""
     axis = np.radians(about)
     cosine = direction @ [np.cos(axis), np.sin(axis), 0]
@@ -160,7 +157,7 @@ def test_cells_tell_nothing_of_beams_that_are_not_in_rows_and_columns() -> None:
     assert (np.isfinite(beams.direction).all(axis=1) == returned).all()
 
 
-@pytest.mark.parametrize(("name", "scan"), list(hard_cases(5000)))
+@pytest.mark.parametrize(("name", "scan"), list(hard_cases(1000)))
 def test_hard_scans_have_the_beams_of_their_valid_rows(name: str, scan: Scan) -> None:
     beams = beams_of(scan)
     assert (beams.returned[: len(scan)] == scan.valid).all(), name
@@ -198,8 +195,7 @@ def as_columns(points: list[tuple[float, float]]) -> tuple[np.ndarray, np.ndarra
 def test_a_place_is_outside_if_a_line_parts_it_from_every_point(
     points: list[tuple[int, int]], place: tuple[int, int]
 ) -> None:
-    away = np.array(points) - place
     # Hulls of such points have edges in these directions only; so do the lines that part.
-    steps = [(a, b) for a in range(-8, 9) for b in range(-8, 9) if (a, b) != (0, 0)]
-    parted = any((away @ np.array(normal) > 0).all() for normal in steps)
+    normals = np.stack(np.meshgrid(np.arange(-8, 9), np.arange(-8, 9))).reshape(2, -1)
+    parted = ((np.array(points) - place) @ normals > 0).all(axis=0).any()
     assert in_hull(as_columns(points), as_columns([place])).all() == (not parted)

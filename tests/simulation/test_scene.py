@@ -62,7 +62,6 @@ def test_walls_and_ground_stay_where_they_are_by_the_poses(open3d: ModuleType) -
 
 def test_what_moves_is_seen_as_if_it_were_built_into_the_street(open3d: ModuleType) -> None:
     drive = scene(DRIVING)
-    assert drive.course is not None
     seen = list(drive.cast(SENSOR, TIMES))
     for time, returns in zip(TIMES, seen, strict=True):
         moving = Track.of(
@@ -79,7 +78,6 @@ def test_what_moves_is_seen_as_if_it_were_built_into_the_street(open3d: ModuleTy
 
 def test_the_numbers_of_what_moves_are_on_it_and_on_nothing_else(open3d: ModuleType) -> None:
     drive = scene(DRIVING)
-    assert drive.course is not None
     for time, returns in zip(TIMES, drive.cast(SENSOR, TIMES), strict=True):
         ends = points(returns, drive.course.pose(time, SENSOR))
         kind, number = unpacked(returns.label)

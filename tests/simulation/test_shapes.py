@@ -12,12 +12,8 @@ def area(triangles: Triangles) -> float:
     return float(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum() / 2)
 
 
-def test_a_box_has_the_area_of_its_six_sides() -> None:
-    sides = 2 * (3 * 2 + 2 * 1.5 + 3 * 1.5)
-    assert area(shapes.box(3, 2, 0.5, 2.0)) == pytest.approx(sides)
-
-
-def test_a_cylinder_has_the_area_of_a_twelve_sided_prism() -> None:
+def test_boxes_and_cylinders_of_twelve_sides_have_the_areas_of_prisms() -> None:
+    assert area(shapes.box(3, 2, 0.5, 2.0)) == pytest.approx(2 * (3 * 2 + 2 * 1.5 + 3 * 1.5))
     base = 12 / 2 * np.sin(2 * np.pi / 12) * 0.4**2
     side = 12 * 2 * np.sin(np.pi / 12) * 0.4 * 1.7
     assert area(shapes.cylinder(0.4, 0.3, 2.0)) == pytest.approx(2 * base + side)

@@ -57,11 +57,3 @@ def test_a_street_has_what_streets_have_and_no_sprinklers() -> None:
     _, surfaces = drawn(0)
     there = {surface.label for surface in surfaces}
     assert there == set(TrackClass) - {TrackClass.RAIN, TrackClass.SPRINKLER, TrackClass.TARGET}
-
-
-def test_a_seed_gives_the_same_street_again_and_another_seed_another_one() -> None:
-    (_, first), (_, again), (_, other) = drawn(1), drawn(1), drawn(2)
-    assert len(first) == len(again)
-    for one, two in zip(first, again, strict=True):
-        assert np.array_equal(one.triangles, two.triangles)
-    assert len(first) != len(other)

@@ -1,25 +1,20 @@
 """The ray-cast track against closed forms and a test of every ray with every triangle."""
 
-from collections.abc import Callable
+import math
 from types import ModuleType
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from derain.simulation import objects, shapes
+from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_facility
-from derain.simulation.layout import lay_out_track
 from derain.simulation.objects import Surface
-from derain.simulation.rough_surface import backscatter
 from derain.simulation.sensor import Sensor
-from derain.simulation.track import Track
-
-LayOut = Callable[[np.random.Generator], Track]
+from derain.simulation.track import Track, backscatter
 
 SENSOR = Sensor(rows=16, columns=40)
-ON_THE_TRACK = set(TrackClass) - {TrackClass.RAIN}
 
 
 def test_flat_ground_lies_where_its_angle_says_and_darkens_with_it(open3d: ModuleType) -> None:
@@ -75,25 +70,7 @@ def test_casting_finds_the_nearest_of_all_triangles(open3d: ModuleType) -> None:
     assert np.allclose(clear.reflectivity[hit], (reflectivity[nearest] * cosine)[hit], atol=1e-4)
 
 
-@pytest.mark.parametrize("lay_out", [lay_out_track, lay_out_facility])
-def test_every_class_but_rain_stands_on_every_track(lay_out: LayOut) -> None:
-    for seed in range(5):
-        track = lay_out(np.random.default_rng(seed))
-        assert {TrackClass(label) for label in track.label} == ON_THE_TRACK
-        assert len(track.label) == len(track.triangles) == len(track.reflectivity)
-        assert track.reflectivity.min() > 0
-        assert track.reflectivity.max() <= 1
-        assert np.isfinite(track.triangles).all()
-
-
-@pytest.mark.parametrize("lay_out", [lay_out_track, lay_out_facility])
-def test_a_seed_gives_the_same_track_again_and_another_seed_another_one(lay_out: LayOut) -> None:
-    first, again, other = (lay_out(np.random.default_rng(seed)) for seed in (1, 1, 2))
-    assert np.array_equal(first.triangles, again.triangles)
-    assert not np.array_equal(first.triangles[:1000], other.triangles[:1000])
-
-
-def centres(track: Track, *kinds: TrackClass) -> NDArray[np.float64]:
+def centres(track: Track, *kinds: TrackClass) -> Floats:
     """Ground positions of the triangles of some classes, float64 (T, 2)."""
     return track.triangles[np.isin(track.label, kinds)].mean(axis=1)[:, :2].astype(np.float64)
 
@@ -146,3 +123,33 @@ def test_foliage_returns_scattered_points_as_weak_as_rain(open3d: ModuleType) ->
     clear = Track.of([bush]).cast(sensor)
     assert 20 < clear.returned.sum() < 0.3 * len(clear.returned)
     assert (clear.reflectivity[clear.returned] < 0.02).mean() > 0.3
+
+
+# Of the light on rough surfaces.
+ANGLES = np.radians(np.linspace(0, 89, 90))
+
+
+def radiance(light: float, eye: float, turn: float, roughness: float) -> float:
+    """Radiance over that of Lambert's surface lit straight on, from and to any direction."""
+    variance = roughness**2
+    facing, grazing = 1 - 0.5 * variance / (variance + 0.33), 0.45 * variance / (variance + 0.09)
+    between = max(0, math.cos(turn)) * math.sin(max(light, eye)) * math.tan(min(light, eye))
+    return math.cos(light) * (facing + grazing * between)
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.1, 0.3, 0.6, 1.0])
+def test_light_comes_back_as_if_the_eye_were_where_the_light_is(roughness: float) -> None:
+    returned = backscatter(np.cos(ANGLES), np.full(len(ANGLES), roughness))
+    expected = [radiance(angle, angle, 0, roughness) for angle in ANGLES]
+    np.testing.assert_allclose(returned, expected, rtol=1e-12)
+
+
+def test_a_smooth_surface_is_lamberts_to_the_bit() -> None:
+    cosine = np.random.default_rng(0).random(1000)
+    assert np.array_equal(backscatter(cosine, np.zeros(1000)), cosine)
+
+
+def test_the_rougher_a_surface_the_more_it_returns_at_a_grazing_angle() -> None:
+    returned = backscatter(np.full(20, 0.05), np.linspace(0, 1.5, 20))
+    assert (np.diff(returned) > 0).all()
+    assert returned.max() < 0.5

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from derain.simulation.columns import Columns
+from derain.simulation.arrays import Columns, Floats, Ints
 from derain.system.cores import sleeping_threads
 
 with sleeping_threads():
@@ -29,9 +28,9 @@ class Meetings(Columns):
         offset: Distance of the particle's centre from the beam's axis, float64 (M,), metres.
     """
 
-    particle: NDArray[np.int64]
-    beam: NDArray[np.int64]
-    offset: NDArray[np.float64]
+    particle: Ints
+    beam: Ints
+    offset: Floats
 
 
 class BeamTree:
@@ -41,11 +40,11 @@ class BeamTree:
         beams: Unit vectors along them, float64 (N, 3).
     """
 
-    def __init__(self, beams: NDArray[np.float64]) -> None:
+    def __init__(self, beams: Floats) -> None:
         self._tree = small_gicp.KdTree(np.ascontiguousarray(beams), num_threads=1)
         self._beams = len(beams)
 
-    def meetings(self, place: NDArray[np.float64], within: NDArray[np.float64]) -> Meetings:
+    def meetings(self, place: Floats, within: Floats) -> Meetings:
         """Finds the beams whose axes pass particles within some distance.
 
         Args:
@@ -72,13 +71,11 @@ class BeamTree:
             rows, count = np.concatenate(more), GROWTH * count
         return _by_particle(found)
 
-    def nearest(self, place: NDArray[np.float64]) -> NDArray[np.int64]:
+    def nearest(self, place: Floats) -> Ints:
         """The beam whose axis passes each place nearest, int64 (P,)."""
         return self._nearest(place, 1)[1][:, 0]
 
-    def _nearest(
-        self, place: NDArray[np.float64], count: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    def _nearest(self, place: Floats, count: int) -> tuple[Floats, Ints]:
         """Offsets and rows of the nearest beams, nearest first, float64 and int64 (P, count)."""
         far = np.linalg.norm(place, axis=1, keepdims=True)
         # One thread, so that beams at the same distance come in the same order every time.
@@ -86,9 +83,7 @@ class BeamTree:
         return np.sqrt(squared) * far, beam.astype(np.int64)
 
 
-def covered_share(
-    beam: NDArray[np.float64], particle: NDArray[np.float64], offset: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def covered_share(beam: Floats, particle: Floats, offset: Floats) -> Floats:
     """Share of a beam's cross-section that a particle covers, float64 (M,), in 0..1.
 
     The area of the lens in which two discs overlap, over that of the first.

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from derain.simulation.arrays import Floats
 from derain.simulation.flying.precipitation import GustForm
 
 # Plane waves of a random field; from so many on it is as good as Gaussian.
@@ -40,7 +40,7 @@ class Gusts:
         self._phase = generator.uniform(0, 2 * math.pi, (2, GUST_WAVES))
         self._form, self._contrast = form, contrast
 
-    def __call__(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, place: Floats) -> Floats:
         """Density over the greatest, float64 (N,), at places, float64 (N, 3), metres."""
         match self._form:
             case "even":
@@ -67,6 +67,6 @@ class Gusts:
             case "filaments":
                 return THINNEST + (1 - THINNEST) / steepness
 
-    def _field(self, number: int, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _field(self, number: int, place: Floats) -> Floats:
         waves = np.cos(place @ self._wave[number] + self._phase[number])
         return np.asarray(waves.sum(axis=1) * math.sqrt(2 / GUST_WAVES))

@@ -1,12 +1,13 @@
 """Returns near the sensor that are no single particles: fog-like air, and water on its window."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
+from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.flying.gusts import Gusts
-from derain.simulation.flying.optics import nearest_seen
 from derain.simulation.flying.precipitation import Precipitation
+from derain.simulation.flying.sizes import nearest_seen
 from derain.simulation.sensor import Returns, Sensor
 
 # Shortest wave of the patches over the view, radians; the longest is four times it.
@@ -15,10 +16,10 @@ PATCH = 0.15
 
 def draw_haze(
     clear: Returns,
-    beams: NDArray[np.float64],
+    beams: Floats,
     precipitation: Precipitation,
     sensor: Sensor,
-    generator: np.random.Generator,
+    generator: Generator,
 ) -> Returns:
     """Draws what a haze returns: of a share of the beams, exponentially distributed in distance.
 

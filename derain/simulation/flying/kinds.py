@@ -6,6 +6,7 @@ from functools import partial
 from typing import Self, get_type_hints
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.errors import InputError
 from derain.files.documents import Entry, shown
@@ -28,7 +29,7 @@ LOWER_LIMITS = {"spill": 1.0, "haze_strength": 1.0, "largest": math.nextafter(SM
 FROM_ZERO = frozenset({"flicker", "jitter", "haze_patches", "gust_contrast"})
 
 
-def _drawn(name: str, span: Span, generator: np.random.Generator) -> float:
+def _drawn(name: str, span: Span, generator: Generator) -> float:
     low, high = span
     share = generator.random()
     if name in LOGARITHMIC and low > 0:
@@ -127,7 +128,7 @@ class Kind:
                     f"precipitation: {one.name}", f"{shown(value)} is impossible", "Correct it."
                 )
 
-    def draw(self, name: str, generator: np.random.Generator) -> Precipitation:
+    def draw(self, name: str, generator: Generator) -> Precipitation:
         """Draws precipitation of this kind."""
         drawn = {
             one.name: _drawn(one.name, getattr(self, one.name), generator)
@@ -251,7 +252,7 @@ class PrecipitationSpans:
             raise entry.fault(error.reason, error.remedy) from error
 
 
-def draw_precipitation(spans: PrecipitationSpans, generator: np.random.Generator) -> Precipitation:
+def draw_precipitation(spans: PrecipitationSpans, generator: Generator) -> Precipitation:
     """Draws a kind of precipitation by the weights, and then its numbers from their spans."""
     weights = np.array([kind.weight for _, kind in spans.kinds])
     name, kind = spans.kinds[generator.choice(len(weights), p=weights / weights.sum())]

@@ -5,19 +5,18 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
+from derain.simulation.arrays import Columns, Floats, Ints
 from derain.simulation.classes import TrackClass
-from derain.simulation.columns import Columns
 from derain.simulation.detection import detected_surfaces, reported
 from derain.simulation.flying.beam_tree import covered_share
 from derain.simulation.flying.gusts import Gusts
 from derain.simulation.flying.haze import draw_haze
-from derain.simulation.flying.optics import Optics, nearest_seen
 from derain.simulation.flying.particles import OpenBeams, Stretch, draw_particles
 from derain.simulation.flying.precipitation import Precipitation
 from derain.simulation.flying.regions import Air, GroundLayer, Region, draw_plumes
-from derain.simulation.flying.sizes import Sizes, Slices
+from derain.simulation.flying.sizes import Optics, Sizes, Slices, nearest_seen
 from derain.simulation.sensor import Returns, Sensor
 
 # A particle leaves at least so much of the light, a modelling choice: a little goes around it.
@@ -50,10 +49,10 @@ class Encounters(Columns):
         brightness: Apparent reflectivity of a particle that covers a whole beam, float64 (M,).
     """
 
-    beam: NDArray[np.int64]
-    range: NDArray[np.float64]
-    covered: NDArray[np.float64]
-    brightness: NDArray[np.float64]
+    beam: Ints
+    range: Floats
+    covered: Floats
+    brightness: Floats
 
     @classmethod
     def none(cls) -> Self:
@@ -65,28 +64,25 @@ class Encounters(Columns):
         return self.take(np.lexsort((self.range, self.beam)))
 
     @property
-    def reflectivity(self) -> NDArray[np.float64]:
+    def reflectivity(self) -> Floats:
         """Apparent reflectivity behind the nearer particles of the beam, float64 (M,)."""
         # Sums up to a particle, less those of the beams before its own.
         loss = np.cumsum(self._loss) - self._loss
         first = np.searchsorted(self.beam, self.beam)
         return self.brightness * self.covered * np.exp(loss - loss[first])
 
-    def transmission(self, beams: int) -> NDArray[np.float64]:
+    def transmission(self, beams: int) -> Floats:
         """Share of the light of each beam that passes all of its particles, float64 (beams,)."""
         return np.exp(np.bincount(self.beam, self._loss, minlength=beams))
 
     @property
-    def _loss(self) -> NDArray[np.float64]:
+    def _loss(self) -> Floats:
         """Logarithm of what a particle leaves on the way there and back, float64 (M,)."""
         return np.asarray(2 * np.log(np.maximum(1 - self.covered, LEAST_LEFT)))
 
 
 def encounter(
-    populations: Sequence[Population],
-    beams: OpenBeams,
-    flicker: float,
-    generator: np.random.Generator,
+    populations: Sequence[Population], beams: OpenBeams, flicker: float, generator: Generator
 ) -> Encounters:
     """Draws what the beams meet of all that flies.
 
@@ -105,7 +101,7 @@ def encounter(
 
 
 def _encounters_with(
-    population: Population, beams: OpenBeams, flicker: float, generator: np.random.Generator
+    population: Population, beams: OpenBeams, flicker: float, generator: Generator
 ) -> Encounters:
     stretch = population.region.stretch(beams.directions, beams.stretch)
     particles, meetings = draw_particles(
@@ -129,10 +125,10 @@ SPRAY = Sizes.gamma(0.5, 1, 3.0)
 
 def meet(
     clear: Returns,
-    beams: NDArray[np.float64],
+    beams: Floats,
     precipitation: Precipitation,
     sensor: Sensor,
-    generator: np.random.Generator,
+    generator: Generator,
 ) -> Returns:
     """Sends beams through what flies and keeps what the sensor reports of each.
 
@@ -164,11 +160,8 @@ def meet(
     )
     extinction = falling * gusts.mean * sizes.extinction
     layer = GroundLayer(-sensor.mounting_height, precipitation.drift_height, gusts)
-    plumes = draw_plumes(
-        *(clear, beams, -sensor.mounting_height),
-        *(precipitation.plumes, precipitation.plume_length),
-        generator,
-    )
+    seen = clear, beams, -sensor.mounting_height
+    plumes = draw_plumes(*seen, precipitation.plumes, precipitation.plume_length, generator)
     met = encounter(
         [
             Population(falling, sizes, Air(gusts)),
@@ -180,16 +173,12 @@ def meet(
         generator,
     )
     transmission = met.transmission(len(beams)) * np.exp(-2 * extinction * clear.range)
-    return reported(
-        Returns.joined(
-            [
-                detected_surfaces(clear, transmission, sensor),
-                _detected_particles(met, extinction, clear, precipitation, sensor, generator),
-                draw_haze(clear, beams, precipitation, sensor, generator),
-            ]
-        ),
-        sensor.returns,
-    )
+    candidates = [
+        detected_surfaces(clear, transmission, sensor),
+        _detected_particles(met, extinction, clear, precipitation, sensor, generator),
+        draw_haze(clear, beams, precipitation, sensor, generator),
+    ]
+    return reported(Returns.joined(candidates), sensor.returns)
 
 
 def uncrowded(precipitation: Precipitation, sensor: Sensor) -> float:
@@ -210,7 +199,7 @@ def _sizes(precipitation: Precipitation) -> Sizes:
 
 
 def _open_beams(
-    clear: Returns, beams: NDArray[np.float64], precipitation: Precipitation, sensor: Sensor
+    clear: Returns, beams: Floats, precipitation: Precipitation, sensor: Sensor
 ) -> OpenBeams:
     near = np.full(len(beams), nearest_seen(precipitation, sensor))
     return OpenBeams(beams, Stretch(near, clear.range), Optics.of(precipitation, sensor))
@@ -222,7 +211,7 @@ def _detected_particles(
     clear: Returns,
     precipitation: Precipitation,
     sensor: Sensor,
-    generator: np.random.Generator,
+    generator: Generator,
 ) -> Returns:
     """Particles that the sensor would see if it reported all that a beam returns."""
     reflectivity = met.reflectivity * np.exp(-2 * extinction * met.range)

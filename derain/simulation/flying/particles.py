@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
-from derain.simulation.columns import Columns
+from derain.simulation.arrays import Bools, Columns, Floats, Ints
 from derain.simulation.flying.beam_tree import BeamTree, Meetings
-from derain.simulation.flying.optics import Optics
-from derain.simulation.flying.sizes import Sizes, Slices
+from derain.simulation.flying.sizes import Optics, Sizes, Slices
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,8 +20,8 @@ class Stretch:
         far: Where it ends, float64 (N,), metres; before ``near`` where the beam has none.
     """
 
-    near: NDArray[np.float64]
-    far: NDArray[np.float64]
+    near: Floats
+    far: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +34,7 @@ class OpenBeams:
         optics: What the sensor sees of particles in them.
     """
 
-    directions: NDArray[np.float64]
+    directions: Floats
     stretch: Stretch
     optics: Optics
 
@@ -54,21 +53,17 @@ class Particles(Columns):
         diameter: Diameters, float64 (P,), metres.
     """
 
-    place: NDArray[np.float64]
-    diameter: NDArray[np.float64]
+    place: Floats
+    diameter: Floats
 
     @property
-    def range(self) -> NDArray[np.float64]:
+    def range(self) -> Floats:
         """Distance from the sensor, float64 (P,), metres."""
         return np.asarray(np.linalg.norm(self.place, axis=1))
 
 
 def draw_particles(
-    number: float,
-    sizes: Sizes,
-    stretch: Stretch,
-    beams: OpenBeams,
-    generator: np.random.Generator,
+    number: float, sizes: Sizes, stretch: Stretch, beams: OpenBeams, generator: Generator
 ) -> tuple[Particles, Meetings]:
     """Draws particles of an even density that beams meet where they may be.
 
@@ -93,9 +88,7 @@ def draw_particles(
     return particles, meetings.take(_inside(beams.stretch, meetings, particles.range))
 
 
-def _by_nearest(
-    drawn: Particles, drawn_for: NDArray[np.int64], stretch: Stretch, beams: OpenBeams
-) -> NDArray[np.bool_]:
+def _by_nearest(drawn: Particles, drawn_for: Ints, stretch: Stretch, beams: OpenBeams) -> Bools:
     """Which particles were drawn for the nearest of the beams that they could be drawn for."""
     if not len(drawn_for):
         return np.empty(0, np.bool_)
@@ -120,21 +113,15 @@ def _meetings(particles: Particles, beams: OpenBeams) -> Meetings:
     return beams.tree.meetings(particles.place, within)
 
 
-def _inside(
-    stretch: Stretch, meetings: Meetings, distance: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _inside(stretch: Stretch, meetings: Meetings, distance: Floats) -> Bools:
     """Which meetings are on the stretch of their beam, bool (M,)."""
     at = distance[meetings.particle]
     return np.asarray((stretch.near[meetings.beam] <= at) & (at <= stretch.far[meetings.beam]))
 
 
 def _drawn_beam_by_beam(
-    number: float,
-    sizes: Sizes,
-    stretch: Stretch,
-    beams: OpenBeams,
-    generator: np.random.Generator,
-) -> tuple[Particles, NDArray[np.int64]]:
+    number: float, sizes: Sizes, stretch: Stretch, beams: OpenBeams, generator: Generator
+) -> tuple[Particles, Ints]:
     """Particles that each beam meets in its stretch, as if there were no other; and its row."""
     optics, used = beams.optics, stretch.far > stretch.near
     slices = Slices(float(stretch.near[used].min(initial=optics.farthest)), optics, sizes)
@@ -165,7 +152,7 @@ def _drawn_beam_by_beam(
     return Particles(along[inside, None] * axis + across, size[inside]), rows
 
 
-def _across(beams: NDArray[np.float64], turn: NDArray[np.float64]) -> NDArray[np.float64]:
+def _across(beams: Floats, turn: Floats) -> Floats:
     """Unit vectors at right angles to beams, turned around them, float64 (N, 3)."""
     steep = np.abs(beams[:, 2]) > 0.9
     helper = np.where(steep[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
+from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.flying.gusts import Gusts
 from derain.simulation.flying.particles import Stretch
@@ -19,7 +20,7 @@ LAYER_TOP = 4.0
 class Region(Protocol):
     """A part of space with a density of particles."""
 
-    def stretch(self, beams: NDArray[np.float64], stretch: Stretch) -> Stretch:
+    def stretch(self, beams: Floats, stretch: Stretch) -> Stretch:
         """The part of each beam's stretch that the region has, at least.
 
         Args:
@@ -27,7 +28,7 @@ class Region(Protocol):
             stretch: What the beams have in front of the surfaces.
         """
 
-    def density(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def density(self, place: Floats) -> Floats:
         """Density over the greatest, float64 (N,), in 0..1, at places, float64 (N, 3), metres."""
 
 
@@ -37,11 +38,11 @@ class Air:
 
     gusts: Gusts
 
-    def stretch(self, beams: NDArray[np.float64], stretch: Stretch) -> Stretch:
+    def stretch(self, beams: Floats, stretch: Stretch) -> Stretch:
         """All of it."""
         return stretch
 
-    def density(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def density(self, place: Floats) -> Floats:
         """That of the gusts."""
         return self.gusts(place)
 
@@ -60,7 +61,7 @@ class GroundLayer:
     height: float
     gusts: Gusts
 
-    def stretch(self, beams: NDArray[np.float64], stretch: Stretch) -> Stretch:
+    def stretch(self, beams: Floats, stretch: Stretch) -> Stretch:
         """Where beams are under the top of the layer."""
         top = self.ground + LAYER_TOP * self.height
         rise = beams[:, 2]
@@ -68,13 +69,12 @@ class GroundLayer:
             crossing = np.nan_to_num(top / rise, nan=math.inf)
         if top > 0:  # beams that rise leave the layer
             return Stretch(
-                stretch.near,
-                np.where(rise > 0, np.minimum(stretch.far, crossing), stretch.far),
+                stretch.near, np.where(rise > 0, np.minimum(stretch.far, crossing), stretch.far)
             )
         enters = np.where(rise < 0, np.maximum(stretch.near, crossing), math.inf)
         return Stretch(enters, stretch.far)
 
-    def density(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def density(self, place: Floats) -> Floats:
         """Densest at the ground; none below it."""
         above = place[:, 2] - self.ground
         fallen = np.exp(-np.maximum(above, 0) / self.height)
@@ -101,11 +101,11 @@ class Plume:
         length: Metres.
     """
 
-    start: NDArray[np.float64]
-    heading: NDArray[np.float64]
+    start: Floats
+    heading: Floats
     length: float
 
-    def stretch(self, beams: NDArray[np.float64], stretch: Stretch) -> Stretch:
+    def stretch(self, beams: Floats, stretch: Stretch) -> Stretch:
         """Where beams are in the sphere around it."""
         centre = self.start + self.heading * self.length / 2
         radius = math.hypot(self.length / 2, self._half_width(self.length), 2 * PLUME_HEIGHT)
@@ -115,7 +115,7 @@ class Plume:
             np.maximum(stretch.near, along - half), np.minimum(stretch.far, along + half)
         )
 
-    def density(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def density(self, place: Floats) -> Floats:
         """Falls to 1/e halfway along it, and over a third of its height."""
         off = place - self.start
         along, up = off @ self.heading, off[:, 2]
@@ -125,17 +125,12 @@ class Plume:
         fallen = np.exp(-2 * along / self.length - 3 * up / PLUME_HEIGHT)
         return np.where(inside, np.minimum(fallen, 1), 0)
 
-    def _half_width(self, along: NDArray[np.float64] | float) -> NDArray[np.float64]:
+    def _half_width(self, along: Floats | float) -> Floats:
         return np.asarray(PLUME_HALF_WIDTH + PLUME_OPENING * along)
 
 
 def draw_plumes(
-    clear: Returns,
-    beams: NDArray[np.float64],
-    ground: float,
-    count: int,
-    length: float,
-    generator: np.random.Generator,
+    clear: Returns, beams: Floats, ground: float, count: int, length: float, generator: Generator
 ) -> list[Plume]:
     """Plumes behind cars that the beams see.
 

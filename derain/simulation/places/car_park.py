@@ -3,9 +3,10 @@
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.simulation import objects
+from derain.simulation.arrays import Floats, Ints
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
 from derain.simulation.places.crowd import ragged_things
@@ -19,9 +20,7 @@ from derain.simulation.places.standing import (
     place,
     scatter,
     shuffled,
-    straight,
 )
-from derain.simulation.shapes import placed
 from derain.simulation.track import Track
 
 # Rows of lots on either side of lanes, metres: how long a lot is, how wide, and a lane.
@@ -31,7 +30,7 @@ LOT_LENGTH, LOT_WIDTH, LANE = 5.2, 2.6, 6.5
 HALF_SIZE = 38.0
 
 
-def lay_out_car_park(generator: np.random.Generator) -> Track:
+def lay_out_car_park(generator: Generator) -> Track:
     """Lays out a car park.
 
     The sensor stands in a lane between rows of cars whose windows let most rays through. People,
@@ -53,17 +52,17 @@ def lay_out_car_park(generator: np.random.Generator) -> Track:
     return assemble(_ground(winter, generator), standing, uneven, generator)
 
 
-def _ground(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+def _ground(winter: bool, generator: Generator) -> Iterator[Surface]:
     surface = [relief.ASPHALT, relief.COBBLES, relief.TRACK][generator.choice(3, p=[0.6, 0.3, 0.1])]
     beyond = relief.SNOW if winter and generator.random() < 0.5 else relief.MEADOW
 
-    def kind_at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+    def kind_at(x: Floats, y: Floats) -> Ints:
         return np.where(np.maximum(np.abs(x), np.abs(y)) < HALF_SIZE, 0, 1)
 
     yield from ground_mesh([surface, beyond], kind_at, generator)
 
 
-def _rows(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _rows(aside: float, generator: Generator) -> Iterator[Surface]:
     """Cars in their lots, nose first or last, those far off of few triangles."""
     full = generator.uniform(0.3, 0.9)
     near_lane = aside + LANE / 2 + LOT_LENGTH / 2
@@ -79,7 +78,7 @@ def _rows(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
                 yield from place(make(generator), *nudged, heading)
 
 
-def _people(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _people(aside: float, generator: Generator) -> Iterator[Surface]:
     """People in the lanes and between cars, near and far, and a few who cycle."""
 
     def in_a_lane(x: float, y: float) -> bool:
@@ -87,17 +86,17 @@ def _people(aside: float, generator: np.random.Generator) -> Iterator[Surface]:
         across = abs(y - aside) % (LANE + 2 * LOT_LENGTH + 0.3)
         return max(abs(x), abs(y)) < HALF_SIZE and across < LANE / 2 + 0.8
 
-    for count, distances in ((generator.integers(6, 16), (2.2, 35)), (6, (15, 50))):
-        makes = choose([(people.person, 8), (people.cyclist, 1)], int(count), generator)
+    for count, distances in (((6, 16), (2.2, 35)), (6, (15, 50))):
+        makes = choose([(people.person, 8), (people.cyclist, 1)], count, generator)
         places = free_places(len(makes), distances, 0.9, generator, in_a_lane)
         yield from scatter(makes, places, generator)
 
 
-def _between(aside: float, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+def _between(aside: float, winter: bool, generator: Generator) -> Iterator[Surface]:
     """What stands along the lane and where lots meet."""
     small = choose(
         [(frames.trolley, 2), (frames.bollard, 2), (frames.thin_pole, 2), (_sapling, 1)],
-        int(generator.integers(8, 25)),
+        (8, 25),
         generator,
     )
 
@@ -117,32 +116,29 @@ def _between(aside: float, winter: bool, generator: np.random.Generator) -> Iter
         yield bank.placed(generator.uniform(3, 20), aside - LANE / 2 - 1)
 
 
-def _edge(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+def _edge(winter: bool, generator: Generator) -> Iterator[Surface]:
     """What closes the car park off: on each of four sides a hedge, a fence, or houses."""
     makes: list[Piece] = [threads.chain_link, frames.railing, _nets, walls.facade]
     makes.append(_brushes if winter else plants.hedge)
     for quarter in range(4):
         make = makes[generator.integers(len(makes))]
         piece = 19.0 if make is walls.facade else 9.5
-        for surface in line_up(
-            make, straight(HALF_SIZE), (-HALF_SIZE, HALF_SIZE), piece, generator, 0.15
-        ):
+        for surface in line_up(make, HALF_SIZE, (-HALF_SIZE, HALF_SIZE), piece, generator, 0.15):
             yield surface.placed(0, 0, quarter * np.pi / 2)
 
 
-def _nets(length: float, generator: np.random.Generator) -> Surface:
+def _nets(length: float, generator: Generator) -> Surface:
     return threads.net(length, generator.uniform(1.5, 5), generator)
 
 
-def _brushes(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _brushes(length: float, generator: Generator) -> Iterator[Surface]:
     for x in np.arange(0, length, 1.0):
         yield from place(plants.brushwood(generator.uniform(0.8, 2), generator), float(x), 0)
 
 
-def _sapling(generator: np.random.Generator) -> Iterable[Surface]:
+def _sapling(generator: Generator) -> Iterable[Surface]:
     """A sapling tied to its stake."""
     yield frames.thin_pole(generator)
     crown = generator.uniform(0.2, 0.6, 3)
     leaves = plants.bush((crown[0], crown[1], crown[2]), generator)
-    shift = placed(leaves.triangles, 0.1, 0) + np.array([0, 0, generator.uniform(0.8, 1.8)])
-    yield Surface(shift, leaves.label, leaves.reflectivity)
+    yield leaves.moved(0.1, 0, generator.uniform(0.8, 1.8))

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
@@ -32,7 +33,7 @@ ON_A_CAR, ON_A_LORRY = 1.3, 2.4
 Parts = Iterator[Triangles]
 
 
-def lay_out_carrier(generator: np.random.Generator, mounting_height: float) -> Iterator[Surface]:
+def lay_out_carrier(generator: Generator, mounting_height: float) -> Iterator[Surface]:
     """Lays out what carries the sensor; nothing for every fifth sensor.
 
     It is upright under the sensor, whichever way the sensor itself is tilted. A sensor that moves
@@ -62,7 +63,7 @@ def lay_out_carrier(generator: np.random.Generator, mounting_height: float) -> I
 
 
 def _finished(
-    part: Triangles, mounting_height: float, painted: float, generator: np.random.Generator
+    part: Triangles, mounting_height: float, painted: float, generator: Generator
 ) -> Iterator[Surface]:
     """A part as paint that returns, or as a mirror with specks on it, or as the specks alone."""
     surface = Surface(part, TrackClass.BACKGROUND, log_uniform(PAINT, generator))
@@ -75,7 +76,7 @@ def _finished(
     yield from shining if hides else islice(shining, 1, None)
 
 
-def _car(generator: np.random.Generator, mounting_height: float) -> Parts:
+def _car(generator: Generator, mounting_height: float) -> Parts:
     """A roof with rack and antenna under the sensor, windscreen, bonnet, boot and mirrors."""
     drop = log_uniform((0.2, min(0.9, mounting_height - 1.0)), generator)
     half = generator.uniform(0.5, 0.75)
@@ -94,7 +95,7 @@ def _car(generator: np.random.Generator, mounting_height: float) -> Parts:
     yield from _equipment((0.25, 1.6), -drop, generator)
 
 
-def _lorry(generator: np.random.Generator, mounting_height: float) -> Parts:
+def _lorry(generator: Generator, mounting_height: float) -> Parts:
     """A cab's roof with a deflector, mirrors on arms, lamps, and the front of a box behind."""
     drop = log_uniform((0.2, 1.2), generator)
     rear, front, half = -generator.uniform(0.5, 1.5), generator.uniform(0.2, 0.8), 1.2
@@ -112,7 +113,7 @@ def _lorry(generator: np.random.Generator, mounting_height: float) -> Parts:
     yield from _equipment((0.25, 2.0), -drop, generator)
 
 
-def _robot(generator: np.random.Generator, mounting_height: float) -> Parts:
+def _robot(generator: Generator, mounting_height: float) -> Parts:
     """A flat deck with posts at its corners, plates over them, cables, an arm, wheels."""
     drop = log_uniform((0.18, max(0.2, 0.8 * mounting_height)), generator)
     drop = max(min(drop, mounting_height - 0.02), 0.17)
@@ -131,7 +132,7 @@ def _robot(generator: np.random.Generator, mounting_height: float) -> Parts:
     yield from _equipment((0.2, max(half_length, 0.4)), -drop, generator)
 
 
-def _tripod(generator: np.random.Generator, mounting_height: float) -> Parts:
+def _tripod(generator: Generator, mounting_height: float) -> Parts:
     """Three legs, what hangs between them, and somebody behind or a hand that holds the sensor."""
     foot = 0.05 - mounting_height
     spread, radius = generator.uniform(0.25, 0.7), generator.uniform(0.01, 0.025)
@@ -159,7 +160,7 @@ def _tripod(generator: np.random.Generator, mounting_height: float) -> Parts:
     yield from _equipment((0.2, 0.8), -0.35, generator)
 
 
-def _mast(generator: np.random.Generator, mounting_height: float) -> Parts:
+def _mast(generator: Generator, mounting_height: float) -> Parts:
     """A pole under the sensor or beside it, brackets, cables, the rim of a housing."""
     aside = generator.choice([0.0, generator.uniform(0.25, 0.6)])
     top = -0.2 if aside == 0 else generator.uniform(-0.2, 1.0)
@@ -169,7 +170,7 @@ def _mast(generator: np.random.Generator, mounting_height: float) -> Parts:
     yield from _equipment((0.25, 1.2), -0.3, generator)
 
 
-def _rack(x: Span, half: float, roof: float, generator: np.random.Generator) -> Parts:
+def _rack(x: Span, half: float, roof: float, generator: Generator) -> Parts:
     """Rails along a roof and bars across it."""
     height = roof + generator.uniform(0.04, min(0.15, -roof - 0.12) if roof < -0.2 else 0.05)
     radius = generator.uniform(0.008, 0.03)
@@ -180,7 +181,7 @@ def _rack(x: Span, half: float, roof: float, generator: np.random.Generator) -> 
         yield bars([((x[0], y, height), (x[1], y, height)) for y in (-half, half)], radius)
 
 
-def _antenna(x: float, roof: float, generator: np.random.Generator) -> Parts:
+def _antenna(x: float, roof: float, generator: Generator) -> Parts:
     if generator.random() < 0.7:
         x = x if abs(x) > 0.3 else -0.35
         y, length = generator.uniform(-0.3, 0.3), generator.uniform(0.08, 0.9)
@@ -188,7 +189,7 @@ def _antenna(x: float, roof: float, generator: np.random.Generator) -> Parts:
         yield bars([((x, y, roof), tip)], log_uniform((0.002, 0.015), generator), 6)
 
 
-def _equipment(distance: Span, floor: float, generator: np.random.Generator) -> Parts:
+def _equipment(distance: Span, floor: float, generator: Generator) -> Parts:
     """Other sensors, lamps, brackets, cables and rims about the sensor, below its horizon or above.
 
     Args:
@@ -215,7 +216,7 @@ def _equipment(distance: Span, floor: float, generator: np.random.Generator) -> 
         yield _rim(generator)
 
 
-def _loop(distance: Span, floor: float, generator: np.random.Generator) -> Triangles:
+def _loop(distance: Span, floor: float, generator: Generator) -> Triangles:
     """A cable that runs about the sensor, level or rising and falling."""
     angle = generator.uniform(-np.pi, np.pi) + np.linspace(0, generator.uniform(0.2, 2.5), 13)
     near, far = generator.uniform(*distance, 2)
@@ -225,7 +226,7 @@ def _loop(distance: Span, floor: float, generator: np.random.Generator) -> Trian
     return shapes.rods(knots[:-1], knots[1:], log_uniform((0.002, 0.012), generator))
 
 
-def _rim(generator: np.random.Generator) -> Triangles:
+def _rim(generator: Generator) -> Triangles:
     """A sector of a ring about the sensor: the frame of a window or the edge of a hood."""
     begin, sector = generator.uniform(-np.pi, np.pi), generator.uniform(0.3, 2.5)
     angle = begin + np.linspace(0, sector, 25)
@@ -238,7 +239,7 @@ def _rim(generator: np.random.Generator) -> Triangles:
     return shapes.sheet(np.stack(rows))
 
 
-def _vaulted(x: Span, half: float, top: float, generator: np.random.Generator) -> Triangles:
+def _vaulted(x: Span, half: float, top: float, generator: Generator) -> Triangles:
     """A roof or a bonnet, curved down towards its sides and ends."""
     along, aside = np.meshgrid(np.linspace(*x, 9), np.linspace(-half, half, 9), indexing="ij")
     from_middle = 2 * (along - sum(x) / 2) / (x[1] - x[0])
@@ -253,7 +254,7 @@ def _between(upper: Point, lower: Point) -> Triangles:
     return shapes.sheet(np.array(corners))
 
 
-Carrier = Callable[[np.random.Generator, float], Parts]
+Carrier = Callable[[Generator, float], Parts]
 CARRIERS_BY_HEIGHT: Sequence[dict[Carrier, float]] = (
     {_robot: 0.55, _tripod: 0.4, _mast: 0.05},
     {_car: 0.7, _tripod: 0.1, _robot: 0.1, _mast: 0.1},

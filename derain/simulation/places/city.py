@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import objects
 from derain.simulation.drawing import along
@@ -19,7 +20,6 @@ from derain.simulation.places.standing import (
     place,
     scatter,
     shuffled,
-    straight,
 )
 from derain.simulation.track import Track
 
@@ -39,7 +39,7 @@ class Section:
     fronts: tuple[float, float]
 
     @classmethod
-    def draw(cls, generator: np.random.Generator) -> "Section":
+    def draw(cls, generator: Generator) -> "Section":
         """Draws a street of 8 to 14 m between pavements of 2 to 9 m."""
         kerbs = -generator.uniform(3.3, 5), generator.uniform(4.5, 9)
         right, left = generator.uniform(2, 9, 2)
@@ -51,7 +51,7 @@ class Section:
         return right or self.kerbs[1] + 0.2 < y < self.fronts[1] - 0.6
 
 
-def lay_out_city(generator: np.random.Generator) -> Track:
+def lay_out_city(generator: Generator) -> Track:
     """Lays out a city street.
 
     Rough fronts with windows that rays go into, balconies, pipes and ivy; parked cars and bicycles;
@@ -78,7 +78,7 @@ def lay_out_city(generator: np.random.Generator) -> Track:
     return assemble(ground, standing, uneven, generator, _cables(section, generator))
 
 
-def _ground(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+def _ground(section: Section, generator: Generator) -> Iterator[Surface]:
     surface = relief.COBBLES if generator.random() < 0.25 else relief.ASPHALT
     right, left = section.kerbs
     return ground_mesh(
@@ -86,18 +86,17 @@ def _ground(section: Section, generator: np.random.Generator) -> Iterator[Surfac
     )
 
 
-def _houses(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+def _houses(section: Section, generator: Generator) -> Iterator[Surface]:
     for side, front in zip((-1, 1), section.fronts, strict=True):
         gaps, piece = generator.uniform(0, 0.3), generator.uniform(9, 18)
-        line = straight(abs(front))
-        for house in line_up(walls.facade, line, CITY_SIGHT, piece, generator, gaps):
+        for house in line_up(walls.facade, abs(front), CITY_SIGHT, piece, generator, gaps):
             # Houses are seen from the street: those on the right are those on the left, turned.
             yield house if side > 0 else house.placed(CITY_SIGHT[0] + CITY_SIGHT[1], 0, np.pi)
     far = walls.facade(30, generator)
     yield from place(far, CITY_SIGHT[1], 15, -np.pi / 2)
 
 
-def _parked(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+def _parked(section: Section, generator: Generator) -> Iterator[Surface]:
     for kerb, side in zip(section.kerbs, (-1, 1), strict=True):
         full = generator.uniform(0.1, 0.9)
         for x in along(*CITY_SIGHT, (5.8, 7.5), generator):
@@ -108,14 +107,14 @@ def _parked(section: Section, generator: np.random.Generator) -> Iterator[Surfac
                 yield from place(make(generator), x, y, heading)
 
 
-def _people(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+def _people(section: Section, generator: Generator) -> Iterator[Surface]:
     makes = choose([(people.person, 8), (people.cyclist, 2)], 18, generator)
     count = int(generator.integers(4, 18))
     places = free_places(count, (2.5, 55), 0.8, generator, section.on_a_pavement)
     yield from scatter(makes, places, generator)
 
 
-def _furniture(section: Section, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+def _furniture(section: Section, winter: bool, generator: Generator) -> Iterator[Surface]:
     """Trees, lamps, signs, bollards and railings along the kerbs; bushes in tubs."""
     for kerb, side in zip(section.kerbs, (-1, 1), strict=True):
         for x in along(*CITY_SIGHT, (6, 30), generator):
@@ -132,7 +131,7 @@ def _furniture(section: Section, winter: bool, generator: np.random.Generator) -
             yield rail.placed(begin, kerb + side * 0.4)
 
 
-def _works(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+def _works(section: Section, generator: Generator) -> Iterator[Surface]:
     """A scaffold before a house, with or without a net."""
     if generator.random() < 0.5:
         side = int(generator.integers(2))
@@ -144,7 +143,7 @@ def _works(section: Section, generator: np.random.Generator) -> Iterator[Surface
             yield veil.placed(x, y - 0.15 if side else y + 1.3)
 
 
-def _cables(section: Section, generator: np.random.Generator) -> Iterator[Surface]:
+def _cables(section: Section, generator: Generator) -> Iterator[Surface]:
     """Cables from house to house, with lamps on them, and a tram's along the street."""
     if generator.random() < 0.6:
         height = generator.uniform(5, 7)

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
+from derain.simulation.arrays import Floats, Ints
 from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, plants, relief, threads
@@ -37,15 +38,13 @@ class Road:
         """The line so many metres outwards from its left (1) or right edge."""
         return lambda x: self.aside + self.bend * x**2 + side * (self.half_width + outwards)
 
-    def outside(
-        self, x: NDArray[np.float64] | float, y: NDArray[np.float64] | float
-    ) -> NDArray[np.float64]:
+    def outside(self, x: Floats | float, y: Floats | float) -> Floats:
         """How far places are from the road, metres; less than 0 on it."""
         from_middle = np.abs(y - self.aside - self.bend * np.asarray(x) ** 2)
         return np.asarray(from_middle - self.half_width)
 
 
-def lay_out_country(generator: np.random.Generator) -> Track:
+def lay_out_country(generator: Generator) -> Track:
     """Lays out a country road.
 
     A road 3 to 7 m wide, bending, on hilly ground; on either side a verge, then a hedge, a fence or
@@ -69,14 +68,14 @@ def lay_out_country(generator: np.random.Generator) -> Track:
     return assemble(_ground(road, snowy, generator), standing, uneven, generator)
 
 
-def _ground(road: Road, snowy: bool, generator: np.random.Generator) -> Iterator[Surface]:
+def _ground(road: Road, snowy: bool, generator: Generator) -> Iterator[Surface]:
     surface = [relief.ASPHALT, relief.TRACK, relief.COBBLES][generator.choice(3, p=[0.6, 0.3, 0.1])]
     fields = [relief.SNOW] if snowy else [relief.FIELD, relief.MEADOW, relief.GRAVEL]
     beyond = [fields[which] for which in generator.integers(len(fields), size=2)]
     verge = relief.SNOW if snowy else relief.MEADOW
     broad = generator.uniform(1, 4)
 
-    def kind_at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+    def kind_at(x: Floats, y: Floats) -> Ints:
         outside = road.outside(x, y)
         field = np.where(y > road.aside + road.bend * x**2, 2, 3)
         return np.where(outside < 0, 0, np.where(outside < broad, 1, field))
@@ -84,7 +83,7 @@ def _ground(road: Road, snowy: bool, generator: np.random.Generator) -> Iterator
     yield from ground_mesh([surface, verge, *beyond], kind_at, generator)
 
 
-def _verges(road: Road, generator: np.random.Generator) -> Iterator[Surface]:
+def _verges(road: Road, generator: Generator) -> Iterator[Surface]:
     for side in (-1, 1):
         for _ in range(generator.integers(1, 5)):
             count = int(generator.integers(50, 600))
@@ -95,7 +94,7 @@ def _verges(road: Road, generator: np.random.Generator) -> Iterator[Surface]:
 
 
 def _boundary(
-    road: Road, side: int, winter: bool, snowy: bool, generator: np.random.Generator
+    road: Road, side: int, winter: bool, snowy: bool, generator: Generator
 ) -> Iterable[Surface]:
     """What follows the road on one side, piece by piece."""
     line = road.beside(side, generator.uniform(1, 7))
@@ -112,13 +111,13 @@ def _boundary(
     return line_up(make, line, COUNTRY_SIGHT, generator.uniform(4, 9), generator, gaps)
 
 
-def _bare_hedge(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _bare_hedge(length: float, generator: Generator) -> Iterator[Surface]:
     height = generator.uniform(0.8, 2.5)
     for x in np.arange(0, length, 0.6):
         yield from place(plants.brushwood(height, generator), float(x), 0)
 
 
-def _trees(road: Road, winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+def _trees(road: Road, winter: bool, generator: Generator) -> Iterator[Surface]:
     for side in (-1, 1):
         line, spacing = road.beside(side, generator.uniform(1.5, 10)), generator.uniform(6, 25)
         for x in along(*COUNTRY_SIGHT, (0.5 * spacing, spacing), generator):
@@ -126,7 +125,7 @@ def _trees(road: Road, winter: bool, generator: np.random.Generator) -> Iterator
             yield from place(plants.tree(winter, generator), x, y, generator.uniform(0, 6))
 
 
-def _cables(road: Road, generator: np.random.Generator) -> Iterator[Surface]:
+def _cables(road: Road, generator: Generator) -> Iterator[Surface]:
     """Poles beside the road with one to four cables from each to the next."""
     line = road.beside(int(generator.choice([-1, 1])), generator.uniform(1.5, 6))
     spacing, height = generator.uniform(18, 40), generator.uniform(4.5, 8)

@@ -3,12 +3,14 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import objects
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, people, plants, threads, vehicles
 from derain.simulation.places.standing import (
     Allowed,
+    Counts,
     anywhere,
     choose,
     free_places,
@@ -17,15 +19,12 @@ from derain.simulation.places.standing import (
     shuffled,
 )
 
-# Fewest, and one more than the most.
-Counts = tuple[int, int]
-
 # How far from the sensor they are, metres.
 NEAR_AND_FAR = (2.2, 70.0)
 
 
 def users(
-    generator: np.random.Generator,
+    generator: Generator,
     allowed: Allowed = anywhere,
     *,
     walkers: Counts = (6, 16),
@@ -42,18 +41,10 @@ def users(
         cars: The same of vehicles, of which few are lorries.
     """
     wheeled = choose(
-        [(vehicles.glazed_car, 8), (objects.car, 2), (vehicles.lorry, 1)],
-        int(generator.integers(*cars)),
-        generator,
+        [(vehicles.glazed_car, 8), (objects.car, 2), (vehicles.lorry, 1)], cars, generator
     )
-    on_foot = choose(
-        [(people.person, 9), (objects.pedestrian, 1)],
-        int(generator.integers(*walkers)),
-        generator,
-    )
-    bikes = choose(
-        [(people.cyclist, 9), (objects.bike, 1)], int(generator.integers(*cyclists)), generator
-    )
+    on_foot = choose([(people.person, 9), (objects.pedestrian, 1)], walkers, generator)
+    bikes = choose([(people.cyclist, 9), (objects.bike, 1)], cyclists, generator)
     far, near = NEAR_AND_FAR[1], NEAR_AND_FAR[0]
     parked = free_places(len(wheeled), (4.5, far), 8.0, generator, allowed)
 
@@ -66,7 +57,7 @@ def users(
 
 
 def ragged_things(
-    generator: np.random.Generator,
+    generator: Generator,
     allowed: Allowed = anywhere,
     *,
     count: Counts = (10, 30),
@@ -94,18 +85,18 @@ def ragged_things(
             (plants.crowned_tree if leafy else plants.bare_tree, 1.5),
             (plants.bare_tree, 1),
         ],
-        int(generator.integers(*count)),
+        count,
         generator,
     )
     places = free_places(len(makes), (2.5, 60.0), 0.6, generator, allowed)
     yield from scatter(makes, places, generator)
 
 
-def _bush(generator: np.random.Generator) -> Surface:
+def _bush(generator: Generator) -> Surface:
     length, width, height = generator.uniform(0.2, 1.5, 3)
     return plants.bush((length, width, height), generator)
 
 
-def _tufts(generator: np.random.Generator) -> Surface:
+def _tufts(generator: Generator) -> Surface:
     spread = generator.uniform(0.3, 2.5)
     return plants.grass(generator.normal(0, spread, (generator.integers(5, 60), 2)), generator)

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.drawing import log_uniform
@@ -20,7 +21,7 @@ def bars(ends: Iterable[tuple[Point, Point]], radius: float, sides: int = 4) -> 
     return shapes.rods(both[:, 0], both[:, 1], radius, sides=sides)
 
 
-def thin_pole(generator: np.random.Generator) -> Surface:
+def thin_pole(generator: Generator) -> Surface:
     """A pole of 5 mm to 6 cm, leaning or not, some with a sign or a lamp on it."""
     height, radius = generator.uniform(0.6, 6), log_uniform((0.005, 0.06), generator)
     foot, lean = (0.0, 0.0, 0.0), generator.normal(0, 0.03, 2) * height
@@ -32,7 +33,7 @@ def thin_pole(generator: np.random.Generator) -> Surface:
     return made(parts, generator)
 
 
-def railing(length: float, generator: np.random.Generator) -> Surface:
+def railing(length: float, generator: Generator) -> Surface:
     """A railing or gate of bars along x, from x = 0 on."""
     height, bottom = generator.uniform(0.8, 2.2), generator.uniform(0.05, 0.25)
     radius = log_uniform((0.006, 0.03), generator)
@@ -43,7 +44,7 @@ def railing(length: float, generator: np.random.Generator) -> Surface:
     return made([bars(upright, radius), bars([*level, *braces], 1.8 * radius)], generator)
 
 
-def scaffold(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+def scaffold(length: float, generator: Generator) -> Iterator[Surface]:
     """Tubes and boards along x, from x = 0 on, two or three storeys high."""
     storeys, depth = generator.integers(1, 4), generator.uniform(0.7, 1.2)
     step, storey, radius = generator.uniform(1.8, 2.6), 2.0, generator.uniform(0.02, 0.035)
@@ -67,7 +68,7 @@ def scaffold(length: float, generator: np.random.Generator) -> Iterator[Surface]
         yield made(boards, generator)
 
 
-def lattice(start: Point, end: Point, width: float, generator: np.random.Generator) -> Surface:
+def lattice(start: Point, end: Point, width: float, generator: Generator) -> Surface:
     """A square lattice girder or mast between two places.
 
     Args:
@@ -87,7 +88,7 @@ def lattice(start: Point, end: Point, width: float, generator: np.random.Generat
     return made(wood, generator)
 
 
-def guard_rail(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+def guard_rail(length: float, generator: Generator) -> Iterator[Surface]:
     """A steel guard rail along x, from x = 0 on: a band on posts."""
     profile = np.array([[0, 0.45], [0.05, 0.52], [0, 0.6], [0.05, 0.68], [0, 0.75]])
     x = np.linspace(0, length, max(2, int(length / 4)))
@@ -102,7 +103,7 @@ def guard_rail(length: float, generator: np.random.Generator) -> Iterator[Surfac
     yield made([shapes.sheet(band), bars(posts, 0.05)], generator)
 
 
-def trolley(generator: np.random.Generator) -> Surface:
+def trolley(generator: Generator) -> Surface:
     """A shopping trolley: a basket of wire, a handle, wheels."""
     length, width, low, high = 0.9, 0.55, 0.4, 0.95
     radius, half = log_uniform((0.003, 0.01), generator), width / 2
@@ -117,13 +118,13 @@ def trolley(generator: np.random.Generator) -> Surface:
     return made([bars(wires, radius), bars(frame, 0.018)], generator)
 
 
-def bollard(generator: np.random.Generator) -> Surface:
+def bollard(generator: Generator) -> Surface:
     """A bollard, a cone's height or a man's waist."""
     return made(
         [shapes.cylinder(generator.uniform(0.03, 0.12), 0, generator.uniform(0.4, 1.1))], generator
     )
 
 
-def made(parts: list[Triangles], generator: np.random.Generator) -> Surface:
+def made(parts: list[Triangles], generator: Generator) -> Surface:
     """Parts of one material as a surface."""
     return of_material(parts, FRAME_REFLECTIVITY, generator)

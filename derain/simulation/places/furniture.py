@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.drawing import log_uniform
@@ -12,7 +13,7 @@ from derain.simulation.places.frames import Point, bars, made
 from derain.simulation.shapes import Triangles
 
 
-def table(generator: np.random.Generator) -> Iterator[Surface]:
+def table(generator: Generator) -> Iterator[Surface]:
     """A table on four legs or a trestle, scatter with papers, screens, cups and cables."""
     length, width = generator.uniform(0.6, 2.2), generator.uniform(0.5, 1.0)
     top = generator.uniform(0.65, 1.05)
@@ -32,7 +33,7 @@ def table(generator: np.random.Generator) -> Iterator[Surface]:
         yield threads.cable(start, start * (1, 1, 0.05), 0.1, (0.003, 0.01), generator)
 
 
-def chair(generator: np.random.Generator) -> Surface:
+def chair(generator: Generator) -> Surface:
     """A chair with legs of tube or on a star of castors, its back closed or of bars."""
     seat, half = generator.uniform(0.4, 0.6), generator.uniform(0.17, 0.25)
     back, radius = seat + generator.uniform(0.3, 0.6), log_uniform((0.007, 0.02), generator)
@@ -53,7 +54,7 @@ def chair(generator: np.random.Generator) -> Surface:
     return made([*parts, bars(rods, radius)], generator)
 
 
-def shelf(generator: np.random.Generator) -> Iterator[Surface]:
+def shelf(generator: Generator) -> Iterator[Surface]:
     """Boards between uprights, full of books, boxes, folders and gaps of all depths."""
     length, depth = generator.uniform(0.6, 2.5), generator.uniform(0.25, 0.6)
     boards = np.arange(0.1, generator.uniform(0.9, 2.3), generator.uniform(0.28, 0.5))
@@ -66,10 +67,7 @@ def shelf(generator: np.random.Generator) -> Iterator[Surface]:
     for z in boards[:-1]:
         x = -half
         while x < half - 0.05:
-            width, height = (
-                log_uniform((0.02, 0.4), generator),
-                generator.uniform(0.05, 0.27),
-            )
+            width, height = (log_uniform((0.02, 0.4), generator), generator.uniform(0.05, 0.27))
             deep = generator.uniform(0.3, 1) * depth
             if generator.random() < full:
                 thing = shapes.box(width, deep, z, z + height)
@@ -78,7 +76,7 @@ def shelf(generator: np.random.Generator) -> Iterator[Surface]:
             x += width + generator.choice([0.0, 0.01, 0.1])
 
 
-def pot_plant(generator: np.random.Generator) -> Iterator[Surface]:
+def pot_plant(generator: Generator) -> Iterator[Surface]:
     """A plant of leaves or of long blades in a pot."""
     height, radius = generator.uniform(0.15, 0.5), generator.uniform(0.08, 0.25)
     yield made([shapes.cylinder(radius, 0, height)], generator)
@@ -87,11 +85,10 @@ def pot_plant(generator: np.random.Generator) -> Iterator[Surface]:
         leaves = plants.bush((0.5 * size, 0.5 * size, 0.7 * size), generator)
     else:
         leaves = plants.brushwood(size, generator)
-    raised = shapes.raised(leaves.triangles, height)
-    yield Surface(raised, leaves.label, leaves.reflectivity)
+    yield leaves.moved(0, 0, height)
 
 
-def standing_lamp(generator: np.random.Generator) -> Surface:
+def standing_lamp(generator: Generator) -> Surface:
     """A lamp, a coat stand, a microphone or a flag on a thin pole."""
     height, radius = generator.uniform(1.0, 2.0), log_uniform((0.006, 0.03), generator)
     parts = [bars([((0, 0, 0), (0, 0, height))], radius, 6), shapes.cylinder(0.15, 0, 0.03)]
@@ -104,7 +101,7 @@ def standing_lamp(generator: np.random.Generator) -> Surface:
     return made([*parts, bars(arms, radius)] if arms else parts, generator)
 
 
-def machine(generator: np.random.Generator) -> Iterator[Surface]:
+def machine(generator: Generator) -> Iterator[Surface]:
     """A machine of a lab: boxes on each other, pipes, a hood, hoses."""
     length, width = generator.uniform(0.4, 1.5, 2)
     top = 0.0
@@ -122,7 +119,7 @@ def machine(generator: np.random.Generator) -> Iterator[Surface]:
         yield threads.cable(start, end, generator.uniform(0, 0.2), (0.006, 0.04), generator)
 
 
-def rubbish(generator: np.random.Generator) -> Surface:
+def rubbish(generator: Generator) -> Surface:
     """Boxes, bags and a bucket on the floor, one leaning on the other."""
     parts = []
     for _ in range(generator.integers(1, 6)):
@@ -133,7 +130,7 @@ def rubbish(generator: np.random.Generator) -> Surface:
     return made(parts, generator)
 
 
-def _small_thing(top: float, generator: np.random.Generator) -> Triangles:
+def _small_thing(top: float, generator: Generator) -> Triangles:
     """A screen on its foot, a cup, a book, a tablet on edge, something bent."""
     kind = generator.integers(4)
     if kind == 0:

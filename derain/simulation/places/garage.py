@@ -1,10 +1,10 @@
 """A parking garage: a low ceiling with pipes and lamps, pillars, mesh, things near on all sides."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.drawing import log_uniform
@@ -23,7 +23,6 @@ from derain.simulation.places.standing import (
     place,
     scatter,
     shuffled,
-    straight,
 )
 from derain.simulation.track import Track
 
@@ -31,26 +30,20 @@ from derain.simulation.track import Track
 LOWEST_CEILING = 2.9
 
 
-@dataclass(frozen=True)
-class Hall(Walls):
-    """The hall of a garage, with the sensor somewhere in it.
-
-    Attributes:
-        bay: Between pillars, metres.
-    """
-
-    bay: float
-    MARGIN = 0.7
-
-
-def lay_out_garage(generator: np.random.Generator) -> Track:
+def lay_out_garage(generator: Generator) -> Track:
     """Lays out a garage.
 
     A hall with rough walls, pillars and a ceiling under which pipes, cables, lamps and nets hang;
     cars with windows, people, bicycles, cages of mesh, railings, trolleys and dust sheets near on
     all sides, from 2 m on. A wall may be open to the outside, with a railing.
     """
-    hall = _hall(generator)
+    # From a private garage's yard to a whole storey.
+    hall = Walls(
+        (-generator.uniform(4, 25), generator.uniform(10, 45)),
+        (-generator.uniform(4, 20), generator.uniform(4, 20)),
+        generator.uniform(LOWEST_CEILING, 4.5),
+        margin=0.7,
+    )
     standing = [
         *_pillars(hall, generator),
         *_walls(hall, generator),
@@ -64,23 +57,13 @@ def lay_out_garage(generator: np.random.Generator) -> Track:
     return assemble(floor, standing, uneven, generator, [_ceiling(hall, generator)])
 
 
-def _hall(generator: np.random.Generator) -> Hall:
-    """Draws a hall, from a private garage's yard to a whole storey."""
-    return Hall(
-        (-generator.uniform(4, 25), generator.uniform(10, 45)),
-        (-generator.uniform(4, 20), generator.uniform(4, 20)),
-        generator.uniform(LOWEST_CEILING, 4.5),
-        generator.uniform(4.5, 8),
-    )
-
-
-def _ceiling(hall: Hall, generator: np.random.Generator) -> Surface:
+def _ceiling(hall: Walls, generator: Generator) -> Surface:
     length, width = hall.x[1] - hall.x[0], hall.y[1] - hall.y[0]
     rough = walls.rough_wall(length, width, generator, cell=0.6)
     return walls.laid_flat(rough, (hall.x[0], hall.y[0]), hall.height)
 
 
-def _under_the_ceiling(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _under_the_ceiling(hall: Walls, generator: Generator) -> Iterator[Surface]:
     """Pipes, trays, lamps, and loose cables that hang down."""
     top = hall.height - 0.05
     for _ in range(generator.integers(3, 12)):
@@ -103,12 +86,13 @@ def _under_the_ceiling(hall: Hall, generator: np.random.Generator) -> Iterator[S
         yield threads.cable(start, end, generator.uniform(0.1, 0.9), (0.004, 0.03), generator)
 
 
-def _pillars(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _pillars(hall: Walls, generator: Generator) -> Iterator[Surface]:
+    bay = generator.uniform(4.5, 8)
     side, rounded = generator.uniform(0.25, 0.7), generator.random() < 0.3
-    shift = generator.uniform(0, hall.bay, 2)
+    shift = generator.uniform(0, bay, 2)
     for x, y in product(
-        np.arange(hall.x[0] + shift[0], hall.x[1], hall.bay),
-        np.arange(hall.y[0] + shift[1], hall.y[1], hall.bay),
+        np.arange(hall.x[0] + shift[0], hall.x[1], bay),
+        np.arange(hall.y[0] + shift[1], hall.y[1], bay),
     ):
         if np.hypot(x, y) > 2.6:
             box = shapes.box(side, side, 0, hall.height)
@@ -116,7 +100,7 @@ def _pillars(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
             yield frames.made([shapes.placed(pillar, float(x), float(y))], generator)
 
 
-def _walls(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _walls(hall: Walls, generator: Generator) -> Iterator[Surface]:
     (behind, ahead), (right, left) = hall.x, hall.y
     for number, (x, y) in enumerate(hall.corners):
         length = (ahead - behind) if number % 2 == 0 else (left - right)
@@ -130,7 +114,7 @@ def _walls(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
         yield from place(wall, x, y, number * np.pi / 2)
 
 
-def _parked(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _parked(hall: Walls, generator: Generator) -> Iterator[Surface]:
     full = generator.uniform(0.2, 0.9)
     for y, nose in ((hall.y[0] + 3, 1), (hall.y[1] - 3, -1)):
         for x in np.arange(hall.x[0] + 2, hall.x[1] - 2, 2.7):
@@ -139,7 +123,7 @@ def _parked(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
                 yield from place(vehicles.glazed_car(generator), float(x), float(y), heading)
 
 
-def _about(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _about(hall: Walls, generator: Generator) -> Iterator[Surface]:
     """People and small things on the floor."""
     makes: list[Make] = [people.person] * int(generator.integers(3, 11))
     small: list[tuple[Make, float]] = [
@@ -151,12 +135,12 @@ def _about(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
         (heaps.logs, 0.4),
         (of_size(heaps.rubble, (0.3, 1)), 1),
     ]
-    makes += choose(small, int(generator.integers(5, 20)), generator)
+    makes += choose(small, (5, 20), generator)
     places = free_places(len(makes), (2.2, 30), 0.9, generator, hall.holds)
     yield from scatter(shuffled(makes, generator), places, generator)
 
 
-def _cages(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
+def _cages(hall: Walls, generator: Generator) -> Iterator[Surface]:
     """Walls of mesh, nets and railings that part the hall."""
     kinds: list[Piece] = [
         threads.chain_link,
@@ -167,5 +151,5 @@ def _cages(hall: Hall, generator: np.random.Generator) -> Iterator[Surface]:
     for x, y in free_places(int(generator.integers(2, 6)), (2.5, 20), 2.5, generator, hall.holds):
         make = kinds[generator.integers(len(kinds))]
         reach = min(generator.uniform(1.5, 7), hall.x[1] - x)
-        pieces = line_up(make, straight(0), (0, reach + 0.1), reach, generator)
+        pieces = line_up(make, 0, (0, reach + 0.1), reach, generator)
         yield from place(pieces, x, y)

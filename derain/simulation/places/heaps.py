@@ -1,6 +1,7 @@
 """Heaps: rubble, stones, logs, banks of earth and of snow."""
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.drawing import log_uniform, log_uniforms
@@ -13,7 +14,7 @@ BRIGHT, DULL = (0.3, 0.95), (0.05, 0.4)
 SPREAD = 0.25
 
 
-def bank(length: float, generator: np.random.Generator, *, snow: bool = False) -> Surface:
+def bank(length: float, generator: Generator, *, snow: bool = False) -> Surface:
     """A bank along x, from x = 0 on, lumpy all over.
 
     Args:
@@ -35,7 +36,7 @@ def bank(length: float, generator: np.random.Generator, *, snow: bool = False) -
     return spotted(triangles, BRIGHT if snow else DULL, SPREAD, generator)
 
 
-def rubble(radius: float, generator: np.random.Generator) -> Surface:
+def rubble(radius: float, generator: Generator) -> Surface:
     """Stones, bricks and clods on a heap, of some centimetres to some decimetres.
 
     Args:
@@ -53,7 +54,7 @@ def rubble(radius: float, generator: np.random.Generator) -> Surface:
     return spotted(faces.reshape(-1, 3, 3), DULL, SPREAD, generator)
 
 
-def logs(generator: np.random.Generator) -> Surface:
+def logs(generator: Generator) -> Surface:
     """Trunks in a stack along x."""
     length, radius = generator.uniform(2, 6), generator.uniform(0.08, 0.25)
     rows = generator.integers(1, 5)

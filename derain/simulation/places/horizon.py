@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
@@ -26,7 +27,7 @@ HORIZON_REFLECTIVITY = (0.03, 0.9)
 RETROREFLECTIVE = (0.7, 1.0)
 
 
-def lay_out_horizon(generator: np.random.Generator) -> Iterator[Surface]:
+def lay_out_horizon(generator: Generator) -> Iterator[Surface]:
     """Lays out what is far away, to be added to any place outdoors.
 
     Args:
@@ -39,7 +40,7 @@ def lay_out_horizon(generator: np.random.Generator) -> Iterator[Surface]:
         and small things that glint.
     """
     yield _hills(generator)
-    kinds: list[tuple[Callable[[float, np.random.Generator], Iterator[Surface]], int]] = [
+    kinds: list[tuple[Callable[[float, Generator], Iterator[Surface]], int]] = [
         (_row_of_trees, 5),
         (_tree, 12),
         (_building, 8),
@@ -60,7 +61,7 @@ def lay_out_horizon(generator: np.random.Generator) -> Iterator[Surface]:
                 )
 
 
-def _hills(generator: np.random.Generator) -> Surface:
+def _hills(generator: Generator) -> Surface:
     """A ring of ground that rises or falls away from the sensor, waves on waves, stones on them."""
     angle = np.linspace(0, 2 * np.pi, 241)
     away = np.geomspace(*HILLS, 22)[:, None]
@@ -78,7 +79,7 @@ def _hills(generator: np.random.Generator) -> Surface:
     return Surface(triangles, TrackClass.BACKGROUND, usual * spread)
 
 
-def _row_of_trees(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _row_of_trees(away: float, generator: Generator) -> Iterator[Surface]:
     """A row or an edge of a wood across the line of sight, of crowns that differ, with gaps."""
     half = min(generator.uniform(10, 90), 0.8 * away)
     spacing, gaps = generator.uniform(3, 10), generator.uniform(0, 0.6)
@@ -93,12 +94,12 @@ def _row_of_trees(away: float, generator: np.random.Generator) -> Iterator[Surfa
         yield _plant(np.concatenate(parts), generator)
 
 
-def _tree(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _tree(away: float, generator: Generator) -> Iterator[Surface]:
     """A tree by itself, its crown sparse or dense, on a stem."""
     yield _plant(_crown(900, generator), generator)
 
 
-def _scrub(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _scrub(away: float, generator: Generator) -> Iterator[Surface]:
     """Bushes and stalks by the dozen, each seen by a beam or none."""
     count = int(log_uniform((10, 300), generator))
     spread = generator.uniform((1, 3), (4, 20)) / 2
@@ -111,7 +112,7 @@ def _scrub(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     )
 
 
-def _crown(most: int, generator: np.random.Generator) -> Triangles:
+def _crown(most: int, generator: Generator) -> Triangles:
     """Leaves about boughs, some clumped, over a stem."""
     height = log_uniform((4, 22), generator)
     radii = height * generator.uniform(0.12, 0.3, 3)
@@ -127,7 +128,7 @@ def _crown(most: int, generator: np.random.Generator) -> Triangles:
     return np.concatenate([shapes.raised(leaves, height - radii[2]), stem])
 
 
-def _building(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _building(away: float, generator: Generator) -> Iterator[Surface]:
     """A building of one to three blocks with eaves, chimneys and aerials, its corner ahead."""
     for _ in range(generator.integers(1, 4)):
         length, width = generator.uniform(6, 25, 2)
@@ -145,7 +146,7 @@ def _building(away: float, generator: np.random.Generator) -> Iterator[Surface]:
             yield of_material([shapes.placed(thin, x, y, heading)], HORIZON_REFLECTIVITY, generator)
 
 
-def _poles(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _poles(away: float, generator: Generator) -> Iterator[Surface]:
     """Lamps or poles in a line across, with arms; perhaps a cable from each to the next."""
     count, step = int(generator.integers(1, 8)), generator.uniform(8, 30)
     height, radius = generator.uniform(3, 12), log_uniform((0.02, 0.2), generator)
@@ -161,7 +162,7 @@ def _poles(away: float, generator: np.random.Generator) -> Iterator[Surface]:
             yield threads.cable(start, end, generator.uniform(0.2, 1.5), (0.01, 0.06), generator)
 
 
-def _pylons(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _pylons(away: float, generator: Generator) -> Iterator[Surface]:
     """Two lattice masts with arms and the cables between them."""
     height, apart = generator.uniform(12, 40), generator.uniform(30, 120)
     heads = []
@@ -174,7 +175,7 @@ def _pylons(away: float, generator: np.random.Generator) -> Iterator[Surface]:
         yield threads.cable(start, end, 0.03 * apart, (0.015, 0.08), generator)
 
 
-def _sign(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _sign(away: float, generator: Generator) -> Iterator[Surface]:
     """A retroreflecting sign, plate or marker post, towards the sensor or turned from it."""
     side, top = log_uniform((0.08, 3), generator), log_uniform((0.6, 7), generator)
     plate = shapes.box(0.03, side, top - side, top)
@@ -184,14 +185,14 @@ def _sign(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     yield of_material([post], HORIZON_REFLECTIVITY, generator)
 
 
-def _glint(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _glint(away: float, generator: Generator) -> Iterator[Surface]:
     """A lamp, a marker or a scrap of metal that returns light from afar, to one beam or two."""
     size, height = log_uniform((0.05, 0.5), generator), generator.uniform(-1, 8)
     glint = shapes.raised(shapes.leaves(np.zeros((1, 3)), size, generator), height)
     yield Surface(glint, TrackClass.BACKGROUND, generator.uniform(*RETROREFLECTIVE))
 
 
-def _vehicle(away: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _vehicle(away: float, generator: Generator) -> Iterator[Surface]:
     """A car or a lorry, of which some beams meet the lamps or the edges of the roof."""
     length, width, height = [(4.4, 1.8, 1.5), (10.0, 2.5, 3.6)][int(generator.random() < 0.3)]
     body = shapes.box(length, width, -1.0, height)
@@ -200,7 +201,7 @@ def _vehicle(away: float, generator: np.random.Generator) -> Iterator[Surface]:
     yield of_material([turned], (0.02, 0.6), generator, TrackClass.CAR)
 
 
-def _plant(triangles: Triangles, generator: np.random.Generator) -> Surface:
+def _plant(triangles: Triangles, generator: Generator) -> Surface:
     """Leaves that return from nearly nothing to nearly all of the light."""
     usual = log_uniform((0.1, 0.7), generator)
     spread = log_uniforms((0.3, 1.4), len(triangles), generator)

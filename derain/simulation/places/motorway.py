@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import objects, shapes
 from derain.simulation.drawing import along
@@ -18,7 +19,6 @@ from derain.simulation.places.standing import (
     line_up,
     place,
     scatter,
-    straight,
 )
 from derain.simulation.track import Track
 
@@ -26,7 +26,7 @@ MOTORWAY_SIGHT = (-80.0, 115.0)
 LANE = 3.75
 
 
-def lay_out_motorway(generator: np.random.Generator) -> Track:
+def lay_out_motorway(generator: Generator) -> Track:
     """Lays out a motorway.
 
     Two carriageways of two to four lanes with guard rails, cars and lorries in the lanes; gantries
@@ -51,22 +51,20 @@ def lay_out_motorway(generator: np.random.Generator) -> Track:
     return assemble(_ground(right, other, generator), standing, uneven, generator, over)
 
 
-def _ground(right: float, left: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _ground(right: float, left: float, generator: Generator) -> Iterator[Surface]:
     verge = [relief.MEADOW, relief.GRAVEL, relief.SNOW][generator.choice(3, p=[0.6, 0.25, 0.15])]
     return ground_mesh(
         [relief.ASPHALT, verge], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
     )
 
 
-def _rails(lines: tuple[float, ...], generator: np.random.Generator) -> Iterator[Surface]:
+def _rails(lines: tuple[float, ...], generator: Generator) -> Iterator[Surface]:
     for y in lines:
         make = frames.guard_rail if generator.random() < 0.7 else threads.wire_fence
-        yield from line_up(make, straight(y), MOTORWAY_SIGHT, 16, generator, gaps=0.05)
+        yield from line_up(make, y, MOTORWAY_SIGHT, 16, generator, gaps=0.05)
 
 
-def _driving(
-    lanes: int, own: int, median: float, generator: np.random.Generator
-) -> Iterator[Surface]:
+def _driving(lanes: int, own: int, median: float, generator: Generator) -> Iterator[Surface]:
     """Cars and lorries in every lane, in the sensor's own at a distance."""
     for lane in range(2 * lanes):
         own_carriageway = lane < lanes
@@ -75,16 +73,13 @@ def _driving(
             if lane == own and abs(x) < 12:
                 continue
             slow = lane in (0, 2 * lanes - 1)
-            make: Make = vehicles.lorry if generator.random() < 0.15 + 0.45 * slow else _car(x)
+            car = vehicles.glazed_car if abs(x) < 35 else objects.car
+            make: Make = vehicles.lorry if generator.random() < 0.15 + 0.45 * slow else car
             heading = 0 if own_carriageway else np.pi
             yield from place(make(generator), x, y + generator.normal(0, 0.2), heading)
 
 
-def _car(x: float) -> Make:
-    return vehicles.glazed_car if abs(x) < 35 else objects.car
-
-
-def _breakdown(right: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _breakdown(right: float, generator: Generator) -> Iterator[Surface]:
     """On the hard shoulder and behind the rail: somebody who waits, workers, cones, a car."""
 
     def on_the_shoulder(x: float, y: float) -> bool:
@@ -95,7 +90,7 @@ def _breakdown(right: float, generator: np.random.Generator) -> Iterator[Surface
     yield from scatter(makes, places, generator)
 
 
-def _beside(edges: tuple[float, float], generator: np.random.Generator) -> Iterator[Surface]:
+def _beside(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
     """Delineators, signs, emergency telephones and lamps; weeds, and what lies on the shoulder."""
     for y, side in zip(edges, (-1, 1), strict=True):
         count = int(generator.integers(20, 300))
@@ -108,7 +103,7 @@ def _beside(edges: tuple[float, float], generator: np.random.Generator) -> Itera
             yield from place(frames.thin_pole(generator), x, y + side * generator.uniform(0.8, 3))
 
 
-def _gantries(edges: tuple[float, float], generator: np.random.Generator) -> Iterator[Surface]:
+def _gantries(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
     """Girders of lattice across the road, with signs; now and then cables."""
     for x in along(12, 110, (25, 80), generator):
         height = generator.uniform(5.5, 7.5)
@@ -126,18 +121,13 @@ def _gantries(edges: tuple[float, float], generator: np.random.Generator) -> Ite
             yield threads.cable(ends[0], ends[1], generator.uniform(1, 3), (0.02, 0.06), generator)
 
 
-def _embankments(edges: tuple[float, float], generator: np.random.Generator) -> Iterator[Surface]:
+def _embankments(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
     """Beyond the road: a noise wall, a fence and scrub, or a bank with trees."""
     for y, side in zip(edges, (-1, 1), strict=True):
-        kind = generator.choice(["wall", "fence", "bank"])
+        make, out, piece, gaps = EMBANKMENTS[generator.integers(len(EMBANKMENTS))]
         away = y + side * generator.uniform(0.5, 4)
-        kinds: dict[str, tuple[Piece, float, float, float]] = {
-            "wall": (_noise_wall, away, 13, 0.05),
-            "fence": (threads.chain_link, away, 13, 0.1),
-            "bank": (heaps.bank, away + 2 * side, 10, 0.0),
-        }
-        make, line, piece, gaps = kinds[kind]
-        yield from line_up(make, straight(line), MOTORWAY_SIGHT, piece, generator, gaps)
+        line = away + out * side
+        yield from line_up(make, line, MOTORWAY_SIGHT, piece, generator, gaps)
         for x in along(*MOTORWAY_SIGHT, (5, 18), generator):
             y = away + side * generator.uniform(1, 12)
             yield from place(plants.tree(generator.random() < 0.4, generator), x, y)
@@ -146,7 +136,16 @@ def _embankments(edges: tuple[float, float], generator: np.random.Generator) -> 
             yield from place(scrub, x, away + side * generator.uniform(0.5, 6))
 
 
-def _noise_wall(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _noise_wall(length: float, generator: Generator) -> Iterator[Surface]:
     height = generator.uniform(2, 5)
     yield walls.rough_wall(length, height, generator)
     yield frames.made([frames.bars([((0, -0.1, 0), (0, -0.1, height + 0.1))], 0.12)], generator)
+
+
+# What makes a piece of an embankment, how much farther out it stands and how long a piece is,
+# metres, and the share of gaps.
+EMBANKMENTS: tuple[tuple[Piece, float, float, float], ...] = (
+    (_noise_wall, 0, 13, 0.05),
+    (threads.chain_link, 0, 13, 0.1),
+    (heaps.bank, 2, 10, 0.0),
+)

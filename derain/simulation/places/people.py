@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
@@ -14,17 +15,17 @@ from derain.simulation.shapes import Triangles
 PERSON_REFLECTIVITY = (0.03, 0.7)
 
 
-def person(generator: np.random.Generator) -> Surface:
+def person(generator: Generator) -> Surface:
     """Somebody of 0.9 to 1.95 m who stands or strides along x, perhaps with something in hand."""
     height = generator.uniform(0.9, 1.95)
     parts = [_body(height, generator)]
-    carried = generator.choice(["nothing", "bag", "umbrella", "pushchair", "stick", "dog"])
-    if carried != "nothing" and height > 1.4:
-        parts.append(CARRIED[carried](height, generator))
+    carried = CARRIED[generator.integers(len(CARRIED))]
+    if carried and height > 1.4:
+        parts.append(carried(height, generator))
     return _clothed(parts, TrackClass.PEDESTRIAN, generator)
 
 
-def cyclist(generator: np.random.Generator) -> Surface:
+def cyclist(generator: Generator) -> Surface:
     """A bicycle along x of thin tubes and spokes, mostly with its rider."""
     parts = [_wheel(x, generator) for x in (-0.52, 0.52)]
     frame = [
@@ -47,7 +48,7 @@ def cyclist(generator: np.random.Generator) -> Surface:
     return _clothed(parts, TrackClass.BIKE, generator)
 
 
-def _body(height: float, generator: np.random.Generator) -> Triangles:
+def _body(height: float, generator: Generator) -> Triangles:
     """Legs, trunk, arms and head, whose proportions are a child's or an adult's."""
     hip, shoulder = 0.48 * height, 0.82 * height
     girth, stride = generator.uniform(0.75, 1.25), generator.uniform(0, 0.22) * height
@@ -66,13 +67,13 @@ def _body(height: float, generator: np.random.Generator) -> Triangles:
     return np.concatenate([*limbs, trunk, head])
 
 
-def _bag(height: float, generator: np.random.Generator) -> Triangles:
+def _bag(height: float, generator: Generator) -> Triangles:
     bottom = generator.uniform(0.15, 0.3) * height
     bag = shapes.box(0.3, 0.1, bottom, bottom + 0.35)
     return shapes.placed(bag, 0, -0.15 * height)
 
 
-def _umbrella(height: float, generator: np.random.Generator) -> Triangles:
+def _umbrella(height: float, generator: Generator) -> Triangles:
     radius, top = generator.uniform(0.35, 0.6), height + generator.uniform(0.1, 0.3)
     angle, out = np.linspace(0, 2 * np.pi, 9), np.linspace(0, 1, 4)[:, None]
     dome = np.stack(
@@ -85,7 +86,7 @@ def _umbrella(height: float, generator: np.random.Generator) -> Triangles:
     return np.concatenate([shapes.sheet(dome), stick])
 
 
-def _pushchair(height: float, generator: np.random.Generator) -> Triangles:
+def _pushchair(height: float, generator: Generator) -> Triangles:
     ahead = generator.uniform(0.5, 0.7)
     seat = shapes.placed(shapes.box(0.5, 0.4, 0.35, 0.7), ahead + 0.25, 0)
     tubes = [((ahead - 0.35, y, 1.0), (ahead + 0.5, y, 0.1)) for y in (-0.22, 0.22)]
@@ -93,7 +94,7 @@ def _pushchair(height: float, generator: np.random.Generator) -> Triangles:
     return np.concatenate([seat, _limbs(tubes, 0.015)])
 
 
-def _stick(height: float, generator: np.random.Generator) -> Triangles:
+def _stick(height: float, generator: Generator) -> Triangles:
     """A walking stick, a spade or a pole on a shoulder."""
     reach = generator.uniform(0.5, 1.2) * height
     lean = generator.normal(0, 0.5)
@@ -101,7 +102,7 @@ def _stick(height: float, generator: np.random.Generator) -> Triangles:
     return _limbs([(foot, (0.2 + lean * reach, 0.15 * height, 0.03 + reach))], 0.015)
 
 
-def _dog(height: float, generator: np.random.Generator) -> Triangles:
+def _dog(height: float, generator: Generator) -> Triangles:
     size, x = generator.uniform(0.25, 0.7), generator.uniform(0.6, 1.5)
     body = [((x, 0, 0.75 * size), (x + size, 0, 0.75 * size))]
     legs = [
@@ -115,16 +116,11 @@ def _dog(height: float, generator: np.random.Generator) -> Triangles:
     return np.concatenate([_limbs(ends, radius) for ends, radius in parts])
 
 
-CARRIED = {
-    "bag": _bag,
-    "umbrella": _umbrella,
-    "pushchair": _pushchair,
-    "stick": _stick,
-    "dog": _dog,
-}
+# What somebody has in hand; one of six has nothing.
+CARRIED = (None, _bag, _umbrella, _pushchair, _stick, _dog)
 
 
-def _wheel(x: float, generator: np.random.Generator) -> Triangles:
+def _wheel(x: float, generator: Generator) -> Triangles:
     angle = np.linspace(0, 2 * np.pi, 17)
     rim = np.column_stack([x + 0.34 * np.cos(angle), 0 * angle, 0.34 + 0.34 * np.sin(angle)])
     hub = np.broadcast_to((x, 0.0, 0.34), (len(angle), 3))
@@ -139,7 +135,7 @@ def _limbs(ends: Sequence[tuple[tuple[float, ...], tuple[float, ...]]], radius: 
     return shapes.rods(both[:, 0], both[:, 1], radius, taper=0.75, sides=6)
 
 
-def _clothed(parts: list[Triangles], label: TrackClass, generator: np.random.Generator) -> Surface:
+def _clothed(parts: list[Triangles], label: TrackClass, generator: Generator) -> Surface:
     """Every part of a reflectivity of its own."""
     reflectivity = [
         np.full(len(part), log_uniform(PERSON_REFLECTIVITY, generator)) for part in parts

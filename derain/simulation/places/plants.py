@@ -7,9 +7,10 @@ spread of reflectivity.
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.simulation import shapes
+from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform, log_uniforms
 from derain.simulation.objects import Surface
@@ -29,7 +30,7 @@ CHILDREN = 4
 SHORTENING = (0.45, 0.8)
 
 
-def bush(radii: tuple[float, float, float], generator: np.random.Generator) -> Surface:
+def bush(radii: tuple[float, float, float], generator: Generator) -> Surface:
     """Leaves in an ellipsoid that stands on the ground, in clumps or evenly.
 
     Args:
@@ -39,7 +40,7 @@ def bush(radii: tuple[float, float, float], generator: np.random.Generator) -> S
     return _plant(shapes.raised(_leaves(radii, generator), 0.9 * radii[2]), generator)
 
 
-def crowned_tree(generator: np.random.Generator) -> Iterator[Surface]:
+def crowned_tree(generator: Generator) -> Iterator[Surface]:
     """A tree in leaf, from a sapling to one of 12 m."""
     height = log_uniform((2.0, 12.0), generator)
     radii = height * generator.uniform(0.12, 0.35, 3)
@@ -48,17 +49,17 @@ def crowned_tree(generator: np.random.Generator) -> Iterator[Surface]:
     yield _plant(_boughs(0.8 * height, 3, generator), generator)
 
 
-def bare_tree(generator: np.random.Generator) -> Surface:
+def bare_tree(generator: Generator) -> Surface:
     """A tree in winter: a trunk, boughs, and twigs down to a finger's width."""
     return _plant(_boughs(log_uniform((2.0, 10.0), generator), 6, generator), generator)
 
 
-def tree(winter: bool, generator: np.random.Generator) -> Surface | Iterator[Surface]:
+def tree(winter: bool, generator: Generator) -> Surface | Iterator[Surface]:
     """A bare tree in winter, else one in leaf."""
     return bare_tree(generator) if winter else crowned_tree(generator)
 
 
-def brushwood(radius: float, generator: np.random.Generator) -> Surface:
+def brushwood(radius: float, generator: Generator) -> Surface:
     """Bare rods and brambles that rise from one spot, as far as a radius in metres."""
     count = int(generator.integers(15, 80))
     starts = np.column_stack([generator.normal(0, 0.15 * radius, (count, 2)), np.zeros(count)])
@@ -73,7 +74,7 @@ def brushwood(radius: float, generator: np.random.Generator) -> Surface:
     return _plant(np.concatenate([stems, shapes.blades(starts, ends, width, generator)]), generator)
 
 
-def hedge(length: float, generator: np.random.Generator) -> Surface:
+def hedge(length: float, generator: Generator) -> Surface:
     """A hedge along x, from x = 0 on: dense or full of gaps, clipped or wild.
 
     Args:
@@ -93,7 +94,7 @@ def hedge(length: float, generator: np.random.Generator) -> Surface:
     return _plant(shapes.leaves(centres, size, generator), generator)
 
 
-def grass(places: NDArray[np.float64], generator: np.random.Generator) -> Surface:
+def grass(places: Floats, generator: Generator) -> Surface:
     """Blades, from a lawn's to reeds', in tufts.
 
     Args:
@@ -113,12 +114,12 @@ def grass(places: NDArray[np.float64], generator: np.random.Generator) -> Surfac
     return _plant(shapes.blades(starts, ends, width, generator), generator)
 
 
-def _plant(triangles: Triangles, generator: np.random.Generator) -> Surface:
+def _plant(triangles: Triangles, generator: Generator) -> Surface:
     reflectivity = log_uniforms(PLANT_REFLECTIVITY, len(triangles), generator)
     return Surface(triangles, TrackClass.BACKGROUND, reflectivity)
 
 
-def _leaves(radii: tuple[float, float, float], generator: np.random.Generator) -> Triangles:
+def _leaves(radii: tuple[float, float, float], generator: Generator) -> Triangles:
     """Leaves in an ellipsoid about the origin, sparse or dense, some of them in clumps."""
     size = log_uniform(LEAF, generator)
     shadow = np.pi * np.sqrt(radii[0] * radii[1]) * radii[2]
@@ -136,7 +137,7 @@ def _area(size: float) -> float:
     return 1.3 * size**2
 
 
-def _boughs(height: float, generations: int, generator: np.random.Generator) -> Triangles:
+def _boughs(height: float, generations: int, generator: Generator) -> Triangles:
     """A trunk as high as half of the tree, and what branches from it, generation by generation."""
     starts = np.zeros((1, 3))
     ends = np.array([[*generator.normal(0, 0.05 * height, 2), 0.5 * height]])

@@ -4,9 +4,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from derain.simulation import shapes
+from derain.simulation.arrays import Floats, Ints
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import Span, log_uniform, log_uniforms
 from derain.simulation.objects import Surface
@@ -38,7 +40,7 @@ class Relief:
     phases: NDArray[np.float32]
 
     @classmethod
-    def draw(cls, height: float, generator: np.random.Generator) -> "Relief":
+    def draw(cls, height: float, generator: Generator) -> "Relief":
         """Draws a relief.
 
         Args:
@@ -52,7 +54,7 @@ class Relief:
         phases = generator.uniform(0, 2 * np.pi, RELIEF_WAVES)
         return cls(*(part.astype(np.float32) for part in (waves.T, amplitudes, phases)))
 
-    def __call__(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, x: Floats, y: Floats) -> Floats:
         """Heights at some places, metres, float64, shaped as they are; 0 under the sensor."""
         height = np.zeros(np.shape(x), np.float32)
         at_x, at_y = np.asarray(x, np.float32), np.asarray(y, np.float32)
@@ -92,9 +94,7 @@ CONCRETE = GroundKind(TrackClass.ROAD, (0.001, 0.006), (0.1, 0.4), wet=0.1)
 
 
 def ground_mesh(
-    kinds: Sequence[GroundKind],
-    kind_at: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.int64]],
-    generator: np.random.Generator,
+    kinds: Sequence[GroundKind], kind_at: Callable[[Floats, Floats], Ints], generator: Generator
 ) -> Iterator[Surface]:
     """The ground about the sensor, finest near it, on a plane but for its bumps.
 
@@ -120,10 +120,7 @@ def ground_mesh(
 
 
 def _patch(
-    kind: GroundKind,
-    triangles: shapes.Triangles,
-    wetness: NDArray[np.float64],
-    generator: np.random.Generator,
+    kind: GroundKind, triangles: shapes.Triangles, wetness: Floats, generator: Generator
 ) -> Surface:
     """All ground of a kind: uneven in reflectivity from spot to spot, dark where it is wet."""
     usual = log_uniform(kind.reflectivity, generator)
@@ -132,7 +129,7 @@ def _patch(
     return Surface(triangles, kind.label, np.clip(spots, 0.003, 1))
 
 
-def _rings() -> NDArray[np.float64]:
+def _rings() -> Floats:
     """Corners on rings, float64 (RINGS + 1, CORNERS + 1, 3); the first ring is a point."""
     radius = np.concatenate([[0.0], np.geomspace(*RADII, RINGS)])[:, None]
     angle = np.linspace(0, 2 * np.pi, CORNERS + 1)
@@ -140,8 +137,7 @@ def _rings() -> NDArray[np.float64]:
     return np.stack([x, y, np.zeros_like(x)], axis=-1)
 
 
-def _furrows(corners: NDArray[np.float64], generator: np.random.Generator) -> NDArray[np.float64]:
+def _furrows(corners: Floats, generator: Generator) -> Floats:
     direction = generator.uniform(0, np.pi)
     over = corners[..., 0] * np.cos(direction) + corners[..., 1] * np.sin(direction)
-    furrows: NDArray[np.float64] = np.sin(2 * np.pi / generator.uniform(0.4, 1) * over)
-    return furrows
+    return np.asarray(np.sin(2 * np.pi / generator.uniform(0.4, 1) * over))

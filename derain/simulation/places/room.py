@@ -4,15 +4,16 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.simulation import shapes
+from derain.simulation.arrays import Bools
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places import furniture, people, plants, threads
 from derain.simulation.places.frames import bars, made, railing
-from derain.simulation.places.shell import Walls, moved, shell
+from derain.simulation.places.shell import Walls, shell
 from derain.simulation.places.specks import mirrored
 from derain.simulation.places.standing import Make, choose, free_places, of_size, place, scatter
 from derain.simulation.track import Track
@@ -28,7 +29,7 @@ POLISHED = 0.12
 SPECKS_OF_A_THING = (3.0, 150.0)
 
 
-def lay_out_room(generator: np.random.Generator) -> Track:
+def lay_out_room(generator: Generator) -> Track:
     """Lays out a room in a building: mostly a furnished one, else a corridor or a staircase.
 
     Its walls, floor and ceiling are closed about the sensor, but for windows, glass and doors, with
@@ -63,7 +64,7 @@ def _cleared(surface: Surface) -> Surface:
     return replace(surface, triangles=surface.triangles[far], reflectivity=reflectivity)
 
 
-def _polished(surface: Surface, generator: np.random.Generator) -> Iterator[Surface]:
+def _polished(surface: Surface, generator: Generator) -> Iterator[Surface]:
     """A thing as it is, or of polished metal, black glass or lacquer, seen in a few specks."""
     if generator.random() > POLISHED or surface.label != TrackClass.BACKGROUND:
         yield surface
@@ -72,7 +73,7 @@ def _polished(surface: Surface, generator: np.random.Generator) -> Iterator[Surf
     yield from mirrored(surface, np.array([0, 0, np.mean(MOUNTING_HEIGHTS)]), count, generator)
 
 
-def _about_axis(triangles: shapes.Triangles) -> NDArray[np.bool_]:
+def _about_axis(triangles: shapes.Triangles) -> Bools:
     """Whether the z axis goes through a triangle, bool (T,)."""
     first = triangles[..., :2]
     second = np.roll(first, -1, axis=1)
@@ -81,7 +82,7 @@ def _about_axis(triangles: shapes.Triangles) -> NDArray[np.bool_]:
     return np.asarray(left | right)
 
 
-def _below_the_ceiling(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
+def _below_the_ceiling(room: Walls, generator: Generator) -> Iterator[Surface]:
     """Lamps on wires, pipes, trays, cables that hang down."""
     for _ in range(generator.integers(1, 8)):
         x, y = generator.uniform(*room.x), generator.uniform(*room.y)
@@ -104,7 +105,7 @@ def _below_the_ceiling(room: Walls, generator: np.random.Generator) -> Iterator[
         yield threads.cable(start, end, generator.uniform(0, 0.3), (0.003, 0.015), generator)
 
 
-def _furniture(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
+def _furniture(room: Walls, generator: Generator) -> Iterator[Surface]:
     """Furniture, the more the larger the room, from bare to cluttered."""
     options: list[tuple[Make, float]] = [
         (furniture.table, 4),
@@ -124,20 +125,20 @@ def _furniture(room: Walls, generator: np.random.Generator) -> Iterator[Surface]
     yield from scatter(makes, places, generator)
 
 
-def _people(room: Walls, most: int, generator: np.random.Generator) -> Iterator[Surface]:
+def _people(room: Walls, most: int, generator: Generator) -> Iterator[Surface]:
     """Somebody at an arm's length or at the other end of the room."""
     count = int(generator.integers(0, most))
     places = free_places(count, (0.6, 8.0), 0.5, generator, room.holds)
     yield from scatter([people.person] * count, places, generator)
 
 
-def _twigs(generator: np.random.Generator) -> Surface:
+def _twigs(generator: Generator) -> Surface:
     """Dry twigs, wires or tinsel on the floor or on a stand."""
     twigs = plants.brushwood(generator.uniform(0.2, 1.0), generator)
-    return moved(twigs, 0, 0, generator.choice([0.0, generator.uniform(0, 1)]))
+    return twigs.moved(0, 0, generator.choice([0.0, generator.uniform(0, 1)]))
 
 
-def _along_a_corridor(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
+def _along_a_corridor(room: Walls, generator: Generator) -> Iterator[Surface]:
     """Doors ajar with their handles, pipes, cabinets, and little else."""
     lengthwise = room.x[1] - room.x[0] > room.y[1] - room.y[0]
     ends, sides = (room.x, room.y) if lengthwise else (room.y, room.x)
@@ -154,7 +155,7 @@ def _along_a_corridor(room: Walls, generator: np.random.Generator) -> Iterator[S
     yield from scatter(chosen, free_places(count, (0.8, 20), 1, generator, room.holds), generator)
 
 
-def _stairs(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
+def _stairs(room: Walls, generator: Generator) -> Iterator[Surface]:
     """A flight that rises from the sensor's floor, another above it, and their railings."""
     rise, tread, width = generator.uniform(0.15, 0.2), generator.uniform(0.25, 0.32), 1.2
     closed = generator.random() < 0.5
@@ -167,7 +168,7 @@ def _stairs(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
         rail = railing(12 * tread, generator)
         parts = [made(steps, generator)]
         for y in (-width / 2, width / 2):
-            sloped = shapes.sloped(moved(rail, 0, y, 0).triangles, rise / tread, 0)
+            sloped = shapes.sloped(rail.moved(0, y, 0).triangles, rise / tread, 0)
             parts.append(replace(rail, triangles=shapes.raised(sloped, level + rise)))
         turned = -6 * tread if heading else 0.8
         yield from place(parts, turned * np.cos(heading), 0.6 * np.sign(heading), heading)

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import ClassVar
 
 import numpy as np
+from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.drawing import Span, log_uniform
@@ -23,6 +23,9 @@ SMOOTH = 0.2
 # Walls, floors and ceilings overlap by so much, metres: bumps leave no slit between them.
 OVERLAP = 0.1
 
+# How far behind a window or a door the next wall is, metres.
+BEYOND = (1.0, 40.0)
+
 
 @dataclass(frozen=True)
 class Walls:
@@ -32,16 +35,16 @@ class Walls:
         x: From wall to wall along x, metres.
         y: From wall to wall along y, metres.
         height: Of the ceiling, metres.
-        MARGIN: Least distance of the middle of a thing from the walls, metres.
+        margin: Least distance of the middle of a thing from the walls, metres.
     """
 
     x: Span
     y: Span
     height: float
-    MARGIN: ClassVar[float] = 0.35
+    margin: float = 0.35
 
     @classmethod
-    def draw(cls, shortest: Span, longest: Span, generator: np.random.Generator) -> "Walls":
+    def draw(cls, shortest: Span, longest: Span, generator: Generator) -> "Walls":
         """Draws walls by the spans of the length of the shorter side and of the longer one."""
         sides = [log_uniform(span, generator) for span in (shortest, longest)]
         along, across = (sides[which] for which in generator.permutation(2))
@@ -62,38 +65,33 @@ class Walls:
 
     def holds(self, x: float, y: float) -> bool:
         """Whether there is room for a thing between the walls."""
-        inside = self.x[0] + self.MARGIN < x < self.x[1] - self.MARGIN
-        return inside and self.y[0] + self.MARGIN < y < self.y[1] - self.MARGIN
+        inside = self.x[0] + self.margin < x < self.x[1] - self.margin
+        return inside and self.y[0] + self.margin < y < self.y[1] - self.margin
 
 
-def shell(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
+def shell(room: Walls, generator: Generator) -> Iterator[Surface]:
     """Floor, ceiling and walls, closed but for windows and doorways."""
     yield from _floor_and_ceiling(room, generator)
     yield from _walls(room, generator)
 
 
-def moved(surface: Surface, x: float, y: float, z: float) -> Surface:
-    """A surface moved by metres along the three axes."""
-    return replace(surface, triangles=surface.triangles + np.array([x, y, z]))
-
-
-def _floor_and_ceiling(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
+def _floor_and_ceiling(room: Walls, generator: Generator) -> Iterator[Surface]:
     length, width = room.x[1] - room.x[0], room.y[1] - room.y[0]
     for height, bumps in ((0.0, SMOOTH), (room.height, -SMOOTH)):
         rough = walls.rough_wall(length + 2 * OVERLAP, width + 2 * OVERLAP, generator, cell=0.5)
-        rough = moved(rough, -OVERLAP, 0, -OVERLAP)
+        rough = rough.moved(-OVERLAP, 0, -OVERLAP)
         lying = walls.laid_flat(rough, (room.x[0], room.y[0]), height, bumps)
         yield replace(lying, reflectivity=log_uniform(FLOOR, generator))
 
 
-def _walls(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
+def _walls(room: Walls, generator: Generator) -> Iterator[Surface]:
     """Four walls, each whole, or with a band of glass or a doorway in it and a wall behind."""
     for number, (start, end) in enumerate(pairwise([*room.corners, room.corners[0]])):
         length = float(np.hypot(end[0] - start[0], end[1] - start[1]))
         kind = generator.choice(["whole", "glass", "doorway"], p=[0.5, 0.3, 0.2])
         if length < 1.5 or kind == "whole":
             whole = walls.rough_wall(length + 2 * OVERLAP, room.height, generator, cell=0.5)
-            wall = [moved(whole, -OVERLAP, 0, 0)]
+            wall = [whole.moved(-OVERLAP, 0, 0)]
         else:
             sill, lintel = (generator.choice([0.0, 0.9]), 2.1) if kind == "glass" else (0.0, 2.0)
             wide = length - 0.4 if kind == "glass" else 0.9
@@ -101,21 +99,13 @@ def _walls(room: Walls, generator: np.random.Generator) -> Iterator[Surface]:
             if kind == "glass":
                 wall += [*_panes(length, (wide, sill, lintel), generator)]
             behind = walls.rough_wall(length + 8, room.height + 2, generator, cell=0.8)
-            wall.append(moved(behind, -4, -_beyond(generator), -1))
+            wall.append(behind.moved(-4, -log_uniform(BEYOND, generator), -1))
         wall += [*_on_the_wall(length, room.height, generator)]
         yield from place(wall, *start, number * np.pi / 2)
 
 
-def _beyond(generator: np.random.Generator) -> float:
-    """How far behind a window or a door the next wall is, metres."""
-    return log_uniform((1.0, 40.0), generator)
-
-
 def _pierced(
-    length: float,
-    height: float,
-    opening: tuple[float, float, float],
-    generator: np.random.Generator,
+    length: float, height: float, opening: tuple[float, float, float], generator: Generator
 ) -> Iterator[Surface]:
     """A wall with an opening in the middle, by its width, lower and upper edge, and its frame."""
     wide, low, high = opening
@@ -126,14 +116,14 @@ def _pierced(
     for (begin, end), (bottom, top) in pieces:
         if top - bottom > 0.01:
             piece = walls.rough_wall(end - begin, top - bottom, generator, cell=0.5)
-            yield replace(moved(piece, begin, 0, bottom), reflectivity=shine)
+            yield replace(piece.moved(begin, 0, bottom), reflectivity=shine)
     edges: list[tuple[Point, Point]] = [((x, 0, low), (x, 0, high)) for x in (left, right)]
     edges += [((left, 0, z), (right, 0, z)) for z in (low, high)]
     yield made([bars(edges, generator.uniform(0.02, 0.08))], generator)
 
 
 def _panes(
-    length: float, opening: tuple[float, float, float], generator: np.random.Generator
+    length: float, opening: tuple[float, float, float], generator: Generator
 ) -> Iterator[Surface]:
     """Glass in an opening, frames between the panes, blinds or a curtain before some of them."""
     wide, low, high = opening
@@ -149,7 +139,7 @@ def _panes(
             )
 
 
-def _on_the_wall(length: float, height: float, generator: np.random.Generator) -> Iterator[Surface]:
+def _on_the_wall(length: float, height: float, generator: Generator) -> Iterator[Surface]:
     """Pictures, boards, pipes, a radiator, coats on hooks, cables; the room lies at positive y."""
     for _ in range(generator.integers(0, 4)):
         x, z = generator.uniform(0, length), generator.uniform(0.8, 2.0)

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
+from derain.simulation.arrays import Floats
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.shapes import Triangles
@@ -21,9 +22,7 @@ NEAREST_SPECK = 0.15
 SIZE = (1.5e-3, 8e-3)
 
 
-def specks(
-    surface: Triangles, sensor: NDArray[np.float64], count: int, generator: np.random.Generator
-) -> Triangles:
+def specks(surface: Triangles, sensor: Floats, count: int, generator: Generator) -> Triangles:
     """Small triangles on a surface, evenly or in clumps, so that few rays meet one.
 
     Args:
@@ -46,12 +45,11 @@ def specks(
     corners = generator.normal(0, 1, (len(places), 3, 3))
     small = places[:, None] + size[:, None, None] * np.clip(corners, -2, 2)
     away = np.linalg.norm(small - sensor, axis=2).min(axis=1)
-    kept: Triangles = small[away > NEAREST_SPECK]
-    return kept
+    return np.asarray(small[away > NEAREST_SPECK])
 
 
 def mirrored(
-    surface: Surface, sensor: NDArray[np.float64], count: int, generator: np.random.Generator
+    surface: Surface, sensor: Floats, count: int, generator: Generator
 ) -> Iterator[Surface]:
     """A surface that mirrors the light away and hides what is behind it, with specks on it.
 
@@ -67,9 +65,7 @@ def mirrored(
         yield Surface(on_it, surface.label, log_uniform(PAINT, generator))
 
 
-def on_surface(
-    surface: Triangles, count: int, generator: np.random.Generator
-) -> NDArray[np.float64]:
+def on_surface(surface: Triangles, count: int, generator: Generator) -> Floats:
     """Places uniform over the area of triangles, (count, 3), metres."""
     first, second, third = surface.transpose(1, 0, 2)
     area = np.linalg.norm(np.cross(second - first, third - first), axis=1)
@@ -77,7 +73,4 @@ def on_surface(
     u, v = generator.random((2, count, 1))
     beyond = u + v > 1
     u, v = np.where(beyond, 1 - u, u), np.where(beyond, 1 - v, v)
-    places: NDArray[np.float64] = (
-        first[which] + u * (second - first)[which] + v * (third - first)[which]
-    )
-    return places
+    return np.asarray(first[which] + u * (second - first)[which] + v * (third - first)[which])

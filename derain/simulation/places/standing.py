@@ -5,9 +5,10 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.simulation import shapes
+from derain.simulation.arrays import Floats
 from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places.relief import Relief
@@ -17,13 +18,16 @@ from derain.simulation.track import Track
 Allowed = Callable[[float, float], bool]
 
 # Something made at the origin, of one surface or of several.
-Make = Callable[[np.random.Generator], Surface | Iterable[Surface]]
+Make = Callable[[Generator], Surface | Iterable[Surface]]
 
 # Made piece by piece along a line, by the length of a piece in metres.
-Piece = Callable[[float, np.random.Generator], Surface | Iterable[Surface]]
+Piece = Callable[[float, Generator], Surface | Iterable[Surface]]
+
+# Fewest, and one more than the most.
+Counts = tuple[int, int]
 
 # A line on the ground: its y at each x.
-Line = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Line = Callable[[Floats], Floats]
 
 # What stands in a place is farther from the sensor's axis, metres. Only the ground reaches it.
 AXIS_CLEARANCE = 1.6
@@ -40,11 +44,7 @@ def anywhere(x: float, y: float) -> bool:
 
 
 def free_places(
-    count: int,
-    distances: Span,
-    apart: float,
-    generator: np.random.Generator,
-    allowed: Allowed = anywhere,
+    count: int, distances: Span, apart: float, generator: Generator, allowed: Allowed = anywhere
 ) -> list[tuple[float, float]]:
     """Places about the sensor, as many within each doubling of the distance.
 
@@ -69,9 +69,7 @@ def free_places(
 
 
 def scatter(
-    makes: Iterable[Make],
-    places: Iterable[tuple[float, float]],
-    generator: np.random.Generator,
+    makes: Iterable[Make], places: Iterable[tuple[float, float]], generator: Generator
 ) -> Iterator[Surface]:
     """One thing at each place, turned at random.
 
@@ -90,15 +88,10 @@ def of_size(make: Callable[..., Surface | Iterable[Surface]], *sizes: Span) -> M
     return lambda generator: make(*(generator.uniform(*size) for size in sizes), generator)
 
 
-def shuffled(makes: Iterable[Make], generator: np.random.Generator) -> list[Make]:
+def shuffled(makes: Iterable[Make], generator: Generator) -> list[Make]:
     """Makers of things in another order."""
     ordered = list(makes)
     return [ordered[which] for which in generator.permutation(len(ordered))]
-
-
-def straight(y: float) -> Line:
-    """The line along x at a y."""
-    return lambda x: np.full(np.shape(x), y)
 
 
 def place(
@@ -110,25 +103,21 @@ def place(
 
 
 def line_up(
-    make: Piece,
-    line: Line,
-    x: Span,
-    piece: float,
-    generator: np.random.Generator,
-    gaps: float = 0.0,
+    make: Piece, line: Line | float, x: Span, piece: float, generator: Generator, gaps: float = 0.0
 ) -> Iterator[Surface]:
     """Pieces of a hedge, a fence or a wall, end to end along a line.
 
     Args:
         make: Makes a piece along x from the origin on, by its length in metres.
-        line: Where.
+        line: Where; a number is the line along x at that y, metres.
         x: From where to where, metres.
         piece: Length of a piece, metres.
         generator: Random generator.
         gaps: Share of the pieces that is missing.
     """
     ends = np.arange(*x, piece)
-    for (before, after), (left, right) in zip(pairwise(ends), pairwise(line(ends)), strict=True):
+    y = line(ends) if callable(line) else np.full(len(ends), float(line))
+    for (before, after), (left, right) in zip(pairwise(ends), pairwise(y), strict=True):
         if generator.random() >= gaps:
             length = float(np.hypot(after - before, right - left))
             heading = float(np.arctan2(right - left, after - before))
@@ -136,11 +125,18 @@ def line_up(
 
 
 def choose(
-    options: Iterable[tuple[Make, float]], count: int, generator: np.random.Generator
+    options: Iterable[tuple[Make, float]], count: int | Counts, generator: Generator
 ) -> list[Make]:
-    """So many of several makers of things, each with the probability of its share in the sum."""
+    """So many of several makers of things, each with the probability of its share in the sum.
+
+    Args:
+        options: The makers and their shares.
+        count: How many, or between which numbers it is drawn.
+        generator: Random generator.
+    """
+    number = count if isinstance(count, int) else int(generator.integers(*count))
     makes, shares = zip(*options, strict=True)
-    chosen = generator.choice(len(makes), count, p=np.array(shares) / np.sum(shares))
+    chosen = generator.choice(len(makes), number, p=np.array(shares) / np.sum(shares))
     return [makes[which] for which in chosen]
 
 
@@ -148,7 +144,7 @@ def assemble(
     ground: Iterable[Surface],
     standing: Iterable[Surface],
     relief: Relief,
-    generator: np.random.Generator,
+    generator: Generator,
     over: Iterable[Surface] = (),
 ) -> Track:
     """A track of what is laid out on a plane: cleared about the sensor, on uneven ground, tilted.
@@ -168,7 +164,7 @@ def assemble(
     return replace(track, triangles=tilted.astype(np.float32))
 
 
-def _tilt(generator: np.random.Generator) -> NDArray[np.float64]:
+def _tilt(generator: Generator) -> Floats:
     """Turns rows of coordinates by up to 9 degrees, and raises them by up to 2 % either way."""
     axes = np.eye(3)[:, None]
     turned = shapes.placed(axes, 0, 0, generator.uniform(-0.15, 0.15))
@@ -178,19 +174,10 @@ def _tilt(generator: np.random.Generator) -> NDArray[np.float64]:
 
 def _cleared(track: Track) -> Track:
     """A track without those of its triangles that are too near to the sensor's axis."""
-    lowest, greatest = _bounds(track.triangles[..., :2])
-    near = (lowest < AXIS_CLEARANCE) & (greatest > -AXIS_CLEARANCE)
-    about = near[:, 0] & near[:, 1]
+    level = track.triangles[..., :2]
+    lowest, greatest = level.min(axis=1), level.max(axis=1)
+    about = ((lowest < AXIS_CLEARANCE) & (greatest > -AXIS_CLEARANCE)).all(axis=1)
     far = ~about
     x, y = shapes.nearest_to_axis(track.triangles[about])
     far[about] = np.hypot(x, y) > AXIS_CLEARANCE
     return Track(track.triangles[far], track.reflectivity[far], track.label[far])
-
-
-def _bounds(
-    corners: NDArray[np.float32],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Least and greatest coordinates of each triangle of corners (T, 3, 2), (T, 2) both."""
-    first, second, third = corners.transpose(1, 0, 2)
-    least = np.minimum(np.minimum(first, second), third)
-    return least, np.maximum(np.maximum(first, second), third)

@@ -6,9 +6,10 @@ Threads are drawn as wide as beams see them, from some millimetres to some centi
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.simulation import shapes
+from derain.simulation.arrays import Floats
 from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface, of_material
 from derain.simulation.shapes import Triangles
@@ -17,7 +18,7 @@ THREAD_REFLECTIVITY = (0.03, 0.6)
 POST_SPACING = (2.0, 4.0)
 
 
-def net(length: float, height: float, generator: np.random.Generator) -> Surface:
+def net(length: float, height: float, generator: Generator) -> Surface:
     """A net that hangs in the x-z plane from x = 0 on, billowing and torn.
 
     Args:
@@ -38,7 +39,7 @@ def net(length: float, height: float, generator: np.random.Generator) -> Surface
     return _strung(_ribbons(starts[whole], ends[whole], width), generator)
 
 
-def chain_link(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+def chain_link(length: float, generator: Generator) -> Iterator[Surface]:
     """A fence of diagonal wire along x, from x = 0 on, with its posts."""
     height, mesh = generator.uniform(1, 2.2), generator.uniform(0.05, 0.14)
     width = log_uniform((0.003, 0.012), generator)
@@ -55,7 +56,7 @@ def chain_link(length: float, generator: np.random.Generator) -> Iterator[Surfac
     yield from posts(length, height + 0.05, generator)
 
 
-def wire_fence(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+def wire_fence(length: float, generator: Generator) -> Iterator[Surface]:
     """A fence of a few level wires along x, barbed or not, with its posts."""
     height = generator.uniform(0.8, 1.5)
     for z in np.linspace(height / generator.integers(2, 7), height, generator.integers(2, 7)):
@@ -64,7 +65,7 @@ def wire_fence(length: float, generator: np.random.Generator) -> Iterator[Surfac
     yield from posts(length, height + 0.1, generator)
 
 
-def posts(length: float, height: float, generator: np.random.Generator) -> Iterator[Surface]:
+def posts(length: float, height: float, generator: Generator) -> Iterator[Surface]:
     """Posts of a fence along x, from x = 0 on, some of them crooked."""
     x = np.arange(0, length, generator.uniform(*POST_SPACING))
     feet = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
@@ -73,13 +74,7 @@ def posts(length: float, height: float, generator: np.random.Generator) -> Itera
     yield _strung(shapes.rods(feet, heads, radius, sides=6), generator)
 
 
-def cable(
-    start: NDArray[np.float64],
-    end: NDArray[np.float64],
-    sag: float,
-    width: Span,
-    generator: np.random.Generator,
-) -> Surface:
+def cable(start: Floats, end: Floats, sag: float, width: Span, generator: Generator) -> Surface:
     """A wire or cable between two places, (3,) each, metres.
 
     Args:
@@ -95,7 +90,7 @@ def cable(
     return _strung(shapes.rods(knots[:-1], knots[1:], radius), generator)
 
 
-def _ribbons(starts: NDArray[np.float64], ends: NDArray[np.float64], width: float) -> Triangles:
+def _ribbons(starts: Floats, ends: Floats, width: float) -> Triangles:
     """Flat threads in planes upright along x, two triangles each."""
     along = ends - starts
     aside = np.cross(along, (0.0, 1.0, 0.0))
@@ -103,5 +98,5 @@ def _ribbons(starts: NDArray[np.float64], ends: NDArray[np.float64], width: floa
     return shapes.quads(starts - aside, starts + aside, ends + aside, ends - aside)
 
 
-def _strung(triangles: Triangles, generator: np.random.Generator) -> Surface:
+def _strung(triangles: Triangles, generator: Generator) -> Surface:
     return of_material([triangles], THREAD_REFLECTIVITY, generator)

@@ -3,9 +3,10 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.simulation import shapes
+from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface, of_material
 from derain.simulation.places.frames import bars
@@ -18,7 +19,7 @@ CLOTH = (0.05, 0.5)
 RUBBER = (0.02, 0.1)
 
 
-def glazed_car(generator: np.random.Generator) -> Iterator[Surface]:
+def glazed_car(generator: Generator) -> Iterator[Surface]:
     """A car along x, from a small one to a van: body, pillars, roof, windows, seats, mirrors."""
     length, width = generator.uniform(3.4, 5.4), generator.uniform(1.6, 2.0)
     sill, roof = generator.uniform(0.8, 1.1), generator.uniform(1.4, 2.1)
@@ -39,7 +40,7 @@ def glazed_car(generator: np.random.Generator) -> Iterator[Surface]:
     yield of_material([_wheels(0.31 * length, width)], RUBBER, generator, TrackClass.CAR)
 
 
-def lorry(generator: np.random.Generator) -> Iterator[Surface]:
+def lorry(generator: Generator) -> Iterator[Surface]:
     """A lorry along x: a cab with windows, a box with a wavy tarpaulin, an open chassis."""
     length, width, top = generator.uniform(5, 13), 2.5, generator.uniform(2.8, 4.0)
     cab = shapes.placed(shapes.box(1.8, 2.4, 0.5, 1.6), length / 2 + 1.1, 0)
@@ -65,8 +66,8 @@ def lorry(generator: np.random.Generator) -> Iterator[Surface]:
 
 
 def _cabin(
-    length: float, width: float, sill: float, roof: float, generator: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    length: float, width: float, sill: float, roof: float, generator: Generator
+) -> tuple[Floats, Floats]:
     """Lower and upper ends of the four pillars, from the right at the rear on, (4, 3) both."""
     rear, front = -generator.uniform(0.3, 0.49), generator.uniform(0.18, 0.32)
     half, lean = 0.46 * width, generator.uniform(0.03, 0.16)
@@ -76,17 +77,14 @@ def _cabin(
     return foot * (length, half, 1), head * (length, half, 1)
 
 
-def _panes(
-    cabin: tuple[NDArray[np.float64], NDArray[np.float64]], generator: np.random.Generator
-) -> list[Triangles]:
+def _panes(cabin: tuple[Floats, Floats], generator: Generator) -> list[Triangles]:
     """A pane on every side of a cabin; one of them may be open."""
     foot, head = cabin
-    sides = [np.stack([foot[i], foot[j], head[j], head[i]]) for i, j in ((0, 1), (1, 2), (2, 3))]
-    sides.append(np.stack([foot[3], foot[0], head[0], head[3]]))
-    return [pane(side, generator) for side in sides]
+    after = np.roll(foot, -1, axis=0), np.roll(head, -1, axis=0)
+    return [pane(side, generator) for side in np.stack([foot, *after, head], axis=1)]
 
 
-def _seats(length: float, width: float, sill: float, generator: np.random.Generator) -> Triangles:
+def _seats(length: float, width: float, sill: float, generator: Generator) -> Triangles:
     """Backs and headrests, a wheel to steer, and perhaps who sits there."""
     parts = []
     for x in (0.02 * length, -0.2 * length):
@@ -108,7 +106,7 @@ def _wheels(axle: float, width: float, radius: float = 0.32) -> Triangles:
     return np.concatenate([shapes.placed(wheel, x, y) for x, y in places])
 
 
-def _tarpaulin(length: float, y: float, top: float, generator: np.random.Generator) -> Triangles:
+def _tarpaulin(length: float, y: float, top: float, generator: Generator) -> Triangles:
     x = np.linspace(-length / 2, length / 2, int(length / 0.15))
     z = np.linspace(1.15, top, 6)
     corners = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)[:, 0]

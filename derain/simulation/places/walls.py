@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from derain.simulation import shapes
+from derain.simulation.arrays import Floats
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface, of_material, spotted
 from derain.simulation.places.frames import bars, railing
@@ -20,7 +21,7 @@ MOST_CELLS = 900
 RETURNING = (0.005, 0.6)
 
 
-def pane(corners: NDArray[np.float64], generator: np.random.Generator) -> Triangles:
+def pane(corners: Floats, generator: Generator) -> Triangles:
     """A pane of glass.
 
     Args:
@@ -39,23 +40,18 @@ def pane(corners: NDArray[np.float64], generator: np.random.Generator) -> Triang
     return shapes.quads(*(_between(corners, u + i / wide, v + j / high) for i, j in ends))
 
 
-def _between(
-    corners: NDArray[np.float64], u: NDArray[np.float64], v: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _between(corners: Floats, u: Floats, v: Floats) -> Floats:
     """Places by their shares of the way from the first corner to the second and to the fourth."""
     first, second, third, fourth = corners
-    lower: NDArray[np.float64] = (1 - u) * first + u * second
-    upper: NDArray[np.float64] = (1 - u) * fourth + u * third
-    return (1 - v) * lower + v * upper
+    lower, upper = (1 - u) * first + u * second, (1 - u) * fourth + u * third
+    return np.asarray((1 - v) * lower + v * upper)
 
 
 STONE = (0.08, 0.7)
 GLASS = (0.01, 0.2)
 
 
-def rough_wall(
-    length: float, height: float, generator: np.random.Generator, cell: float = 0.4
-) -> Surface:
+def rough_wall(length: float, height: float, generator: Generator, cell: float = 0.4) -> Surface:
     """A wall along x, from x = 0 on, with bumps from a millimetre to some centimetres.
 
     Args:
@@ -88,7 +84,7 @@ def laid_flat(
     return replace(wall, triangles=lying)
 
 
-def facade(length: float, generator: np.random.Generator) -> Iterator[Surface]:
+def facade(length: float, generator: Generator) -> Iterator[Surface]:
     """A house's front along x, from x = 0 on, with rooms behind its windows; seen from -y."""
     storeys, storey = int(generator.integers(1, 5)), generator.uniform(2.6, 3.4)
     height, bay = storeys * storey, generator.uniform(1.8, 3.6)
@@ -122,7 +118,7 @@ def facade(length: float, generator: np.random.Generator) -> Iterator[Surface]:
 
 
 def _on_the_wall(
-    length: float, height: float, storey: float, generator: np.random.Generator
+    length: float, height: float, storey: float, generator: Generator
 ) -> Iterator[Surface]:
     """What hangs on a house: drain pipes, balconies, wires, ivy, an aerial."""
     pipes = [((x, -0.1, 0), (x, -0.1, height)) for x in generator.uniform(0, length, 2)]

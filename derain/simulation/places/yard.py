@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
+from derain.simulation.arrays import Floats, Ints
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, plants, relief, threads, walls
 from derain.simulation.places.crowd import ragged_things, users
@@ -20,12 +21,11 @@ from derain.simulation.places.standing import (
     place,
     scatter,
     shuffled,
-    straight,
 )
 from derain.simulation.track import Track
 
 
-def lay_out_yard(generator: np.random.Generator) -> Track:
+def lay_out_yard(generator: Generator) -> Track:
     """Lays out a yard.
 
     Nothing in it is smooth. On rough ground heaps of rubble, earth, snow and logs, scaffolds with
@@ -44,19 +44,19 @@ def lay_out_yard(generator: np.random.Generator) -> Track:
     return assemble(_ground(winter, generator), standing, uneven, generator, _cables(generator))
 
 
-def _ground(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+def _ground(winter: bool, generator: Generator) -> Iterator[Surface]:
     kinds = [relief.GRAVEL, relief.TRACK, relief.SNOW if winter else relief.MEADOW, relief.FIELD]
     chosen = [kinds[which] for which in generator.permutation(len(kinds))[:2]]
     patches = Relief.draw(1, generator)
 
-    def kind_at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
+    def kind_at(x: Floats, y: Floats) -> Ints:
         return (patches(x, y) > 0).astype(np.int64)
 
     yield from ground_mesh(chosen, kind_at, generator)
 
 
-def _heaps(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
-    def mound(generator: np.random.Generator) -> Surface:
+def _heaps(winter: bool, generator: Generator) -> Iterator[Surface]:
+    def mound(generator: Generator) -> Surface:
         return heaps.bank(
             generator.uniform(2, 8), generator, snow=winter and generator.random() < 0.7
         )
@@ -66,7 +66,7 @@ def _heaps(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
     yield from scatter(shuffled(makes, generator), places, generator)
 
 
-def _lines(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
+def _lines(winter: bool, generator: Generator) -> Iterator[Surface]:
     """Fences, nets, scaffolds, hedges and walls, each a line somewhere, turned anyhow."""
     kinds: list[Piece] = [
         threads.chain_link,
@@ -81,13 +81,13 @@ def _lines(winter: bool, generator: np.random.Generator) -> Iterator[Surface]:
         make = kinds[generator.integers(len(kinds))]
         piece = generator.uniform(4, 9)
         reach = (0.0, piece * generator.integers(1, 4) + 0.1)
-        line = line_up(make, straight(0), reach, piece, generator, 0.1)
+        line = line_up(make, 0, reach, piece, generator, 0.1)
         # Across the way from the sensor to its beginning, so that it does not lead to the sensor.
         across = np.arctan2(y, x) + np.pi / 2 + generator.normal(0, 0.5)
         yield from place(line, x, y, across)
 
 
-def _grass(generator: np.random.Generator) -> Iterator[Surface]:
+def _grass(generator: Generator) -> Iterator[Surface]:
     for _ in range(generator.integers(1, 4)):
         count = int(generator.integers(100, 900))
         distance = AXIS_CLEARANCE + generator.exponential(generator.uniform(3, 9), count)
@@ -96,7 +96,7 @@ def _grass(generator: np.random.Generator) -> Iterator[Surface]:
         yield plants.grass(places, generator)
 
 
-def _cables(generator: np.random.Generator) -> Iterator[Surface]:
+def _cables(generator: Generator) -> Iterator[Surface]:
     for _ in range(generator.integers(0, 6)):
         height, x = generator.uniform(3, 7), generator.uniform(-10, 30)
         start, end = np.array([x, -25, height]), np.array([x + generator.normal(0, 15), 25, height])

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from numpy.random import Generator
 
 from derain.simulation.flying.gusts import Gusts
 from derain.simulation.flying.meeting import Encounters, Population, encounter
-from derain.simulation.flying.optics import Optics
 from derain.simulation.flying.particles import OpenBeams, Stretch
 from derain.simulation.flying.precipitation import Precipitation
 from derain.simulation.flying.regions import Air
-from derain.simulation.flying.sizes import Sizes
+from derain.simulation.flying.sizes import Optics, Sizes
 from derain.simulation.sensor import Sensor
 
 # Columns are .87 mrad apart, and beams .3 mrad wide.
@@ -34,7 +34,7 @@ def met(diameter: float, number: float, seed: int) -> Encounters:
     return encounter([Population(number, sizes, AIR)], beams, 0, np.random.default_rng(seed))
 
 
-def random_encounters(generator: np.random.Generator) -> Encounters:
+def random_encounters(generator: Generator) -> Encounters:
     """Of thirty beams, in order, those that are divisible by five with none."""
     beam = generator.choice([row for row in range(30) if row % 5], 200)
     part = Encounters(

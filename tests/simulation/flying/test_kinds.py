@@ -1,6 +1,7 @@
 """What precipitation is drawn from, and reading it."""
 
-from dataclasses import fields
+import math
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.simulation.flying.kinds import KINDS, Kind, PrecipitationSpans, draw_precipitation
+from derain.simulation.flying.precipitation import Precipitation
 
 
 def read(value: object) -> PrecipitationSpans:
@@ -89,3 +91,29 @@ def test_a_wrong_document_is_refused_with_its_place(value: object, named: str) -
     with pytest.raises(InputError, match=r"world\.yaml") as caught:
         read(value)
     assert named in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("number", -1.0),
+        ("number", math.nan),
+        ("number", math.inf),
+        ("diameter", 0.0),
+        ("largest", 0.1),
+        ("largest", 100.0),
+        ("reflectivity", 1.1),
+        ("flicker", 1.0),
+        ("spill", 0.9),
+        ("cut_off", 0.0),
+        ("crowding", math.nan),
+        ("jitter", -0.1),
+        ("gust_form", "storm"),
+        ("haze", 1.5),
+        ("haze_strength", 0.5),
+        ("plumes", -1),
+    ],
+)
+def test_precipitation_that_cannot_be_is_refused_by_name(name: str, value: object) -> None:
+    with pytest.raises(InputError, match=name):
+        replace(Precipitation(), **{name: value})

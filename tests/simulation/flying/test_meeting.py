@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.flying.kinds import KINDS
 from derain.simulation.flying.meeting import meet, uncrowded
-from derain.simulation.flying.optics import Optics
 from derain.simulation.flying.precipitation import Precipitation
-from derain.simulation.flying.sizes import Sizes, Slices
+from derain.simulation.flying.sizes import Optics, Sizes, Slices
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.sensor import Returns, Sensor
@@ -180,7 +179,7 @@ def test_no_more_particles_than_the_crowding_meet_an_open_beam(crowding: float) 
     assert uncrowded(replace(snow, number=few / 2), SENSOR) == few / 2
 
 
-def rain_places(weather: Precipitation, clear: Returns, seed: int) -> NDArray[np.float64]:
+def rain_places(weather: Precipitation, clear: Returns, seed: int) -> Floats:
     detected = meet(clear, BEAMS, weather, SENSOR, np.random.default_rng(seed))
     rain = detected.label == TrackClass.RAIN
     return BEAMS[detected.beam[rain]] * detected.range[rain, None]

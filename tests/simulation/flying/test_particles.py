@@ -5,12 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from derain.simulation.flying.optics import Optics
+from derain.simulation.arrays import Floats
 from derain.simulation.flying.particles import OpenBeams, Stretch, draw_particles
 from derain.simulation.flying.precipitation import Precipitation
-from derain.simulation.flying.sizes import Sizes, Slices
+from derain.simulation.flying.sizes import Optics, Sizes, Slices
 from derain.simulation.sensor import Sensor
 
 # It sees everything within 12 m.
@@ -25,9 +24,7 @@ APART = Sensor(columns=100, rows=20, azimuth=(-180, 180), inclination=(-40, 40))
 TOGETHER = Sensor(columns=30, rows=20, azimuth=(-0.5, 0.5), inclination=(-0.3, 0.3)).beams()
 
 
-def open_beams(
-    directions: NDArray[np.float64], far: NDArray[np.float64] | float = 12.0
-) -> OpenBeams:
+def open_beams(directions: Floats, far: Floats | float = 12.0) -> OpenBeams:
     near = np.full(len(directions), SENSOR.minimum_range)
     return OpenBeams(directions, Stretch(near, np.broadcast_to(far, near.shape)), OPTICS)
 

@@ -27,22 +27,6 @@ def seen(seed: int, which: int) -> Returns:
     return room(seed).cast(SENSORS[which])
 
 
-def test_a_room_is_of_triangles_that_can_be_seen() -> None:
-    for seed in SEEDS:
-        track = room(seed)
-        assert len(track.label) == len(track.triangles) == len(track.reflectivity) < 200_000
-        assert np.isfinite(track.triangles).all()
-        assert 0 < track.reflectivity.min() <= track.reflectivity.max() <= 1
-        assert set(track.label) <= {TrackClass.BACKGROUND, TrackClass.PEDESTRIAN}
-
-
-def test_a_seed_gives_the_same_room_again_and_another_seed_another_one() -> None:
-    again = lay_out_room(np.random.default_rng(0))
-    assert np.array_equal(room(0).triangles, again.triangles)
-    assert np.array_equal(room(0).reflectivity, again.reflectivity)
-    assert len({len(room(seed).label) for seed in SEEDS}) > 6
-
-
 def test_nothing_but_the_floor_and_the_ceiling_is_at_the_sensor(open3d: ModuleType) -> None:
     for seed in SEEDS:
         for which, sensor in enumerate(SENSORS):

@@ -1,4 +1,4 @@
-"""Arrays whose rows belong together."""
+"""Types of arrays, and arrays whose rows belong together."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
@@ -6,6 +6,10 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
