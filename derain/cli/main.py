@@ -160,7 +160,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _run_training(arguments: list[str]) -> int:
-    from derain.cli.training.help import short_help
+    from derain.cli.training import short_help, train
     from derain.workflows.configurations import require_configuration
 
     if {"-h", "--help"} & {*arguments}:
@@ -168,8 +168,6 @@ def _run_training(arguments: list[str]) -> int:
         return 0
     require_configuration(arguments)
     require(arguments[0], *TRAINING_LIBRARIES)
-    from derain.cli.training.train import train
-
     train(arguments)
     return 0
 

@@ -1,25 +1,19 @@
 """Writes a recording as several methods clean it, for Rerun's viewer."""
 
-import argparse
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tqdm import tqdm
-
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
-from derain.cli.bag_options import in_topic
-from derain.cli.outputs import print_lines
+from derain.cli.outputs import print_error, print_lines
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method, split_title
 from derain.files.atomic import require_writable
-from derain.files.reading import reading
 from derain.sources.folders import named_frames
-from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
+from derain.sources.judging import Failures
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
 from derain.system.extras import RERUN
@@ -33,34 +27,52 @@ if TYPE_CHECKING:
 SUFFIX = ".rrd"
 
 
-def view_recording(arguments: argparse.Namespace) -> int:
+def view_recording(
+    out: Path,
+    paths: Sequence[Path],
+    names: Sequence[str],
+    *,
+    columns: Sequence[str],
+    card_name: str | None,
+    poses: str | None,
+    intensity_scale: float,
+    frames: slice,
+    every: int,
+    threads: int,
+) -> int:
     """Writes the file, and prints its size.
+
+    Args:
+        out: The file, which :func:`refuse_unusable` has let pass.
+        paths: The scans.
+        names: The methods, as the command line names them.
+        columns: Names of the columns of files that do not name them.
+        card_name: Data card of the scans' labels; None shows no truth.
+        poses: Where the poses come from, as for :func:`derain.recordings.posed.with_poses`.
+        intensity_scale: Factor from the scans' intensities to the unit of the methods.
+        frames: The scans to show, by their places.
+        every: Shows every so many of them.
+        threads: Threads to use; 0 takes all cores.
 
     Returns:
         The exit code: 2 where something could not be shown.
 
     Raises:
-        InputError: Rerun is not installed; a method that there is not; scans or poses that cannot
-            be read; a file that cannot be written.
+        InputError: A method that there is not; scans or poses that cannot be read; a file that
+            cannot be written.
     """
-    out: Path = arguments.rerun
-    refuse_unusable(out)
     from derain.pictures.selection import Labels, Selection
 
     keep_freed_memory()
-    methods = _methods(arguments.methods, arguments.threads)
-    card = None if arguments.card is None else load_card(arguments.card)
+    methods = _methods(names, threads)
+    card = None if card_name is None else load_card(card_name)
     found = named_frames(
-        in_topic(arguments.scans, arguments),
-        arguments.columns,
-        labelled=card is not None,
-        layouts=layouts_for(card),
-        recordings=True,
+        paths, columns, labelled=card is not None, layouts=layouts_for(card), recordings=True
     )
-    source = placed(found, arguments.poses, arguments.threads).map(
-        lambda frame: frame.with_intensity_times(arguments.intensity_scale)
+    source = placed(found, poses, threads).map(
+        lambda frame: frame.with_intensity_times(intensity_scale)
     )
-    numbers = range(len(source))[arguments.frames][:: arguments.every]
+    numbers = range(len(source))[frames][::every]
     selection = Selection(source, numbers)
     if card is not None and not any(frame.has_labels for frame in selection.frames):
         warn(f"{selection.frames[0].name}: no scan has labels, so no truth is shown")
@@ -84,10 +96,7 @@ def refuse_unusable(out: Path) -> None:
 
 
 def write_and_report(
-    out: Path,
-    selection: "Selection",
-    methods: dict[str, Method],
-    labels: "Labels | None",
+    out: Path, selection: "Selection", methods: dict[str, Method], labels: "Labels | None"
 ) -> int:
     """Writes the file, and prints what it shows, its size and what is wrong with its scans.
 
@@ -101,24 +110,20 @@ def write_and_report(
 
     scans = len(selection.frames)
     print_lines(f"{scans:,} scans, methods: {', '.join(methods)}")
-    notices, errors = Notices(), set()
+    notices = Notices()
+    errors: set[str] = set()
 
-    @contextmanager
-    def reporting(frame: Frame) -> Iterator[None]:
-        """Prints an error and goes on; once, for every method reads the frame again."""
-        try:
-            with reading(Path(frame.name)):
-                yield
-        except InputError as error:
-            if str(error) not in errors:
-                tqdm.write(f"derain: {error}", sys.stderr)
-            errors.add(str(error))
+    def print_once(error: InputError) -> None:
+        """Prints an error the first time: every method reads the frame again."""
+        if str(error) not in errors:
+            print_error(error)
+        errors.add(str(error))
 
     def watch(title: str, judgement: Judgement) -> None:
         assert judgement.frame is not None
         notices.warn(judgement.frame.name, methods[title].issues(judgement), title)
 
-    write_playback(out, selection, methods, labels, reporting, watch)
+    write_playback(out, selection, methods, labels, Failures(print_once).skipping_failures, watch)
     notices.warn_of_repeats()
     print_lines(f"{out}: {out.stat().st_size / 1e6:,.1f} MB. To view it: rerun {out}")
     if errors:

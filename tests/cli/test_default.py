@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from derain.cli.info_default import card_as_text
+from derain.cli.info import card_as_text
 from derain.default import ModelScore, default_model, model_card
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
