@@ -1,7 +1,7 @@
 """``derain simulate``: a data set of simulated rain, or rain on scans of one's own."""
 
 import argparse
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ from derain.cli.outputs import folder_sink, print_lines
 from derain.cli.scan_options import add_columns
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
+from derain.sources.folders import named_frames
 from derain.system.cores import usable_cores
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
 
@@ -155,16 +156,19 @@ def main(arguments: argparse.Namespace) -> int:
     given = {name: value for name, value in vars(arguments).items() if value is not None}
     if arguments.on is not None:
         _refuse((*DATA_SET_DEFAULTS, "world"), given, needs="without --on")
-        return _rain_on_scans(
-            arguments.on,
-            arguments.out,
-            arguments.columns or DEFAULT_COLUMNS,
-            arguments.rain or (),
-            arguments.sensor or "spinning_64",
-            seed=arguments.seed,
-            picture=bool(arguments.picture),
-            as_json=bool(arguments.json),
-        )
+        if arguments.picture:
+            require("--picture", MATPLOTLIB)
+        from derain.cli.rain_on_scans import rain_on_scans
+        from derain.simulation.rain_field import UniformRain
+        from derain.simulation.sensor_file import load_sensor
+
+        if not arguments.rain or len(arguments.rain) > 1:
+            raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")
+        rain, sensor = UniformRain(*arguments.rain), load_sensor(arguments.sensor or "spinning_64")
+        source = named_frames(arguments.on, arguments.columns or DEFAULT_COLUMNS)
+        sink = folder_sink(arguments.out, source)
+        output = bool(arguments.picture), bool(arguments.json)
+        return rain_on_scans(source, rain, sensor, sink, arguments.seed, *output)
     require("simulate", OPEN3D)
     from derain.simulation.dataset import simulate_track
 
@@ -220,29 +224,3 @@ def _world_campaign(arguments: argparse.Namespace) -> "WorldCampaign":
 
     parts = partition(arguments.sequences or DATA_SET_DEFAULTS["sequences"])
     return WorldCampaign(*parts, seed=arguments.seed, world=arguments.world)
-
-
-def _rain_on_scans(
-    scans: Sequence[Path],
-    out: Path,
-    columns: Sequence[str],
-    rates: Sequence[float],
-    sensor: str,
-    *,
-    seed: int,
-    picture: bool,
-    as_json: bool,
-) -> int:
-    if picture:
-        require("--picture", MATPLOTLIB)
-    from derain.cli.rain_on_scans import rain_on_scans
-    from derain.simulation.rain_field import UniformRain
-    from derain.simulation.sensor_file import load_sensor
-    from derain.sources.folders import named_frames
-
-    if len(rates) != 1:
-        raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")
-    rain, of_sensor = UniformRain(rates[0]), load_sensor(sensor)
-    source = named_frames(scans, columns)
-    sink = folder_sink(out, source)
-    return rain_on_scans(source, rain, of_sensor, sink, seed, picture, as_json)

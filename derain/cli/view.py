@@ -15,10 +15,13 @@ from derain.cli.scan_options import add_columns, add_intensity_scale, add_poses,
 from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.sources.bag_frame import NUMBER, BagFrame
-from derain.sources.folders import frame_of
+from derain.sources.folders import frame_of, named_frames
+from derain.sources.source import Source
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
+from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices
 from derain.views.scan_issues import outside_view
+from derain.workflows.odometry import placed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -99,23 +102,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     if arguments.rerun is not None:
-        from derain.cli.view_recording import refuse_unusable, view_recording
+        from derain.cli.view_recording import load_methods, refuse_unusable, view_recording
 
         if arguments.out or arguments.window:
             raise InputError("--rerun", "excludes --out and --window", "Leave them out.")
         refuse_unusable(arguments.rerun)
-        return view_recording(
-            arguments.rerun,
-            within(arguments.scans, arguments.topic),
-            arguments.methods,
-            columns=arguments.columns,
-            card_name=arguments.card,
-            poses=arguments.poses,
-            intensity_scale=arguments.intensity_scale,
-            frames=arguments.frames,
-            every=arguments.every,
-            threads=arguments.threads,
-        )
+        keep_freed_memory()
+        methods = load_methods(arguments.methods, arguments.threads)
+        card = None if arguments.card is None else load_card(arguments.card)
+        source = _recordings(arguments, card)
+        shown = range(len(source))[arguments.frames][:: arguments.every]
+        return view_recording(arguments.rerun, methods, source, shown, card)
     path = arguments.scans[0]
     if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):
         raise InputError(
@@ -142,6 +139,20 @@ def _numbers(text: str) -> slice:
     if not colon:
         raise argparse.ArgumentTypeError(f"{text} is not FROM:TO, such as 10:20")
     return slice(*(whole(part) if part else None for part in (first, end)))
+
+
+def _recordings(arguments: argparse.Namespace, card: DataCard | None) -> Source:
+    """The scans that the arguments name, each with its pose."""
+    found = named_frames(
+        within(arguments.scans, arguments.topic),
+        arguments.columns,
+        labelled=card is not None,
+        layouts=layouts_for(card),
+        recordings=True,
+    )
+    return placed(found, arguments.poses, arguments.threads).map(
+        lambda frame: frame.with_intensity_times(arguments.intensity_scale)
+    )
 
 
 def _view_scan(

@@ -5,21 +5,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from derain.cards.card import load_card
-from derain.cards.known import layouts_for
+from derain.cards.card import DataCard
 from derain.cli.outputs import print_error, print_lines
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method, split_title
 from derain.files.atomic import require_writable
-from derain.sources.folders import named_frames
 from derain.sources.judgement import Judgement
 from derain.sources.judging import Failures
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
+from derain.sources.source import Source
 from derain.system.extras import RERUN
-from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
-from derain.workflows.odometry import placed
 
 if TYPE_CHECKING:
     from derain.pictures.selection import Labels, Selection
@@ -29,50 +26,28 @@ SUFFIX = ".rrd"
 
 def view_recording(
     out: Path,
-    paths: Sequence[Path],
-    names: Sequence[str],
-    *,
-    columns: Sequence[str],
-    card_name: str | None,
-    poses: str | None,
-    intensity_scale: float,
-    frames: slice,
-    every: int,
-    threads: int,
+    methods: dict[str, Method],
+    source: Source,
+    numbers: Sequence[int],
+    card: DataCard | None,
 ) -> int:
     """Writes the file, and prints its size.
 
     Args:
         out: The file, which :func:`refuse_unusable` has let pass.
-        paths: The scans.
-        names: The methods, as the command line names them.
-        columns: Names of the columns of files that do not name them.
-        card_name: Data card of the scans' labels; None shows no truth.
-        poses: Where the poses come from, as for :func:`derain.recordings.posed.with_poses`.
-        intensity_scale: Factor from the scans' intensities to the unit of the methods.
-        frames: The scans to show, by their places.
-        every: Shows every so many of them.
-        threads: Threads to use; 0 takes all cores.
+        methods: The methods by their titles.
+        source: All scans.
+        numbers: The places of the scans to show, ascending.
+        card: Data card of the scans' labels; None shows no truth.
 
     Returns:
         The exit code: 2 where something could not be shown.
 
     Raises:
-        InputError: A method that there is not; scans or poses that cannot be read; a file that
-            cannot be written.
+        InputError: Scans or poses that cannot be read, or a file that cannot be written.
     """
     from derain.pictures.selection import Labels, Selection
 
-    keep_freed_memory()
-    methods = _methods(names, threads)
-    card = None if card_name is None else load_card(card_name)
-    found = named_frames(
-        paths, columns, labelled=card is not None, layouts=layouts_for(card), recordings=True
-    )
-    source = placed(found, poses, threads).map(
-        lambda frame: frame.with_intensity_times(intensity_scale)
-    )
-    numbers = range(len(source))[frames][::every]
     selection = Selection(source, numbers)
     if card is not None and not any(frame.has_labels for frame in selection.frames):
         warn(f"{selection.frames[0].name}: no scan has labels, so no truth is shown")
@@ -131,7 +106,7 @@ def write_and_report(
     return 2 if errors else 0
 
 
-def _methods(names: Sequence[str], threads: int) -> dict[str, Method]:
+def load_methods(names: Sequence[str], threads: int) -> dict[str, Method]:
     """The methods by their titles, in order.
 
     Raises:

@@ -13,9 +13,9 @@ from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.runtime import Derainer
 from derain.files import read_scan, write_scan
 from derain.files.labels import write_labels
-from derain.models.base import DerainingModule
 from derain.models.checkpoint import save_model
 from derain.models.outdet import OutDet
+from derain.models.salsanext import SalsaNext
 from derain.scan import Scan
 from derain.views.grid_fit import fit_grid
 from derain.views.spherical_grid import grid_of
@@ -191,14 +191,14 @@ def test_a_file_that_cannot_be_read_keeps_no_other_from_being_described(
 
 
 def test_a_model_on_range_images_says_its_grid_and_rule(
-    run_derain, image_model: DerainingModule, image_onnx: Path, tmp_path: Path
+    run_derain, random_salsanext: SalsaNext, salsanext_onnx: Path, tmp_path: Path
 ) -> None:
-    save_model(image_model, tmp_path / "model.ckpt")
-    for path in (image_onnx, tmp_path / "model.ckpt"):
+    save_model(random_salsanext, tmp_path / "model.ckpt")
+    for path in (salsanext_onnx, tmp_path / "model.ckpt"):
         facts = strict_json(run_derain("info", path, "--json").out)
-        assert facts["spec"] == image_model.spec.as_dict()
+        assert facts["spec"] == random_salsanext.spec.as_dict()
         text = run_derain("info", path).out
-        assert f"network: {image_model.NAME}" in text
+        assert f"network: {random_salsanext.NAME}" in text
         assert "kind: range" in text
         assert "way_back: nearest range" in text
 

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from derain.cli.main import main
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
-from derain.recordings.registration import shift_of
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.sources.trajectory import read_trajectory
@@ -211,13 +209,6 @@ def test_a_damaged_record_of_times_ends_it_before_the_work(
     outcome = run_derain("odometry", recording, "--out", tmp_path / "poses.txt")
     assert (outcome.code, outcome.out) == (2, "")
     assert "times.txt: line 2 is not 1 number" in outcome.err
-
-
-def test_the_command_is_the_same_on_any_number_of_threads(recording: Path, tmp_path: Path) -> None:
-    for threads in ("1", "2"):
-        main(["odometry", str(recording), "--out", str(tmp_path / threads), "--threads", threads])
-    assert (tmp_path / "1").read_bytes() == (tmp_path / "2").read_bytes()
-    assert shift_of(read_trajectory(tmp_path / "1").poses[3]) > 2
 
 
 def test_a_recording_that_fails_takes_no_other_with_it(

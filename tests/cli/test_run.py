@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
-from derain.files import write_scan
-from derain.scan import Scan
 
 
 @pytest.fixture
@@ -169,19 +167,6 @@ def test_intensities_of_another_unit_are_warned_of_once(
         "run", onnx_model, tmp_path, "--out", tmp_path / "out", "--intensity-scale", "1000"
     )
     assert scaled.said == []
-
-
-def test_a_missing_intensity_is_warned_of_once(
-    run_derain, onnx_model: Path, tmp_path: Path
-) -> None:
-    for name in ("a", "b"):
-        write_scan(tmp_path / f"{name}.pcd", Scan(scene(100)[:, :3].copy()))
-    outcome = run_derain("run", onnx_model, tmp_path, "--out", tmp_path / "out")
-    assert outcome.code == 0
-    assert outcome.said == [
-        f"derain: warning: {tmp_path / 'a.pcd'}: no intensity: the mean of WADS, 9.88, stands in",
-        "derain: warning: 1 more scan: no intensity",
-    ]
 
 
 def test_a_model_that_was_trained_without_intensity_warns_of_none(

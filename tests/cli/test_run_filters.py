@@ -8,7 +8,7 @@ import pytest
 
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.files import read_scan, write_scan
-from derain.filters import DROR, DSOR, FILTERS, SSR, FilterDerainer, filter_from
+from derain.filters import DROR, DSOR, FILTERS, FilterDerainer, filter_from
 from derain.scan import Scan
 
 
@@ -86,15 +86,6 @@ def test_a_missing_intensity_is_warned_of_once_and_only_where_it_is_needed(
         "derain: warning: 1 more scan: no intensity",
     ]
     assert run_derain("run", "dror", *arguments).said == []
-
-
-def test_the_intensity_scale_reaches_the_filter(run_derain, scan: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    options = ["--intensity-scale", "0.5", "--set", "threshold=2000"]
-    assert run_derain("run", "ssr", scan, "--out", out, *options).code == 0
-    expected = FilterDerainer(SSR(threshold=4000))(scene(400))
-    assert rain_in(out) == expected.tolist()
-    assert 0 < expected.sum() < 400
 
 
 @pytest.mark.parametrize(

@@ -60,23 +60,6 @@ def test_it_rains_on_a_data_set(run_derain, root: Path, tmp_path: Path) -> None:
     assert len(names(out)) == 4 * 3
 
 
-@pytest.mark.parametrize("out", ["sequences", "sequences/02/labels", "sequences/02/velodyne"])
-def test_nothing_of_a_data_set_is_overwritten(run_derain, root: Path, out: str) -> None:
-    before = names(root)
-    named = root if out == "sequences" else root / "sequences/02"
-    outcome = run_derain("run", "dror", named, "--out", root / out)
-    assert (outcome.code, outcome.out) == (2, "")
-    assert len(outcome.err.splitlines()) == 1
-    assert names(root) == before
-
-
-def test_one_scan_named_twice_is_refused(run_derain, root: Path, tmp_path: Path) -> None:
-    scan = root / "sequences/02/velodyne/000000.bin"
-    outcome = run_derain("run", "dror", scan, scan, "--out", tmp_path / "out")
-    assert (outcome.code, outcome.out) == (2, "")
-    assert "another scan has the same name" in outcome.err
-
-
 @pytest.mark.parametrize(
     "command",
     [

@@ -208,12 +208,15 @@ def test_the_scans_are_drawn_by_the_seed(
         return yaml.safe_load(out.read_text()), out.read_text().splitlines()[1]
 
     assert tuned("a.yaml", 1) == tuned("b.yaml", 1)
-    assert len({tuned(f"{seed}.yaml", seed)[1] for seed in range(8)}) > 1
+    assert len({tuned(f"{seed}.yaml", seed)[1] for seed in range(1, 5)}) > 1
 
 
 @pytest.mark.parametrize(
     ("method", "reason"),
-    [("absent.onnx", "absent.onnx: no such file"), ("nothing", "nothing: no such file")],
+    [
+        ("absent.onnx", "absent.onnx: no such file"),
+        ("dzor", "dzor: no such file. Did you mean dsor?"),
+    ],
 )
 def test_a_method_that_is_not_there_is_refused(
     run_derain, data: list[str | Path], tmp_path: Path, method: str, reason: str
@@ -254,11 +257,3 @@ def test_what_cannot_be_written_is_refused_before_any_work(
     assert outcome.code == 2
     assert "no.yaml: cannot be written" in outcome.err
     assert not storage.exists()
-
-
-def test_what_is_no_method_is_told_what_methods_there_are(
-    run_derain, data: list[str | Path], tmp_path: Path
-) -> None:
-    outcome = run_derain("tune", "dzor", *data, "--out", tmp_path / "no.yaml")
-    assert outcome.code == 2
-    assert "dzor: no such file. Did you mean dsor?" in outcome.err

@@ -58,16 +58,15 @@ def bad_checkpoints(checkpoint: Path) -> None:
 
 
 @pytest.mark.usefixtures("bad_checkpoints")
-@pytest.mark.parametrize("command", ["fit", "test"])
 @pytest.mark.parametrize(
-    ("path", "reason"),
+    ("command", "path", "reason"),
     [
-        ("https://example.org/outdet.ckpt", "is an address. Download it and give the file."),
-        ("s3://bucket/outdet.ckpt", "is an address. Download it and give the file."),
-        ("none.ckpt", "no such file"),
-        ("cut.ckpt", "damaged"),
-        ("weights.ckpt", "not a checkpoint of derain"),
-        ("resnet.ckpt", "a checkpoint of 'resnet'"),
+        ("fit", "https://example.org/outdet.ckpt", "is an address. Download it and give the file."),
+        ("test", "s3://bucket/outdet.ckpt", "is an address. Download it and give the file."),
+        ("fit", "none.ckpt", "no such file"),
+        ("fit", "cut.ckpt", "damaged"),
+        ("test", "weights.ckpt", "not a checkpoint of derain"),
+        ("test", "resnet.ckpt", "a checkpoint of 'resnet'"),
     ],
 )
 def test_a_checkpoint_that_cannot_be_used_is_one_line(
@@ -142,17 +141,19 @@ SPOILS: dict[str, tuple[Callable[[Path], None], str]] = {
 }
 
 
-@pytest.mark.parametrize("workers", ["0", "1"])
-@pytest.mark.parametrize(("change", "reason"), SPOILS.values(), ids=SPOILS.keys())
+@pytest.mark.parametrize(
+    ("spoil", "workers"),
+    [("unknown ids", "0"), ("another length", "1"), ("missing", "0"), ("missing", "1")],
+)
 def test_labels_that_cannot_be_used_are_named_with_the_remedy(
     run_derain,
     wads: list[str],
     checkpoint: Path,
     tmp_path: Path,
-    change: Callable[[Path], None],
-    reason: str,
+    spoil: str,
     workers: str,
 ) -> None:
+    change, reason = SPOILS[spoil]
     label = tmp_path / "WADS/sequences/02/labels/0.label"
     change(label)
     options = ["--ckpt_path", checkpoint, "--data.loading.workers", workers]

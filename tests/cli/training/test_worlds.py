@@ -20,6 +20,7 @@ precipitation: {snow: {weight: 1, crowding: [0.1, 0.3]}}
 """
 
 
+@pytest.mark.usefixtures("one_block")
 def test_worlds_are_made_trained_on_and_exported(
     run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -30,7 +31,7 @@ def test_worlds_are_made_trained_on_and_exported(
     monkeypatch.chdir(tmp_path)
     Path("small.yaml").write_text(WORLD, "utf-8")
     outcome = run_derain(
-        *("fit", "--config", "relative_outdet_worlds.yaml", "--trainer.max_epochs", 2),
+        *("fit", "--config", "relative_outdet_worlds.yaml", "--trainer.max_epochs", 1),
         *("--data.root", "worlds", "--data.workers", 1, "--data.loading.workers", 0),
         *("--data.campaign.train", 2, "--data.campaign.validation", 1),
         *("--data.campaign.world", "small.yaml", "--trainer.enable_progress_bar", "false"),
