@@ -144,12 +144,3 @@ def test_a_radar_frame_of_no_scan_is_refused(run_derain, tmp_path: Path, sequenc
     line = refused(run_derain, sequence, *arguments, "--radar", tmp_path / "radar")
     assert "000009.bin: no scan has its name" in line
     assert not (tmp_path / "out").exists()
-
-
-def test_a_scene_that_does_not_fit_is_refused(run_derain, tmp_path: Path, sequence: Path) -> None:
-    (tmp_path / "scene.yaml").write_text("road: [[-9, 0], [-8, 0], [-8, 1]]")
-    arguments = ["--scene", tmp_path / "scene.yaml", "--out", tmp_path / "out"]
-    assert "0 points over the road" in refused(run_derain, sequence, *arguments)
-    (tmp_path / "scene.yaml").write_text("boxes: {}")
-    assert "scene.yaml: road is missing" in refused(run_derain, sequence, *arguments)
-    assert not (tmp_path / "out").exists()

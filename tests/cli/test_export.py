@@ -24,8 +24,7 @@ def test_a_checkpoint_becomes_a_model_with_its_proof_and_times(
     scan, out = tmp_path / "scan.bin", tmp_path / "new" / "outdet.onnx"
     scene(500).tofile(scan)
     outcome = run_derain(
-        *("export", checkpoint, "--out", out),
-        *("--scan", scan, "--threads", "1", "--repeats", "3"),
+        *("export", checkpoint, "--out", out), *("--scan", scan, "--threads", "1", "--repeats", "3")
     )
     assert outcome.code == 0
     assert "48 cases" in outcome.out
@@ -68,11 +67,7 @@ def test_candidates_are_fitted_to_labelled_scans_and_their_cost_is_said(
 
 
 def test_scans_that_candidates_are_fitted_to_count_once_and_are_warned_of(
-    run_derain,
-    checkpoint: Path,
-    write_labelled,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    run_derain, checkpoint: Path, write_labelled, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(onnx_file, "export", lambda _, path, *__: path.touch())
     monkeypatch.setattr("derain.export.latency.measure_latency", lambda *_: "times")

@@ -156,11 +156,7 @@ def assert_imported(
     ],
 )
 def test_a_grid_that_is_missing_or_unknown_is_one_line_and_exit_code_2(
-    run_derain,
-    image_model: DerainingModule,
-    tmp_path: Path,
-    options: tuple[str, ...],
-    reason: str,
+    run_derain, image_model: DerainingModule, tmp_path: Path, options: tuple[str, ...], reason: str
 ) -> None:
     weights, out = tmp_path / "published", tmp_path / "model.ckpt"
     torch.save(of_image_network(image_model), weights)

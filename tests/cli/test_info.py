@@ -15,7 +15,6 @@ from derain.files import read_scan, write_scan
 from derain.files.labels import write_labels
 from derain.models.checkpoint import save_model
 from derain.models.outdet import OutDet
-from derain.models.salsanext import SalsaNext
 from derain.scan import Scan
 from derain.views.grid_fit import fit_grid
 from derain.views.spherical_grid import grid_of
@@ -156,25 +155,13 @@ def test_a_checkpoint_says_its_spec_and_size(
     ],
 )
 def test_scans_of_a_training_are_counted_in_the_text_and_named_in_json(
-    run_derain,
-    random_outdet: OutDet,
-    tmp_path: Path,
-    training: dict[str, list[str]],
-    line: str,
+    run_derain, random_outdet: OutDet, tmp_path: Path, training: dict[str, list[str]], line: str
 ) -> None:
     model, path = deepcopy(random_outdet), tmp_path / "model.ckpt"
     model.adopt(replace(model.spec, training=training))
     save_model(model, path)
     assert line in run_derain("info", path).out.splitlines()
     assert strict_json(run_derain("info", path, "--json").out)["spec"]["training"] == training
-
-
-def test_several_files_give_one_object_each(
-    run_derain, scan: Path, onnx_model: Path, tmp_path: Path
-) -> None:
-    outcome = run_derain("info", scan, onnx_model, "--json")
-    objects = [strict_json(line) for line in outcome.out.splitlines()]
-    assert [item["file"] for item in objects] == [str(scan), str(onnx_model)]
 
 
 def test_a_file_that_cannot_be_read_keeps_no_other_from_being_described(
@@ -188,19 +175,6 @@ def test_a_file_that_cannot_be_read_keeps_no_other_from_being_described(
         "none.bin",
         str(tmp_path / "cut.bin"),
     ]
-
-
-def test_a_model_on_range_images_says_its_grid_and_rule(
-    run_derain, random_salsanext: SalsaNext, salsanext_onnx: Path, tmp_path: Path
-) -> None:
-    save_model(random_salsanext, tmp_path / "model.ckpt")
-    for path in (salsanext_onnx, tmp_path / "model.ckpt"):
-        facts = strict_json(run_derain("info", path, "--json").out)
-        assert facts["spec"] == random_salsanext.spec.as_dict()
-        text = run_derain("info", path).out
-        assert f"network: {random_salsanext.NAME}" in text
-        assert "kind: range" in text
-        assert "way_back: nearest range" in text
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """A data set that derain has never heard of needs one YAML, its data card."""
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
@@ -46,24 +45,6 @@ def test_info_counts_it(run_derain, data: list[str | Path], tmp_path: Path) -> N
         )
         assert facts["points_by_class"] == {"dry": 540 * sequences, "drop": 60 * sequences}
     assert run_derain("info", root).code == 2  # without the card, nothing says where scans lie
-
-
-def test_what_is_stated_goes_before_the_card(run_derain, data: list[str | Path]) -> None:
-    _, root, *card = data
-    outcome = run_derain("info", root, *card, "--layout", "lidar,elsewhere", "--json")
-    facts = json.loads(outcome.out)
-    assert (facts["sequences"], facts["scans"], facts["labelled_points"]) == (3, 6, 0)
-
-
-def test_methods_are_tuned_on_its_validation_part(
-    run_derain, data: list[str | Path], tmp_path: Path
-) -> None:
-    shutil.rmtree(tmp_path / "ours/drives/monday")  # of which tuning takes nothing
-    out = tmp_path / "best.yaml"
-    outcome = run_derain("tune", "dror", *data, "--trials", "3", "--out", out)
-    assert outcome.code == 0, outcome.err
-    assert " on 2 scans of ours, " in outcome.out
-    assert out.is_file()
 
 
 def test_methods_are_compared_on_its_test_part(

@@ -79,11 +79,7 @@ def test_a_method_that_takes_nearly_all_says_so(run_derain, scans: Path, tmp_pat
 
 @pytest.mark.parametrize("options", [[], ["--most-removed", "0.99"]])
 def test_a_scan_that_would_lose_too_much_is_left_whole(
-    run_derain,
-    tmp_path: Path,
-    scans: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    options: list[str],
+    run_derain, tmp_path: Path, scans: Path, monkeypatch: pytest.MonkeyPatch, options: list[str]
 ) -> None:
     monkeypatch.setattr("derain.cli.run.MOST_RAIN", MOST_RAIN)
     spread = scene(200) * np.array([1e3, 1e3, 1e3, 1], np.float32)

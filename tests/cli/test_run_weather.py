@@ -129,10 +129,7 @@ def test_without_an_option_that_asks_a_few_scans_are_enough_for_the_last_line(
 
 @pytest.mark.parametrize(
     ("asked", "code", "told"),
-    [
-        ("warning", 3, "the weather was at warning or worse in 2 of 6 scans"),
-        ("error", 0, ""),
-    ],
+    [("warning", 3, "the weather was at warning or worse in 2 of 6 scans"), ("error", 0, "")],
 )
 def test_bad_weather_can_be_told_by_the_exit_code_after_all_scans(
     run_derain, recording: Path, tmp_path: Path, asked: str, code: int, told: str

@@ -8,7 +8,6 @@ import pytest
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from derain.datamodules.simulated import Simulated
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import read_labels
@@ -118,18 +117,6 @@ def test_an_impossible_drive_is_refused_before_anything_is_written(
     assert outcome.code == 2
     assert outcome.err.startswith(f"derain: {message}")
     assert not (tmp_path / "drive").exists()
-
-
-def test_one_sequence_is_enough_to_look_at_but_not_to_train(run_derain, tmp_path: Path) -> None:
-    root = tmp_path / "one"
-    assert run_derain("simulate", "--out", root, *QUICK, "--sequences", "1").code == 0
-    assert names(root / "sequences") == ["000"]
-    outcome = run_derain("info", root, "--json")
-    assert json.loads(outcome.out)["scans"] == 1
-    data = Simulated(str(root), make=False)
-    assert len(data.frames("train")) == 1
-    with pytest.raises(InputError, match="no sequence is for validation"):
-        data.frames("validation")
 
 
 def rained(folder: Path, stem: str, columns: int = 4) -> tuple[NDArray[np.float32], NDArray]:

@@ -18,10 +18,7 @@ QUICK = [
 
 
 def test_the_packaged_mixture_goes_from_training_to_predictions(
-    run_derain,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    write_labelled: Callable[..., None],
+    run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write_labelled: Callable[..., None]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     snow, streets = Path("WADS/sequences"), Path("streets/sequences")
@@ -51,10 +48,7 @@ def test_the_packaged_mixture_goes_from_training_to_predictions(
     assert tested.code == 0, tested.err
     classes = json.loads((run / "version_0/test.json").read_text())["classes"]
     assert classes["snow: falling-snow"]["points"] == 30 * len(load_card("wads").split["test"])
-    assert classes["streets: rain"] == {
-        **classes["streets: rain"],
-        **{"points": 30, "rain": True},
-    }
+    assert classes["streets: rain"] == {**classes["streets: rain"], **{"points": 30, "rain": True}}
 
     assert run_derain("predict", *data, "--ckpt_path", checkpoint).code == 0
     written = sorted(Path("predictions").rglob("*.label"))
