@@ -32,15 +32,15 @@ Exports a checkpoint as one ONNX file, proves it against PyTorch, and times it.
   derain export salsanext.ckpt --out salsanext.onnx --int8 --calibration scans/
   derain export outdet.ckpt --out outdet.onnx --candidates WADS/sequences/36 --card wads
 
-With --candidates, the model judges no point outside a few bounds (range, height, intensity). They
-are fitted to labelled scans so that they hold, with a margin, all but a thousandth of the rain that
-the network finds there, and what that costs is printed. Of a candidate, the model says what it says
-without.
+With --candidates, the model judges only points within a few bounds of range, height and intensity.
+derain fits the bounds to labelled scans, so that they hold, with a margin, all but a thousandth of
+the rain that the network finds there, and prints what they cost. For points within the bounds, the
+model gives the same answer as without them.
 
-Where the proof fails, no file is left. With --int8, convolutions compute in eight bits, scaled by
-what they see in scans of the calibration folder. They must find the rain there that the network
-finds: so the scans have to hold some, and their intensities the unit of the training data.
-The file is the same for every runtime: another that is named has to pass the proof too.
+If the proof fails, derain leaves no file. With --int8, convolutions compute in eight bits, scaled
+by what they see in scans of the calibration folder. The network must find rain in these scans, and
+their intensities must have the unit of the training data.
+The file is the same for every runtime. If you name another, it has to pass the proof too.
 """
 
 
@@ -61,24 +61,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="+",
         metavar="DATA",
-        help="labelled scans, folders of them, or a data set, that bounds of rain are fitted to",
+        help="labelled scans, folders of them, or a data set, to fit bounds of rain to",
     )
     parser.add_argument(
         "--inside",
         type=share,
         help=f"share of the rain found that is within the bounds (default: {RAIN_INSIDE:g})",
     )
-    parser.add_argument("--card", help="data card of the labelled scans (default: as they tell)")
     parser.add_argument(
-        "--scan", type=Path, help="time the model on this scan; by default on a made-up one"
+        "--card", help="data card of the labelled scans (default: found by their folders)"
+    )
+    parser.add_argument(
+        "--scan", type=Path, help="scan to time the model on (default: a made-up one)"
     )
     add_columns(parser)
     add_intensity_scale(parser, of="calibration and labelled ")
     parser.add_argument(
-        "--threads", type=threads, default=0, help="threads to time with (default all)"
+        "--threads", type=threads, default=0, help="threads for the timing (default: all cores)"
     )
     add_runtime(parser, help="prove and time the file by this runtime too")
-    parser.add_argument("--repeats", type=count, default=30, help="timed runs (default 30)")
+    parser.add_argument(
+        "--repeats", type=count, default=30, help="timed runs (default: %(default)s)"
+    )
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -159,7 +159,7 @@ def _fuse(frame: Frame, partner: Frame | None, fusing: Fusing, out: Path) -> Non
 
 
 def _read(frame: Frame, option: str) -> Scan:
-    """Reads a frame; what an error says of --columns is here the option of its sensor."""
+    """Reads a frame; an error that names --columns names the option of the sensor instead."""
     try:
         return frame.read()
     except InputError as error:
@@ -175,7 +175,7 @@ def _refuse_overwriting(out: Path, read: Iterable[Path | None]) -> None:
 
 
 def _times(frames: Source, columns: Sequence[str]) -> NDArray[np.float64]:
-    """When each frame was taken, seconds, as its folder's metadata says."""
+    """Times of the frames in seconds, from the metadata in their folders."""
     return read_frame_times([Path(frame.name) for frame in frames], columns)
 
 

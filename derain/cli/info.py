@@ -138,7 +138,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _describe(name: str, options: Options) -> None:
     """Prints what is in one file or folder."""
-    if name == DEFAULT:  # ./default is another thing, and a Path would not tell them apart
+    if name == DEFAULT:  # not ./default, which is a file or folder; a Path would make both the same
         _describe_default(options.as_json)
         return
     path = within([Path(name)], options.topic)[0]

@@ -154,7 +154,7 @@ def draw(facts: FolderFacts, picture: Path) -> None:
 
 
 def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout | None:
-    """What a folder's folders are called: as stated, as its data card says, or as others do."""
+    """The layout of a folder: as stated, by its data card, or by the names of its folders."""
     if stated is None:
         return find_layout(folder, layouts_for(card))
     folders = stated.split(",")

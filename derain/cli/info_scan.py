@@ -54,7 +54,7 @@ def _fitted(scan: Scan) -> dict[str, Any]:
 
 
 def _returns(scan: Scan, frame: Frame, card: DataCard | None) -> dict[str, Any] | str:
-    """How many rays have two returns, and what lies behind rain where labels tell."""
+    """How many rays have two returns, and what lies behind rain if labels are known."""
     returns = pair_returns(scan)
     if not returns.dual:
         return "one of each ray"

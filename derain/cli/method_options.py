@@ -138,7 +138,7 @@ class _FilterHelp(argparse.RawDescriptionHelpFormatter):
     """
 
     def add_text(self, text: str | None) -> None:
-        """Adds a text of the parser's, with the lists where they belong."""
+        """Adds a text to the help, with the lists in place of their marks."""
         if text and _FILTERS_HERE in text:
             text = text.replace(_FILTERS_HERE, _listed({n: f.HELP for n, f in FILTERS.items()}))
         if text and _METHODS_HERE in text:

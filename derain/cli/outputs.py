@@ -1,4 +1,4 @@
-"""What commands print, and where they may write what they make of scans."""
+"""What commands print, and the files and folders that they may write."""
 
 import json
 import os
@@ -40,7 +40,7 @@ def folder_sink(out: Path, source: Source, removed: Path | None = None) -> Folde
 def print_facts(facts: "DataclassInstance", as_json: bool) -> None:
     """Prints what was done to a scan, above a progress bar: a line of text, or an object."""
     tqdm.write(json.dumps(asdict(facts)) if as_json else str(facts), sys.stdout)
-    sys.stdout.flush()  # whoever reads them through a pipe is told of each scan at once
+    sys.stdout.flush()  # so that the reader of a pipe gets each line at once
 
 
 def print_lines(text: str, stream: TextIO | None = None) -> None:

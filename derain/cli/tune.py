@@ -126,13 +126,13 @@ def main(arguments: argparse.Namespace) -> int:
         )
     print_lines(f"{method}: {facts}")
     for name, value in tuned.parameters.items():
-        if name != CANDIDATES:  # they were said when they were found
+        if name != CANDIDATES:  # printed already
             print(f"  {name}: {value}")
     return 0
 
 
 def _candidates(inside: float, data: "ScanData", frames: Sequence["Frame"]) -> Candidates | None:
-    """Bounds that hold a share of the scans' rain; None where none tell rain from the rest."""
+    """Bounds that hold a share of the scans' rain; None if no bounds tell rain from the rest."""
 
     def known() -> Iterator[tuple[Any, Any]]:
         for frame in tqdm(frames, desc="bounding rain", unit="scan", disable=None):

@@ -73,7 +73,7 @@ def refuse_unusable(out: Path) -> None:
 def write_and_report(
     out: Path, selection: "Selection", methods: dict[str, Method], labels: "Labels | None"
 ) -> int:
-    """Writes the file, and prints what it shows, its size and what is wrong with its scans.
+    """Writes the file, and prints what it shows, its size, and errors of single scans.
 
     Returns:
         The exit code: 2 where something could not be shown.

@@ -85,9 +85,8 @@ def test_a_scan_is_described_by_its_valid_points(run_derain, scan: Path) -> None
     }
 
 
-def test_the_text_says_the_same_line_by_line(run_derain, scan: Path) -> None:
-    outcome = run_derain("info", scan)
-    assert outcome.code == 0
+def test_the_text_says_the_same_line_by_line(succeed, scan: Path) -> None:
+    outcome = succeed("info", scan)
     lines = outcome.out.splitlines()
     assert lines[0] == str(scan)
     assert "  points: 6" in lines
@@ -215,22 +214,17 @@ def test_what_a_second_return_gives_back_is_told_where_labels_and_card_say_what_
     assert "share given back" not in strict_json(run_derain(*arguments).out)["returns"]
 
 
-def test_labels_of_another_scan_are_refused(
-    run_derain, tmp_path: Path, recording: Recording
-) -> None:
+def test_labels_of_another_scan_are_refused(refused, tmp_path: Path, recording: Recording) -> None:
     write_labels(tmp_path / "dual.label", np.zeros(3, np.int64))
-    outcome = run_derain("info", tmp_path / "dual.npz", "--card", "wads")
-    assert (outcome.code, outcome.out) == (2, "")
-    assert "holds 3 labels of 4 bytes for a scan of" in outcome.err
+    line = refused("info", tmp_path / "dual.npz", "--card", "wads")
+    assert "holds 3 labels of 4 bytes for a scan of" in line
 
 
-def test_a_scan_without_a_valid_point_has_no_grid(run_derain, tmp_path: Path) -> None:
+def test_a_scan_without_a_valid_point_has_no_grid(run_derain, refused, tmp_path: Path) -> None:
     np.full((10, 4), np.nan, np.float32).tofile(tmp_path / "nothing.bin")
     facts = strict_json(run_derain("info", tmp_path / "nothing.bin", "--json").out)
     assert facts["fitted grid"] == "none"
-    outcome = run_derain("info", "--grid", tmp_path / "nothing.bin")
-    assert (outcome.code, outcome.out) == (2, "")
-    (line,) = outcome.err.splitlines()
+    line = refused("info", "--grid", tmp_path / "nothing.bin")
     assert line.startswith("derain: grid: there is no valid point to fit it to.")
 
 
@@ -253,14 +247,12 @@ def test_a_scan_without_a_valid_point_has_no_grid(run_derain, tmp_path: Path) ->
     ],
 )
 def test_a_file_that_cannot_be_read_is_one_line_and_exit_code_2(
-    run_derain, tmp_path: Path, name: str, content: bytes | None, reason: str
+    refused, tmp_path: Path, name: str, content: bytes | None, reason: str
 ) -> None:
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
-    outcome = run_derain("info", path)
-    assert (outcome.code, outcome.out) == (2, "")
-    (line,) = outcome.err.splitlines()
+    line = refused("info", path)
     assert line.startswith(f"derain: {path}: ")
     assert reason in line
     assert line.endswith(".")

@@ -26,7 +26,7 @@ def data(tmp_path: Path, write_labelled) -> list[str | Path]:
     return ["--data", tmp_path / "ours", "--card", tmp_path / "ours.yaml"]
 
 
-def test_info_counts_it(run_derain, data: list[str | Path], tmp_path: Path) -> None:
+def test_info_counts_it(run_derain, succeed, data: list[str | Path], tmp_path: Path) -> None:
     _, root, *card = data
     for part, sequences in {
         "": 3,
@@ -34,8 +34,7 @@ def test_info_counts_it(run_derain, data: list[str | Path], tmp_path: Path) -> N
         "drives/friday": 1,
         "drives/friday/lidar": 1,
     }.items():
-        outcome = run_derain("info", root / part, *card, "--json")
-        assert outcome.code == 0, outcome.err
+        outcome = succeed("info", root / part, *card, "--json")
         facts = json.loads(outcome.out)
         assert facts["layout"] == ["lidar", "truth"]
         assert (facts["card"], facts["sequences"], facts["scans"]) == (
@@ -48,11 +47,10 @@ def test_info_counts_it(run_derain, data: list[str | Path], tmp_path: Path) -> N
 
 
 def test_methods_are_compared_on_its_test_part(
-    run_derain, data: list[str | Path], tmp_path: Path
+    succeed, data: list[str | Path], tmp_path: Path
 ) -> None:
     options = ["--methods", "dror", "--timed", "1", "--repeats", "1", "--out", tmp_path / "bench"]
-    outcome = run_derain("bench", *data, *options)
-    assert outcome.code == 0, outcome.err
+    succeed("bench", *data, *options)
     (row,) = json.loads((tmp_path / "bench/bench.json").read_text())["rows"]
     assert sum(row["counts"].values()) == 600
     assert row["counts"]["true_positive"] + row["counts"]["false_negative"] == 60

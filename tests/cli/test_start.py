@@ -66,14 +66,13 @@ def test_default_is_the_checkpoint_that_derain_comes_with(
 
 
 def test_fit_begins_with_the_weights_of_its_start(
-    run_derain, tmp_path: Path, wads: list[str], monkeypatch: pytest.MonkeyPatch
+    succeed, tmp_path: Path, wads: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     source = trained(tmp_path / "start.ckpt")
     # At a rate of nothing, it ends where it began.
     still = ("--model.learning_rate", "0", "--model.weight_decay", "0", "--trainer.max_epochs", "1")
-    outcome = run_derain("fit", *wads, "--start", "start.ckpt", *still, "--panels.scans", "1")
-    assert outcome.code == 0, outcome.err
+    succeed("fit", *wads, "--start", "start.ckpt", *still, "--panels.scans", "1")
     run = Path("runs/outdet_wads/version_0")
     student = load_model(run / "checkpoints/last.ckpt")
     for name, parameter in source.named_parameters():
@@ -85,8 +84,7 @@ def test_fit_begins_with_the_weights_of_its_start(
     # A training goes on from its checkpoints as from any other.
     last = ("--ckpt_path", run / "checkpoints/last.ckpt")
     more = ("--start", "start.ckpt", *still[:-1], "2")
-    outcome = run_derain("fit", *wads, *more, *last)
-    assert outcome.code == 0, outcome.err
+    succeed("fit", *wads, *more, *last)
 
 
 def test_fit_tells_what_it_cannot_start_from(run_derain, tmp_path: Path, wads: list[str]) -> None:
@@ -115,14 +113,13 @@ def recording(tmp_path: Path) -> Callable[[int], Path]:
 
 @pytest.mark.usefixtures("one_block")
 def test_learn_takes_over_what_its_start_sees_and_says_so(
-    run_derain, tmp_path: Path, recording, monkeypatch: pytest.MonkeyPatch
+    succeed, tmp_path: Path, recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     trained(Path("mine.ckpt"))
     command = ("learn", recording(4), "--out", "student.onnx", "--teacher", "dror")
-    outcome = run_derain(*command, "--epochs", "1", "--start", "mine.ckpt")
-    assert outcome.code == 0, outcome.err
+    succeed(*command, "--epochs", "1", "--start", "mine.ckpt")
     spec = Derainer("student.onnx").spec
     assert spec.channels == ("range",)
     assert spec.view["neighbours"] == 4
@@ -143,7 +140,7 @@ def test_learn_takes_over_what_its_start_sees_and_says_so(
     ],
 )
 def test_learn_tells_what_does_not_go_with_its_start(
-    run_derain,
+    refused,
     tmp_path: Path,
     recording,
     monkeypatch: pytest.MonkeyPatch,
@@ -158,7 +155,5 @@ def test_learn_tells_what_does_not_go_with_its_start(
     save_model(model, Path("mine.ckpt"))
     names = ("--columns", "x,y,z,intensity"[: 5 if columns == 3 else None])
     command = ("learn", recording(columns), "--out", "student.onnx", *names, *options)
-    outcome = run_derain(*command, "--start", "mine.ckpt")
-    assert outcome.code == 2
-    assert says in outcome.err
+    assert says in refused(*command, "--start", "mine.ckpt")
     assert not Path("student.onnx").exists()
