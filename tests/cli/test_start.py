@@ -140,7 +140,7 @@ def test_learn_takes_over_what_its_start_sees_and_says_so(
     ],
 )
 def test_learn_tells_what_does_not_go_with_its_start(
-    refused,
+    run_derain,
     tmp_path: Path,
     recording,
     monkeypatch: pytest.MonkeyPatch,
@@ -155,5 +155,7 @@ def test_learn_tells_what_does_not_go_with_its_start(
     save_model(model, Path("mine.ckpt"))
     names = ("--columns", "x,y,z,intensity"[: 5 if columns == 3 else None])
     command = ("learn", recording(columns), "--out", "student.onnx", *names, *options)
-    assert says in refused(*command, "--start", "mine.ckpt")
+    outcome = run_derain(*command, "--start", "mine.ckpt")
+    assert outcome.code == 2
+    assert says in outcome.err
     assert not Path("student.onnx").exists()
