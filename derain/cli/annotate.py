@@ -4,7 +4,7 @@ import argparse
 import json
 import os
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -101,7 +101,7 @@ def main(arguments: argparse.Namespace) -> int:
     source = named_frames(folders, arguments.columns, layouts=())  # one sequence, no data set
     sequence = arguments.sequence or _sequence_of(Path(source[0].name))
     sink = folder_sink(arguments.out, source)
-    radar = _radar_frames(arguments, source)
+    radar = _radar_frames(arguments.radar, arguments.radar_columns, source)
     scene = read_scene(arguments.scene).in_sequence(sequence)
 
     plane = _road_plane(source, scene)
@@ -131,11 +131,11 @@ def _sequence_of(scan: Path) -> str:
     return folder.parent.name if folder.name in lidar_folders() else folder.name
 
 
-def _radar_frames(arguments: argparse.Namespace, source: Source) -> dict[str, Frame]:
+def _radar_frames(folder: Path | None, columns: Sequence[str], source: Source) -> dict[str, Frame]:
     """Radar frames by the key of the scan that each belongs to."""
-    if arguments.radar is None:
+    if folder is None:
         return {}
-    frames = named_frames([arguments.radar], arguments.radar_columns, layouts=())
+    frames = named_frames([folder], columns, layouts=())
     keys = {frame.key for frame in source}
     for frame in frames:
         if frame.key not in keys:

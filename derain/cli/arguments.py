@@ -1,4 +1,4 @@
-"""Types of command line arguments: what cannot be meant is refused before any work."""
+"""Types of command line arguments, which refuse impossible values before any work."""
 
 import argparse
 import math
@@ -63,7 +63,7 @@ def file_named(*suffixes: str) -> Callable[[str], Path]:
     """A file to write, with a suffix by which other commands know its kind.
 
     Args:
-        suffixes: Those that it may have.
+        suffixes: The suffixes that it may have.
     """
 
     def path(text: str) -> Path:
@@ -75,11 +75,11 @@ def file_named(*suffixes: str) -> Callable[[str], Path]:
 
 
 def command_line(arguments: argparse.Namespace, positional: str | None = None) -> str:
-    """The command line that says all this, defaults included.
+    """The command line of some parsed arguments, defaults included.
 
     Args:
-        arguments: What was parsed, with the name of the command.
-        positional: Name of the argument that is given without its name.
+        arguments: The parsed arguments, with the name of the command.
+        positional: Name of the positional argument, if there is one.
     """
     words = ["derain", arguments.command]
     for name, value in vars(arguments).items():

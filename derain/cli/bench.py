@@ -8,22 +8,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cli.arguments import add_threads, command_line, count
-from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
+from derain.cli.method_options import add_runtime, list_filters, runtime_of
 from derain.cli.outputs import print_lines
-from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.errors import InputError
-from derain.evaluation.published_tables import (
-    TABLES,
-    paper_table,
-    scans_by_group,
-)
+from derain.evaluation.published_tables import TABLES, paper_table, scans_by_group
 from derain.files.atomic import replacing, require_writable
 
 if TYPE_CHECKING:
     from derain.datamodules.scan_data import Part, ScanData
     from derain.export.bench.bench import Bench
-    from derain.export.bench.bench_entries import BenchEntry, LearnFrom
+    from derain.export.bench.bench_entries import LearnFrom
     from derain.export.bench.labelled_frames import LabelledFrames
     from derain.sources.frame import Frame
     from derain.sources.source import Frames
@@ -94,50 +89,53 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     from derain.datamodules.labelled import rain_rates
+    from derain.datamodules.scan_data import SequenceData
+    from derain.export.bench.bench import Effort, run_bench
     from derain.export.bench.bench_entries import bench_entries
     from derain.export.bench.report import with_published_rows
+    from derain.sources.spread import evenly_spaced
 
-    data = labelled(arguments, arguments.data)
+    read = partial(
+        labelled,
+        card=arguments.card,
+        columns=arguments.columns,
+        intensity_scale=arguments.intensity_scale,
+        topic=arguments.topic,
+        distinct=arguments.distinct,
+    )
+    data = read(arguments.data)
     rates = rain_rates(arguments.data, arguments.rain_rates)
     methods = bench_entries(
         arguments.methods,
-        _learn_from(arguments, data),
+        _learn_from(data, None if arguments.train is None else read(arguments.train)),
         runtime_of(arguments.runtime, arguments.precision),
     )
     require_writable(arguments.out / "bench.json")
+
+    def bench(frames: Sequence["Frame"], out: Path) -> "Bench":
+        """Benches the methods on some of the scans, and writes tables and picture."""
+        scans = _labelled_frames(data, frames, rates)
+        chosen = evenly_spaced(frames, arguments.limit or len(frames))
+        effort = Effort(arguments.threads, arguments.timed, arguments.repeats, arguments.seed)
+        bench = run_bench(methods, replace(scans, frames=chosen), effort, command_line(arguments))
+        bench.write(out)
+        return bench
+
     if arguments.paper is None:
-        scans = _labelled_frames(data, _frames(data, arguments.part), rates)
-        print_lines(str(_bench(arguments, methods, scans, arguments.out)))
+        print_lines(str(bench(_frames(data, arguments.part), arguments.out)))
         return 0
-    _require_split(arguments, data)
+    if not isinstance(data, SequenceData):
+        raise InputError(
+            arguments.data[0], "has no split, which the paper's tables ask for", "Name the root."
+        )
     table = paper_table(arguments.paper)
     groups = scans_by_group(table, partial(_frames, data), lambda frame: rates.get(frame.sequence))
-    ours = {}
-    for group, frames in groups.items():
-        scans = _labelled_frames(data, frames, rates)
-        ours[group] = _bench(arguments, methods, scans, arguments.out / group).rows
+    ours = {group: bench(frames, arguments.out / group).rows for group, frames in groups.items()}
     text = with_published_rows(table, ours, data.card)
     with replacing(arguments.out / f"{arguments.paper}.md") as temporary:
         temporary.write_text(text + "\n", "utf-8")
     print_lines(text)
     return 0
-
-
-def _bench(
-    arguments: argparse.Namespace,
-    methods: Sequence["BenchEntry"],
-    scans: "LabelledFrames",
-    out: Path,
-) -> "Bench":
-    """Benches the methods on some of the scans, and writes tables and picture."""
-    from derain.export.bench.bench import Effort, run_bench
-    from derain.sources.spread import evenly_spaced
-
-    chosen = evenly_spaced(scans.frames, arguments.limit or len(scans.frames))
-    effort = Effort(arguments.threads, arguments.timed, arguments.repeats, arguments.seed)
-    bench = run_bench(methods, replace(scans, frames=chosen), effort, command_line(arguments))
-    bench.write(out)
-    return bench
 
 
 def _frames(data: "ScanData", part: "Part") -> "Frames":
@@ -156,22 +154,12 @@ def _labelled_frames(
     return LabelledFrames(data.card, frames, data.loading.intensity_scale, data.distinct, rates)
 
 
-def _learn_from(arguments: argparse.Namespace, data: "ScanData") -> "LearnFrom | None":
-    """What gives the training scans; None where none are named."""
+def _learn_from(data: "ScanData", training: "ScanData | None") -> "LearnFrom | None":
+    """What gives the training scans: those named, or else those of a data set; None without."""
     from derain.datamodules.scan_data import SequenceData, TaughtData
 
-    if arguments.train is None and not isinstance(data, SequenceData | TaughtData):
+    if training is None and not isinstance(data, SequenceData | TaughtData):
         return None
-
-    training = data if arguments.train is None else labelled(arguments, arguments.train)
+    scans = training or data
     # Found only when they are asked for: a bench without such a baseline needs no training scans.
-    return lambda: _labelled_frames(training, _frames(training, "train"), {}).truths()
-
-
-def _require_split(arguments: argparse.Namespace, data: "ScanData") -> None:
-    from derain.datamodules.scan_data import SequenceData
-
-    if not isinstance(data, SequenceData):
-        raise InputError(
-            arguments.data[0], "has no split, which the paper's tables ask for", "Name the root."
-        )
+    return lambda: _labelled_frames(scans, _frames(scans, "train"), {}).truths()

@@ -1,21 +1,24 @@
 """``derain export``: an ONNX file from a checkpoint, proved and timed."""
 
 import argparse
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from derain.cli.arguments import count, file_named, share, threads
+from derain.cli.labelled_data import labelled
+from derain.cli.method_options import add_runtime, runtime_of
 from derain.cli.outputs import print_lines
-from derain.cli.runtime_options import add_runtime, runtime_of
 from derain.cli.scan_options import add_columns, add_intensity_scale
+from derain.errors import InputError
 from derain.system.extras import EXPORT_LIBRARIES, require
 from derain.system.notices import Notices
 from derain.views.candidate_fit import RAIN_INSIDE
 from derain.views.channels import extra_channels, with_columns
 
 if TYPE_CHECKING:
+    from derain.datamodules.scan_data import ScanData
     from derain.models.base import DerainingModule
     from derain.scan import Scan
     from derain.sources.frame import Frame
@@ -29,15 +32,15 @@ Exports a checkpoint as one ONNX file, proves it against PyTorch, and times it.
   derain export salsanext.ckpt --out salsanext.onnx --int8 --calibration scans/
   derain export outdet.ckpt --out outdet.onnx --candidates WADS/sequences/36 --card wads
 
-With --candidates, the model judges no point outside a few bounds (range, height, intensity). They
-are fitted to labelled scans so that they hold, with a margin, all but a thousandth of the rain that
-the network finds there, and what that costs is printed. Of a candidate, the model says what it says
-without.
+With --candidates, the model judges only points within a few bounds of range, height and intensity.
+derain fits the bounds to labelled scans, so that they hold, with a margin, all but a thousandth of
+the rain that the network finds there, and prints what they cost. For points within the bounds, the
+model gives the same answer as without them.
 
-Where the proof fails, no file is left. With --int8, convolutions compute in eight bits, scaled by
-what they see in scans of the calibration folder. They must find the rain there that the network
-finds: so the scans have to hold some, and their intensities the unit of the training data.
-The file is the same for every runtime: another that is named has to pass the proof too.
+If the proof fails, derain leaves no file. With --int8, convolutions compute in eight bits, scaled
+by what they see in scans of the calibration folder. The network must find rain in these scans, and
+their intensities must have the unit of the training data.
+The file is the same for every runtime. If you name another, it has to pass the proof too.
 """
 
 
@@ -58,31 +61,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="+",
         metavar="DATA",
-        help="labelled scans, folders of them, or a data set, that bounds of rain are fitted to",
+        help="labelled scans, folders of them, or a data set, to fit bounds of rain to",
     )
     parser.add_argument(
         "--inside",
         type=share,
         help=f"share of the rain found that is within the bounds (default: {RAIN_INSIDE:g})",
     )
-    parser.add_argument("--card", help="data card of the labelled scans (default: as they tell)")
     parser.add_argument(
-        "--scan", type=Path, help="time the model on this scan; by default on a made-up one"
+        "--card", help="data card of the labelled scans (default: found by their folders)"
+    )
+    parser.add_argument(
+        "--scan", type=Path, help="scan to time the model on (default: a made-up one)"
     )
     add_columns(parser)
     add_intensity_scale(parser, of="calibration and labelled ")
     parser.add_argument(
-        "--threads", type=threads, default=0, help="threads to time with (default all)"
+        "--threads", type=threads, default=0, help="threads for the timing (default: all cores)"
     )
     add_runtime(parser, help="prove and time the file by this runtime too")
-    parser.add_argument("--repeats", type=count, default=30, help="timed runs (default 30)")
+    parser.add_argument(
+        "--repeats", type=count, default=30, help="timed runs (default: %(default)s)"
+    )
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     require("export", *EXPORT_LIBRARIES)
     from derain.bags.names import split
-    from derain.errors import InputError
     from derain.export.onnx_file import export
     from derain.export.timing import measure_latency
     from derain.files.reading import is_file
@@ -94,10 +100,20 @@ def main(arguments: argparse.Namespace) -> int:
         raise InputError("--inside", "bounds candidates, and there are none", "Give --candidates.")
     runtime = runtime_of(arguments.runtime, arguments.precision)
     model = load_model(arguments.checkpoint)
-    calibration = _calibration(arguments)
+    if arguments.int8 != bool(arguments.calibration):
+        raise InputError(
+            "--int8", "needs --calibration, and that needs it", "Give both or neither."
+        )
+    calibration = _calibration(
+        arguments.calibration or [], arguments.columns, arguments.intensity_scale
+    )
     _warn_of_issues(calibration, model.spec)
     if arguments.candidates:
-        _fit_candidates(model, arguments)
+        data = labelled(
+            arguments.candidates, arguments.card, arguments.columns, arguments.intensity_scale
+        )
+        inside = RAIN_INSIDE if arguments.inside is None else arguments.inside
+        _fit_candidates(model, data, inside)
     proof = export(model, arguments.out, calibration, runtime)
     print(proof)
     print_lines(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
@@ -114,31 +130,25 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _calibration(arguments: argparse.Namespace) -> Collection["Scan"]:
+def _calibration(
+    paths: Sequence[Path], columns: Sequence[str], intensity_scale: float
+) -> Collection["Scan"]:
     """Scans that an eight-bit model is scaled by; none for one in float32."""
-    from derain.errors import InputError
     from derain.export.quantisation import CALIBRATION_SCANS, CalibrationScans
     from derain.sources.folders import named_frames
     from derain.sources.spread import evenly_spaced
 
-    if arguments.int8 != bool(arguments.calibration):
-        raise InputError(
-            "--int8", "needs --calibration, and that needs it", "Give both or neither."
-        )
-    source = named_frames(arguments.calibration or [], arguments.columns)
-    frames = evenly_spaced(source, CALIBRATION_SCANS)
-    scale = arguments.intensity_scale
-    return CalibrationScans([frame.with_intensity_times(scale) for frame in frames])
+    frames = evenly_spaced(named_frames(paths, columns), CALIBRATION_SCANS)
+    return CalibrationScans([frame.with_intensity_times(intensity_scale) for frame in frames])
 
 
-def _fit_candidates(model: "DerainingModule", arguments: argparse.Namespace) -> None:
-    """Lets a model judge candidates alone, and says what they are and what they cost."""
-    from derain.cli.labelled_data import labelled
+def _fit_candidates(model: "DerainingModule", data: "ScanData", inside: float) -> None:
+    """Fits a model's candidates to labelled scans, and prints their bounds and what they cost."""
     from derain.export.candidates import fit_network_candidates
     from derain.learning.task import EXAMPLE_SCANS
     from derain.sources.spread import evenly_spaced
 
-    data, notices = labelled(arguments, arguments.candidates), Notices()
+    notices = Notices()
 
     def read(frame: "Frame") -> "Scan":
         scan = data.read_measured(frame)
@@ -146,7 +156,6 @@ def _fit_candidates(model: "DerainingModule", arguments: argparse.Namespace) -> 
         return with_columns(scan, extra_channels(model.channels))
 
     scans = map(read, evenly_spaced(data.frames("train"), EXAMPLE_SCANS))
-    inside = RAIN_INSIDE if arguments.inside is None else arguments.inside
     fitted = fit_network_candidates(model, scans, data.card, inside)
     notices.warn_of_repeats()
     model.adopt(replace(model.spec, candidates=fitted.candidates))
@@ -159,11 +168,7 @@ def _warn_of_issues(scans: Iterable["Scan"], spec: "Spec") -> None:
     The proof would not tell: it has both models judge the same scans, in whatever unit.
     """
     notices = Notices()
-
-    def tell(scan: "Scan") -> None:
+    for scan in scans:
         notices.warn(scan.name, spec.issues(scan))
-
-    # Mapped, for a loop would hold on to one scan while the next is read.
-    for _ in map(tell, scans):
-        pass
+        del scan  # or it would be in memory while the next is read
     notices.warn_of_repeats()

@@ -2,7 +2,8 @@
 
 import argparse
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,23 @@ timestamp (in seconds). A radar point gets the label of the nearest LiDAR point,
 LAYOUT = load_card("rehearse3d").layout
 
 
+@dataclass(frozen=True)
+class Fusing:
+    """How scans and radar frames are merged.
+
+    Attributes:
+        extrinsics: Pose of the radar in the LiDAR's frame.
+        labels: Folder of the LiDAR scans' labels; None where there are none.
+        label_within: Largest distance in metres from which a radar point takes a label.
+        extra: Columns of the radar to keep.
+    """
+
+    extrinsics: Extrinsics
+    labels: Path | None
+    label_within: float
+    extra: Sequence[str]
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument("--lidar", type=Path, required=True, help="folder of LiDAR scans")
@@ -95,7 +113,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    _refuse_overwriting(arguments)
+    _refuse_overwriting(arguments.out, (arguments.lidar, arguments.radar, arguments.labels))
     extrinsics = read_extrinsics(arguments.extrinsics)
     lidar = named_frames([arguments.lidar], arguments.lidar_columns, layouts=())
     radar = named_frames([arguments.radar], arguments.radar_columns, layouts=())
@@ -109,8 +127,14 @@ def main(arguments: argparse.Namespace) -> int:
             "Check that the timestamps are seconds of one clock, or widen --within.",
         )
     partners = [radar[number] if number >= 0 else None for number in nearest.tolist()]
+    fusing = Fusing(
+        extrinsics,
+        arguments.labels,
+        arguments.label_within,
+        list(filter(None, arguments.extra.split(","))),
+    )
     for frame, partner in tqdm(zip(lidar, partners, strict=True), total=len(lidar), disable=None):
-        _fuse(frame, partner, extrinsics, arguments)
+        _fuse(frame, partner, fusing, arguments.out)
     _write_metadata(arguments.out / LAYOUT.scans / METADATA, lidar, times, partners)
     alone = partners.count(None)
     folder = arguments.out / LAYOUT.scans
@@ -118,27 +142,24 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _fuse(
-    frame: Frame, partner: Frame | None, extrinsics: Extrinsics, arguments: argparse.Namespace
-) -> None:
+def _fuse(frame: Frame, partner: Frame | None, fusing: Fusing, out: Path) -> None:
     lidar = _read(frame, "--lidar-columns")
     raw = None
-    if arguments.labels is not None:
-        raw = read_labels(arguments.labels / f"{frame.key}{LABEL}", len(lidar))
+    if fusing.labels is not None:
+        raw = read_labels(fusing.labels / f"{frame.key}{LABEL}", len(lidar))
         lidar = lidar.with_label(semantic(raw))
     radar = NO_DETECTIONS if partner is None else _read(partner, "--radar-columns")
-    extra = list(filter(None, arguments.extra.split(",")))
-    fused = fuse(lidar, radar, extrinsics, arguments.label_within, extra)
-    suffix = ".npz" if extra else ".bin"
-    write_scan(arguments.out / LAYOUT.scans / f"{frame.key}{suffix}", fused)
+    fused = fuse(lidar, radar, fusing.extrinsics, fusing.label_within, fusing.extra)
+    suffix = ".npz" if fusing.extra else ".bin"
+    write_scan(out / LAYOUT.scans / f"{frame.key}{suffix}", fused)
     if fused.label is not None and raw is not None:
         instances = np.pad(instance(raw), (0, len(radar)))  # the radar's points are of none
-        labels = arguments.out / LAYOUT.labels / f"{frame.key}{LABEL}"
+        labels = out / LAYOUT.labels / f"{frame.key}{LABEL}"
         write_labels(labels, fused.label, instances)
 
 
 def _read(frame: Frame, option: str) -> Scan:
-    """Reads a frame; what an error says of --columns is here the option of its sensor."""
+    """Reads a frame; an error that names --columns names the option of the sensor instead."""
     try:
         return frame.read()
     except InputError as error:
@@ -146,15 +167,15 @@ def _read(frame: Frame, option: str) -> Scan:
         raise InputError(*(text.replace("--columns", option) for text in texts)) from error
 
 
-def _refuse_overwriting(arguments: argparse.Namespace) -> None:
-    written = {(arguments.out / name).resolve() for name in (LAYOUT.scans, LAYOUT.labels)}
-    for folder in (arguments.lidar, arguments.radar, arguments.labels):
+def _refuse_overwriting(out: Path, read: Iterable[Path | None]) -> None:
+    written = {(out / name).resolve() for name in (LAYOUT.scans, LAYOUT.labels)}
+    for folder in read:
         if folder is not None and folder.resolve() in written:
-            raise InputError(arguments.out, f"would overwrite {folder}", "Give another --out.")
+            raise InputError(out, f"would overwrite {folder}", "Give another --out.")
 
 
 def _times(frames: Source, columns: Sequence[str]) -> NDArray[np.float64]:
-    """When each frame was taken, seconds, as its folder's metadata says."""
+    """Times of the frames in seconds, from the metadata in their folders."""
     return read_frame_times([Path(frame.name) for frame in frames], columns)
 
 

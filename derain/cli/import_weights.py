@@ -76,7 +76,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _not_published(name: str) -> InputError:
-    """What is said of a network that there is not, or of which nothing was published."""
+    """The error for a network that does not exist or has no published weights."""
     from derain.models.published import Published
     from derain.models.registry import NETWORKS
 

@@ -4,36 +4,34 @@ import argparse
 import json
 import os
 import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from derain.bags.names import is_bag, split, within
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
-from derain.cli.bag_options import add_topic
 from derain.cli.info_bag import facts_of_bag
-from derain.cli.info_default import card_as_text
 from derain.cli.info_folder import draw, facts_of_folder
-from derain.cli.info_returns import facts_of_returns
+from derain.cli.info_scan import facts_of_scan
 from derain.cli.outputs import print_lines
-from derain.cli.scan_options import ListFormats, add_columns
-from derain.default import DEFAULT, default_model, model_card
+from derain.cli.scan_options import ListFormats, add_columns, add_topic
+from derain.default import DEFAULT, ModelCard, ModelScore, default_model, model_card
 from derain.errors import InputError, printable
+from derain.evaluation.text_tables import number_text
 from derain.files.documents import Entry
 from derain.files.labels import read_labels, semantic
 from derain.files.reading import reading
-from derain.scan import Scan
 from derain.sources.folders import frame_of, named_frames
 from derain.system.extras import CHECKPOINT_LIBRARIES, MATPLOTLIB, require
 from derain.system.notices import warn
 from derain.views.candidates import candidates_at
-from derain.views.directions import directions
 from derain.views.grid_fit import fit_grid
-from derain.views.morton import distinct_rows
 from derain.views.scan_issues import no_points
 
 DESCRIPTION = """\
@@ -58,6 +56,27 @@ is, how good it is, and when not to use it.
   derain info WADS --json
   derain info my_data --layout lidar,classes --card my_card.yaml
 """
+
+
+@dataclass(frozen=True)
+class Options:
+    """How files and folders are described.
+
+    Attributes:
+        card: Name or file of their data card; None finds that of a folder.
+        layout: Names of a sequence's folders of scans and labels; None finds them.
+        columns: Names of the columns of files that do not name them.
+        topic: Topic of point clouds, in bags.
+        picture: File for a picture of a folder's statistics.
+        as_json: Whether each line is a JSON object.
+    """
+
+    card: str | None
+    layout: str | None
+    columns: tuple[str, ...]
+    topic: str | None
+    picture: Path | None
+    as_json: bool
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -89,51 +108,52 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    _refuse_unclear_picture(arguments)
+    if arguments.picture:
+        if arguments.grid or len(arguments.files) > 1 or not os.path.isdir(arguments.files[0]):
+            raise InputError("--picture", "shows one folder's statistics", "Name one folder alone.")
+        require("--picture", MATPLOTLIB)
     if arguments.grid:
         paths = within([Path(name) for name in arguments.files], arguments.topic)
         frames = named_frames(paths, arguments.columns)
         fit = fit_grid([frame.read() for frame in frames]).as_dict()
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0
+    options = Options(
+        arguments.card,
+        arguments.layout,
+        arguments.columns,
+        arguments.topic,
+        arguments.picture,
+        arguments.json,
+    )
     code = 0
     for name in arguments.files:
         try:
-            _describe(name, arguments)
+            _describe(name, options)
         except InputError as error:  # the other files are none the worse for it
             print(f"derain: {error}", file=sys.stderr)
             code = 2
     return code
 
 
-def _describe(name: str, arguments: argparse.Namespace) -> None:
+def _describe(name: str, options: Options) -> None:
     """Prints what is in one file or folder."""
-    if name == DEFAULT:  # ./default is another thing, and a Path would not tell them apart
-        _describe_default(arguments)
+    if name == DEFAULT:  # not ./default, which is a file or folder; a Path would make both the same
+        _describe_default(options.as_json)
         return
-    path = within([Path(name)], arguments.topic)[0]
+    path = within([Path(name)], options.topic)[0]
     if os.path.isdir(path) and not is_bag(path):
-        _describe_folder(path, arguments)
+        _describe_folder(path, options)
         return
-    facts = _facts(path, arguments)
-    if arguments.json:
+    facts = _facts(path, options.card, options.columns)
+    if options.as_json:
         print(json.dumps({"file": str(path), **facts}))
     else:
         print(printable(str(path)))
         print_lines(_indented(_in_brief(facts)))
 
 
-def _refuse_unclear_picture(arguments: argparse.Namespace) -> None:
-    """Refuses a picture of anything but the statistics of one folder."""
-    if arguments.picture and (
-        arguments.grid or len(arguments.files) > 1 or not os.path.isdir(arguments.files[0])
-    ):
-        raise InputError("--picture", "shows one folder's statistics", "Name one folder alone.")
-    if arguments.picture:
-        require("--picture", MATPLOTLIB)
-
-
-def _describe_default(arguments: argparse.Namespace) -> None:
+def _describe_default(as_json: bool) -> None:
     """Prints the card of the model that comes with derain, once its file is known to be it."""
     if os.path.exists(DEFAULT):
         raise InputError(
@@ -142,25 +162,25 @@ def _describe_default(arguments: argparse.Namespace) -> None:
             f"Write ./{DEFAULT} for that, or ask from another folder.",
         )
     model, card = default_model(), model_card()
-    if arguments.json:
+    if as_json:
         print(json.dumps({"file": str(model), **card.as_dict()}))
     else:
         print_lines(card_as_text(card, model.stat().st_size))
 
 
-def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
-    facts = facts_of_folder(folder, arguments)
-    print_lines(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
-    if arguments.card is not None and not facts.total.labelled:
+def _describe_folder(folder: Path, options: Options) -> None:
+    facts = facts_of_folder(folder, options.card, options.layout, options.columns)
+    print_lines(json.dumps(facts.as_dict()) if options.as_json else facts.as_text())
+    if options.card is not None and not facts.total.labelled:
         warn(
             f"{folder}: no labels are beside its scans or in a folder that the card names. Name "
             f"the folders of scans and labels, as in --layout {folder.absolute().name},labels"
         )
-    if arguments.picture:
-        draw(facts, arguments.picture)
+    if options.picture:
+        draw(facts, options.picture)
 
 
-def _facts(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
+def _facts(path: Path, card_name: str | None, columns: Sequence[str]) -> dict[str, Any]:
     if is_bag(path):
         return facts_of_bag(path)
     with reading(path):
@@ -188,39 +208,12 @@ def _facts(path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
                 "Make a checkpoint of them with `derain import-weights`.",
             )
         case _:
-            card = None if arguments.card is None else load_card(arguments.card)
-            frame = frame_of(path, arguments.columns, layouts_for(card))
+            card = None if card_name is None else load_card(card_name)
+            frame = frame_of(path, columns, layouts_for(card))
             scan = frame.read()
             for issue in no_points(scan):
                 warn(f"{path}: {issue.detail}")
-            return {**_of_scan(scan), "returns": facts_of_returns(scan, frame, card)}
-
-
-def _of_scan(scan: Scan) -> dict[str, Any]:
-    valid = scan.valid
-    points = scan.xyz[valid]
-    azimuth, inclination = directions(points)
-    return {
-        "points": len(scan),
-        "valid": int(valid.sum()),
-        "distinct positions": len(distinct_rows(scan)[0]),
-        "organised": "no" if scan.shape is None else f"{scan.shape[0]} x {scan.shape[1]}",
-        "fields": {name: str(column.dtype) for name, column in scan.fields.items()},
-        "x / m": _span(points[:, 0]),
-        "y / m": _span(points[:, 1]),
-        "z / m": _span(points[:, 2]),
-        "range / m": _span(scan.range[valid]),
-        "azimuth / deg": _span(azimuth),
-        "inclination / deg": _span(inclination),
-        "intensity": "none" if scan.intensity is None else _span(scan.intensity[valid]),
-        "fitted grid": _fitted(scan) if valid.any() else "none",
-    }
-
-
-def _fitted(scan: Scan) -> dict[str, Any]:
-    fit = fit_grid([scan]).as_dict()
-    del fit["grid"]  # one number a row: of use in a configuration, for which there is --grid
-    return fit
+            return facts_of_scan(scan, frame, card)
 
 
 def _of_labels(path: Path) -> dict[str, Any]:
@@ -232,17 +225,6 @@ def _of_labels(path: Path) -> dict[str, Any]:
     return {
         "points": len(label),
         "points by class id": dict(zip(map(str, ids), counts.tolist(), strict=True)),
-    }
-
-
-def _span(values: NDArray[Any]) -> dict[str, float] | str:
-    if not len(values):
-        return "none"
-    lowest, median, highest = np.percentile(values, [0, 50, 100])
-    return {
-        "min": round(float(lowest), 4),
-        "median": round(float(median), 4),
-        "max": round(float(highest), 4),
     }
 
 
@@ -277,3 +259,59 @@ def _indented(facts: Any, depth: int = 1) -> str:
         else:
             lines.append(f"{'  ' * depth}{name}: {fact}")
     return "\n".join(lines)
+
+
+# Letters of a line, as in every document of derain.
+LINE_LENGTH = 100
+
+
+def card_as_text(card: ModelCard, size: int) -> str:
+    """A card in lines for the screen.
+
+    Args:
+        card: The card.
+        size: Bytes of the model's file.
+    """
+    return "\n".join(
+        [
+            f"{card.title}, {size:,} bytes",
+            *_part("what it is", card.what),
+            *_part("when not to use it", *card.not_for),
+            *_part("how good it is", *_scores(card.scores)),
+            *_part("measured by", card.measured),
+            *_part("threshold", f"{card.threshold:g}: {card.threshold_chosen}"),
+            *_part("learnt from", card.data),
+            *_part("made by", *card.training),
+            *_part("seed", str(card.seed)),
+            *_part("licence", card.licence),
+            *_part("sha256", card.sha256),
+        ]
+    )
+
+
+def _part(heading: str, *paragraphs: str) -> Iterator[str]:
+    """A heading and what stands below it; of several paragraphs, further lines are set in."""
+    yield f"  {heading}:"
+    hanging = "    " if len(paragraphs) == 1 else "      "
+    for paragraph in paragraphs:
+        # As it is where it fits, for tables have columns.
+        fits = len(paragraph) <= LINE_LENGTH - 4
+        lines = [paragraph] if fits else wrap(paragraph, LINE_LENGTH - 6, break_long_words=False)
+        yield f"    {lines[0]}"
+        yield from (f"{hanging}{line}" for line in lines[1:])
+
+
+def _scores(scores: Sequence[ModelScore]) -> list[str]:
+    """A table of scores: a line of headings, and a line for each data set."""
+    if not scores:
+        return ["not measured"]
+    width = max(len(score.data) for score in scores)
+    return [
+        f"{'':{width}}      P      R    IoU    taken",
+        *(
+            f"{score.data:{width}}  {number_text(score.precision):>5}"
+            f"  {number_text(score.recall):>5}  {number_text(score.iou):>5}"
+            f"  {number_text(score.taken, '.3%'):>7}"
+            for score in scores
+        ),
+    ]

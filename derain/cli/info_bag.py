@@ -1,4 +1,4 @@
-"""What ``derain info`` says of a bag: its topics, and what the first clouds are made of."""
+"""What ``derain info`` prints of a bag: its topics, and the layout of their first clouds."""
 
 from datetime import UTC, datetime
 from pathlib import Path

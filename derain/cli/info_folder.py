@@ -1,7 +1,6 @@
-"""What ``derain info`` says of a folder: scans and points by class and by rain rate."""
+"""What ``derain info`` prints of a folder: scans and points by class and by rain rate."""
 
-import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -12,13 +11,7 @@ from derain.cards.card import DataCard, load_card
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
 from derain.errors import InputError
-from derain.evaluation.contents import (
-    Contents,
-    class_name,
-    count_frame,
-    find_sequences,
-    rate_name,
-)
+from derain.evaluation.contents import Contents, class_name, count_frame, find_sequences, rate_name
 from derain.evaluation.text_tables import plain_table
 from derain.simulation.manifest import manifest_of
 from derain.sources.folders import find_layout
@@ -112,20 +105,25 @@ class FolderFacts:
         return text
 
 
-def facts_of_folder(folder: Path, arguments: argparse.Namespace) -> FolderFacts:
+def facts_of_folder(
+    folder: Path, card_name: str | None, layout_names: str | None, columns: Sequence[str]
+) -> FolderFacts:
     """Counts what is in a folder.
 
     Args:
         folder: The folder.
-        arguments: Those of ``derain info``.
+        card_name: Its data card; None chooses one by what is in the folder.
+        layout_names: Names of its folders of scans and labels, with a comma between; None finds
+            them.
+        columns: Names of the columns of files that do not name them.
 
     Raises:
         InputError: A folder without scans, a file in it that cannot be read, or no such data card.
     """
-    card = None if arguments.card is None else load_card(arguments.card)
-    layout = _layout(folder, card, arguments.layout)
+    card = None if card_name is None else load_card(card_name)
+    layout = _layout(folder, card, layout_names)
     card, rests_on = (card, "--card") if card else _card(folder, layout)
-    sequences = find_sequences(folder, layout, arguments.columns)
+    sequences = find_sequences(folder, layout, columns)
     rates = sorted(
         {sequence.rain_rate for sequence in sequences}, key=lambda rate: (rate is None, rate or 0)
     )
@@ -156,7 +154,7 @@ def draw(facts: FolderFacts, picture: Path) -> None:
 
 
 def _layout(folder: Path, card: DataCard | None, stated: str | None) -> Layout | None:
-    """What a folder's folders are called: as stated, as its data card says, or as others do."""
+    """The layout of a folder: as stated, by its data card, or by the names of its folders."""
     if stated is None:
         return find_layout(folder, layouts_for(card))
     folders = stated.split(",")

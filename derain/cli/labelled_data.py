@@ -1,12 +1,13 @@
 """Arguments that name labelled scans, the same in every command that measures."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from derain.bags.names import within
 from derain.cards.card import packaged_cards
-from derain.cli.bag_options import add_topic, in_topic
-from derain.cli.scan_options import add_columns, add_intensity_scale
+from derain.cli.scan_options import add_columns, add_intensity_scale, add_topic
 
 if TYPE_CHECKING:
     from derain.datamodules.scan_data import ScanData
@@ -43,8 +44,24 @@ def add_data_arguments(parser: argparse.ArgumentParser, part: str) -> None:
     add_topic(parser)
 
 
-def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanData":
-    """The labelled scans that these arguments, and some paths, name.
+def labelled(
+    paths: Sequence[Path],
+    card: str | None,
+    columns: tuple[str, ...],
+    intensity_scale: float,
+    *,
+    topic: str | None = None,
+    distinct: bool | None = None,
+) -> "ScanData":
+    """The labelled scans that a command line names.
+
+    Args:
+        paths: Scans and folders of them, or the root of one data set.
+        card: Name or file of their data card; None finds it by their folders.
+        columns: Names of the columns of files that do not name them.
+        intensity_scale: Factor from the scans' intensities to the unit of the data card.
+        topic: Topic of point clouds in bags; None where the paths name it.
+        distinct: Whether points at one position count once; None follows the data card.
 
     Raises:
         InputError: Data whose labels nothing explains, or a root without sequences.
@@ -52,10 +69,6 @@ def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanData":
     from derain.datamodules.labelled import card_of, labelled_scans
     from derain.datamodules.scan_data import Loading
 
-    loading = Loading(
-        columns=arguments.columns,
-        intensity_scale=arguments.intensity_scale,
-        deduplicate=getattr(arguments, "distinct", None),
-    )
-    paths = in_topic(paths, arguments)
-    return labelled_scans(paths, card_of(paths, arguments.card), loading)
+    loading = Loading(columns=columns, intensity_scale=intensity_scale, deduplicate=distinct)
+    paths = within(paths, topic)
+    return labelled_scans(paths, card_of(paths, card), loading)

@@ -3,11 +3,10 @@
 import argparse
 from pathlib import Path
 
+from derain.bags.names import within
 from derain.cli.arguments import count, file_named
-from derain.cli.bag_options import add_topic, in_topic
 from derain.cli.outputs import print_lines
-from derain.cli.pose_options import add_poses
-from derain.cli.scan_options import add_columns
+from derain.cli.scan_options import add_columns, add_poses, add_topic
 from derain.cli.view_recording import refuse_unusable, write_and_report
 from derain.sources.method import Method
 from derain.system.extras import EXPORT_LIBRARIES, TRAINING_LIBRARIES, require
@@ -42,10 +41,7 @@ MOST_SHOWN = 100
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
     parser.add_argument(
-        "recording",
-        nargs="+",
-        type=Path,
-        help="folders of consecutive scans, or bags, in order",
+        "recording", nargs="+", type=Path, help="folders of consecutive scans, or bags, in order"
     )
     parser.add_argument(
         "--out", type=file_named(".onnx"), required=True, help="the ONNX file to write"
@@ -89,7 +85,7 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.rerun is not None:
         refuse_unusable(arguments.rerun)
     config = LearnConfig(
-        recordings=in_topic(arguments.recording, arguments),
+        recordings=within(arguments.recording, arguments.topic),
         out=arguments.out,
         folder=arguments.work,
         model=arguments.model,

@@ -1,4 +1,4 @@
-"""The command ``derain``: finds the subcommand, and turns errors of the user's into one line."""
+"""The command ``derain``: runs a subcommand, and prints errors of the user in one line."""
 
 import argparse
 import io
@@ -46,7 +46,7 @@ COMMANDS = {
     "demo": "the whole story on simulated rain, in about six minutes",
 }
 
-# Exit code where whoever read the output has closed it, as of programs that SIGPIPE ends.
+# Exit code if the reader of the output closes the pipe, as of programs that SIGPIPE ends.
 BROKEN_PIPE = 128 + 13
 
 # Lightning's own, which parses its arguments itself.
@@ -130,7 +130,7 @@ def _cut_off(error: BrokenPipeError) -> int:
 
 
 def _interrupted(interruption: KeyboardInterrupt) -> int:
-    """Tells of the signal that ended the command, as its exit code does."""
+    """Prints which signal ended the command; returns the exit code of that signal."""
     number = getattr(interruption, "signal", signal.SIGINT)
     by = "" if number == signal.SIGINT else f" by {number.name}"
     print(f"derain: interrupted{by}", file=sys.stderr)
@@ -160,7 +160,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _run_training(arguments: list[str]) -> int:
-    from derain.cli.training.help import short_help
+    from derain.cli.training import short_help, train
     from derain.workflows.configurations import require_configuration
 
     if {"-h", "--help"} & {*arguments}:
@@ -168,8 +168,6 @@ def _run_training(arguments: list[str]) -> int:
         return 0
     require_configuration(arguments)
     require(arguments[0], *TRAINING_LIBRARIES)
-    from derain.cli.training.train import train
-
     train(arguments)
     return 0
 

@@ -1,15 +1,32 @@
-"""Arguments that name a method and its parameters, the same in every command that runs one."""
+"""Arguments that name a method, its parameters and what runs it, the same in every command."""
 
 import argparse
 from pathlib import Path
 from typing import Any
 
-from derain.cli.filter_help import list_methods
+from derain.default import DEFAULT
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method
-from derain.export.runtimes.registry import Runtime
-from derain.filters import read_parameters
+from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
+from derain.export.runtimes.session import FLOAT32_PRECISION
+from derain.filters import FILTERS, read_parameters
+from derain.recordings.registry import METHODS
 from derain.sources.method import Method
+
+_MODEL = f"the model that comes with derain:\n  {DEFAULT}  see `derain info {DEFAULT}`"
+_FILTERS_HERE, _METHODS_HERE = "{filters}", "{methods}"
+
+
+def list_filters(parser: argparse.ArgumentParser) -> None:
+    """Ends the help of a command with the default model and the filters, one a line."""
+    parser.formatter_class = _FilterHelp
+    parser.epilog = f"{_MODEL}\nfilters:\n{_FILTERS_HERE}"
+
+
+def list_methods(parser: argparse.ArgumentParser) -> None:
+    """Ends the help of a command with these, and the methods that see several scans."""
+    list_filters(parser)
+    parser.epilog = f"{parser.epilog}\n{_METHODS_HERE}"
 
 
 def add_method(parser: argparse.ArgumentParser, metavar: str = "METHOD") -> None:
@@ -28,10 +45,7 @@ def add_method(parser: argparse.ArgumentParser, metavar: str = "METHOD") -> None
 def add_parameters(parser: argparse.ArgumentParser) -> None:
     """Declares the method's parameters."""
     parser.add_argument(
-        "--parameters",
-        type=Path,
-        metavar="YAML",
-        help="parameters of the method, from derain tune",
+        "--parameters", type=Path, metavar="YAML", help="parameters of the method, from derain tune"
     )
     parser.add_argument(
         "--set",
@@ -41,6 +55,39 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="set one parameter, over those of --parameters; repeatable",
     )
+
+
+def add_runtime(parser: argparse.ArgumentParser, help: str) -> None:
+    """Declares what runs a model's network.
+
+    Args:
+        parser: The command's parser.
+        help: What the command does with it.
+    """
+    parser.add_argument(
+        "--runtime",
+        metavar="NAME",
+        help=f"{help}: {DEFAULT_RUNTIME} (default), or openvino: pip install 'derain[openvino]'",
+    )
+    parser.add_argument(
+        "--precision",
+        metavar="NAME",
+        help=f"precision of its arithmetic: {FLOAT32_PRECISION} (default), or bf16 if the runtime "
+        "and the processor support it",
+    )
+
+
+def runtime_of(name: str | None, precision: str | None) -> Runtime:
+    """The runtime and the precision that a command line names.
+
+    Args:
+        name: What ``--runtime`` names; None is the default.
+        precision: What ``--precision`` names; None is the default.
+
+    Raises:
+        InputError: No such runtime, or a precision that it does not have.
+    """
+    return Runtime(name or DEFAULT_RUNTIME, precision or FLOAT32_PRECISION)
 
 
 def method_of(
@@ -81,3 +128,27 @@ def _assignment(text: str) -> tuple[str, int | float | str]:
         except ValueError:
             continue
     return name, value
+
+
+class _FilterHelp(argparse.RawDescriptionHelpFormatter):
+    """Makes the list when help is asked for.
+
+    Every start of derain makes every parser, and most starts need not look for what other packages
+    bring.
+    """
+
+    def add_text(self, text: str | None) -> None:
+        """Adds a text to the help, with the lists in place of their marks."""
+        if text and _FILTERS_HERE in text:
+            text = text.replace(_FILTERS_HERE, _listed({n: f.HELP for n, f in FILTERS.items()}))
+        if text and _METHODS_HERE in text:
+            listed = _listed({name: method.HELP for name, method in METHODS.items()})
+            heading = "methods that see several scans of a recording:\n" if listed else ""
+            text = text.replace(_METHODS_HERE, heading + listed)
+        super().add_text(text)
+
+
+def _listed(helps: dict[str, str]) -> str:
+    """Names, a line each, and what stands for each."""
+    width = max(map(len, helps), default=0)
+    return "\n".join(f"  {name:{width}}  {help_}".rstrip() for name, help_ in helps.items())

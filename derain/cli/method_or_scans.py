@@ -8,12 +8,7 @@ from derain.bags.names import split
 from derain.cli.method_options import add_method
 from derain.default import DEFAULT
 from derain.errors import InputError
-from derain.export.methods import (
-    CHECKPOINT_SUFFIX,
-    PARAMETER_SUFFIXES,
-    is_method_name,
-    method_hint,
-)
+from derain.export.methods import CHECKPOINT_SUFFIX, PARAMETER_SUFFIXES, is_method_name, method_hint
 from derain.files.format import FORMATS
 from derain.files.names import scan_suffix
 from derain.files.reading import is_file
@@ -59,9 +54,7 @@ def method_and_scans(first: str, others: list[Path], command: str) -> tuple[str,
     )
     if not (named or there):
         raise InputError(
-            first,
-            "no such file",
-            f"{method_hint(first)}, and scans after it; or scans alone.",
+            first, "no such file", f"{method_hint(first)}, and scans after it; or scans alone."
         )
     if not named and (not others or _may_be_scans(first)):
         return DEFAULT, [Path(first), *others]

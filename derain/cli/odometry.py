@@ -10,10 +10,8 @@ from tqdm import tqdm
 
 from derain.bags.names import within
 from derain.cli.arguments import add_threads
-from derain.cli.bag_options import add_topic
-from derain.cli.outputs import print_facts, print_lines
-from derain.cli.scan_by_scan import ScanByScan, exit_code
-from derain.cli.scan_options import add_columns
+from derain.cli.outputs import ScanByScan, exit_code, print_facts, print_lines
+from derain.cli.scan_options import add_columns, add_topic
 from derain.errors import printable
 from derain.recordings.registration import Registration
 from derain.sources.folders import named_frames

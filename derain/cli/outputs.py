@@ -1,4 +1,4 @@
-"""What commands print, and where they may write what they make of scans."""
+"""What commands print, and the files and folders that they may write."""
 
 import json
 import os
@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, TextIO
 from tqdm import tqdm
 
 from derain.errors import InputError, printable
+from derain.sources.frame import Frame
+from derain.sources.judging import Failures
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
 
@@ -38,7 +40,7 @@ def folder_sink(out: Path, source: Source, removed: Path | None = None) -> Folde
 def print_facts(facts: "DataclassInstance", as_json: bool) -> None:
     """Prints what was done to a scan, above a progress bar: a line of text, or an object."""
     tqdm.write(json.dumps(asdict(facts)) if as_json else str(facts), sys.stdout)
-    sys.stdout.flush()  # whoever reads them through a pipe is told of each scan at once
+    sys.stdout.flush()  # so that the reader of a pipe gets each line at once
 
 
 def print_lines(text: str, stream: TextIO | None = None) -> None:
@@ -86,3 +88,39 @@ def require_free_path(option: str, path: Path, written: Iterable[Path]) -> None:
         else:
             continue
         raise InputError(path, reason, f"Give {option} another file.")
+
+
+class ScanByScan(Failures):
+    """The frames of a source, one after the other, with a progress bar.
+
+    It prints what is wrong with single scans, and goes on with the others.
+
+    Args:
+        source: The source.
+    """
+
+    def __init__(self, source: Source) -> None:
+        super().__init__(print_error)
+        self._source = source
+
+    def __iter__(self) -> Iterator[Frame]:
+        return iter(tqdm(self._source, unit="scan", disable=None))
+
+
+def exit_code(failed: int, scans: int, outcome: str) -> int:
+    """The command's exit code: 2 where scans failed, which it prints, else 0.
+
+    Args:
+        failed: Number of scans that failed.
+        scans: Number of all scans.
+        outcome: What became of those that failed, with their number as ``{scans}``.
+    """
+    if not failed:
+        return 0
+    print(f"derain: {outcome.format(scans=f'{failed} of {scans} scans')}", file=sys.stderr)
+    return 2
+
+
+def print_error(error: InputError) -> None:
+    """Prints an error on stderr, above a progress bar."""
+    tqdm.write(f"derain: {error}", sys.stderr)

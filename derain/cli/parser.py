@@ -17,7 +17,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        # In place of Python's own, whose names would stand in the messages.
+        # Instead of int and float, whose names would appear in the messages.
         self.register("type", int, whole)
         self.register("type", float, number)
 
@@ -41,7 +41,7 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_args(args, namespace)
 
     def _refuse_unknown_options(self, words: Sequence[str]) -> None:
-        """Refuses a misspelt option, before argparse misses the one that is meant."""
+        """Refuses a misspelt option, before argparse reports the right one as missing."""
         options = self._option_string_actions
         before_names = words[: words.index("--")] if "--" in words else words
         for word in before_names:

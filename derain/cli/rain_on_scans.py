@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.cli.outputs import noting_progress, print_facts
-from derain.cli.scan_by_scan import ScanByScan, exit_code
+from derain.cli.outputs import ScanByScan, exit_code, noting_progress, print_facts
 from derain.errors import printable
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass

@@ -6,14 +6,17 @@ from pathlib import Path
 
 from derain.bags.names import within
 from derain.cli.arguments import add_threads, share
-from derain.cli.bag_options import add_cleaned_bags, add_topic, bag_options
-from derain.cli.method_options import add_parameters, method_of
+from derain.cli.method_options import add_parameters, add_runtime, method_of, runtime_of
 from derain.cli.method_or_scans import RULE, add_method_and_scans, method_and_scans
-from derain.cli.outputs import noting_progress, print_facts, print_lines, require_free_path
-from derain.cli.pose_options import add_poses
-from derain.cli.runtime_options import add_runtime, runtime_of
-from derain.cli.scan_by_scan import exit_code, print_error
-from derain.cli.scan_options import add_columns, add_intensity_scale
+from derain.cli.outputs import (
+    exit_code,
+    noting_progress,
+    print_error,
+    print_facts,
+    print_lines,
+    require_free_path,
+)
+from derain.cli.scan_options import add_columns, add_intensity_scale, add_poses, add_topic
 from derain.cli.weather_options import (
     WeatherTable,
     add_weather,
@@ -23,12 +26,11 @@ from derain.cli.weather_options import (
 from derain.default import DEFAULT, model_card
 from derain.errors import InputError
 from derain.sources.clean_sink import CleanSink, require_probabilities
-from derain.sources.cleaned_bags import RAIN_PROBABILITY
+from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
 from derain.sources.cleaning import CleanedScan, CleaningObserver, CleanReport, clean
 from derain.sources.folders import named_frames
 from derain.sources.judgement import Judgement
 from derain.sources.recordings import irregularities
-from derain.sources.source import Source
 from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
 from derain.views.scan_issues import MOST_RAIN, ScanIssue
@@ -92,15 +94,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--removed", type=Path, metavar="DIR", help="write the removed points to DIR"
     )
     parser.add_argument(
-        "--probability",
-        action="store_true",
-        help=f"add the column {RAIN_PROBABILITY} to the scans",
+        "--probability", action="store_true", help=f"add the column {RAIN_PROBABILITY} to the scans"
     )
     add_parameters(parser)
     add_poses(parser)
     add_topic(parser)
-    add_cleaned_bags(parser)
+    _add_cleaned_bags(parser)
     add_weather(parser)
+
+
+def _add_cleaned_bags(parser: argparse.ArgumentParser) -> None:
+    """Declares what is written of bags."""
+    parser.add_argument(
+        "--cleaned-topic",
+        metavar="NAME",
+        help="bags: add a topic of clean clouds (default: replace the clouds)",
+    )
+    parser.add_argument(
+        "--removed-topic", metavar="NAME", help="bags: add a topic of the removed points"
+    )
+    parser.add_argument(
+        "--keep-shape",
+        action="store_true",
+        help="bags: keep rows and columns of organised clouds; removed points become NaN",
+    )
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -110,12 +127,21 @@ def main(arguments: argparse.Namespace) -> int:
     runtime = runtime_of(arguments.runtime, arguments.precision)
     settings = dict(arguments.set)
     method = method_of(name, arguments.parameters, settings, arguments.threads, runtime)
-    source = _source(scans, arguments)
+    frames = named_frames(within(scans, arguments.topic), arguments.columns)
+    source = placed(frames, arguments.poses, arguments.threads).map(
+        lambda frame: frame.with_intensity_times(arguments.intensity_scale)
+    )
     if arguments.probability:
         require_probabilities(method, source)
     weather, table = weather_options(arguments), WeatherTable(arguments.weather)
     printer = _Printer(table, arguments.json)
-    with _sink(source, arguments) as sink:
+    with CleanSink(
+        arguments.out,
+        source,
+        removed=arguments.removed,
+        probability=arguments.probability,
+        bags=BagOptions(arguments.cleaned_topic, arguments.removed_topic, arguments.keep_shape),
+    ) as sink:
         if arguments.weather is not None:
             require_free_path("--weather", arguments.weather, sink.targets())
         if name == DEFAULT:
@@ -130,23 +156,6 @@ def main(arguments: argparse.Namespace) -> int:
             printer.summarise(report)
         failed = exit_code(len(report.failures), len(source), "{scans} could not be cleaned")
         return failed or warn_of_bad_weather(report.weather, arguments.fail_at)
-
-
-def _source(scans: list[Path], arguments: argparse.Namespace) -> Source:
-    """The scans with their poses, in the method's unit of intensity."""
-    frames = named_frames(within(scans, arguments.topic), arguments.columns)
-    posed = placed(frames, arguments.poses, arguments.threads)
-    return posed.map(lambda frame: frame.with_intensity_times(arguments.intensity_scale))
-
-
-def _sink(source: Source, arguments: argparse.Namespace) -> CleanSink:
-    return CleanSink(
-        arguments.out,
-        source,
-        removed=arguments.removed,
-        probability=arguments.probability,
-        bags=bag_options(arguments),
-    )
 
 
 class _Printer(CleaningObserver):

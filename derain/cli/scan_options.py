@@ -1,10 +1,11 @@
-"""Options that say how scans are read, the same in every command."""
+"""Options that set how scans are read, the same in every command."""
 
 import argparse
 
 from derain.cli.arguments import factor
 from derain.files import DEFAULT_COLUMNS
 from derain.files.format import FORMATS
+from derain.recordings.posed import ODOMETRY, STANDING
 
 
 def column_names(text: str) -> tuple[str, ...]:
@@ -50,6 +51,24 @@ def add_intensity_scale(parser: argparse.ArgumentParser, of: str = "") -> None:
         default=1.0,
         metavar="FACTOR",
         help=f"multiply the {of}scans' intensities by FACTOR, e.g. 255 (default: 1)",
+    )
+
+
+def add_topic(parser: argparse.ArgumentParser) -> None:
+    """Declares the topic to read of a bag."""
+    parser.add_argument(
+        "--topic", metavar="NAME", help="topic of point clouds, for bags with several"
+    )
+
+
+def add_poses(parser: argparse.ArgumentParser) -> None:
+    """Declares where poses come from, as :func:`derain.recordings.posed.with_poses` takes it."""
+    parser.add_argument(
+        "--poses",
+        metavar="POSES",
+        help=f"poses of the scans: a file in the format of KITTI or TUM, a folder with one "
+        f"<sequence>.txt per sequence, {STANDING}, or {ODOMETRY} (default: poses.txt beside the "
+        f"scans, otherwise {ODOMETRY})",
     )
 
 

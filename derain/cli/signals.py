@@ -1,4 +1,4 @@
-"""Signals that ask a command to end: it hears an interruption, and so clears up behind itself."""
+"""Signals that ask a command to end: they interrupt it, so that it cleans up."""
 
 import signal
 import threading
@@ -12,7 +12,7 @@ ENDING = [
 
 
 class Interruption(KeyboardInterrupt):
-    """A signal asked to end. Libraries know it as Ctrl-C, which they end well on.
+    """A signal asks the command to end. Libraries treat it as Ctrl-C.
 
     Args:
         signal: The signal.
@@ -31,7 +31,7 @@ def interrupting() -> Iterator[None]:
     listens to, or that are to be ignored, as after ``nohup``, are left to them.
     """
     if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread hears signals
+        yield  # only the main thread receives signals
         return
     found = {number: signal.getsignal(number) for number in ENDING}
     ours = {

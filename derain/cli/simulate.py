@@ -1,17 +1,22 @@
 """``derain simulate``: a data set of simulated rain, or rain on scans of one's own."""
 
 import argparse
-from collections.abc import Collection, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from derain.cli.arguments import count
 from derain.cli.outputs import folder_sink, print_lines
 from derain.cli.scan_options import add_columns
 from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
+from derain.sources.folders import named_frames
 from derain.system.cores import usable_cores
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
+
+if TYPE_CHECKING:
+    from derain.simulation.campaign import Campaign
+    from derain.simulation.world import WorldCampaign
 
 DESCRIPTION = """\
 Simulates a rain facility in the layout of REHEARSE-3D: LiDAR, radar, both merged, labels, weather.
@@ -59,19 +64,19 @@ LAYOUT_NAMES = (
     *("facility", "street", "city", "country", "car_park", "motorway", "garage", "yard", "room"),
 )
 
-# What only one of the three uses knows, and what it takes where nothing is said.
-DATA_SET_DEFAULTS = {
+# Options of a data set, and what each is where it is not given.
+DATA_SET_DEFAULTS: dict[str, Any] = {
     "layout": "facility",
     "sequences": 10,
     "scans": 10,
-    "radar": True,
+    "radar": None,  # by what moves
     "speed": 0.0,
     "traffic": 0,
     "skew": False,
     "workers": usable_cores(),
 }
-WORLD_DEFAULTS = {"sequences": 10, "workers": usable_cores()}
-SCAN_DEFAULTS = {"columns": DEFAULT_COLUMNS, "picture": False, "json": False}
+OF_NO_WORLD = [name for name in DATA_SET_DEFAULTS if name not in ("sequences", "workers")]
+SCAN_OPTIONS = ("columns", "picture", "json")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -148,88 +153,74 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     if arguments.seed < 0:
         raise InputError("--seed", f"{arguments.seed} is negative", "Give 0 or more.")
+    given = {name: value for name, value in vars(arguments).items() if value is not None}
     if arguments.on is not None:
-        _apply_defaults(
-            arguments, SCAN_DEFAULTS, foreign=[*DATA_SET_DEFAULTS, "world"], needs="without --on"
-        )
-        return _rain_on_scans(arguments)
+        _refuse((*DATA_SET_DEFAULTS, "world"), given, needs="without --on")
+        if arguments.picture:
+            require("--picture", MATPLOTLIB)
+        from derain.cli.rain_on_scans import rain_on_scans
+        from derain.simulation.rain_field import UniformRain
+        from derain.simulation.sensor_file import load_sensor
+
+        if not arguments.rain or len(arguments.rain) > 1:
+            raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")
+        rain, sensor = UniformRain(*arguments.rain), load_sensor(arguments.sensor or "spinning_64")
+        source = named_frames(arguments.on, arguments.columns or DEFAULT_COLUMNS)
+        sink = folder_sink(arguments.out, source)
+        output = bool(arguments.picture), bool(arguments.json)
+        return rain_on_scans(source, rain, sensor, sink, arguments.seed, *output)
     require("simulate", OPEN3D)
-    if arguments.world is not None:
-        foreign = [
-            name for name in (*DATA_SET_DEFAULTS, *SCAN_DEFAULTS) if name not in WORLD_DEFAULTS
-        ]
-        foreign += ["rain", "sensor"]  # of which a world has its own
-        _apply_defaults(arguments, WORLD_DEFAULTS, foreign, needs="without --world")
-        return _simulate_worlds(arguments)
-    if arguments.radar is None:
-        arguments.radar = not (arguments.speed or arguments.traffic or arguments.skew)
-    _apply_defaults(arguments, DATA_SET_DEFAULTS, foreign=SCAN_DEFAULTS, needs="with --on")
-    return _simulate(arguments)
-
-
-def _apply_defaults(
-    arguments: argparse.Namespace, own: Mapping[str, Any], foreign: Collection[str], needs: str
-) -> None:
-    """Refuses the options of other uses, and fills in what was not said."""
-    for name in foreign:
-        if getattr(arguments, name) is not None:
-            raise InputError(f"--{name}", f"has a meaning only {needs}", "Leave it out.")
-    for name, default in own.items():
-        if getattr(arguments, name) is None:
-            setattr(arguments, name, default)
-
-
-def _rain_on_scans(arguments: argparse.Namespace) -> int:
-    if arguments.picture:
-        require("--picture", MATPLOTLIB)
-    from derain.cli.rain_on_scans import rain_on_scans
-    from derain.simulation.rain_field import UniformRain
-    from derain.simulation.sensor_file import load_sensor
-    from derain.sources.folders import named_frames
-
-    if not arguments.rain or len(arguments.rain) > 1:
-        raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")
-    rain, sensor = UniformRain(arguments.rain[0]), load_sensor(arguments.sensor or "spinning_64")
-    source = named_frames(arguments.on, arguments.columns)
-    sink = folder_sink(arguments.out, source)
-    options = (arguments.seed, arguments.picture, arguments.json)
-    return rain_on_scans(source, rain, sensor, sink, *options)
-
-
-def _simulate(arguments: argparse.Namespace) -> int:
-    from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, partition
     from derain.simulation.dataset import simulate_track
+
+    workers = arguments.workers or DATA_SET_DEFAULTS["workers"]
+    campaign: WorldCampaign | Campaign
+    if arguments.world is not None:
+        _refuse((*OF_NO_WORLD, *SCAN_OPTIONS, "rain", "sensor"), given, needs="without --world")
+        campaign, scans = _world_campaign(arguments), 1
+    else:
+        _refuse(SCAN_OPTIONS, given, needs="with --on")
+        campaign = _campaign(
+            argparse.Namespace(**{**vars(arguments), **DATA_SET_DEFAULTS, **given})
+        )
+        scans = campaign.scans
+    simulate_track(arguments.out, campaign, workers)
+    sequences = len(campaign.names)
+    print_lines(
+        f"{arguments.out}: {sequences} sequences, {sequences * scans:,} scans. "
+        f"What is in them: derain info {arguments.out}"
+    )
+    return 0
+
+
+def _refuse(foreign: Iterable[str], given: Mapping[str, object], needs: str) -> None:
+    """Refuses the options of other uses."""
+    for name in foreign:
+        if name in given:
+            raise InputError(f"--{name}", f"has a meaning only {needs}", "Leave it out.")
+
+
+def _campaign(options: argparse.Namespace) -> "Campaign":
+    from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, partition
     from derain.simulation.drive import Drive
     from derain.simulation.radar import Radar
 
-    moves = arguments.speed, arguments.traffic, arguments.skew
-    campaign = Campaign(
-        *partition(arguments.sequences),
-        scans=arguments.scans,
-        rain_rates=tuple(arguments.rain or FACILITY_RAIN_RATES),
-        seed=arguments.seed,
-        sensor=arguments.sensor or "mems_256",
-        layout=arguments.layout,
-        radar=Radar() if arguments.radar else None,
+    moves = options.speed, options.traffic, options.skew
+    radar = not any(moves) if options.radar is None else options.radar
+    return Campaign(
+        *partition(options.sequences),
+        scans=options.scans,
+        rain_rates=tuple(options.rain or FACILITY_RAIN_RATES),
+        seed=options.seed,
+        sensor=options.sensor or "mems_256",
+        layout=options.layout,
+        radar=Radar() if radar else None,
         drive=Drive(*moves) if any(moves) else None,
     )
-    simulate_track(arguments.out, campaign, arguments.workers)
-    return _print_result(arguments.out, len(campaign.names), len(campaign.names) * campaign.scans)
 
 
-def _simulate_worlds(arguments: argparse.Namespace) -> int:
+def _world_campaign(arguments: argparse.Namespace) -> "WorldCampaign":
     from derain.simulation.campaign import partition
-    from derain.simulation.dataset import simulate_track
     from derain.simulation.world import WorldCampaign
 
-    parts = partition(arguments.sequences)
-    campaign = WorldCampaign(*parts, seed=arguments.seed, world=arguments.world)
-    simulate_track(arguments.out, campaign, arguments.workers)
-    return _print_result(arguments.out, len(campaign.names), len(campaign.names))
-
-
-def _print_result(out: Path, sequences: int, scans: int) -> int:
-    print_lines(
-        f"{out}: {sequences} sequences, {scans:,} scans. What is in them: derain info {out}"
-    )
-    return 0
+    parts = partition(arguments.sequences or DATA_SET_DEFAULTS["sequences"])
+    return WorldCampaign(*parts, seed=arguments.seed, world=arguments.world)

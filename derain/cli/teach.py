@@ -10,13 +10,9 @@ from derain.bags.names import within
 from derain.cards.card import load_card, packaged_cards
 from derain.cards.known import layouts_for
 from derain.cli.arguments import add_threads
-from derain.cli.bag_options import add_topic
-from derain.cli.method_options import add_method, add_parameters, method_of
-from derain.cli.outputs import print_facts, print_lines
-from derain.cli.pose_options import add_poses
-from derain.cli.runtime_options import add_runtime, runtime_of
-from derain.cli.scan_by_scan import ScanByScan, exit_code
-from derain.cli.scan_options import add_columns, add_intensity_scale
+from derain.cli.method_options import add_method, add_parameters, add_runtime, method_of, runtime_of
+from derain.cli.outputs import ScanByScan, exit_code, print_facts, print_lines
+from derain.cli.scan_options import add_columns, add_intensity_scale, add_poses, add_topic
 from derain.errors import printable
 from derain.evaluation.counts import or_none
 from derain.evaluation.text_tables import number_text

@@ -5,7 +5,6 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +15,8 @@ from tqdm import tqdm
 from derain import __version__
 from derain.cards.rain_found import require_rain
 from derain.cli.arguments import add_threads, command_line, count, file_named, share
-from derain.cli.filter_help import list_filters
 from derain.cli.labelled_data import add_data_arguments, labelled
+from derain.cli.method_options import list_filters
 from derain.cli.outputs import print_lines
 from derain.default import DEFAULT
 from derain.errors import InputError
@@ -34,7 +33,7 @@ from derain.views.scan_issues import ScanChecker, outside_view
 
 if TYPE_CHECKING:
     from derain.datamodules.scan_data import ScanData
-    from derain.export.tuning import Tuned
+    from derain.export.tuning import LabelledNeighbourhoods, Tuned
     from derain.scan import Scan
     from derain.sources.frame import Frame
 
@@ -88,84 +87,106 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.method in FILTERS:
         require("tune", OPTUNA)
     notices = Notices()
-    data = labelled(arguments, arguments.data)
+    data = labelled(
+        arguments.data,
+        arguments.card,
+        arguments.columns,
+        arguments.intensity_scale,
+        topic=arguments.topic,
+    )
     frames = _drawn(data.frames(arguments.part), arguments.scans, arguments.seed)
     require_writable(arguments.out)
-    tune = _tuned_filter if arguments.method in FILTERS else _tuned_model
-    tuned = tune(arguments, data, frames, notices)
+    method, threads = arguments.method, arguments.threads
+    if method in FILTERS:
+        inside = arguments.candidates
+        candidates = None if inside is None else _candidates(inside, data, frames)
+        scans = _neighbourhoods(method, data, frames, candidates, threads, notices)
+        names = [frame.name for frame in frames]
+        search = (arguments.trials, arguments.seed, arguments.storage)
+        tuned = _tuned_filter(method, scans, names, *search)
+        if candidates is not None:
+            bounded = {**tuned.parameters, CANDIDATES: candidates.as_dict()}
+            tuned = replace(tuned, parameters=bounded)
+    elif arguments.candidates is not None:
+        raise InputError("--candidates", "a model has its own", "Give it to `derain export`.")
+    else:
+        tuned = _tuned_model(method, data, frames, threads, notices)
     notices.warn_of_repeats()
     facts = (
         f"IoU {tuned.iou:.4f} on {len(frames)} scans of {data.card.name}, "
         f"{tuned.default_iou:.4f} with the defaults"
     )
-    _write(arguments, tuned, facts)
-    print_lines(f"{arguments.method}: {facts}")
+    content = {"method": _relative_to(arguments.out.parent, method), **tuned.parameters}
+    with replacing(arguments.out) as temporary:
+        temporary.write_text(
+            f"# derain {__version__}: {command_line(arguments, 'method')}\n"
+            f"# {facts}\n{yaml.safe_dump(content, sort_keys=False)}",
+            "utf-8",
+        )
+    print_lines(f"{method}: {facts}")
     for name, value in tuned.parameters.items():
-        if name != CANDIDATES:  # they were said when they were found
+        if name != CANDIDATES:  # printed already
             print(f"  {name}: {value}")
     return 0
 
 
-def _tuned_filter(
-    arguments: argparse.Namespace,
-    data: "ScanData",
-    frames: list["Frame"],
-    notices: Notices,
-) -> "Tuned":
-    from derain.export.tuning import LabelledNeighbourhoods, Search, neighbours_to_find, tune_filter
-
-    neighbours = neighbours_to_find(arguments.method)
-    read = partial(_read, data, filter_from(arguments.method, {}), notices)
-    candidates = _candidates(arguments, data, frames)
-    scans = [
-        LabelledNeighbourhoods.of(read(frame), data.card, neighbours, arguments.threads, candidates)
-        for frame in tqdm(frames, desc="finding neighbours", unit="scan", disable=None)
-    ]
-    require_rain(any(scan.rain.any() for scan in scans), data.card, "--data")
-    with tqdm(desc="tuning", unit="trial", total=arguments.trials, disable=None) as progress:
-        search = Search(
-            arguments.trials,
-            arguments.seed,
-            arguments.storage,
-            [frame.name for frame in frames],
-            progress.update,
-        )
-        tuned = tune_filter(arguments.method, scans, search)
-    if candidates is None:
-        return tuned
-    bounded = {**tuned.parameters, CANDIDATES: candidates.as_dict()}
-    return replace(tuned, parameters=bounded)
-
-
-def _candidates(
-    arguments: argparse.Namespace, data: "ScanData", frames: list["Frame"]
-) -> Candidates | None:
-    """Bounds of the scans' rain, where they are asked for and there are any."""
-    if arguments.candidates is None:
-        return None
+def _candidates(inside: float, data: "ScanData", frames: Sequence["Frame"]) -> Candidates | None:
+    """Bounds that hold a share of the scans' rain; None if no bounds tell rain from the rest."""
 
     def known() -> Iterator[tuple[Any, Any]]:
         for frame in tqdm(frames, desc="bounding rain", unit="scan", disable=None):
             yield data.card.known_points(data.read_measured(frame))
 
-    candidates = fit_candidates(known(), ("intensity",), arguments.candidates)
+    candidates = fit_candidates(known(), ("intensity",), inside)
     print_lines(f"candidates: {candidates or 'every point, for no bounds tell rain from the rest'}")
     return candidates
 
 
-def _tuned_model(
-    arguments: argparse.Namespace,
+def _neighbourhoods(
+    method: str,
     data: "ScanData",
-    frames: list["Frame"],
+    frames: Sequence["Frame"],
+    candidates: Candidates | None,
+    threads: int,
     notices: Notices,
+) -> list["LabelledNeighbourhoods"]:
+    """The labelled scans with the neighbours that a filter needs; one of them has rain."""
+    from derain.export.tuning import LabelledNeighbourhoods, neighbours_to_find
+
+    neighbours, filter_ = neighbours_to_find(method), filter_from(method, {})
+    scans = [
+        LabelledNeighbourhoods.of(
+            _read(data, filter_, notices, frame), data.card, neighbours, threads, candidates
+        )
+        for frame in tqdm(frames, desc="finding neighbours", unit="scan", disable=None)
+    ]
+    require_rain(any(scan.rain.any() for scan in scans), data.card, "--data")
+    return scans
+
+
+def _tuned_filter(
+    method: str,
+    scans: Sequence["LabelledNeighbourhoods"],
+    names: Sequence[str],
+    trials: int,
+    seed: int,
+    storage: Path | None,
+) -> "Tuned":
+    from derain.export.tuning import Search, tune_filter
+
+    with tqdm(desc="tuning", unit="trial", total=trials, disable=None) as progress:
+        search = Search(trials, seed, storage, names, progress.update)
+        return tune_filter(method, scans, search)
+
+
+def _tuned_model(
+    method: str, data: "ScanData", frames: Sequence["Frame"], threads: int, notices: Notices
 ) -> "Tuned":
     from derain.export.methods import load_method_of_one_scan
     from derain.export.runtime import Derainer
     from derain.export.tuning import tune_threshold
 
-    if arguments.candidates is not None:
-        raise InputError("--candidates", "a model has its own", "Give it to `derain export`.")
-    derainer = load_method_of_one_scan(arguments.method, {}, arguments.threads)
+    derainer = load_method_of_one_scan(method, {}, threads)
     assert isinstance(derainer, Derainer)  # filters are tuned by _tuned_filter
 
     def judged() -> Iterator[tuple[Any, Any]]:
@@ -177,7 +198,7 @@ def _tuned_model(
             notices.warn(frame.name, outside)
             yield judgement.probability[known], data.card.rain_of(scan)[known]
 
-    note = training_overlap(arguments.method, derainer.spec, data.card, frames)
+    note = training_overlap(method, derainer.spec, data.card, frames)
     if note is not None:
         tqdm.write(f"derain: warning: {note}", sys.stderr)
     scans = list(judged())
@@ -197,16 +218,6 @@ def _drawn(frames: Sequence["Frame"], most: int, seed: int) -> list["Frame"]:
     generator = np.random.default_rng(seed)
     chosen = generator.choice(len(frames), min(most, len(frames)), replace=False)
     return [frames[number] for number in np.sort(chosen)]
-
-
-def _write(arguments: argparse.Namespace, tuned: "Tuned", facts: str) -> None:
-    content = {"method": _relative_to(arguments.out.parent, arguments.method), **tuned.parameters}
-    with replacing(arguments.out) as temporary:
-        temporary.write_text(
-            f"# derain {__version__}: {command_line(arguments, 'method')}\n"
-            f"# {facts}\n{yaml.safe_dump(content, sort_keys=False)}",
-            "utf-8",
-        )
 
 
 def _relative_to(folder: Path, method: str) -> str:

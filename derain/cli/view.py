@@ -1,16 +1,35 @@
 """``derain view``: shows scans as several methods clean them."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from derain.bags.names import is_bag
+from derain.bags.names import is_bag, within
+from derain.cards.card import DataCard, load_card
+from derain.cards.known import layouts_for
 from derain.cli.arguments import add_threads, count, whole
-from derain.cli.bag_options import add_topic
-from derain.cli.filter_help import list_methods
-from derain.cli.pose_options import add_poses
-from derain.cli.scan_options import add_columns, add_intensity_scale
+from derain.cli.method_options import list_methods
+from derain.cli.outputs import print_lines
+from derain.cli.scan_options import add_columns, add_intensity_scale, add_poses, add_topic
 from derain.default import DEFAULT
 from derain.errors import InputError
+from derain.sources.bag_frame import NUMBER, BagFrame
+from derain.sources.folders import frame_of, named_frames
+from derain.sources.source import Source
+from derain.system.extras import MATPLOTLIB, OPEN3D, require
+from derain.system.memory import keep_freed_memory
+from derain.system.notices import Notices
+from derain.views.scan_issues import outside_view
+from derain.workflows.odometry import placed
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from derain.export.bench.bench_entries import BenchEntry
+    from derain.scan import Scan
+    from derain.sources.frame import Frame
 
 DESCRIPTION = """\
 Draws a scan, its labels if there are any, and the result of each method, from above and from the
@@ -83,13 +102,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     if arguments.rerun is not None:
-        from derain.cli.view_recording import view_recording
+        from derain.cli.view_recording import load_methods, refuse_unusable, view_recording
 
         if arguments.out or arguments.window:
             raise InputError("--rerun", "excludes --out and --window", "Leave them out.")
-        return view_recording(arguments)
-    from derain.cli.view_scan import view_scan
-
+        refuse_unusable(arguments.rerun)
+        keep_freed_memory()
+        methods = load_methods(arguments.methods, arguments.threads)
+        card = None if arguments.card is None else load_card(arguments.card)
+        source = _recordings(arguments, card)
+        shown = range(len(source))[arguments.frames][:: arguments.every]
+        return view_recording(arguments.rerun, methods, source, shown, card)
     path = arguments.scans[0]
     if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):
         raise InputError(
@@ -97,7 +120,16 @@ def main(arguments: argparse.Namespace) -> int:
             "is more than one scan; a picture shows one",
             "Name one, or give --rerun out.rrd to see all of them.",
         )
-    view_scan(arguments)
+    _view_scan(
+        within(arguments.scans, arguments.topic)[0],
+        arguments.methods,
+        columns=arguments.columns,
+        card_name=arguments.card,
+        intensity_scale=arguments.intensity_scale,
+        threads=arguments.threads,
+        out=arguments.out,
+        window=arguments.window,
+    )
     return 0
 
 
@@ -107,3 +139,99 @@ def _numbers(text: str) -> slice:
     if not colon:
         raise argparse.ArgumentTypeError(f"{text} is not FROM:TO, such as 10:20")
     return slice(*(whole(part) if part else None for part in (first, end)))
+
+
+def _recordings(arguments: argparse.Namespace, card: DataCard | None) -> Source:
+    """The scans that the arguments name, each with its pose."""
+    found = named_frames(
+        within(arguments.scans, arguments.topic),
+        arguments.columns,
+        labelled=card is not None,
+        layouts=layouts_for(card),
+        recordings=True,
+    )
+    return placed(found, arguments.poses, arguments.threads).map(
+        lambda frame: frame.with_intensity_times(arguments.intensity_scale)
+    )
+
+
+def _view_scan(
+    path: Path,
+    names: Sequence[str],
+    *,
+    columns: Sequence[str],
+    card_name: str | None,
+    intensity_scale: float,
+    threads: int,
+    out: Path | None,
+    window: bool,
+) -> None:
+    """Draws a scan as several methods clean it, or shows it in a window.
+
+    Raises:
+        InputError: A scan or labels that cannot be read, an unknown method, or an output that
+            cannot be written.
+    """
+    from derain.export.bench.bench_entries import bench_entries
+
+    if not (out or window):
+        raise InputError(path, "no output is named", "Give --out, --window or --rerun.")
+    require("view", MATPLOTLIB, *((OPEN3D,) if window else ()))
+    methods = bench_entries(names)
+    card = None if card_name is None else load_card(card_name)
+    frame = frame_of(path, columns, layouts_for(card))
+    scan = frame.with_intensity_times(intensity_scale).read()
+    notices = Notices()
+    for method in methods:
+        if method.spec_or_filter is not None:
+            notices.warn(frame.name, method.spec_or_filter.issues(scan), method.title)
+    truth = None if card is None else _truth(scan, frame, card)
+    predicted = {method.title: _rain(scan, method, threads, notices) for method in methods}
+    title, rain = f"{_shown(frame, path)}: {len(scan):,} points", None
+    if truth is not None:
+        rain, known = truth
+        scan, rain = scan.take(known), rain[known]
+        predicted = {name: called_rain[known] for name, called_rain in predicted.items()}
+    if out:
+        from derain.pictures.comparison import comparison_figure
+        from derain.pictures.scan_pictures import save
+
+        save(comparison_figure(scan, predicted, rain, title), out)
+        print_lines(str(out))
+    if window:
+        from derain.pictures.comparison import show_comparison
+
+        show_comparison(scan, predicted, rain)
+
+
+def _shown(frame: "Frame", path: Path) -> str:
+    """Name of a scan in the title; prints which cloud of a bag is drawn."""
+    if not isinstance(frame, BagFrame):
+        return path.name
+    if NUMBER.fullmatch(path.name) is None:
+        print_lines(f"{frame.name} is drawn, the first of {len(frame.clouds):,} clouds")
+    return str(frame.path.relative_to(frame.clouds.bag.path.parent))
+
+
+def _rain(
+    scan: "Scan", method: "BenchEntry", threads: int, notices: Notices
+) -> "NDArray[np.bool_]":
+    """Points that a method calls rain, bool (N,); warns of many points outside a model's view."""
+    from derain.export.runtime import Derainer
+    from derain.system.stopwatch import Stopwatch
+
+    judge = method.ready(threads)
+    if not isinstance(judge, Derainer):
+        return judge(scan, Stopwatch())
+    judgement = judge.judge(scan)
+    outside = outside_view(scan, judgement.judged, judge.spec.data)
+    notices.warn(scan.name, outside, method.title)
+    return judgement.rain
+
+
+def _truth(
+    scan: "Scan", frame: "Frame", card: DataCard
+) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]]":
+    """Points that are rain, and points whose label is known, each bool (N,)."""
+    labelled = scan.with_label(frame.read_label(len(scan)))
+    return card.rain_of(labelled), ~card.unknown_of(labelled)

@@ -1,31 +1,22 @@
 """Writes a recording as several methods clean it, for Rerun's viewer."""
 
-import argparse
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tqdm import tqdm
-
-from derain.cards.card import load_card
-from derain.cards.known import layouts_for
-from derain.cli.bag_options import in_topic
-from derain.cli.outputs import print_lines
+from derain.cards.card import DataCard
+from derain.cli.outputs import print_error, print_lines
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method, split_title
 from derain.files.atomic import require_writable
-from derain.files.reading import reading
-from derain.sources.folders import named_frames
-from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
+from derain.sources.judging import Failures
 from derain.sources.method import Method
 from derain.sources.recordings import irregularities
+from derain.sources.source import Source
 from derain.system.extras import RERUN
-from derain.system.memory import keep_freed_memory
 from derain.system.notices import Notices, warn
-from derain.workflows.odometry import placed
 
 if TYPE_CHECKING:
     from derain.pictures.selection import Labels, Selection
@@ -33,34 +24,30 @@ if TYPE_CHECKING:
 SUFFIX = ".rrd"
 
 
-def view_recording(arguments: argparse.Namespace) -> int:
+def view_recording(
+    out: Path,
+    methods: dict[str, Method],
+    source: Source,
+    numbers: Sequence[int],
+    card: DataCard | None,
+) -> int:
     """Writes the file, and prints its size.
+
+    Args:
+        out: The file, which :func:`refuse_unusable` has let pass.
+        methods: The methods by their titles.
+        source: All scans.
+        numbers: The places of the scans to show, ascending.
+        card: Data card of the scans' labels; None shows no truth.
 
     Returns:
         The exit code: 2 where something could not be shown.
 
     Raises:
-        InputError: Rerun is not installed; a method that there is not; scans or poses that cannot
-            be read; a file that cannot be written.
+        InputError: Scans or poses that cannot be read, or a file that cannot be written.
     """
-    out: Path = arguments.rerun
-    refuse_unusable(out)
     from derain.pictures.selection import Labels, Selection
 
-    keep_freed_memory()
-    methods = _methods(arguments.methods, arguments.threads)
-    card = None if arguments.card is None else load_card(arguments.card)
-    found = named_frames(
-        in_topic(arguments.scans, arguments),
-        arguments.columns,
-        labelled=card is not None,
-        layouts=layouts_for(card),
-        recordings=True,
-    )
-    source = placed(found, arguments.poses, arguments.threads).map(
-        lambda frame: frame.with_intensity_times(arguments.intensity_scale)
-    )
-    numbers = range(len(source))[arguments.frames][:: arguments.every]
     selection = Selection(source, numbers)
     if card is not None and not any(frame.has_labels for frame in selection.frames):
         warn(f"{selection.frames[0].name}: no scan has labels, so no truth is shown")
@@ -84,12 +71,9 @@ def refuse_unusable(out: Path) -> None:
 
 
 def write_and_report(
-    out: Path,
-    selection: "Selection",
-    methods: dict[str, Method],
-    labels: "Labels | None",
+    out: Path, selection: "Selection", methods: dict[str, Method], labels: "Labels | None"
 ) -> int:
-    """Writes the file, and prints what it shows, its size and what is wrong with its scans.
+    """Writes the file, and prints what it shows, its size, and errors of single scans.
 
     Returns:
         The exit code: 2 where something could not be shown.
@@ -101,24 +85,20 @@ def write_and_report(
 
     scans = len(selection.frames)
     print_lines(f"{scans:,} scans, methods: {', '.join(methods)}")
-    notices, errors = Notices(), set()
+    notices = Notices()
+    errors: set[str] = set()
 
-    @contextmanager
-    def reporting(frame: Frame) -> Iterator[None]:
-        """Prints an error and goes on; once, for every method reads the frame again."""
-        try:
-            with reading(Path(frame.name)):
-                yield
-        except InputError as error:
-            if str(error) not in errors:
-                tqdm.write(f"derain: {error}", sys.stderr)
-            errors.add(str(error))
+    def print_once(error: InputError) -> None:
+        """Prints an error the first time: every method reads the frame again."""
+        if str(error) not in errors:
+            print_error(error)
+        errors.add(str(error))
 
     def watch(title: str, judgement: Judgement) -> None:
         assert judgement.frame is not None
         notices.warn(judgement.frame.name, methods[title].issues(judgement), title)
 
-    write_playback(out, selection, methods, labels, reporting, watch)
+    write_playback(out, selection, methods, labels, Failures(print_once).skipping_failures, watch)
     notices.warn_of_repeats()
     print_lines(f"{out}: {out.stat().st_size / 1e6:,.1f} MB. To view it: rerun {out}")
     if errors:
@@ -126,7 +106,7 @@ def write_and_report(
     return 2 if errors else 0
 
 
-def _methods(names: Sequence[str], threads: int) -> dict[str, Method]:
+def load_methods(names: Sequence[str], threads: int) -> dict[str, Method]:
     """The methods by their titles, in order.
 
     Raises:

@@ -41,10 +41,7 @@ def add_weather(parser: argparse.ArgumentParser) -> None:
     """Declares the table of the weather, and the levels of its visibility."""
     group = parser.add_argument_group("weather")
     group.add_argument(
-        "--weather",
-        type=Path,
-        metavar="CSV",
-        help="write the weather of each scan to a table",
+        "--weather", type=Path, metavar="CSV", help="write the weather of each scan to a table"
     )
     group.add_argument(
         "--dry",

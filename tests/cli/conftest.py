@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,3 +43,29 @@ def wads(tmp_path: Path, write_labelled: WriteScan) -> list[str]:
         *("--data.loading.workers", "0", "--trainer.enable_progress_bar", "false"),
         *("--panels.scans", "0", "--errors.pictures", "0"),
     ]
+
+
+@pytest.fixture
+def refused(run_derain: Callable[..., Any]) -> Callable[..., str]:
+    """Runs a command that is refused with exit code 2 before it prints anything; gives the line."""
+
+    def run(*arguments: str | Path) -> str:
+        outcome = run_derain(*arguments)
+        assert (outcome.code, outcome.out) == (2, "")
+        (line,) = outcome.err.splitlines()
+        assert line.startswith("derain: ")
+        return line
+
+    return run
+
+
+@pytest.fixture
+def succeed(run_derain: Callable[..., Any]) -> Callable[..., Any]:
+    """Runs a command that ends with exit code 0; gives its outcome."""
+
+    def run(*arguments: str | Path) -> Any:
+        outcome = run_derain(*arguments)
+        assert outcome.code == 0, outcome.err
+        return outcome
+
+    return run

@@ -11,7 +11,6 @@ from small_bags import small_bag, tables
 
 from benchmarks.recorded_bags import CLOUD_TYPE, START, STORAGES, Recorded, Ros, Storage
 from derain.annotation.manifest import HELD_OUT_PART, TRAINING_PART, Manifest
-from derain.files.labels import write_labels
 
 
 @pytest.mark.parametrize("storage", STORAGES)
@@ -44,11 +43,10 @@ def test_a_topic_is_named_by_an_option(tmp_path: Path, run_derain) -> None:
     assert "/rear" in told.err
 
 
-def test_a_topic_without_a_bag_is_refused(tmp_path: Path, run_derain) -> None:
+def test_a_topic_without_a_bag_is_refused(tmp_path: Path, refused) -> None:
     np.save(tmp_path / "scan.npy", tables(1)[0])
-    outcome = run_derain("run", "ror", tmp_path, "--out", tmp_path / "out", "--topic", "/points")
-    assert outcome.code == 2
-    assert "no bag is named" in outcome.err
+    line = refused("run", "ror", tmp_path, "--out", tmp_path / "out", "--topic", "/points")
+    assert "no bag is named" in line
 
 
 def test_view_draws_a_cloud_of_a_bag(tmp_path: Path, run_derain) -> None:
@@ -90,23 +88,6 @@ def test_a_taught_bag_is_read_again_with_its_labels(tmp_path: Path, run_derain) 
         scan = frame.read()
         np.testing.assert_array_equal(scan.xyz[:, 0], table["x"])
         assert len(frame.read_label(len(scan))) == len(scan)
-
-
-def test_labels_beside_a_bag_measure_methods(tmp_path: Path) -> None:
-    """What bench and tune measure by, without their processes."""
-    from derain.cards.card import load_card
-    from derain.datamodules.base import Loading
-    from derain.datamodules.labelled import labelled_scans
-
-    bag = small_bag(tmp_path, "sqlite3")
-    label = np.where(np.arange(300) >= 270, 110, 0)
-    for number in range(3):
-        write_labels(tmp_path / "drive.labels" / f"{number:06d}.label", label)
-    card = load_card("wads")
-    data = labelled_scans([bag], card, Loading())
-    scans = [data.read_measured(frame) for frame in data.frames("test")]
-
-    assert [int(card.rain_of(scan).sum()) for scan in scans] == [30, 30, 30]
 
 
 def test_without_the_library_the_extra_is_named(tmp_path: Path) -> None:

@@ -47,11 +47,10 @@ METHODS = ["dror", "position", "intensity", "all", "none"]
 
 
 def test_every_method_and_baseline_stands_in_one_table(
-    run_derain, root: Path, tmp_path: Path, onnx_model: Path
+    succeed, root: Path, tmp_path: Path, onnx_model: Path
 ) -> None:
     out = tmp_path / "out"
-    outcome = run_derain("bench", "--data", root, "--methods", onnx_model, *METHODS, "--out", out)
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("bench", "--data", root, "--methods", onnx_model, *METHODS, "--out", out)
     assert sorted(path.name for path in out.iterdir()) == FILES
     content = json.loads((out / "bench.json").read_text())
     rows = {row["method"]: row for row in content["rows"]}
@@ -115,14 +114,13 @@ def test_methods_are_timed_on_scaled_intensities(root: Path) -> None:
 
 
 def test_a_model_that_knows_the_scans_from_its_training_is_named(
-    run_derain, root: Path, tmp_path: Path, onnx_model: Path, saying
+    succeed, root: Path, tmp_path: Path, onnx_model: Path, saying
 ) -> None:
     spec = Derainer(onnx_model).metadata["spec"]
     here = {"data": "simulated rain", "training": {"sequences": ["002", "003", "000"]}}
     knowing, out = saying({"spec": {**spec, **here}}), tmp_path / "out"
     methods = [f"knowing={knowing}", f"other={onnx_model}", "all"]
-    outcome = run_derain("bench", "--data", root, "--methods", *methods, "--out", out)
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("bench", "--data", root, "--methods", *methods, "--out", out)
     (warning,) = [line for line in outcome.err.splitlines() if "warning" in line]
     assert warning.startswith("derain: warning: knowing was trained on 2 of these 3 scans, such as")
     assert str(root / "sequences/002/lidar_radar_pcd/0.bin") in warning
@@ -132,13 +130,12 @@ def test_a_model_that_knows_the_scans_from_its_training_is_named(
 
 
 def test_a_threshold_tuned_on_training_scans_is_warned_of(
-    run_derain, root: Path, tmp_path: Path, onnx_model: Path, saying
+    succeed, root: Path, tmp_path: Path, onnx_model: Path, saying
 ) -> None:
     spec = Derainer(onnx_model).metadata["spec"]
     here = {"data": "simulated rain", "training": {"sequences": ["001"]}}
     knowing = saying({"spec": {**spec, **here}})
-    outcome = run_derain("tune", knowing, "--data", root, "--out", tmp_path / "tuned.yaml")
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("tune", knowing, "--data", root, "--out", tmp_path / "tuned.yaml")
     assert "was trained on 1 of these 1 scans" in outcome.err
 
 
@@ -167,12 +164,11 @@ def test_the_command_in_the_report_makes_the_same_figures_again(
 
 
 def test_single_scans_are_benched_with_their_card(
-    run_derain, tmp_path: Path, write_labelled
+    run_derain, succeed, tmp_path: Path, write_labelled
 ) -> None:
     write_labelled(tmp_path / "a.bin", tmp_path / "a.label", rain=110)
     data = ["--data", tmp_path / "a.bin", "--card", "wads"]
-    outcome = run_derain("bench", *data, "--methods", "all", "--out", tmp_path / "out")
-    assert outcome.code == 0
+    succeed("bench", *data, "--methods", "all", "--out", tmp_path / "out")
     assert "# WADS, 1 scan, 300 points" in (tmp_path / "out/bench.md").read_text()
     refused = run_derain("bench", *data, "--methods", "position", "--out", tmp_path / "no")
     assert refused.code == 2
@@ -182,11 +178,10 @@ def test_single_scans_are_benched_with_their_card(
     assert not (tmp_path / "no").exists()
 
 
-def test_table_2_stands_beside_ours_for_each_part(run_derain, root: Path, tmp_path: Path) -> None:
+def test_table_2_stands_beside_ours_for_each_part(succeed, root: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     data = ["--paper", "table2", "--data", root, "--card", "rehearse3d"]
-    outcome = run_derain("bench", *data, "--methods", "dsor", "dror", "all", "--out", out)
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("bench", *data, "--methods", "dsor", "dror", "all", "--out", out)
     assert outcome.out == (out / "table2.md").read_text()
     for part in ("validation", "test"):
         assert sorted(path.name for path in (out / part).iterdir()) == FILES
@@ -199,33 +194,30 @@ def test_table_2_stands_beside_ours_for_each_part(run_derain, root: Path, tmp_pa
     assert f"{100 * ours:.2f}" in outcome.out
 
 
-def test_table_3_takes_the_rain_rates_of_a_file(run_derain, root: Path, tmp_path: Path) -> None:
+def test_table_3_takes_the_rain_rates_of_a_file(succeed, root: Path, tmp_path: Path) -> None:
     rates = tmp_path / "rates.yaml"
     rates.write_text(yaml.safe_dump({"002": 50, "003": 25}))
     out = tmp_path / "out"
     data = ["--paper", "table3", "--data", root, "--rain-rates", rates]
-    outcome = run_derain("bench", *data, "--methods", "dsor", "--out", out)
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("bench", *data, "--methods", "dsor", "--out", out)
     assert {path.name for path in out.iterdir()} == {"heavy", "medium", "table3.md"}
     assert "Ours on simulated rain." in outcome.out
     assert "(*) DSOR, medium: F1" in outcome.out
 
 
 def test_the_papers_tables_need_a_data_set_with_a_split(
-    run_derain, root: Path, tmp_path: Path
+    refused, root: Path, tmp_path: Path
 ) -> None:
     scans = root / "sequences/002/lidar_radar_pcd"
     data = ["--paper", "table2", "--data", scans, "--card", "rehearse3d"]
-    outcome = run_derain("bench", *data, "--methods", "all", "--out", tmp_path / "out")
-    assert outcome.code == 2
-    assert "has no split, which the paper's tables ask for. Name the root." in outcome.err
+    line = refused("bench", *data, "--methods", "all", "--out", tmp_path / "out")
+    assert "has no split, which the paper's tables ask for. Name the root." in line
 
 
 def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
-    run_derain, root: Path, monkeypatch: pytest.MonkeyPatch
+    refused, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr(bench, "score")
     out = root / "manifest.json"
-    outcome = run_derain("bench", "--data", root, "--methods", "all", "--out", out)
-    assert outcome.code == 2
-    assert "bench.json: cannot be written" in outcome.err
+    line = refused("bench", "--data", root, "--methods", "all", "--out", out)
+    assert "bench.json: cannot be written" in line

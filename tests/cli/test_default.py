@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from derain.cli.info_default import card_as_text
+from derain.cli.info import card_as_text
 from derain.default import ModelScore, default_model, model_card
 from derain.evaluation.hard_cases import scene
 from derain.export.runtime import Derainer
@@ -58,9 +58,8 @@ def test_scans_alone_are_cleaned_by_the_model_that_comes_with_derain(
     np.testing.assert_array_equal(judged(here / "cleaned"), expected)
 
 
-def test_with_json_it_says_so_beside_the_objects(run_derain, here: Path) -> None:
-    outcome = run_derain("run", "scans", "--out", "cleaned", "--json")
-    assert outcome.code == 0
+def test_with_json_it_says_so_beside_the_objects(succeed, here: Path) -> None:
+    outcome = succeed("run", "scans", "--out", "cleaned", "--json")
     assert [json.loads(line)["points"] for line in outcome.out.splitlines()] == [200, 200]
     assert outcome.err.startswith(SAYS)
 
@@ -75,10 +74,9 @@ def test_with_json_it_says_so_beside_the_objects(run_derain, here: Path) -> None
     ],
 )
 def test_a_method_that_is_named_is_the_one_that_cleans(
-    run_derain, here: Path, words: list[str]
+    succeed, here: Path, words: list[str]
 ) -> None:
-    outcome = run_derain("run", *words)
-    assert outcome.code == 0
+    outcome = succeed("run", *words)
     assert SAYS not in outcome.out + outcome.err
     assert len(judged(here / "cleaned")) == 2
 
@@ -110,9 +108,8 @@ def test_words_that_can_be_read_in_no_way_or_in_two_are_refused(
     assert not judged(here / "cleaned")
 
 
-def test_parameters_are_its_own(run_derain, here: Path) -> None:
-    outcome = run_derain("run", "scans", "--out", "all", "--set", "threshold=0")
-    assert outcome.code == 0
+def test_parameters_are_its_own(run_derain, succeed, here: Path) -> None:
+    outcome = succeed("run", "scans", "--out", "all", "--set", "threshold=0")
     probability = [Derainer(threads=1).probability(scene(200, number)) for number in range(2)]
     np.testing.assert_array_equal(judged(here / "all"), np.array(probability) > 0)
     Path("other.yaml").write_text("method: dsor\n")
@@ -140,11 +137,12 @@ def test_scores_of_a_card_are_a_table() -> None:
     assert "clean            -      -      -   0.050%" in text
 
 
-def test_a_folder_of_its_name_makes_it_unclear_what_is_asked(run_derain, here: Path) -> None:
+def test_a_folder_of_its_name_makes_it_unclear_what_is_asked(
+    run_derain, refused, here: Path
+) -> None:
     (here / "default").mkdir()
-    outcome = run_derain("info", "default")
-    assert outcome.code == 2
-    assert "default: it is the model that comes with derain, and something here" in outcome.err
+    line = refused("info", "default")
+    assert "default: it is the model that comes with derain, and something here" in line
     scene(50).tofile(here / "default" / "0.bin")
     assert run_derain("info", here / "default").code == 0
     assert run_derain("info", "./default").code == 0
@@ -162,14 +160,13 @@ def test_the_first_help_names_it(run_derain) -> None:
 
 
 def test_other_commands_know_it(
-    run_derain, here: Path, write_labelled: Callable[..., None]
+    run_derain, succeed, here: Path, write_labelled: Callable[..., None]
 ) -> None:
     for number in range(3):
         write_labelled(here / f"data/{number}.bin", here / f"data/{number}.label", rain=110)
     labelled = ["--data", "data", "--card", "wads"]
     out = ["--out", "bench", "--timed", "1", "--repeats", "1"]
-    outcome = run_derain("bench", *labelled, "--methods", "default", "all", *out)
-    assert outcome.code == 0, outcome.err
+    succeed("bench", *labelled, "--methods", "default", "all", *out)
     first, _ = json.loads(Path("bench/bench.json").read_text())["rows"]
     assert first["method"] == "default"
 

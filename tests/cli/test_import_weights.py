@@ -1,7 +1,6 @@
 """``derain import-weights`` makes a checkpoint of published weights, and of nothing else."""
 
 import json
-import pickle
 from pathlib import Path
 
 import pytest
@@ -25,8 +24,7 @@ def published(random_outdet: OutDet) -> dict[str, Tensor]:
     return {published: tensors[ours] for ours, published in PUBLISHED_KEYS.items()}
 
 
-@pytest.mark.parametrize("stats", ["wads", "kitti", "spray"])
-@pytest.mark.parametrize("prefix", ["", "module."])
+@pytest.mark.parametrize(("prefix", "stats"), [("", "wads"), ("module.", "spray")])
 def test_the_checkpoint_computes_what_the_weights_do(
     run_derain,
     published: dict[str, Tensor],
@@ -66,26 +64,13 @@ def test_normalisation_and_identity_are_two_things(
 
 
 def test_weights_that_know_rain_were_not_trained_on_clean_data(
-    run_derain, published: dict[str, Tensor], tmp_path: Path
+    refused, published: dict[str, Tensor], tmp_path: Path
 ) -> None:
     weights, out = tmp_path / "published.pt", tmp_path / "outdet.ckpt"
     torch.save(published, weights)
-    outcome = run_derain(
-        "import-weights", "outdet", weights, "--stats", "semantickitti", "--out", out
-    )
-    assert (outcome.code, outcome.out) == (2, "")
-    assert outcome.err.startswith("derain: --data: SemanticKITTI has no rain")
+    line = refused("import-weights", "outdet", weights, "--stats", "semantickitti", "--out", out)
+    assert line.startswith("derain: --data: SemanticKITTI has no rain")
     assert not out.exists()
-
-
-def test_a_training_checkpoint_that_holds_the_weights_will_do(
-    run_derain, published: dict[str, Tensor], tmp_path: Path
-) -> None:
-    weights, out = tmp_path / "published.pt", tmp_path / "outdet.ckpt"
-    torch.save({"epoch": 3, "state_dict": published}, weights)
-    outcome = run_derain("import-weights", "outdet", weights, "--stats", "wads", "--out", out)
-    assert outcome.code == 0
-    assert load_model(out).spec.data == "WADS"
 
 
 def of_image_network(model: DerainingModule, prefix: str = "") -> dict[str, Tensor]:
@@ -138,14 +123,6 @@ def training_checkpoint(model: DerainingModule) -> dict[str, object]:
     }
 
 
-@published_image_models
-def test_a_whole_training_checkpoint_of_an_image_network_will_do(
-    run_derain, image_model: DerainingModule, tmp_path: Path
-) -> None:
-    content = {**training_checkpoint(image_model), "scheduler": {"last_epoch": 7}}
-    assert_imported(run_derain, image_model, content, tmp_path)
-
-
 def test_a_checkpoint_as_salsanext_saves_it_will_do(
     run_derain, random_salsanext: SalsaNext, tmp_path: Path
 ) -> None:
@@ -176,19 +153,13 @@ def assert_imported(
     ],
 )
 def test_a_grid_that_is_missing_or_unknown_is_one_line_and_exit_code_2(
-    run_derain,
-    image_model: DerainingModule,
-    tmp_path: Path,
-    options: tuple[str, ...],
-    reason: str,
+    refused, image_model: DerainingModule, tmp_path: Path, options: tuple[str, ...], reason: str
 ) -> None:
     weights, out = tmp_path / "published", tmp_path / "model.ckpt"
     torch.save(of_image_network(image_model), weights)
-    outcome = run_derain(
+    line = refused(
         "import-weights", image_model.NAME, weights, "--stats", "kitti", "--out", out, *options
     )
-    assert (outcome.code, outcome.out) == (2, "")
-    (line,) = outcome.err.splitlines()
     assert reason in line
     assert not out.exists()
 
@@ -205,29 +176,6 @@ def test_a_network_that_sees_no_grid_is_given_none(
     assert not out.exists()
 
 
-class Trojan:
-    """Runs code when it is unpickled by a careless reader."""
-
-    def __init__(self, trace: Path) -> None:
-        self.trace = trace
-
-    def __reduce__(self) -> tuple[object, tuple[Path]]:
-        return Path.touch, (self.trace,)
-
-
-def test_weights_that_run_code_are_refused(run_derain, tmp_path: Path) -> None:
-    weights, trace = tmp_path / "trojan.pt", tmp_path / "trace"
-    torch.save({"state_dict": Trojan(trace)}, weights)
-    out = tmp_path / "out.ckpt"
-    outcome = run_derain("import-weights", "outdet", weights, "--stats", "wads", "--out", out)
-    assert outcome.code == 2
-    assert len(outcome.err.splitlines()) == 1
-    assert not trace.exists()
-    assert not out.exists()
-    pickle.loads(pickle.dumps(Trojan(trace)))  # so the trap does work
-    assert trace.exists()
-
-
 @pytest.mark.parametrize(
     ("network", "weights", "stats", "reason"),
     [
@@ -236,12 +184,10 @@ def test_weights_that_run_code_are_refused(run_derain, tmp_path: Path) -> None:
         ("outdet", "published.pt", "mars", "mars: no such data card. Give a YAML file or one of"),
         ("outdet", "published.pt", "rehearse3d", "the data card has no statistics"),
         ("outdet", "other.pt", "wads", "the state_dict is of another network (1 keys missing"),
-        ("outdet", "list.pt", "wads", "list.pt: holds a list"),
-        ("outdet", "text.pt", "wads", "text.pt: damaged"),
     ],
 )
 def test_what_cannot_be_imported_is_one_line_and_exit_code_2(
-    run_derain,
+    refused,
     published: dict[str, Tensor],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -253,24 +199,6 @@ def test_what_cannot_be_imported_is_one_line_and_exit_code_2(
     monkeypatch.chdir(tmp_path)
     torch.save(published, "published.pt")
     torch.save({key: tensor for key, tensor in published.items() if key != "fc.bias"}, "other.pt")
-    torch.save([1, 2], "list.pt")
-    Path("text.pt").write_text("weights")
-    outcome = run_derain("import-weights", network, weights, "--stats", stats, "--out", "out.ckpt")
-    assert (outcome.code, outcome.out) == (2, "")
-    (line,) = outcome.err.splitlines()
+    line = refused("import-weights", network, weights, "--stats", stats, "--out", "out.ckpt")
     assert reason in line
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        *("list.pt", "other.pt", "published.pt", "text.pt")
-    ]
-
-
-def test_an_output_that_cannot_be_written_is_reported(
-    run_derain, published: dict[str, Tensor], tmp_path: Path
-) -> None:
-    weights = tmp_path / "published.pt"
-    torch.save(published, weights)
-    out = weights / "outdet.ckpt"
-    outcome = run_derain("import-weights", "outdet", weights, "--stats", "wads", "--out", out)
-    assert outcome.code == 2
-    assert outcome.err.startswith(f"derain: {out}: cannot be written")
-    assert list(tmp_path.iterdir()) == [weights]
+    assert {path.name for path in tmp_path.iterdir()} == {"other.pt", "published.pt"}

@@ -168,18 +168,13 @@ def test_files_and_folders_can_be_named_together(run_derain, data_set: Path) -> 
     ],
 )
 def test_what_cannot_be_meant_is_one_line(
-    run_derain, data_set: Path, arguments: list[str], reason: str
+    refused, data_set: Path, arguments: list[str], reason: str
 ) -> None:
-    outcome = run_derain("info", data_set, *arguments)
-    assert (outcome.code, outcome.out) == (2, "")
-    (line,) = outcome.err.splitlines()
-    assert reason in line
+    assert reason in refused("info", data_set, *arguments)
 
 
-def test_an_empty_folder_is_refused(run_derain, tmp_path: Path) -> None:
-    outcome = run_derain("info", tmp_path)
-    assert (outcome.code, outcome.out) == (2, "")
-    assert "holds no scans" in outcome.err
+def test_an_empty_folder_is_refused(refused, tmp_path: Path) -> None:
+    assert "holds no scans" in refused("info", tmp_path)
 
 
 @pytest.mark.parametrize(("rain", "doubted"), [(110, False), (70, True)], ids=["WADS", "KITTI"])

@@ -59,12 +59,11 @@ def weights(model: Path) -> str:
 
 @pytest.mark.usefixtures("one_block")
 def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
-    run_derain, write: WriteRecording
+    succeed, write: WriteRecording
 ) -> None:
     recording, work = write(), Path("model_learning")
     command = ("learn", recording, "--out", "model.onnx", *QUICK)
-    outcome = run_derain(*command)
-    assert outcome.code == 0, outcome.err
+    outcome = succeed(*command)
     steps = [line.partition(":")[0] for line in outcome.out.splitlines()]
     assert [step for step in steps if step.istitle()][:3] == ["Teaching", "Training", "Export"]
     assert "(step 3 of 3)" in outcome.out
@@ -92,8 +91,7 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
         label = recording.parent / "labels" / f"{number:06d}.label"
         write_labels(label, np.where(np.arange(600) < 540, 110, 65535))
     (work / "left.txt").touch()
-    outcome = run_derain(*command, "--card", "wads", "--rerun", "report.rrd")
-    assert outcome.code == 0, outcome.err
+    outcome = succeed(*command, "--card", "wads", "--rerun", "report.rrd")
     assert weights(Path("model.onnx")) == without_labels
     assert "Nothing could be measured" in (work / "report.md").read_text()
     assert not (work / "left.txt").exists()
@@ -125,13 +123,12 @@ def shows_teacher_and_student(found: ReadBack, recording: Path, work: Path) -> N
     assert [number for number, text in captions.items() if ", held out" in text[0]] == [4]
 
 
-def test_a_folder_of_something_else_is_not_cleared(run_derain, write: WriteRecording) -> None:
+def test_a_folder_of_something_else_is_not_cleared(refused, write: WriteRecording) -> None:
     mine = Path("mine/notes.txt")
     mine.parent.mkdir()
     mine.touch()
-    outcome = run_derain("learn", write(), "--out", "model.onnx", "--work", "mine")
-    assert outcome.code == 2
-    assert "mine: holds something other than what an earlier run left" in outcome.err
+    line = refused("learn", write(), "--out", "model.onnx", "--work", "mine")
+    assert "mine: holds something other than what an earlier run left" in line
     assert mine.exists()
 
 

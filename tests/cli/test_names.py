@@ -52,11 +52,10 @@ def assert_fit_for_a_terminal(text: str) -> None:
     ],
 )
 def test_odd_names_are_told_in_one_line_each_and_whole_in_json(
-    run_derain, scans: list[Path], command: list[str]
+    run_derain, succeed, scans: list[Path], command: list[str]
 ) -> None:
     command = [word.format(dir=scans[0].parent) for word in command]
-    outcome = run_derain(*command)
-    assert outcome.code == 0, outcome.err
+    outcome = succeed(*command)
     assert_fit_for_a_terminal(outcome.out)
     told = outcome.out.splitlines()
     assert all(line.startswith(r"dir\udcff\x1b[1m/") for line in told[: len(scans)])
@@ -66,20 +65,18 @@ def test_odd_names_are_told_in_one_line_each_and_whole_in_json(
     assert {path.name for path in Path("out").glob("*.bin")} == {path.name for path in scans}
 
 
-def test_info_tells_of_odd_names(run_derain, scans: list[Path]) -> None:
-    outcome = run_derain("info", *scans, scans[0].parent, "--columns", "x,y,z,intensity")
-    assert outcome.code == 0, outcome.err
+def test_info_tells_of_odd_names(run_derain, succeed, scans: list[Path]) -> None:
+    outcome = succeed("info", *scans, scans[0].parent, "--columns", "x,y,z,intensity")
     assert_fit_for_a_terminal(outcome.out)
     outcome = run_derain("info", *scans, "--json")
     assert [json.loads(line)["file"] for line in outcome.out.splitlines()] == list(map(str, scans))
 
 
-def test_what_is_written_of_odd_names_is_text(run_derain, scans: list[Path]) -> None:
+def test_what_is_written_of_odd_names_is_text(succeed, scans: list[Path]) -> None:
     data = ["--data", scans[0].parent, "--card", "wads"]
     title = os.fsdecode(b"\xfftitle\x1b[1m=dror")
     once = ["--limit", "1", "--timed", "1", "--repeats", "1"]
-    outcome = run_derain("bench", *data, "--methods", title, "--out", "bench", *once)
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("bench", *data, "--methods", title, "--out", "bench", *once)
     assert_fit_for_a_terminal(outcome.out)
     assert r"\udcfftitle\x1b[1m" in outcome.out
     assert_fit_for_a_terminal((Path("bench") / "bench.md").read_text("utf-8"))
@@ -94,10 +91,9 @@ def test_a_command_line_of_odd_names_is_one_line_of_text() -> None:
 
 
 @pytest.mark.parametrize("number", [1, 4])
-def test_odd_names_are_drawn(run_derain, scans: list[Path], number: int) -> None:
+def test_odd_names_are_drawn(succeed, scans: list[Path], number: int) -> None:
     picture = Path(f"{scans[number].stem}.png")
-    outcome = run_derain("view", scans[number], "--methods", "dror", "--out", picture)
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("view", scans[number], "--methods", "dror", "--out", picture)
     assert_fit_for_a_terminal(outcome.out)
     assert picture.stat().st_size > 0
 
@@ -128,16 +124,11 @@ def test_odd_names_are_drawn(run_derain, scans: list[Path], number: int) -> None
     ids=" ".join,
 )
 def test_a_name_that_is_too_long_is_one_line(
-    run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
+    refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     scene(300).tofile("a.bin")
-    outcome = run_derain(*(word.format(long=TOO_LONG) for word in command))
-    assert outcome.code == 2
-    assert outcome.out == ""
-    assert outcome.err.startswith("derain: ")
-    assert len(outcome.err.splitlines()) == 1
-    assert TOO_LONG in outcome.err
+    assert TOO_LONG in refused(*(word.format(long=TOO_LONG) for word in command))
 
 
 def test_a_scan_whose_labels_could_have_no_name_does_not_stop_the_others(

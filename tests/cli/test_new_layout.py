@@ -1,7 +1,6 @@
 """A data set that derain has never heard of needs one YAML, its data card."""
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
@@ -27,7 +26,7 @@ def data(tmp_path: Path, write_labelled) -> list[str | Path]:
     return ["--data", tmp_path / "ours", "--card", tmp_path / "ours.yaml"]
 
 
-def test_info_counts_it(run_derain, data: list[str | Path], tmp_path: Path) -> None:
+def test_info_counts_it(run_derain, succeed, data: list[str | Path], tmp_path: Path) -> None:
     _, root, *card = data
     for part, sequences in {
         "": 3,
@@ -35,8 +34,7 @@ def test_info_counts_it(run_derain, data: list[str | Path], tmp_path: Path) -> N
         "drives/friday": 1,
         "drives/friday/lidar": 1,
     }.items():
-        outcome = run_derain("info", root / part, *card, "--json")
-        assert outcome.code == 0, outcome.err
+        outcome = succeed("info", root / part, *card, "--json")
         facts = json.loads(outcome.out)
         assert facts["layout"] == ["lidar", "truth"]
         assert (facts["card"], facts["sequences"], facts["scans"]) == (
@@ -48,30 +46,11 @@ def test_info_counts_it(run_derain, data: list[str | Path], tmp_path: Path) -> N
     assert run_derain("info", root).code == 2  # without the card, nothing says where scans lie
 
 
-def test_what_is_stated_goes_before_the_card(run_derain, data: list[str | Path]) -> None:
-    _, root, *card = data
-    outcome = run_derain("info", root, *card, "--layout", "lidar,elsewhere", "--json")
-    facts = json.loads(outcome.out)
-    assert (facts["sequences"], facts["scans"], facts["labelled_points"]) == (3, 6, 0)
-
-
-def test_methods_are_tuned_on_its_validation_part(
-    run_derain, data: list[str | Path], tmp_path: Path
-) -> None:
-    shutil.rmtree(tmp_path / "ours/drives/monday")  # of which tuning takes nothing
-    out = tmp_path / "best.yaml"
-    outcome = run_derain("tune", "dror", *data, "--trials", "3", "--out", out)
-    assert outcome.code == 0, outcome.err
-    assert " on 2 scans of ours, " in outcome.out
-    assert out.is_file()
-
-
 def test_methods_are_compared_on_its_test_part(
-    run_derain, data: list[str | Path], tmp_path: Path
+    succeed, data: list[str | Path], tmp_path: Path
 ) -> None:
     options = ["--methods", "dror", "--timed", "1", "--repeats", "1", "--out", tmp_path / "bench"]
-    outcome = run_derain("bench", *data, *options)
-    assert outcome.code == 0, outcome.err
+    succeed("bench", *data, *options)
     (row,) = json.loads((tmp_path / "bench/bench.json").read_text())["rows"]
     assert sum(row["counts"].values()) == 600
     assert row["counts"]["true_positive"] + row["counts"]["false_negative"] == 60

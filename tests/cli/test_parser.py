@@ -65,12 +65,10 @@ def test_a_value_that_an_option_cannot_have_is_refused_in_words(
     ],
 )
 def test_a_slip_is_one_line_that_names_what_is_meant(
-    run_derain, tmp_path, monkeypatch: pytest.MonkeyPatch, words: str, named: tuple[str, ...]
+    refused, tmp_path, monkeypatch: pytest.MonkeyPatch, words: str, named: tuple[str, ...]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    outcome = run_derain(*words.split())
-    assert (outcome.code, outcome.out) == (2, "")
-    (line,) = outcome.err.splitlines()
+    line = refused(*words.split())
     for part in named:
         assert part in line
 

@@ -5,12 +5,11 @@ from pathlib import Path
 from derain.evaluation.hard_cases import scene
 
 
-def test_odometry_on_request_tells_where_it_fails(run_derain, tmp_path: Path) -> None:
+def test_odometry_on_request_tells_where_it_fails(succeed, tmp_path: Path) -> None:
     for number in range(3):  # scans of different places, with too little in them
         scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
     options = ("--out", tmp_path / "out", "--poses", "odometry")
-    outcome = run_derain("run", "persistence", tmp_path, *options)
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("run", "persistence", tmp_path, *options)
     first = outcome.err.splitlines()[0]
     assert first.startswith(
         f"derain: warning: {tmp_path / '1.bin'}: where it was taken is not known"

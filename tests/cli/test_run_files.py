@@ -19,17 +19,16 @@ def rain_of(label_file: Path) -> NDArray[np.bool_]:
 
 
 def test_columns_are_taken_as_stated_and_all_kept(
-    run_derain, onnx_model: Path, tmp_path: Path
+    succeed, onnx_model: Path, tmp_path: Path
 ) -> None:
     points = scene(200)
     wide = np.column_stack([points, np.arange(200, dtype=np.float32)])
     wide.tofile(tmp_path / "wide.bin")
     out = tmp_path / "out"
-    outcome = run_derain(
+    succeed(
         *("run", onnx_model, tmp_path / "wide.bin", "--out", out),
         *("--columns", "x,y,z,intensity,ring"),
     )
-    assert outcome.code == 0
     rain = rain_of(out / "wide.label")
     np.testing.assert_array_equal(rain, Derainer(onnx_model)(points))
     assert (out / "wide.bin").read_bytes() == wide[~rain].tobytes()

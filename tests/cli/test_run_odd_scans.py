@@ -33,10 +33,9 @@ def scans(tmp_path: Path) -> Path:
 
 
 def test_every_fault_is_told_with_its_first_file_and_counted(
-    run_derain, scans: Path, onnx_model: Path, tmp_path: Path
+    succeed, scans: Path, onnx_model: Path, tmp_path: Path
 ) -> None:
-    outcome = run_derain("run", onnx_model, scans, "--out", tmp_path / "out", "--json")
-    assert outcome.code == 0
+    outcome = succeed("run", onnx_model, scans, "--out", tmp_path / "out", "--json")
     *told, summary = outcome.said
     assert told == [
         f"derain: warning: {scans / 'b.pcd'}: no intensity: the mean of WADS, 9.88, stands in",
@@ -62,10 +61,9 @@ def test_a_constant_intensity_is_judged_as_none(
     assert (Derainer(onnx_model)(mean) == second).all()
 
 
-def test_a_method_that_takes_nearly_all_says_so(run_derain, scans: Path, tmp_path: Path) -> None:
+def test_a_method_that_takes_nearly_all_says_so(succeed, scans: Path, tmp_path: Path) -> None:
     options = ["--set", "radius=1e-6", "--out", tmp_path / "out"]
-    outcome = run_derain("run", "ror", scans, *options)
-    assert outcome.code == 0
+    outcome = succeed("run", "ror", scans, *options)
     assert outcome.err.splitlines() == [
         f"derain: warning: {scans / 'a.bin'}: 100% of the points are called rain, where the "
         "heaviest rain has 17%: the method may not suit the sensor",
@@ -79,11 +77,7 @@ def test_a_method_that_takes_nearly_all_says_so(run_derain, scans: Path, tmp_pat
 
 @pytest.mark.parametrize("options", [[], ["--most-removed", "0.99"]])
 def test_a_scan_that_would_lose_too_much_is_left_whole(
-    run_derain,
-    tmp_path: Path,
-    scans: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    options: list[str],
+    run_derain, tmp_path: Path, scans: Path, monkeypatch: pytest.MonkeyPatch, options: list[str]
 ) -> None:
     monkeypatch.setattr("derain.cli.run.MOST_RAIN", MOST_RAIN)
     spread = scene(200) * np.array([1e3, 1e3, 1e3, 1], np.float32)
@@ -100,16 +94,13 @@ def test_a_scan_that_would_lose_too_much_is_left_whole(
 
 
 @pytest.mark.parametrize("share", ["1.01", "-0.1", "nan"])
-def test_a_share_that_is_none_is_refused(
-    run_derain, scans: Path, tmp_path: Path, share: str
-) -> None:
-    outcome = run_derain("run", "ror", scans, "--out", tmp_path / "out", f"--most-removed={share}")
-    assert outcome.code == 2
-    assert f"--most-removed: {share} is not a number from 0 to 1" in outcome.err
+def test_a_share_that_is_none_is_refused(refused, scans: Path, tmp_path: Path, share: str) -> None:
+    line = refused("run", "ror", scans, "--out", tmp_path / "out", f"--most-removed={share}")
+    assert f"--most-removed: {share} is not a number from 0 to 1" in line
 
 
 def test_a_scan_is_projected_once_and_in_the_time_that_is_told(
-    run_derain, salsanext_onnx: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    succeed, salsanext_onnx: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     points = scene(400)
     points[:100, 2] = 80.0  # above the grid
@@ -121,8 +112,7 @@ def test_a_scan_is_projected_once_and_in_the_time_that_is_told(
         return pixel(grid, xyz)
 
     monkeypatch.setattr(SphericalGrid, "pixel", counting)
-    outcome = run_derain("run", salsanext_onnx, tmp_path / "scan.bin", "--out", tmp_path / "out")
-    assert outcome.code == 0
+    outcome = succeed("run", salsanext_onnx, tmp_path / "scan.bin", "--out", tmp_path / "out")
     assert [points for points in projected if points] == [400]  # of none when a model is opened
     grid = Derainer(salsanext_onnx).view.grid
     outside = (grid.pixel(points[:, :3]) < 0).mean()
@@ -133,7 +123,7 @@ def test_a_scan_is_projected_once_and_in_the_time_that_is_told(
     ]
 
 
-def test_parts_of_a_file_that_are_not_written_are_named(run_derain, tmp_path: Path) -> None:
+def test_parts_of_a_file_that_are_not_written_are_named(succeed, tmp_path: Path) -> None:
     points = "\n".join(f"{x} {y} {x * y % 7}" for x in range(1, 4) for y in range(40))
     scan = tmp_path / "mesh.ply"
     scan.write_text(
@@ -141,18 +131,16 @@ def test_parts_of_a_file_that_are_not_written_are_named(run_derain, tmp_path: Pa
         "property float z\nelement edge 1\nproperty int a\nproperty int b\nend_header\n"
         f"{points}\n0 1\n"
     )
-    outcome = run_derain("run", "ror", scan, "--out", tmp_path / "out")
-    assert outcome.code == 0
+    outcome = succeed("run", "ror", scan, "--out", tmp_path / "out")
     assert outcome.said == [f"derain: warning: {scan}: the cleaned file is without its edge"]
 
 
 @pytest.mark.parametrize("command", ["run dror", "info"])
-def test_a_file_without_points_is_warned_of(run_derain, tmp_path: Path, command: str) -> None:
+def test_a_file_without_points_is_warned_of(succeed, tmp_path: Path, command: str) -> None:
     scan = tmp_path / "empty.bin"
     scan.touch()
     out = ("--out", tmp_path / "out") if command != "info" else ()
-    outcome = run_derain(*command.split(), scan, *out)
-    assert outcome.code == 0
+    outcome = succeed(*command.split(), scan, *out)
     (warning,) = outcome.err.splitlines()
     assert warning.startswith(f"derain: warning: {scan}: it holds no points")
 

@@ -63,11 +63,10 @@ LEVELS = ("--warning", "40", "90", "--error", "5", "9", "--hold", "2")
 
 
 def test_json_says_what_the_labels_that_are_written_say(
-    run_derain, recording: Path, tmp_path: Path
+    succeed, recording: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    outcome = run_derain("run", "dror", recording, "--out", out, "--json", *LEVELS)
-    assert outcome.code == 0
+    outcome = succeed("run", "dror", recording, "--out", out, "--json", *LEVELS)
     alarm = Alarm(Threshold(40, 90), Threshold(5, 9), hold=2)
     told, weathers = objects(outcome.out), weather_of(recording, out)
     for item, weather in zip(told, weathers, strict=True):
@@ -129,10 +128,7 @@ def test_without_an_option_that_asks_a_few_scans_are_enough_for_the_last_line(
 
 @pytest.mark.parametrize(
     ("asked", "code", "told"),
-    [
-        ("warning", 3, "the weather was at warning or worse in 2 of 6 scans"),
-        ("error", 0, ""),
-    ],
+    [("warning", 3, "the weather was at warning or worse in 2 of 6 scans"), ("error", 0, "")],
 )
 def test_bad_weather_can_be_told_by_the_exit_code_after_all_scans(
     run_derain, recording: Path, tmp_path: Path, asked: str, code: int, told: str
@@ -151,11 +147,10 @@ def test_bad_weather_can_be_told_by_the_exit_code_after_all_scans(
 
 
 def test_a_table_has_a_line_a_scan_and_nothing_where_nothing_is_known(
-    run_derain, recording: Path, tmp_path: Path
+    succeed, recording: Path, tmp_path: Path
 ) -> None:
     out, table = tmp_path / "out", tmp_path / "tables/weather.csv"
-    outcome = run_derain("run", "dror", recording, "--out", out, "--weather", table, "--json")
-    assert outcome.code == 0
+    outcome = succeed("run", "dror", recording, "--out", out, "--weather", table, "--json")
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["scan"] for row in rows] == [str(path) for path in sorted(recording.iterdir())]
@@ -224,26 +219,22 @@ def test_nothing_is_left_of_the_table_where_the_run_fails(
     "table", ["000002.bin", "000002.label", "../removed/000002.bin", ".", ".."]
 )
 def test_a_table_never_takes_the_place_of_a_result(
-    run_derain, recording: Path, tmp_path: Path, table: str
+    refused, recording: Path, tmp_path: Path, table: str
 ) -> None:
     out = tmp_path / "out"
     (tmp_path / "link").symlink_to(out, target_is_directory=True)
     options = ("--removed", tmp_path / "removed", "--weather", tmp_path / "link" / table)
-    outcome = run_derain("run", "dror", recording, "--out", out, *options)
-    assert (outcome.code, outcome.out) == (2, "")
-    assert "Give --weather another file" in outcome.err
+    line = refused("run", "dror", recording, "--out", out, *options)
+    assert "Give --weather another file" in line
     assert not out.exists()
 
 
-def test_the_table_of_an_earlier_run_is_replaced(
-    run_derain, recording: Path, tmp_path: Path
-) -> None:
+def test_the_table_of_an_earlier_run_is_replaced(succeed, recording: Path, tmp_path: Path) -> None:
     table = tmp_path / "out/weather.csv"
     (tmp_path / "out").mkdir()
     table.touch()
     for scans in (recording, recording / "000000.bin"):
-        outcome = run_derain("run", "dror", scans, "--out", tmp_path / "out", "--weather", table)
-        assert outcome.code == 0, outcome.err
+        succeed("run", "dror", scans, "--out", tmp_path / "out", "--weather", table)
     assert len(table.read_text().splitlines()) == 1 + 1
 
 
@@ -323,15 +314,14 @@ def test_range_that_is_lost_beside_a_dry_reference_is_a_level(
 
 
 def test_a_reference_that_can_show_no_level_is_refused(
-    run_derain, recording: Path, tmp_path: Path
+    run_derain, succeed, recording: Path, tmp_path: Path
 ) -> None:
     small = recording / "000000.bin"  # a wall at 15 m
     arguments = ("run", "dror", recording, "--out", tmp_path / "out", "--dry")
     outcome = run_derain(*arguments, small)
     assert (outcome.code, outcome.out) == (2, "")
     assert f"{small}: its reach is 15" in outcome.err
-    outcome = run_derain(*arguments, small, "--error", "10", "14")
-    assert outcome.code == 0
+    outcome = succeed(*arguments, small, "--error", "10", "14")
     assert "for the error alone" in outcome.err
 
 
@@ -345,9 +335,7 @@ def test_a_reference_that_can_show_no_level_is_refused(
     ],
 )
 def test_levels_that_cannot_be_are_refused_before_any_work(
-    run_derain, recording: Path, tmp_path: Path, options: tuple[str, ...], reason: str
+    refused, recording: Path, tmp_path: Path, options: tuple[str, ...], reason: str
 ) -> None:
-    outcome = run_derain("run", "dror", recording, "--out", tmp_path / "out", *options)
-    assert (outcome.code, outcome.out) == (2, "")
-    assert reason in outcome.err
+    assert reason in refused("run", "dror", recording, "--out", tmp_path / "out", *options)
     assert not (tmp_path / "out").exists()

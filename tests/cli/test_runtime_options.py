@@ -59,15 +59,3 @@ def test_openvino_that_is_not_installed_is_one_line(
     assert (outcome.code, outcome.out) == (2, "")
     assert outcome.err.endswith("not installed. pip install 'derain[openvino]'\n")
     assert not (tmp_path / "out").exists()
-
-
-def test_a_filter_has_no_runtime(run_derain, scan: Path, tmp_path: Path) -> None:
-    outcome = run_derain("run", "dror", scan, "--out", tmp_path / "out", "--runtime", "openvino")
-    assert outcome.code == 2
-    assert outcome.err.startswith("derain: dror: a filter, which has no network")
-    bench = ["bench", "--data", scan, "--card", "wads", "--methods", "dror", "--out", tmp_path]
-    outcome = run_derain(*bench, "--runtime", "openvino")
-    assert outcome.code == 2
-    assert (
-        outcome.err == "derain: runtime openvino: none of the methods is a model. Leave it out.\n"
-    )

@@ -29,7 +29,7 @@ def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     ids=["as the card says", "named", "not"],
 )
 def test_points_that_a_scan_holds_twice_are_counted_alike(
-    run_derain,
+    succeed,
     wads: list[str],
     tmp_path: Path,
     checkpoint: Path,
@@ -43,12 +43,10 @@ def test_points_that_a_scan_holds_twice_are_counted_alike(
     scene(300)[rows].tofile(scan)
     write_labels(scan.parent.parent / "labels/0.label", np.where(rows >= 240, 110, 40))
 
-    tested = run_derain("test", *wads, "--ckpt_path", checkpoint, *test_options)
-    assert tested.code == 0, tested.err
+    succeed("test", *wads, "--ckpt_path", checkpoint, *test_options)
     (report,) = (json.loads(path.read_text()) for path in tmp_path.rglob("test.json"))
     options = ["--data", scan, "--card", "wads", "--methods", onnx_model, *bench_options]
-    benched = run_derain("bench", *options, "--timed", "1", "--repeats", "1", "--out", "bench")
-    assert benched.code == 0, benched.err
+    succeed("bench", *options, "--timed", "1", "--repeats", "1", "--out", "bench")
     (row,) = json.loads(Path("bench/bench.json").read_text())["rows"]
 
     assert sum(row["counts"].values()) == points
@@ -65,7 +63,7 @@ def test_points_that_a_scan_holds_twice_are_counted_alike(
 
 
 def test_baselines_learn_nothing_from_points_that_may_be_rain_or_not(
-    run_derain, tmp_path: Path
+    succeed, tmp_path: Path
 ) -> None:
     # In the voxel at 1 m all that is known is rain; were the unknown taken for dry, it would not
     # be, and neither would the dim be. At 5 m all is known.
@@ -78,8 +76,7 @@ def test_baselines_learn_nothing_from_points_that_may_be_rain_or_not(
     card = {"name": "ours", "classes": {0: "dry", 1: "rain", 2: "haze"}}
     Path("card.yaml").write_text(yaml.safe_dump({**card, "rain": [1], "unknown": [2]}))
     options = ["--data", "scan.bin", "--train", "scan.bin", "--card", "card.yaml"]
-    outcome = run_derain("bench", *options, "--methods", "position", "intensity", "--out", "bench")
-    assert outcome.code == 0, outcome.err
+    succeed("bench", *options, "--methods", "position", "intensity", "--out", "bench")
     for row in json.loads(Path("bench/bench.json").read_text())["rows"]:
         assert row["counts"] == {
             "true_positive": 4,

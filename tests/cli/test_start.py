@@ -66,14 +66,13 @@ def test_default_is_the_checkpoint_that_derain_comes_with(
 
 
 def test_fit_begins_with_the_weights_of_its_start(
-    run_derain, tmp_path: Path, wads: list[str], monkeypatch: pytest.MonkeyPatch
+    succeed, tmp_path: Path, wads: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     source = trained(tmp_path / "start.ckpt")
     # At a rate of nothing, it ends where it began.
     still = ("--model.learning_rate", "0", "--model.weight_decay", "0", "--trainer.max_epochs", "1")
-    outcome = run_derain("fit", *wads, "--start", "start.ckpt", *still, "--panels.scans", "1")
-    assert outcome.code == 0, outcome.err
+    succeed("fit", *wads, "--start", "start.ckpt", *still, "--panels.scans", "1")
     run = Path("runs/outdet_wads/version_0")
     student = load_model(run / "checkpoints/last.ckpt")
     for name, parameter in source.named_parameters():
@@ -82,12 +81,10 @@ def test_fit_begins_with_the_weights_of_its_start(
     assert name.startswith("start.ckpt (")
     assert student.hparams["learning_rate"] == 0
     assert "start: start.ckpt" in (run / "config.yaml").read_text()
-    # Its checkpoints are used, and gone on from, as any other.
+    # A training goes on from its checkpoints as from any other.
     last = ("--ckpt_path", run / "checkpoints/last.ckpt")
-    assert run_derain("test", *wads, *last).code == 0
     more = ("--start", "start.ckpt", *still[:-1], "2")
-    outcome = run_derain("fit", *wads, *more, *last)
-    assert outcome.code == 0, outcome.err
+    succeed("fit", *wads, *more, *last)
 
 
 def test_fit_tells_what_it_cannot_start_from(run_derain, tmp_path: Path, wads: list[str]) -> None:
@@ -116,14 +113,13 @@ def recording(tmp_path: Path) -> Callable[[int], Path]:
 
 @pytest.mark.usefixtures("one_block")
 def test_learn_takes_over_what_its_start_sees_and_says_so(
-    run_derain, tmp_path: Path, recording, monkeypatch: pytest.MonkeyPatch
+    succeed, tmp_path: Path, recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     trained(Path("mine.ckpt"))
     command = ("learn", recording(4), "--out", "student.onnx", "--teacher", "dror")
-    outcome = run_derain(*command, "--epochs", "1", "--start", "mine.ckpt")
-    assert outcome.code == 0, outcome.err
+    succeed(*command, "--epochs", "1", "--start", "mine.ckpt")
     spec = Derainer("student.onnx").spec
     assert spec.channels == ("range",)
     assert spec.view["neighbours"] == 4

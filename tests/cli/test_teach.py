@@ -33,10 +33,9 @@ def drive(tmp_path: Path) -> Path:
     return folder
 
 
-def test_it_tells_of_every_scan_and_of_all(run_derain, drive: Path, tmp_path: Path) -> None:
+def test_it_tells_of_every_scan_and_of_all(succeed, drive: Path, tmp_path: Path) -> None:
     out = tmp_path / "taught"
-    outcome = run_derain("teach", "between", drive, "--out", out, "--set", "rain_below=7")
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("teach", "between", drive, "--out", out, "--set", "rain_below=7")
     lines = outcome.out.splitlines()
     assert [line.split(":")[0] for line in lines[:6]] == [
         str(drive / f"{number:06d}.bin") for number in range(6)
@@ -57,10 +56,9 @@ def test_it_tells_of_every_scan_and_of_all(run_derain, drive: Path, tmp_path: Pa
 
 
 def test_truth_is_measured_for_the_record_where_a_card_explains_it(
-    run_derain, drive: Path, tmp_path: Path
+    succeed, drive: Path, tmp_path: Path
 ) -> None:
-    outcome = run_derain("teach", "dror", drive, "--out", tmp_path / "out", "--card", "wads")
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("teach", "dror", drive, "--out", tmp_path / "out", "--card", "wads")
     told = outcome.out.split("for the record only, beside WADS's own labels of 6 scans")[1]
     lines = [line.split() for line in told.splitlines()]
     assert ["class", "points", "called", "rain", "of", "those", "it", "is", "sure", "of"] in lines
@@ -68,10 +66,9 @@ def test_truth_is_measured_for_the_record_where_a_card_explains_it(
     assert any(line[:3] == ["falling-snow", "(rain)", "120"] for line in lines)
 
 
-def test_garbage_truth_is_told_and_hinders_nothing(run_derain, drive: Path, tmp_path: Path) -> None:
+def test_garbage_truth_is_told_and_hinders_nothing(succeed, drive: Path, tmp_path: Path) -> None:
     (drive.parent / "labels/000003.label").write_bytes(b"garbage")
-    outcome = run_derain("teach", "dror", drive, "--out", tmp_path / "out", "--card", "wads")
-    assert outcome.code == 0
+    outcome = succeed("teach", "dror", drive, "--out", tmp_path / "out", "--card", "wads")
     assert "not measured" in outcome.err
     assert "labels of 5 scans" in outcome.out
     assert len(Manifest.read(tmp_path / "out").scans) == 6
@@ -112,31 +109,28 @@ def test_what_is_wrong_is_told(
     assert (tmp_path / "out").exists() == ("no rain" in told)
 
 
-def test_two_scans_are_all_for_training(run_derain, drive: Path, tmp_path: Path) -> None:
+def test_two_scans_are_all_for_training(run_derain, succeed, drive: Path, tmp_path: Path) -> None:
     for number in range(2, 6):
         (drive / f"{number:06d}.bin").unlink()
-    outcome = run_derain("teach", "dror", drive, "--out", tmp_path / "out")
-    assert outcome.code == 0
+    outcome = succeed("teach", "dror", drive, "--out", tmp_path / "out")
     assert "no scan is held out" in outcome.err
     outcome = run_derain("teach", "between", drive, "--out", tmp_path / "windows")
     assert outcome.code == 2
     assert "2 scans in its recording" in outcome.err
 
 
-def test_scans_out_of_order_are_warned_of(run_derain, drive: Path, tmp_path: Path) -> None:
+def test_scans_out_of_order_are_warned_of(run_derain, succeed, drive: Path, tmp_path: Path) -> None:
     (drive / "times.txt").write_text("0\n0.1\n0.3\n0.2\n0.4\n9\n")
-    outcome = run_derain("teach", "between", drive, "--out", tmp_path / "out")
-    assert outcome.code == 0
+    outcome = succeed("teach", "between", drive, "--out", tmp_path / "out")
     assert "000003.bin: not later than the scan before it" in outcome.err
     assert "000005.bin: more than 1 s after the scan before it" in outcome.err
     assert "not later" not in run_derain("teach", "dror", drive, "--out", tmp_path / "o").err
 
 
 def test_the_cleaned_recording_has_its_best_guesses(
-    run_derain, drive: Path, tmp_path: Path
+    run_derain, succeed, drive: Path, tmp_path: Path
 ) -> None:
-    outcome = run_derain("run", "between", drive, "--out", tmp_path / "out", "--poses", "standing")
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("run", "between", drive, "--out", tmp_path / "out", "--poses", "standing")
     points = scene(POINTS, 1)
     rain = points[:, 3] < 20
     np.testing.assert_array_equal(read_labels(tmp_path / "out/000001.label", POINTS), rain)
@@ -151,7 +145,7 @@ def test_the_cleaned_recording_has_its_best_guesses(
 
 @pytest.mark.parametrize("command", ["run", "teach"])
 def test_the_sensor_is_where_the_user_says(
-    run_derain, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+    run_derain, succeed, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     made: list[Between] = []
 
@@ -165,8 +159,7 @@ def test_the_sensor_is_where_the_user_says(
     poses.write_text("".join(f"1 0 0 {n} 0 1 0 0 0 0 1 0\n" for n in range(6)))
     ways = {"none": [], "file": ["--poses", poses], "standing": ["--poses", "standing"]}
     for name, options in ways.items():
-        outcome = run_derain(command, "between", drive, "--out", tmp_path / name, *options)
-        assert outcome.code == 0, outcome.err
+        outcome = succeed(command, "between", drive, "--out", tmp_path / name, *options)
     unknown, read, standing = (method.poses for method in made)
     assert unknown == [None] * 6
     assert [pose[0, 3] for pose in read] == [0, 1, 2, 3, 4, 5]
@@ -180,13 +173,12 @@ def test_the_sensor_is_where_the_user_says(
 
 
 def test_recordings_that_number_their_scans_alike_are_told_apart(
-    run_derain, drive: Path, tmp_path: Path
+    succeed, drive: Path, tmp_path: Path
 ) -> None:
     second = tmp_path / "again/velodyne"
     second.mkdir(parents=True)
     for number in range(3):
         scene(POINTS, number).tofile(second / f"{number:06d}.bin")
-    outcome = run_derain("teach", "between", drive, second, "--out", tmp_path / "out")
-    assert outcome.code == 0, outcome.err
+    succeed("teach", "between", drive, second, "--out", tmp_path / "out")
     keys = {scan.key for scan in Manifest.read(tmp_path / "out").scans}
     assert {"drive/velodyne/000001", "again/velodyne/000001"} <= keys

@@ -39,7 +39,7 @@ def panels(figure: Figure) -> dict[str, int]:
 
 
 def test_methods_are_drawn_with_and_without_truth(
-    run_derain, scan: Path, tmp_path: Path, onnx_model: Path, saved: list[Figure]
+    succeed, scan: Path, tmp_path: Path, onnx_model: Path, saved: list[Figure]
 ) -> None:
     rain = np.arange(300) >= 270
     called = {
@@ -49,8 +49,7 @@ def test_methods_are_drawn_with_and_without_truth(
     }
     methods = ["--methods", f"net={onnx_model}", "dror", "all"]
     for name, card in {"truth.png": ["--card", "wads"], "none.png": []}.items():
-        outcome = run_derain("view", scan, *methods, *card, "--out", tmp_path / name)
-        assert outcome.code == 0, outcome.err
+        succeed("view", scan, *methods, *card, "--out", tmp_path / name)
     truth, bare = saved
     ious = {
         name: np.count_nonzero(found & rain) / np.count_nonzero(found | rain)
@@ -100,18 +99,14 @@ def test_points_outside_the_grid_of_a_model_are_warned_of(
     assert f"net: {called} points removed" in panels(saved[0])
 
 
-def test_nothing_to_do_is_refused(run_derain, scan: Path) -> None:
-    outcome = run_derain("view", scan, "--methods", "dror")
-    assert outcome.code == 2
-    assert "Give --out, --window or --rerun." in outcome.err
+def test_nothing_to_do_is_refused(refused, scan: Path) -> None:
+    assert "Give --out, --window or --rerun." in refused("view", scan, "--methods", "dror")
 
 
-def test_a_card_without_labels_is_refused(run_derain, tmp_path: Path) -> None:
+def test_a_card_without_labels_is_refused(refused, tmp_path: Path) -> None:
     scene(20).tofile(tmp_path / "bare.bin")
     options = ["--methods", "dror", "--card", "wads", "--out", tmp_path / "out.png"]
-    outcome = run_derain("view", tmp_path / "bare.bin", *options)
-    assert outcome.code == 2
-    assert "bare.label: there is no such file" in outcome.err
+    assert "bare.label: there is no such file" in refused("view", tmp_path / "bare.bin", *options)
     assert not (tmp_path / "out.png").exists()
 
 

@@ -32,14 +32,13 @@ def recording(tmp_path: Path) -> Path:
 
 
 def test_what_is_kept_and_removed_is_what_run_says(
-    run_derain, recording: Path, tmp_path: Path, onnx_model: Path
+    run_derain, succeed, recording: Path, tmp_path: Path, onnx_model: Path
 ) -> None:
     out = tmp_path / "out.rrd"
     methods = {"net": str(onnx_model), "dror": "dror", "persistence": "persistence"}
     given = [f"{title}={name}" for title, name in methods.items()]
     poses = ["--poses", "standing"]
-    outcome = run_derain("view", recording, "--methods", *given, *poses, "--rerun", out)
-    assert outcome.code == 0, outcome.err
+    outcome = succeed("view", recording, "--methods", *given, *poses, "--rerun", out)
     found = ReadBack(out)
     assert found.blueprints == 1
     scans = [read_scan(recording / f"{number:03}.bin") for number in range(SCANS)]
@@ -78,7 +77,9 @@ def test_probabilities_are_those_of_the_model_where_rain_is_not_ruled_out(
     assert not found.points("/sensor/methods/dror/probability")
 
 
-def test_truth_colours_what_methods_do(run_derain, recording: Path, tmp_path: Path) -> None:
+def test_truth_colours_what_methods_do(
+    run_derain, succeed, recording: Path, tmp_path: Path
+) -> None:
     card = tmp_path / "card.yaml"
     card.write_text("{name: ours, classes: {0: a, 110: b, 9: c}, rain: [110], unknown: [9]}")
     labels = np.repeat([9, 0, 110], [100, 170, 30])
@@ -86,10 +87,9 @@ def test_truth_colours_what_methods_do(run_derain, recording: Path, tmp_path: Pa
     write_labels(recording.parent / "labels/001.label", np.full(300, 9))
     (recording.parent / "labels/002.label").unlink()
     out = tmp_path / "out.rrd"
-    outcome = run_derain(
+    succeed(
         "view", recording, "--card", card, "--methods", "dror", "--frames", "0:3", "--rerun", out
     )
-    assert outcome.code == 0, outcome.err
     found = ReadBack(out)
     scan = read_scan(recording / "000.bin")
     told = np.flatnonzero(scan.valid & (labels != 0))
@@ -121,13 +121,12 @@ def test_truth_colours_what_methods_do(run_derain, recording: Path, tmp_path: Pa
     assert ["red: solid, lost" in text for text in captions] == [True, True, False]
 
 
-def test_without_labels_there_is_no_truth(run_derain, recording: Path, tmp_path: Path) -> None:
+def test_without_labels_there_is_no_truth(succeed, recording: Path, tmp_path: Path) -> None:
     for label in (recording.parent / "labels").iterdir():
         label.unlink()
     out = tmp_path / "out.rrd"
     options = ["--card", "wads", "--methods", "dror", "--rerun", out]
-    outcome = run_derain("view", recording, *options)
-    assert outcome.code == 0
+    outcome = succeed("view", recording, *options)
     first = recording / "000.bin"
     (warning,) = outcome.said
     assert f"{first}: no scan has labels" in warning
@@ -199,7 +198,7 @@ def test_a_scan_that_cannot_be_read_is_told_of_once_and_shown_empty(
     ],
 )
 def test_what_cannot_be_meant_is_refused_and_nothing_is_written(
-    run_derain,
+    refused,
     recording: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -207,20 +206,16 @@ def test_what_cannot_be_meant_is_refused_and_nothing_is_written(
     said: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    outcome = run_derain("view", recording, *options)
-    assert outcome.code == 2
-    assert said in outcome.err
-    assert len(outcome.err.splitlines()) == 1
+    assert said in refused("view", recording, *options)
     assert [file.name for file in tmp_path.iterdir()] == ["drive"]
 
 
 def test_without_rerun_it_is_said_what_installs_it(
-    run_derain, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    refused, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)
-    outcome = run_derain("view", recording, "--rerun", tmp_path / "out.rrd")
-    assert outcome.code == 2
-    assert "pip install 'derain[view]'" in outcome.err
+    line = refused("view", recording, "--rerun", tmp_path / "out.rrd")
+    assert "pip install 'derain[view]'" in line
     assert not (tmp_path / "out.rrd").exists()
 
 

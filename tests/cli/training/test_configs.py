@@ -137,6 +137,7 @@ def test_3d_outdet_learns_from_every_point_of_the_ten_scans() -> None:
 @pytest.mark.parametrize(("config", "prepare"), PREPARATIONS.items(), ids=PREPARATIONS.keys())
 def test_a_packaged_configuration_is_trained_and_some_are_measured_and_deployed(
     run_derain,
+    succeed,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     write_labelled: WriteScan,
@@ -158,8 +159,7 @@ def test_a_packaged_configuration_is_trained_and_some_are_measured_and_deployed(
     if config not in DEPLOYED:
         return
 
-    outcome = run_derain("test", *data, "--ckpt_path", checkpoint)
-    assert outcome.code == 0
+    outcome = succeed("test", *data, "--ckpt_path", checkpoint)
     assert "pooled over points" in outcome.out
     report = json.loads((run / "version_0/test.json").read_text())
     scans = sorted(test_folder.glob("*.bin"))

@@ -19,6 +19,7 @@ QUICK = [
 
 def test_the_packaged_mixture_goes_from_training_to_predictions(
     run_derain,
+    succeed,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     write_labelled: Callable[..., None],
@@ -38,8 +39,7 @@ def test_the_packaged_mixture_goes_from_training_to_predictions(
     (streets.parent / MANIFEST).write_text(json.dumps(manifest))
 
     data = ["--config", "outdet_mixture.yaml", *QUICK]
-    fitted = run_derain("fit", *data, "--data.weights.snow", "2")
-    assert fitted.code == 0, fitted.err
+    succeed("fit", *data, "--data.weights.snow", "2")
     run = Path("runs/outdet_mixture")
     checkpoint = run / "version_0/checkpoints/best.ckpt"
     spec = load_model(checkpoint).spec
@@ -47,14 +47,10 @@ def test_the_packaged_mixture_goes_from_training_to_predictions(
     assert spec.training["sequences of WADS"] == tuple(sorted(load_card("wads").split["train"]))
     assert len(spec.training["scans"]) == 1
 
-    tested = run_derain("test", *data, "--ckpt_path", checkpoint)
-    assert tested.code == 0, tested.err
+    succeed("test", *data, "--ckpt_path", checkpoint)
     classes = json.loads((run / "version_0/test.json").read_text())["classes"]
     assert classes["snow: falling-snow"]["points"] == 30 * len(load_card("wads").split["test"])
-    assert classes["streets: rain"] == {
-        **classes["streets: rain"],
-        **{"points": 30, "rain": True},
-    }
+    assert classes["streets: rain"] == {**classes["streets: rain"], **{"points": 30, "rain": True}}
 
     assert run_derain("predict", *data, "--ckpt_path", checkpoint).code == 0
     written = sorted(Path("predictions").rglob("*.label"))

@@ -20,8 +20,9 @@ precipitation: {snow: {weight: 1, crowding: [0.1, 0.3]}}
 """
 
 
+@pytest.mark.usefixtures("one_block")
 def test_worlds_are_made_trained_on_and_exported(
-    run_derain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, succeed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     try:
         import_open3d()
@@ -29,20 +30,18 @@ def test_worlds_are_made_trained_on_and_exported(
         pytest.skip(str(error))
     monkeypatch.chdir(tmp_path)
     Path("small.yaml").write_text(WORLD, "utf-8")
-    outcome = run_derain(
-        *("fit", "--config", "relative_outdet_worlds.yaml", "--trainer.max_epochs", 2),
+    succeed(
+        *("fit", "--config", "relative_outdet_worlds.yaml", "--trainer.max_epochs", 1),
         *("--data.root", "worlds", "--data.workers", 1, "--data.loading.workers", 0),
         *("--data.campaign.train", 2, "--data.campaign.validation", 1),
         *("--data.campaign.world", "small.yaml", "--trainer.enable_progress_bar", "false"),
         *("--panels.scans", 0, "--errors.pictures", 0),
     )
-    assert outcome.code == 0, outcome.err
     (checkpoint,) = Path("runs").rglob("last.ckpt")
     scene(500).tofile("scan.bin")
     # The whole proof has tests of its own.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     timed_on = ["--scan", "scan.bin", "--repeats", "1"]
     assert run_derain("export", checkpoint, "--out", "model.onnx", *timed_on).code == 0
-    outcome = run_derain("run", "model.onnx", "scan.bin", "--out", "out")
-    assert outcome.code == 0, outcome.err
+    succeed("run", "model.onnx", "scan.bin", "--out", "out")
     assert len(np.fromfile("out/scan.label", np.uint32)) == 500

@@ -1,5 +1,6 @@
-"""What ``derain fit``, ``validate``, ``test`` and ``predict`` say of themselves in short."""
+"""``derain fit``, ``validate``, ``test`` and ``predict``, which Lightning runs, and their help."""
 
+import shlex
 from collections.abc import Iterable
 
 from derain.workflows.configurations import packaged_configs
@@ -67,6 +68,26 @@ def short_help(command: str) -> str:
         "Any option can stand in a configuration, and any key of one be given as an option.\n"
         f"All options: derain {command} {ALL}. All values, as they would be used: --print_config."
     )
+
+
+def train(arguments: list[str]) -> None:
+    """Runs one of the four commands; after a training, prints how to export its best checkpoint.
+
+    Args:
+        arguments: The command and its options.
+
+    Raises:
+        InputError: As for :func:`derain.workflows.training.run_trainer`.
+    """
+    from derain.cli.outputs import print_lines
+    from derain.workflows.training import run_trainer
+
+    words = ["--help" if argument == ALL else argument for argument in arguments]
+    trainer = run_trainer(words, descriptions=EXAMPLES).trainer
+    best = getattr(trainer.checkpoint_callback, "best_model_path", "")
+    if arguments[0] == "fit" and best and trainer.is_global_zero:
+        print_lines(f"Best checkpoint: {best}")
+        print_lines(f"derain export {shlex.quote(best)} --out model.onnx")
 
 
 def _by_network(names: Iterable[str]) -> str:

@@ -1,1 +1,0 @@
-"""The four commands that are Lightning's: fit, validate, test and predict."""
