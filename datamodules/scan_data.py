@@ -7,8 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from derain.annotation.held_out import FEWEST_SCANS
-from derain.annotation.manifest import CARD, HELD_OUT_PART, TRAINING_PART, Manifest
+from derain.annotation.manifest import CARD, FEWEST_SCANS, HELD_OUT_PART, TRAINING_PART, Manifest
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import layouts_for
 from derain.cards.layout import Layout

@@ -4,7 +4,7 @@ from itertools import groupby
 
 import pytest
 
-from derain.annotation.held_out import parts_of
+from derain.annotation.manifest import parts_of
 from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
 from derain.sources.frame import Frame

@@ -10,8 +10,7 @@ import pytest
 from window_method import Between, Dimmer
 
 from derain.annotation.manifest import CARD, LABELS, TAUGHT_MANIFEST, Manifest
-from derain.annotation.taught_labels import labels_of
-from derain.annotation.teach import teach
+from derain.annotation.teach import labels_of, teach
 from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene

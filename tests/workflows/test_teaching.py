@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from derain.annotation.truth import TruthRecord
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
 from derain.sources.frame import MemoryFrame
 from derain.sources.judgement import Judgement
+from derain.workflows.teaching import TruthRecord
 
 CARD = DataCard("yard", {0: "wall", 1: "drop", 2: "car", 9: "nobody knows"}, (1,), (9,))
 
