@@ -88,7 +88,7 @@ def test_the_model_that_comes_with_derain_cleans_your_own_scans(
         scene(500, number).tofile(mine / f"{number}.bin")
     np.full((60, 4), 1e5, np.float32).tofile(mine / "far.bin")
     out, lines = tmp_path / "out", []
-    report = clean_own_scans(mine, DEFAULT_COLUMNS, out, Steps(lines.append))
+    report = clean_own_scans(mine, DEFAULT_COLUMNS, out, Steps(lines.append, 1))
     assert sum(scan.points for scan in report.scans) == 1000
     assert [Path(error.subject).name for error in report.failures] == ["far.bin"]
     assert "far.bin: left whole" in capsys.readouterr().err
