@@ -23,7 +23,6 @@ class InMemory(ScanDataModule):
         >>> data = InMemory(train=[scan] * 3, validation=[scan], test=[scan], card="wads")
         >>> model = OutDet()
         >>> quiet = {"logger": False, "enable_progress_bar": False, "enable_checkpointing": False}
-        >>> quiet["enable_model_summary"] = False  # where rich is installed, it is printed
         >>> trainer = Trainer(max_epochs=1, accelerator="cpu", **quiet)
         >>> trainer.fit(model, data)
         >>> (scores,) = trainer.test(model, data, verbose=False)
