@@ -249,4 +249,5 @@ def _key(entry: Entry) -> str:
 def _part(entry: Entry) -> TaughtPart:
     if entry.value not in TAUGHT_PARTS:
         raise entry.fault(f"is {shown(entry.value)}", f"Give {' or '.join(TAUGHT_PARTS)}.")
-    return entry.value
+    part: TaughtPart = entry.value
+    return part

@@ -51,7 +51,8 @@ def _draw_shares(
     total = sum(sequences.values())
     labels = [f"{rate_name(rate)}: {part / total:.0%}" for rate, part in sequences.items()]
     shades = [colours[rate] for rate in sequences]
-    axes.pie([*sequences.values()], None, labels, shades, startangle=90, counterclock=False)
+    parts = [*sequences.values()]
+    axes.pie(parts, labels=labels, colors=shades, startangle=90, counterclock=False)
     axes.set_title(f"sequences: {total:,}")
 
 

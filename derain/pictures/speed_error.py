@@ -96,8 +96,8 @@ def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
     axes.plot(*front, color="#9ca3af", linewidth=1.2, zorder=1, label="nothing beats these")
     for group, (colour, marker) in LOOKS.items():
         if places := [standing.place for standing in standings if standing.group == group]:
-            look = {"marker": marker, "color": colour, "s": 42}
-            axes.scatter(*np.transpose(places), zorder=2, label=group, **look)
+            x, y = np.transpose(places)
+            axes.scatter(x, y, marker=marker, color=colour, s=42, zorder=2, label=group)
     axes.margins(0.12)
     axes.grid(which="both", color="#e5e7eb", linewidth=0.6)
     axes.set_axisbelow(True)
