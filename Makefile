@@ -23,11 +23,12 @@ lint: $(READY)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 
-# mypy sees the package as it installs: the top-level folders as sub-packages of derain.
+# mypy and import-linter see the package as it installs: the top-level folders as sub-packages of derain.
 types: $(READY)
 	rm -rf build
 	$(PYTHON) -m pip install --quiet --no-deps --no-build-isolation --target build/types .
 	$(VENV)/bin/mypy build/types/derain
+	cd build/types && $(CURDIR)/$(VENV)/bin/lint-imports --no-cache --no-logo --config $(CURDIR)/pyproject.toml
 
 # The site in build/site; a warning is an error.
 docs: $(READY)

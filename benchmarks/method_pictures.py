@@ -14,13 +14,8 @@ from PIL import Image
 from derain.cards.card import load_card
 from derain.evaluation.counts import Counts
 from derain.export.methods import load_method
-from derain.pictures.scan_pictures import (
-    draw_as_seen,
-    draw_from_above,
-    explain_colours,
-    label_once,
-    outcomes,
-)
+from derain.pictures.palette import outcomes
+from derain.pictures.scan_pictures import draw_columns, explain_colours
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.sources.source import Source
@@ -73,13 +68,8 @@ def write(scan: Scan, predicted: NDArray[np.bool_], rain: NDArray[np.bool_], pat
         fontsize=10,
     )
     pair = figure.subplots(1, 2, width_ratios=(1, 1.6))
-    above, ahead = pair
-    outcome = outcomes(predicted, rain)
-    draw_from_above(above, scan, outcome)
-    above.set_xlim(-ASIDE, ASIDE)
-    above.set_ylim(0, AHEAD)
-    draw_as_seen(ahead, scan, outcome)
-    label_once(pair)
+    draw_columns(pair[None], [("", scan, outcomes(predicted, rain))])
+    pair[0].set(xlim=(-ASIDE, ASIDE), ylim=(0, AHEAD))
     explain_colours(figure)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=100)

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from derain.annotation.held_out import FEWEST_SCANS
-from derain.annotation.manifest import CARD, HELD_OUT_PART, TRAINING_PART, Manifest
+from derain.annotation.manifest import CARD, FEWEST_SCANS, HELD_OUT_PART, TRAINING_PART, Manifest
 from derain.cards.card import DataCard, load_card
 from derain.cards.layout import Layout
 from derain.datamodules.augmentation import Augmentation

@@ -39,6 +39,9 @@ def examples_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator
     """A folder with what examples read, in which they run, on random numbers of their own."""
     prepare(tmp_path)
     monkeypatch.chdir(tmp_path)
+    # Where rich is installed, as with import-linter, Lightning prints a table of every model.
+    connector = "lightning.pytorch.trainer.connectors.callback_connector"
+    monkeypatch.setattr(f"{connector}._RICH_AVAILABLE", False)
     with torch.random.fork_rng(devices=[]):
         yield tmp_path
 

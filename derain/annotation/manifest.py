@@ -6,8 +6,9 @@ together.
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import repeat
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -23,6 +24,7 @@ from derain.files.labels import LABEL
 from derain.files.reading import is_file, reading
 from derain.sources.bag_frame import bag_frame, clouds_at
 from derain.sources.file_frame import FileFrame
+from derain.sources.frame import Frame
 from derain.sources.records import Records
 from derain.sources.source import Frames
 
@@ -42,6 +44,9 @@ TaughtPart = Literal["train", "validation"]
 TRAINING_PART: TaughtPart = "train"
 HELD_OUT_PART: TaughtPart = "validation"
 TAUGHT_PARTS = (TRAINING_PART, HELD_OUT_PART)
+
+# One scan in ONE_IN is held out, and at least one of a sequence of FEWEST_SCANS or more.
+ONE_IN, FEWEST_SCANS = 5, 3
 
 
 @dataclass(frozen=True)
@@ -94,7 +99,7 @@ class Manifest:
                 root, f"has no {TAUGHT_MANIFEST}", "Give a folder that `derain teach` wrote."
             )
         entry = Entry.of_yaml(path, LARGEST_TAUGHT)
-        if not _is_ours(entry.value):
+        if not (isinstance(entry.value, dict) and entry.value.get("made_by") == TEACHING):
             raise entry.fault("`derain teach` did not write it", "Give a folder that it wrote.")
         home = Path(os.path.realpath(root))
         content = entry.record(
@@ -112,7 +117,8 @@ class Manifest:
         manifest = cls(**{key: content[key] for key in content.keys() - {"made_by", "derain"}})
         if not manifest.finished:
             raise entry.fault("its labels are not complete", "Run the same `derain teach` again.")
-        _refuse_twice(entry, manifest.scans)
+        if len({scan.key for scan in manifest.scans}) < len(manifest.scans):
+            raise entry.fault("two scans have one key", "Teach it again.")
         return manifest
 
     def write(self, root: Path) -> None:
@@ -130,7 +136,9 @@ class Manifest:
             "columns": list(self.columns),
             "intensity_scale": self.intensity_scale,
             "finished": self.finished,
-            "scans": [_as_dict(scan, home) for scan in self.scans],
+            "scans": [
+                {**vars(scan), "scan": _relative_path(home, scan.scan)} for scan in self.scans
+            ],
         }
         with replacing(root / TAUGHT_MANIFEST) as temporary:
             text = yaml.safe_dump(content, sort_keys=False, width=10**6, default_flow_style=None)
@@ -141,27 +149,46 @@ class Manifest:
         folders = {scan.scan.parent for scan in self.scans}
         records = {folder: Records(folder) for folder in folders}
         clouds = {folder: clouds_at(folder) for folder in folders if split(folder) is not None}
-        return Frames(
-            replace(
-                bag_frame(clouds[scan.scan.parent], scan.number, scan.key),
+
+        def frame_of(scan: TaughtScan) -> FileFrame:
+            folder = scan.scan.parent
+            frame = (
+                bag_frame(clouds[folder], scan.number, scan.key)
+                if folder in clouds
+                else FileFrame(
+                    key=scan.key,
+                    number=scan.number,
+                    path=scan.scan,
+                    columns=self.columns,
+                    records=records[folder],
+                )
+            )
+            return replace(
+                frame,
                 sequence=scan.sequence,
                 label_path=label_path(root, scan.key),
                 intensity_scale=self.intensity_scale,
             )
-            if scan.scan.parent in clouds
-            else FileFrame(
-                key=scan.key,
-                sequence=scan.sequence,
-                number=scan.number,
-                label_path=label_path(root, scan.key),
-                intensity_scale=self.intensity_scale,
-                path=scan.scan,
-                columns=self.columns,
-                records=records[scan.scan.parent],
-            )
-            for scan in self.scans
-            if scan.part == part
-        )
+
+        return Frames(frame_of(scan) for scan in self.scans if scan.part == part)
+
+
+def parts_of(frames: Sequence[Frame]) -> Iterator[TaughtPart]:
+    """The part of each frame: the end of each sequence is held out.
+
+    Neighbouring scans show nearly the same: a held-out scan between two training scans would not
+    be new to the student.
+
+    Args:
+        frames: Frames in time order, one sequence after the other, perhaps with some missing.
+    """
+    sequence: list[Frame] = []
+    for frame in frames:
+        if sequence and not _is_later(frame, sequence[-1]):
+            yield from _parts(len(sequence))
+            sequence = []
+        sequence.append(frame)
+    yield from _parts(len(sequence))
 
 
 def is_taught(root: Path) -> bool:
@@ -178,18 +205,14 @@ def label_path(root: Path, key: str) -> Path:
     return root / LABELS / f"{key}{LABEL}"
 
 
-def _is_ours(content: object) -> bool:
-    return isinstance(content, dict) and content.get("made_by") == TEACHING
+def _is_later(frame: Frame, other: Frame) -> bool:
+    """Whether a frame is later in the same sequence; two sequences may have one name."""
+    return frame.sequence == other.sequence and frame.number > other.number
 
 
-def _as_dict(scan: TaughtScan, home: Path) -> dict[str, Any]:
-    return {
-        "key": scan.key,
-        "scan": _relative_path(home, scan.scan),
-        "sequence": scan.sequence,
-        "number": scan.number,
-        "part": scan.part,
-    }
+def _parts(scans: int) -> list[TaughtPart]:
+    held_out = max(scans // ONE_IN, 1) if scans >= FEWEST_SCANS else 0
+    return [*repeat(TRAINING_PART, scans - held_out), *repeat(HELD_OUT_PART, held_out)]
 
 
 def _relative_path(home: Path, scan: Path) -> str:
@@ -224,13 +247,7 @@ def _key(entry: Entry) -> str:
 
 
 def _part(entry: Entry) -> TaughtPart:
-    for part in TAUGHT_PARTS:
-        if entry.value == part:
-            return part
-    raise entry.fault(f"is {shown(entry.value)}", f"Give {' or '.join(TAUGHT_PARTS)}.")
-
-
-def _refuse_twice(entry: Entry, scans: Sequence[TaughtScan]) -> None:
-    keys = [scan.key for scan in scans]
-    if len(set(keys)) < len(keys):
-        raise entry.fault("two scans have one key", "Teach it again.")
+    if entry.value not in TAUGHT_PARTS:
+        raise entry.fault(f"is {shown(entry.value)}", f"Give {' or '.join(TAUGHT_PARTS)}.")
+    part: TaughtPart = entry.value
+    return part

@@ -5,11 +5,12 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from derain.annotation.scene import Scene
 from derain.fusion import UNKNOWN
 from derain.pictures.palette import BACKGROUND
+from derain.pictures.scan_pictures import legend_below, titled_figure
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.views.directions import directions
@@ -46,16 +47,14 @@ def annotation_figure(scan: Scan, label: NDArray[np.int64], scene: Scene, title:
     rarity = np.argsort(-np.bincount(label, minlength=UNKNOWN + 1)[label[seen]], kind="stable")
     points, colour = points[rarity], colour[rarity]
 
-    figure = Figure(figsize=(14, 10), layout="constrained")
-    figure.suptitle(title)
+    figure = titled_figure(14, 10, title)
     above, ahead = figure.subplots(2, 1)
     _scatter(above, points[:, 0], points[:, 1], colour)
     _draw_scene(above, scene)
     azimuth, inclination = directions(points)
     _scatter(ahead, -azimuth, inclination, colour)
-    ahead.set_xlabel("azimuth, to the right / °")
-    ahead.set_ylabel("inclination / °")
-    figure.legend(handles=_legend(label[seen]), loc="outside lower center", ncols=9, frameon=False)
+    ahead.set(xlabel="azimuth, to the right / °", ylabel="inclination / °")
+    legend_below(figure, _legend(label[seen]), ncols=9)
     return figure
 
 
@@ -88,19 +87,17 @@ def _scatter(
 
 def _draw_scene(axes: Axes, scene: Scene) -> None:
     """Draws the outlines of road and boxes from above, in axes that show the road."""
-    axes.add_patch(Polygon(scene.road, fill=False, edgecolor="white", linewidth=0.8))
+    _outline(axes, scene.road, "white", 0.8)
     if scene.rain_area is not None:
-        colour = CLASS_COLOURS[TrackClass.RAIN]
-        axes.add_patch(Polygon(scene.rain_area, fill=False, edgecolor=colour, linewidth=0.8))
+        _outline(axes, scene.rain_area, CLASS_COLOURS[TrackClass.RAIN], 0.8)
     for box in scene.boxes.values():
-        colour = CLASS_COLOURS[box.kind]
-        axes.add_patch(
-            Polygon(box.footprint.corners(), fill=False, edgecolor=colour, linewidth=0.6)
-        )
+        _outline(axes, box.footprint.corners(), CLASS_COLOURS[box.kind], 0.6)
     road = np.array(scene.rain_area or scene.road)
     (left, bottom), (right, top) = road.min(axis=0), road.max(axis=0)
     axes.set_xlim(left - SURROUNDINGS, right + SURROUNDINGS)
     axes.set_ylim(bottom - SURROUNDINGS, top + SURROUNDINGS)
-    axes.set_aspect("equal")
-    axes.set_xlabel("forward / m")
-    axes.set_ylabel("left / m")
+    axes.set(aspect="equal", xlabel="forward / m", ylabel="left / m")
+
+
+def _outline(axes: Axes, corners: ArrayLike, colour: str, width: float) -> None:
+    axes.add_patch(Polygon(corners, fill=False, edgecolor=colour, linewidth=width))

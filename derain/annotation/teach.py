@@ -1,16 +1,17 @@
-"""Labels recordings by a method."""
+"""Labels recordings by a method, and writes the data card of the labels."""
 
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from derain.annotation.held_out import parts_of
 from derain.annotation.manifest import (
     CARD,
     LABELS,
@@ -19,18 +20,31 @@ from derain.annotation.manifest import (
     TaughtScan,
     is_taught,
     label_path,
+    parts_of,
 )
-from derain.annotation.taught_labels import TAUGHT_UNKNOWN, labels_of, write_card
 from derain.cards.card import DataCard
 from derain.errors import InputError
+from derain.evaluation.answers import TEACHERS_ANSWERS
+from derain.files.atomic import replacing
 from derain.files.labels import write_labels
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
 from derain.sources.judging import Answer, Guard, judgements, unguarded
 from derain.sources.label_sink import LabelSink
 from derain.sources.method import Method
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
+
+# Class ids of a teacher's answers.
+TAUGHT_NOT_RAIN, TAUGHT_RAIN, TAUGHT_UNKNOWN = 0, 1, 255
+TAUGHT_CLASSES = (TAUGHT_NOT_RAIN, TAUGHT_RAIN, TAUGHT_UNKNOWN)
+TAUGHT_CARD = DataCard(
+    "taught",
+    classes=dict(zip(TAUGHT_CLASSES, TEACHERS_ANSWERS.values(), strict=True)),
+    rain=(TAUGHT_RAIN,),
+    unknown=(TAUGHT_UNKNOWN,),
+)
 
 # The folder of the labels until all of them are known.
 UNFINISHED = ".unfinished"
@@ -88,9 +102,56 @@ def teach(
                 "nothing is written, for of no point it is known whether it is rain",
                 "See whether the method suits the scans: some need several of one recording.",
             )
-        manifest = _manifest_of(method, frames)
+        manifest = Manifest(
+            method.as_dict(),
+            [
+                TaughtScan(frame.key, frame.path, frame.sequence, frame.number, part)
+                for frame, part in zip(frames, parts_of(frames), strict=True)
+            ],
+            frames[0].columns,
+            frames[0].intensity_scale,
+        )
         _put_in_place(folder, out, manifest, card)
     return manifest
+
+
+def labels_of(judgement: Judgement) -> NDArray[np.uint32]:
+    """The labels of each row of a judged scan, uint32 (N,), as they are written.
+
+    Rows of which the method is not sure, which it did not see or which hold no return are unknown.
+    """
+    labels = np.where(judgement.rain, np.uint32(TAUGHT_RAIN), np.uint32(TAUGHT_NOT_RAIN))
+    labels[~(judgement.answered & judgement.scan.valid)] = TAUGHT_UNKNOWN
+    return labels
+
+
+def write_card(path: Path, teacher: str, scans: DataCard | None) -> None:
+    """Writes the data card of a teacher's labels; training measures its statistics.
+
+    Args:
+        path: The file.
+        teacher: Name of the teacher.
+        scans: Data card of the scans, which gives their licence, their unit, and whether points at
+            one position count once; None where there is none.
+
+    Raises:
+        InputError: It cannot be written.
+    """
+    card: dict[str, Any] = {
+        "name": f"{'scans' if scans is None else scans.name} taught by {teacher}",
+        "classes": dict(TAUGHT_CARD.classes),
+        "rain": [*TAUGHT_CARD.rain],
+        "unknown": [*TAUGHT_CARD.unknown],
+        "licence": f"derived from scans whose licence is {(scans or TAUGHT_CARD).licence}",
+    }
+    if scans is not None:
+        card |= {
+            "intensity_unit": scans.intensity_unit,
+            "simulated": scans.simulated,
+            "deduplicate": scans.deduplicate,
+        }
+    with replacing(path) as temporary:
+        temporary.write_text(yaml.safe_dump(card, sort_keys=False, allow_unicode=True), "utf-8")
 
 
 def refuse_to_overwrite(out: Path, source: Source) -> None:
@@ -129,21 +190,11 @@ def _is_text(path: Path) -> bool:
     return True
 
 
-def _manifest_of(method: Method, frames: Sequence[FileFrame]) -> Manifest:
-    return Manifest(
-        method.as_dict(),
-        [
-            TaughtScan(frame.key, frame.path, frame.sequence, frame.number, part)
-            for frame, part in zip(frames, parts_of(frames), strict=True)
-        ],
-        frames[0].columns,
-        frames[0].intensity_scale,
-    )
-
-
 def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | None) -> None:
     """Replaces the folder's contents; if it is interrupted, the manifest is marked unfinished."""
-    former = _former_keys(out)
+    former: set[str] = set()
+    with suppress(InputError):  # no former manifest, or one of an unfinished teaching
+        former = {scan.key for scan in Manifest.read(out).scans}
     Manifest(manifest.teacher, finished=False).write(out)
     for key in (scan.key for scan in manifest.scans):
         label_path(out, key).parent.mkdir(parents=True, exist_ok=True)
@@ -152,13 +203,6 @@ def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | 
         label_path(out, key).unlink(missing_ok=True)
     write_card(out / CARD, Path(manifest.teacher["method"]).stem, card)
     manifest.write(out)
-
-
-def _former_keys(out: Path) -> set[str]:
-    """Keys of the scans in the folder's present manifest."""
-    with suppress(InputError):
-        return {scan.key for scan in Manifest.read(out).scans}
-    return set()
 
 
 @contextmanager

@@ -14,6 +14,9 @@ from torch.nn import functional
 
 from derain.errors import InputError
 
+# Added to the share of each class, so that the weight of one that hardly occurs is finite.
+LEAST_SHARE = 1e-3
+
 
 class SegmentationLoss(NamedTuple):
     """A loss and the parts it is the sum of, each a scalar."""
@@ -134,14 +137,13 @@ def _jaccard_steps(foreground: Tensor, dtype: torch.dtype) -> Tensor:
     return torch.where(foreground, 1 / union, intersection / (union * union_before))
 
 
-def class_weights(shares: Sequence[float], floor: float = 1e-3) -> Tensor:
-    """Weights that make rare classes count, 1 / (share + floor).
+def class_weights(shares: Sequence[float]) -> Tensor:
+    """Weights that make rare classes count, 1 / (share + 0.001); one that never occurs has 1000.
 
     Source: sporsho/3D_OutDet, train_wads.py; TiagoCortinhal/SalsaNext, trainer.py.
 
     Args:
         shares: Share of each class among the training points, 0 to 1.
-        floor: What is added to each share, so that a class that hardly occurs has a finite weight.
 
     Returns:
         float32 (C,).
@@ -153,7 +155,7 @@ def class_weights(shares: Sequence[float], floor: float = 1e-3) -> Tensor:
         raise InputError(
             "class shares", f"{list(shares)} are not all within 0 and 1", "Count the points again."
         )
-    return torch.tensor([1 / (share + floor) for share in shares])
+    return torch.tensor([1 / (share + LEAST_SHARE) for share in shares])
 
 
 def at_least_float32(tensor: Tensor) -> Tensor:

@@ -23,7 +23,12 @@ from derain.evaluation.answers import (
 )
 from derain.evaluation.counts import ratio
 from derain.pictures.palette import OUTCOMES
-from derain.pictures.scan_pictures import draw_from_above, explain_colours
+from derain.pictures.scan_pictures import (
+    draw_from_above,
+    explain_colours,
+    legend_below,
+    titled_figure,
+)
 from derain.scan import Scan
 
 # Distinct to colour-blind eyes and in grey.
@@ -53,8 +58,7 @@ def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
         scans: The scans, in time order, one or more.
         title: Heading.
     """
-    figure = Figure(figsize=(12, 4.6), layout="constrained")
-    figure.suptitle(title)
+    figure = titled_figure(12, 4.6, title)
     by_scan, by_range = figure.subplots(1, 2, width_ratios=(3, 2))
     _draw_by_scan(by_scan, scans)
     bands = coarse_bands(total([scan.answers for scan in scans]))
@@ -62,13 +66,8 @@ def teacher_figure(scans: Sequence[AnswersOfScan], title: str) -> Figure:
     _draw_shares(by_range, np.arange(len(filled)), list(filled.values()), width=0.8)
     by_range.set_xticks(range(len(filled)), list(filled))
     by_range.set_title("by range, all scans", fontsize=10)
-    figure.legend(
-        *by_range.get_legend_handles_labels(),
-        loc="outside lower center",
-        ncols=len(TEACHERS_ANSWERS),
-        frameon=False,
-        title="the rest: not rain",
-    )
+    ncols = len(TEACHERS_ANSWERS)
+    legend_below(figure, by_range.containers, ncols=ncols, title="the rest: not rain")
     return figure
 
 
@@ -85,9 +84,14 @@ def removed_figure(held_out: Answers, title: str) -> Figure:
     points = held_out.table.sum(axis=(1, 2))
     answers = held_out.table.sum(axis=2)
     drawn = points >= FEWEST_POINTS
-    rain = _shares(answers[:, RAIN], points, drawn)
-    perhaps = _shares(answers[:, RAIN] + answers[:, NOT_KNOWN], points, drawn)
-    student = _shares(held_out.table[..., 1].sum(axis=1), points, drawn)
+    counted = np.stack(
+        [
+            answers[:, RAIN],
+            answers[:, RAIN] + answers[:, NOT_KNOWN],
+            held_out.table[..., 1].sum(axis=1),
+        ]
+    )
+    rain, perhaps, student = np.where(drawn, ratio(counted, points), np.nan)
     edges = [*FINE_EDGES, LAST_EDGE]
     axes.stairs(rain, edges, fill=True, color=OF_ANSWERS[RAIN], alpha=0.35)
     axes.stairs(
@@ -143,8 +147,7 @@ def answers_figure(
         "not known to the teacher, or rain to it alone": LEFT,
         "rain to the student alone": LOST,
     }
-    figure = Figure(figsize=(16, 5.7), layout="constrained")
-    figure.suptitle(title)
+    figure = titled_figure(16, 5.7, title)
     row = figure.subplots(1, 3, sharex=True, sharey=True)
     for axes, (name, outcome) in zip(row, panels.items(), strict=True):
         axes.set_title(name)
@@ -212,10 +215,3 @@ def _scale(axes: Axes, largest: float) -> None:
     axes.set_ylim(0, min(1.0, max(1.15 * largest, LEAST_TOP)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:.3g} %"))
     axes.spines[["top", "right"]].set_visible(False)
-
-
-def _shares(
-    part: NDArray[np.int64], whole: NDArray[np.int64], drawn: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Each part divided by its whole; NaN where it is not drawn."""
-    return np.where(drawn, ratio(part, whole), np.nan)

@@ -15,10 +15,10 @@ from derain.evaluation.counts import Counts
 from derain.evaluation.text_tables import number_text
 from derain.pictures.palette import BACKGROUND, OUTCOMES, WITHOUT_LABELS, outcomes
 from derain.pictures.scan_pictures import (
-    draw_pair,
+    draw_columns,
     explain_colours,
     input_title,
-    label_once,
+    titled_figure,
 )
 from derain.scan import Scan
 from derain.system.open3d_import import import_open3d
@@ -48,17 +48,14 @@ def comparison_figure(
     panels = {input_title(scan): None, **dict(_panels(predicted, rain))}
     blocks = -(-len(panels) // MOST_PANELS_IN_A_ROW)
     columns = -(-len(panels) // blocks)  # of equal width where possible
-    figure = Figure(figsize=(4 * columns, 6 * blocks + 1), layout="constrained")
-    figure.suptitle(title)
+    figure = titled_figure(4 * columns, 6 * blocks + 1, title)
     axes = figure.subplots(2 * blocks, columns, squeeze=False, height_ratios=[3, 2] * blocks)
     # Panels from left to right, block by block, each a pair of axes one above the other.
     pairs = axes.reshape(blocks, 2, columns).transpose(0, 2, 1).reshape(-1, 2)
-    for pair, (name, outcome) in zip(pairs, panels.items(), strict=False):
-        draw_pair(pair, scan, outcome)
-        pair[0].set_title(textwrap.fill(name, TITLE_WIDTH), fontsize=10)
+    drawn = [(textwrap.fill(name, TITLE_WIDTH), scan, panels[name]) for name in panels]
+    draw_columns(pairs[: len(panels)], drawn, fontsize=10)
     for unused in pairs[len(panels) :].flat:
         unused.set_axis_off()
-    label_once(pairs[0])
     explain_colours(figure, WITHOUT_LABELS if rain is None else OUTCOMES)
     return figure
 

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from derain.evaluation.contents import Contents, class_name, rate_name
+from derain.pictures.scan_pictures import legend_below, titled_figure
 
 # Without rain, and where the rate is unknown; rates have shades between the next two.
 CLEAN, UNKNOWN = "#c9b458", "#9aa3ad"
@@ -26,18 +27,12 @@ def statistics_figure(
 
     Source: what is shown is that of figures 3 and 5 of REHEARSE-3D.
     """
-    figure = Figure(figsize=(13, 5.5), layout="constrained")
-    figure.suptitle(title)
+    figure = titled_figure(13, 5.5, title)
     shares, points = figure.subplots(1, 2, width_ratios=(1, 3))
     colours = _colours(contents)
     _draw_shares(shares, contents, colours)
     _draw_points(points, contents, classes, colours)
-    figure.legend(
-        handles=points.containers,
-        loc="outside lower center",
-        ncols=max(len(contents), 1),
-        frameon=False,
-    )
+    legend_below(figure, points.containers)
     return figure
 
 
@@ -52,18 +47,13 @@ def _colours(contents: Mapping[float | None, Contents]) -> dict[float | None, An
 def _draw_shares(
     axes: Axes, contents: Mapping[float | None, Contents], colours: Mapping[float | None, Any]
 ) -> None:
-    sequences = [found.sequences for found in contents.values()]
-    axes.pie(
-        sequences,
-        labels=[
-            f"{rate_name(rate)}: {found.sequences / sum(sequences):.0%}"
-            for rate, found in contents.items()
-        ],
-        colors=[colours[rate] for rate in contents],
-        startangle=90,
-        counterclock=False,
-    )
-    axes.set_title(f"sequences: {sum(sequences):,}")
+    sequences = {rate: found.sequences for rate, found in contents.items()}
+    total = sum(sequences.values())
+    labels = [f"{rate_name(rate)}: {part / total:.0%}" for rate, part in sequences.items()]
+    shades = [colours[rate] for rate in sequences]
+    parts = [*sequences.values()]
+    axes.pie(parts, labels=labels, colors=shades, startangle=90, counterclock=False)
+    axes.set_title(f"sequences: {total:,}")
 
 
 def _draw_points(
@@ -75,13 +65,9 @@ def _draw_points(
     ids = sorted({id_ for found in contents.values() for id_ in found.labelled})
     width = 0.8 / max(len(contents), 1)
     for place, (rate, found) in enumerate(contents.items()):
-        axes.bar(
-            np.arange(len(ids)) - 0.4 + (place + 0.5) * width,
-            [found.labelled[id_] for id_ in ids],
-            width,
-            color=colours[rate],
-            label=rate_name(rate),
-        )
+        left = np.arange(len(ids)) - 0.4 + (place + 0.5) * width
+        heights = [found.labelled[id_] for id_ in ids]
+        axes.bar(left, heights, width, color=colours[rate], label=rate_name(rate))
     axes.set_xticks(range(len(ids)), [class_name(id_, classes) for id_ in ids], rotation=30)
     axes.set_yscale("log")
     axes.set_ylabel("points")

@@ -12,6 +12,7 @@ from derain.evaluation.operating_points import OperatingPoints
 from derain.evaluation.rain_counts import ClassCounts
 from derain.evaluation.text_tables import number_text
 from derain.pictures.palette import LOST, MISSED
+from derain.pictures.scan_pictures import legend_below
 
 # Most rows of a table of classes; the last sums up all further classes.
 MOST_CLASSES = 14
@@ -55,20 +56,11 @@ def errors_figure(
     axes.xaxis.tick_top()
     axes.tick_params(length=0)
     axes.axvline(len(bands) - 0.5, color="black", linewidth=0.8)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
-    figure.legend(
-        handles=[
-            Patch(color=LEFT(0.8), label="rain that is left"),
-            Patch(color=LOST_SHADES(0.8), label="solid that is lost"),
-        ],
-        title="share of the class judged wrongly, and how many points that is",
-        loc="outside lower center",
-        ncols=2,
-        frameon=False,
-        fontsize=9,
-        title_fontsize=9,
-    )
+    axes.spines[:].set_visible(False)
+    left = Patch(color=LEFT(0.8), label="rain that is left")
+    lost = Patch(color=LOST_SHADES(0.8), label="solid that is lost")
+    explained = "share of the class judged wrongly, and how many points that is"
+    legend_below(figure, [left, lost], title=explained, fontsize=9, title_fontsize=9)
     return figure
 
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,33 +12,8 @@ from tqdm import tqdm
 
 from derain.errors import InputError, printable
 from derain.evaluation.counts import Counts, ratio
-from derain.pictures.entities import (
-    CAPTION,
-    CLASS_KEPT,
-    CLASS_MISSED,
-    CLASS_NOT_KNOWN,
-    CLASS_RAIN,
-    FRAME,
-    NOTHING,
-    POINTS,
-    RANGES,
-    SCAN,
-    SENSOR,
-    TIME,
-    MethodEntities,
-    class_of,
-)
-from derain.pictures.palette import (
-    LOST,
-    MISSED,
-    OUTCOMES,
-    PROBABILITY,
-    RAIN,
-    SOLID,
-    WITHOUT_LABELS,
-    outcomes,
-    shades,
-)
+from derain.pictures import entities, palette
+from derain.pictures.entities import MethodEntities
 from derain.pictures.playback_layout import layout, write_static
 from derain.pictures.recording_file import RecordingFile, recording_file
 from derain.pictures.selection import LabelledRain, Labels, Selection
@@ -52,7 +28,7 @@ from derain.sources.method import Method
 LEAST_PROBABILITY = 0.01
 
 # Names of the palette's colours.
-COLOUR_NAMES = {SOLID: "grey", RAIN: "blue", MISSED: "yellow", LOST: "red"}
+COLOUR_NAMES = dict(zip(palette.OUTCOMES.values(), ("grey", "blue", "yellow", "red"), strict=True))
 
 PROBABILITY_TEXT = "Probability of rain: dark, blue, white, ever higher"
 
@@ -119,23 +95,21 @@ def _write_scans(writer: "PlaybackWriter", selection: Selection, guard: Guard) -
         raise InputError(first.name, "there is nothing to show: no scan can be read", "See above.")
 
 
+@dataclass(frozen=True, eq=False)
 class PlaybackWriter:
     """Writes scans and judgements to their entities.
 
-    Args:
+    Attributes:
         file: The file to write to.
         selection: The scans shown.
         look: How they are drawn.
         labels: Labels of the scans; None where there are none.
     """
 
-    def __init__(
-        self, file: RecordingFile, selection: Selection, look: SensorLook, labels: Labels | None
-    ) -> None:
-        self.file = file
-        self.selection = selection
-        self.look = look
-        self.labels = labels
+    file: RecordingFile
+    selection: Selection
+    look: SensorLook
+    labels: Labels | None
 
     def write_scan(self, frame: Frame) -> None:
         """Writes a scan with its pose and its labels.
@@ -148,12 +122,13 @@ class PlaybackWriter:
         self._set_time(frame)
         by = None if labelled is None else self.labels
         text = caption(frame, scan, by, frame.key in self.selection.held_out)
-        self.file.log(CAPTION, rerun.TextDocument(text, media_type="text/markdown"))
+        self.file.log(entities.CAPTION, rerun.TextDocument(text, media_type="text/markdown"))
         if frame.key in self.selection.poses:
             pose = self.selection.poses[frame.key]
-            self.file.log(SENSOR, rerun.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
+            placed = rerun.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3])
+            self.file.log(entities.SENSOR, placed)
         colours = self.look.colours(scan)[scan.valid]
-        self.file.log(POINTS, rerun.Points3D(scan.xyz[scan.valid], colors=colours))
+        self.file.log(entities.POINTS, rerun.Points3D(scan.xyz[scan.valid], colors=colours))
         if self.look.view is not None:
             image = rerun.DepthImage(
                 self.look.centimetres(self.look.view(scan)),
@@ -161,7 +136,7 @@ class PlaybackWriter:
                 colormap="grayscale",
                 depth_range=(0, self.look.farthest * PER_METRE),
             )
-            self.file.log(RANGES, image)
+            self.file.log(entities.RANGES, image)
         if self.labels is not None:
             self._write_labels(self.labels, scan, labelled)
 
@@ -178,60 +153,62 @@ class PlaybackWriter:
         """
         frame, scan, rain = judgement.frame, judgement.scan, judgement.rain
         assert frame is not None  # the method was given frames, not points
-        entities = MethodEntities(title)
+        place = MethodEntities(title)
         labelled = None if self.labels is None else self.labels.of(frame, scan)
-        classed = class_of(outcomes(rain, _truth(labelled, rain)))
+        classed = entities.class_of(palette.outcomes(rain, _truth(labelled, rain)))
         self._set_time(frame)
-        for entity, rows in ((entities.kept, scan.valid & ~rain), (entities.removed, rain)):
+        for entity, rows in ((place.kept, scan.valid & ~rain), (place.removed, rain)):
             self.file.log(entity, rerun.Points3D(scan.xyz[rows], class_ids=classed[rows]))
         if self.labels is not None:
-            self._write_errors(entities, judgement, labelled)
+            self._write_errors(place, judgement, labelled)
         if method.gives_probabilities:
             rows = judgement.probability >= LEAST_PROBABILITY
-            colours = shades(PROBABILITY, judgement.probability[rows])
-            self.file.log(entities.probability, rerun.Points3D(scan.xyz[rows], colors=colours))
+            colours = palette.shades(palette.PROBABILITY, judgement.probability[rows])
+            self.file.log(place.probability, rerun.Points3D(scan.xyz[rows], colors=colours))
         if self.look.view is not None:
             winner = self.look.view(scan).winner
-            coloured = np.append(np.where(classed == CLASS_KEPT, NOTHING, classed), NOTHING)
+            kept = classed == entities.CLASS_KEPT
+            coloured = np.append(np.where(kept, entities.NOTHING, classed), entities.NOTHING)
             image = coloured[winner].reshape(self.look.view.grid.rows, -1)
-            self.file.log(entities.image, rerun.SegmentationImage(image.astype(np.uint8)))
-        self._write_share(entities.share, rain, scan)
+            self.file.log(place.image, rerun.SegmentationImage(image.astype(np.uint8)))
+        self._write_share(place.share, rain, scan)
 
     def write_no_scan(self, frame: Frame) -> None:
         """Clears the scan, so that the one before does not stay."""
         self._set_time(frame)
-        self._clear(SCAN, RANGES, CAPTION)
+        self._clear(entities.SCAN, entities.RANGES, entities.CAPTION)
 
     def write_no_judgement(self, title: str, frame: Frame) -> None:
         """Clears what a method found, so that its judgement of the scan before does not stay."""
         self._set_time(frame)
-        entities = MethodEntities(title)
-        self._clear(entities.all, entities.image, entities.share, entities.iou)
+        place = MethodEntities(title)
+        self._clear(place.all, place.image, place.share, place.iou)
 
     def _write_labels(self, labels: Labels, scan: Scan, found: LabelledRain | None) -> None:
-        entities = labels.entities
+        place = labels.entities
         if found is None:
-            self._clear(entities.points, entities.share, entities.share_not_known)
+            self._clear(place.points, place.share, place.share_not_known)
             return
         shown = scan.valid & (found.rain | ~found.known)
-        classed = np.where(found.rain[shown], CLASS_RAIN, CLASS_NOT_KNOWN).astype(np.uint16)
-        self.file.log(entities.points, rerun.Points3D(scan.xyz[shown], class_ids=classed))
-        self._write_share(entities.share, found.rain, scan)
+        classed = np.where(found.rain[shown], entities.CLASS_RAIN, entities.CLASS_NOT_KNOWN)
+        points = rerun.Points3D(scan.xyz[shown], class_ids=classed.astype(np.uint16))
+        self.file.log(place.points, points)
+        self._write_share(place.share, found.rain, scan)
         if labels.card.unknown:
-            self._write_share(entities.share_not_known, ~found.known, scan)
+            self._write_share(place.share_not_known, ~found.known, scan)
 
     def _write_errors(
-        self, entities: MethodEntities, judgement: Judgement, found: LabelledRain | None
+        self, place: MethodEntities, judgement: Judgement, found: LabelledRain | None
     ) -> None:
         """Writes the rain that a method keeps, which is drawn large, and its IoU."""
         if found is None:
-            self._clear(entities.missed, entities.iou)
+            self._clear(place.missed, place.iou)
             return
         scan, rain = judgement.scan, judgement.rain
         judged = scan.valid & found.known
         missed = scan.xyz[judged & found.rain & ~rain]
-        self.file.log(entities.missed, rerun.Points3D(missed, class_ids=CLASS_MISSED))
-        self._write_number(entities.iou, Counts.of(rain[judged], found.rain[judged]).iou)
+        self.file.log(place.missed, rerun.Points3D(missed, class_ids=entities.CLASS_MISSED))
+        self._write_number(place.iou, Counts.of(rain[judged], found.rain[judged]).iou)
 
     def _write_share(self, entity: str, part: NDArray[np.bool_], scan: Scan) -> None:
         """Writes the share of the valid points, per cent, that a part of them is."""
@@ -253,9 +230,9 @@ class PlaybackWriter:
         """Dates all that is logged from here on to a frame."""
         stream, seconds = self.file.stream, self.selection.seconds.get(frame.key)
         stream.reset_time()
-        stream.set_time(FRAME, sequence=self.selection.number_of[frame.key])
+        stream.set_time(entities.FRAME, sequence=self.selection.number_of[frame.key])
         if seconds is not None:
-            stream.set_time(TIME, duration=seconds)
+            stream.set_time(entities.TIME, duration=seconds)
 
 
 def caption(frame: Frame, scan: Scan, labels: Labels | None, held_out: bool) -> str:
@@ -268,7 +245,7 @@ def caption(frame: Frame, scan: Scan, labels: Labels | None, held_out: bool) -> 
         held_out: Whether a model was trained, and not on this scan.
     """
     which = f"**{_escaped(frame.key)}**, {len(scan):,} points" + ", held out" * held_out
-    coloured = OUTCOMES if labels else WITHOUT_LABELS
+    coloured = palette.OUTCOMES if labels else palette.WITHOUT_LABELS
     meanings = "\n".join(
         f"- {COLOUR_NAMES[colour]}: {meaning}" for meaning, colour in coloured.items()
     )

@@ -6,20 +6,9 @@ import rerun
 import rerun.blueprint as views
 from rerun.blueprint import Blueprint
 
-from derain.pictures.entities import (
-    CAPTION,
-    FRAME,
-    IOU,
-    POINTS,
-    RANGE_IMAGE,
-    RANGES,
-    SENSOR,
-    SHARE,
-    TRAJECTORY,
-    MethodEntities,
-    classes,
-)
-from derain.pictures.palette import BACKGROUND, LINES, MISSED, PROBABILITY, SOLID, rgb
+from derain.pictures import entities, palette
+from derain.pictures.entities import MethodEntities
+from derain.pictures.palette import rgb
 from derain.pictures.recording_file import RecordingFile
 from derain.pictures.selection import Labels, Selection
 from derain.sources.method import Method
@@ -49,7 +38,7 @@ def layout(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -
         ),
         # It stays at the first scan until somebody presses play.
         views.TimePanel(
-            timeline=FRAME, state="collapsed", fps=10, play_state="paused", loop_mode="all"
+            timeline=entities.FRAME, state="collapsed", fps=10, play_state="paused", loop_mode="all"
         ),
         views.SelectionPanel(state="hidden"),
         views.BlueprintPanel(state="hidden"),
@@ -60,18 +49,14 @@ def layout(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -
 
 def _clouds(methods: Mapping[str, Method], labels: Labels | None, placed: bool) -> views.Tabs:
     """The point clouds: tabs of what is removed, kept, and probable, the methods side by side."""
-    scan = [POINTS] if labels is None else [POINTS, labels.entities.points]
+    scan = [entities.POINTS] if labels is None else [entities.POINTS, labels.entities.points]
     first = "scan" if labels is None else f"scan and {labels.name}"
-    entities = {title: MethodEntities(title) for title in methods}
-    removed = [
-        _cloud(title, [m.kept, m.removed, m.missed], placed) for title, m in entities.items()
-    ]
-    cleaned = [
-        _cloud(f"{title}: kept", [m.kept, m.missed], placed) for title, m in entities.items()
-    ]
+    places = {title: MethodEntities(title) for title in methods}
+    removed = [_cloud(title, [m.kept, m.removed, m.missed], placed) for title, m in places.items()]
+    cleaned = [_cloud(f"{title}: kept", [m.kept, m.missed], placed) for title, m in places.items()]
     probability = [
-        _cloud(f"{title}: probability", [POINTS, m.probability], placed, dark=True)
-        for title, m in entities.items()
+        _cloud(f"{title}: probability", [entities.POINTS, m.probability], placed, dark=True)
+        for title, m in places.items()
         if methods[title].gives_probabilities
     ]
     tabs = {"Removed": removed, "Cleaned": cleaned, "Probability": probability}
@@ -89,19 +74,19 @@ def _cloud(
     name: str, paths: Sequence[str], placed: bool, *, dark: bool = False
 ) -> views.Spatial3DView:
     # Bright points would look like probable rain, so all have the shade of probability 0.
-    shade = rerun.Points3D.from_fields(colors=rgb(PROBABILITY[0]))
+    shade = rerun.Points3D.from_fields(colors=rgb(palette.PROBABILITY[0]))
     return views.Spatial3DView(
         origin="/",
-        contents=[f"+ {path}" for path in (*paths, TRAJECTORY)],
+        contents=[f"+ {path}" for path in (*paths, entities.TRAJECTORY)],
         name=name,
-        background=rgb(BACKGROUND),
-        overrides={POINTS: shade} if dark else None,
+        background=rgb(palette.BACKGROUND),
+        overrides={entities.POINTS: shade} if dark else None,
         eye_controls=views.EyeControls3D(
             kind=views.Eye3DKind.Orbital,
             position=EYE,
             look_target=LOOK_TARGET,
             eye_up=(0, 0, 1),
-            tracking_entity=SENSOR if placed else None,
+            tracking_entity=entities.SENSOR if placed else None,
         ),
     )
 
@@ -110,30 +95,32 @@ def _images(methods: Mapping[str, Method]) -> views.Tabs:
     """The range image, and over it the result of each method."""
     return views.Tabs(
         *(
-            _image(f"{title}: range image", [RANGES, MethodEntities(title).image])
+            _image(f"{title}: range image", [entities.RANGES, MethodEntities(title).image])
             for title in methods
         ),
-        _image("range image", [RANGES]),
+        _image("range image", [entities.RANGES]),
         active_tab=0,
     )
 
 
 def _image(name: str, paths: Sequence[str]) -> views.Spatial2DView:
     return views.Spatial2DView(
-        origin=RANGE_IMAGE,
+        origin=entities.RANGE_IMAGE,
         contents=[f"+ {path}" for path in paths],
         name=name,
-        background=rgb(BACKGROUND),
+        background=rgb(palette.BACKGROUND),
     )
 
 
 def _curves(labels: Labels | None) -> views.Horizontal:
     """Numbers over the scans, and the text of the scan."""
-    shares = _curve(SHARE, "Share of the points, %", legend=True)
-    text = views.TextDocumentView(origin=CAPTION, name="Scan")
+    shares = _curve(entities.SHARE, "Share of the points, %", legend=True)
+    text = views.TextDocumentView(origin=entities.CAPTION, name="Scan")
     if labels is None:
         return views.Horizontal(shares, text, column_shares=[3, 1])
-    iou = _curve(IOU, f"IoU with the {labels.name}", legend=False)  # colours as in the shares
+    iou = _curve(
+        entities.IOU, f"IoU with the {labels.name}", legend=False
+    )  # colours as in the shares
     return views.Horizontal(shares, iou, text, column_shares=[3, 3, 2])
 
 
@@ -154,29 +141,29 @@ def write_static(
         labels: Labels of the scans, where they have some.
         methods: The methods by their titles.
     """
-    file.log("/", rerun.ViewCoordinates.FLU, classes(), static=True)
-    _sized(file, SMALL, [POINTS])
+    file.log("/", rerun.ViewCoordinates.FLU, entities.classes(), static=True)
+    _sized(file, SMALL, [entities.POINTS])
     if selection.paths:
-        path = rerun.LineStrips3D(selection.paths, colors=rgb(SOLID), radii=LARGE)
-        file.log(TRAJECTORY, path, static=True)
+        path = rerun.LineStrips3D(selection.paths, colors=rgb(palette.SOLID), radii=LARGE)
+        file.log(entities.TRAJECTORY, path, static=True)
     if labels is not None:
         of_labels = labels.entities
         _sized(file, LARGE, [of_labels.points])
-        _line(file, of_labels.share, labels.name, SOLID)
-        _line(file, of_labels.share_not_known, f"not known to the {labels.name}", MISSED)
+        _line(file, of_labels.share, labels.name, palette.SOLID)
+        _line(file, of_labels.share_not_known, f"not known to the {labels.name}", palette.MISSED)
     for number, title in enumerate(methods):
-        entities = MethodEntities(title)
-        _sized(file, SMALL, [entities.kept])
-        _sized(file, LARGE, [entities.removed, entities.missed, entities.probability])
-        for line in (entities.share, entities.iou):
-            _line(file, line, title, LINES[number % len(LINES)])
+        place = MethodEntities(title)
+        _sized(file, SMALL, [place.kept])
+        _sized(file, LARGE, [place.removed, place.missed, place.probability])
+        for line in (place.share, place.iou):
+            _line(file, line, title, palette.LINES[number % len(palette.LINES)])
 
 
-def _sized(file: RecordingFile, size: float, entities: Sequence[str]) -> None:
+def _sized(file: RecordingFile, size: float, paths: Sequence[str]) -> None:
     # Where points are few, the viewer would otherwise write their class over them.
     look = rerun.Points3D.from_fields(radii=size, show_labels=False)
-    for entity in entities:
-        file.log(entity, look, static=True)
+    for path in paths:
+        file.log(path, look, static=True)
 
 
 def _line(file: RecordingFile, entity: str, name: str, colour: str) -> None:

@@ -1,7 +1,8 @@
 """Pictures of scans from above and as the sensor sees them, with the result of a derainer."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -39,19 +40,15 @@ def judgement_figure(
         rain: Points that are rain, bool (N,).
         title: Heading.
     """
-    figure = Figure(figsize=(16, 7), layout="constrained")
-    figure.suptitle(title)
+    figure = titled_figure(16, 7, title)
     columns = figure.subplots(2, 4, sharex="row", sharey="row").T
-    colourings = {
+    panels = {
         input_title(scan): None,
         "truth": rain.astype(int),
         "prediction": predicted.astype(int),
         "error": outcomes(predicted, rain),
     }
-    for column, (name, outcome) in zip(columns, colourings.items(), strict=True):
-        column[0].set_title(name)
-        draw_pair(column, scan, outcome)
-    label_once(columns[0])
+    draw_columns(columns, [(name, scan, outcome) for name, outcome in panels.items()])
     explain_colours(figure)
     return figure
 
@@ -64,18 +61,20 @@ def before_after_figure(scan: Scan, predicted: NDArray[np.bool_], title: str) ->
         predicted: Points called rain, bool (N,).
         title: Heading.
     """
-    figure = Figure(figsize=(14, 9), layout="constrained")
-    figure.suptitle(title)
+    figure = titled_figure(14, 9, title)
     columns = figure.subplots(2, 2, sharex="row", sharey="row", height_ratios=(3, 2)).T
     kept = scan.take(~predicted)
-    parts = {
-        f"before: {scan.valid.sum():,} points, {predicted.sum():,} of them rain": (scan, predicted),
-        f"after: {kept.valid.sum():,} points": (kept, np.zeros(len(kept), bool)),
-    }
-    for column, (name, (part, rain)) in zip(columns, parts.items(), strict=True):
-        column[0].set_title(name)
-        draw_pair(column, part, rain.astype(int))
-    label_once(columns[0])
+    before = f"before: {scan.valid.sum():,} points, {predicted.sum():,} of them rain"
+    after = f"after: {kept.valid.sum():,} points"
+    nothing = np.zeros(len(kept), int)
+    draw_columns(columns, [(before, scan, predicted.astype(int)), (after, kept, nothing)])
+    return figure
+
+
+def titled_figure(width: float, height: float, title: str) -> Figure:
+    """A figure, its size in inches, that leaves room for its heading and its legend."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    figure.suptitle(title)
     return figure
 
 
@@ -102,12 +101,20 @@ def explain_colours(figure: Figure, colours: Mapping[str, str] = OUTCOMES) -> No
         figure: The figure.
         colours: Colours by what they mean.
     """
-    figure.legend(
-        handles=[Patch(color=colour, label=name) for name, colour in colours.items()],
-        loc="outside lower center",
-        ncols=len(colours),
-        frameon=False,
-    )
+    legend_below(figure, [Patch(color=colour, label=name) for name, colour in colours.items()])
+
+
+def legend_below(figure: Figure, handles: Sequence[Any], **options: Any) -> None:
+    """Puts a legend below everything else, in one row.
+
+    Args:
+        figure: The figure.
+        handles: What the legend explains, with labels.
+        options: Of matplotlib's ``legend``.
+    """
+    columns = max(len(handles), 1)
+    options = {"handles": handles, "ncols": columns, "frameon": False, **options}
+    figure.legend(loc="outside lower center", **options)
 
 
 def input_title(scan: Scan) -> str:
@@ -115,16 +122,25 @@ def input_title(scan: Scan) -> str:
     return "input" if scan.intensity is None else "input: intensity"
 
 
-def draw_pair(pair: NDArray[np.object_], scan: Scan, outcome: NDArray[np.int64] | None) -> None:
-    """Draws a scan from above on the first of two panels, and as the sensor sees it on the second.
+def draw_columns(
+    columns: NDArray[np.object_],
+    panels: Sequence[tuple[str, Scan, NDArray[np.int64] | None]],
+    fontsize: float | str = "large",
+) -> None:
+    """Draws scans side by side, each from above and below that as the sensor sees it.
 
     Args:
-        pair: The axes of the panels, (2,).
-        scan: The scan; invalid points are not drawn.
-        outcome: As for :func:`draw_from_above`.
+        columns: Axes of the panels, (K, 2); those of the first column are labelled.
+        panels: Title, scan and outcomes of each column, as for :func:`draw_from_above`.
+        fontsize: Size of the titles, as matplotlib takes it.
     """
-    draw_from_above(pair[0], scan, outcome)
-    draw_as_seen(pair[1], scan, outcome)
+    for (above, ahead), (title, scan, outcome) in zip(columns, panels, strict=True):
+        above.set_title(title, fontsize=fontsize)
+        draw_from_above(above, scan, outcome)
+        _draw_as_seen(ahead, scan, outcome)
+    above, ahead = columns[0]
+    above.set(ylabel="forward / m", xlabel="right / m")
+    ahead.set(ylabel="inclination / °", xlabel="azimuth, to the right / °")
 
 
 def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
@@ -148,14 +164,8 @@ def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -
         axes.set_ylim(middle - half, middle + half)
 
 
-def draw_as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
-    """Draws inclination over azimuth, in degrees, left being left.
-
-    Args:
-        axes: Where to draw.
-        scan: The scan; invalid points are not drawn.
-        outcome: As for :func:`draw_from_above`.
-    """
+def _draw_as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
+    """Draws inclination over azimuth, in degrees, left being left."""
     seen = scan.valid
     azimuth, inclination = directions(scan.xyz[seen])
     _scatter(axes, -azimuth, inclination, *_colours(scan, outcome, seen))
@@ -193,20 +203,11 @@ def _scatter(
     # Colour by colour, which is several times as fast; grey first and the rarest colour last, on
     # top.
     for chosen in np.lexsort([-points, ~is_grey]):
-        rows = number == chosen
-        if not rows.any():
+        if not points[chosen]:
             continue
-        by_number = np.clip(ALONE / np.sqrt(points[chosen]), size, LARGEST)
-        area = size if is_grey[chosen] else by_number
+        rows, area = number == chosen, size
+        if not is_grey[chosen]:
+            area = np.clip(ALONE / np.sqrt(points[chosen]), size, LARGEST)
         axes.scatter(x[rows], y[rows], s=area, color=colours[chosen], linewidths=0, rasterized=True)
     axes.set_facecolor(BACKGROUND)
     axes.tick_params(labelsize=8)
-
-
-def label_once(column: NDArray[np.object_]) -> None:
-    """Labels the axes of one pair of panels, from above and as seen."""
-    above, ahead = column
-    above.set_ylabel("forward / m")
-    above.set_xlabel("right / m")
-    ahead.set_ylabel("inclination / °")
-    ahead.set_xlabel("azimuth, to the right / °")

@@ -1,6 +1,7 @@
 """How the scans of a recording are drawn: one brightness and one range image for all of them."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Self
 
@@ -49,18 +50,17 @@ class SensorLook:
         Args:
             frames: Its frames, one or more; those that cannot be read are skipped.
         """
-        scans = list(_readable(evenly_spaced(frames, LOOKED_AT)))
+        scans = []
+        for frame in evenly_spaced(frames, LOOKED_AT):
+            with suppress(InputError):  # reported when the frame is written
+                scans.append(frame.read())
         intensities = [s.intensity[s.valid] for s in scans if s.intensity is not None]
         ranges = [scan.range[scan.valid] for scan in scans]
         try:
             view = RangeView(fit_grid(scans).grid, channels=())
         except InputError:  # no valid point
             view = None
-        return cls(
-            brightest=_nearly_all(intensities),
-            farthest=_nearly_all(ranges),
-            view=view,
-        )
+        return cls(_nearly_all(intensities), _nearly_all(ranges), view)
 
     def colours(self, scan: Scan) -> NDArray[np.uint8]:
         """Shades of grey by intensity, uint8 (N, 3)."""
@@ -75,16 +75,6 @@ class SensorLook:
         ranges = np.where(seen.valid, seen.nearest, 0) * PER_METRE
         pixels: NDArray[np.uint16] = np.clip(ranges, 0, 65535).round().astype(np.uint16)
         return pixels
-
-
-def _readable(frames: Sequence[Frame]) -> list[Scan]:
-    scans = []
-    for frame in frames:
-        try:
-            scans.append(frame.read())
-        except InputError:  # reported when the frame is written
-            continue
-    return scans
 
 
 def _nearly_all(values: Sequence[NDArray[np.float32]]) -> float:

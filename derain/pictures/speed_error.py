@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 # Smaller errors are drawn as this one: a logarithmic axis has no place for an error of 0.
 LEAST_ERROR = 1e-4
 
-COLOURS = {"network": "#1f77b4", "filter": "#d98200", "baseline": "#6b7280"}
-MARKERS = {"network": "o", "filter": "s", "baseline": "D"}
+# Colour and marker of each group.
+LOOKS = {"network": ("#1f77b4", "o"), "filter": ("#d98200", "s"), "baseline": ("#6b7280", "D")}
 
 # Places of a label around its marker, in points from it, by preference.
 DIRECTIONS = np.radians([0, 180, 45, -45, 135, -135, 90, -90])
@@ -44,6 +44,11 @@ class Standing:
     milliseconds: float
     group: str
     size: int | None = None
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Where its marker is: milliseconds, and the error as it is drawn."""
+        return self.milliseconds, max(self.error, LEAST_ERROR)
 
     @property
     def label(self) -> str:
@@ -87,9 +92,12 @@ def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
     axes.set(xscale="log", yscale="log", title=title)
     axes.set_xlabel("milliseconds a scan, from file to mask (median)")
     axes.set_ylabel("error: 1 - IoU of rain")
-    _draw_front(axes, pareto_front(standings))
-    for group, marker in MARKERS.items():
-        _draw_group(axes, [s for s in standings if s.group == group], group, marker)
+    front = np.transpose([standing.place for standing in pareto_front(standings)])
+    axes.plot(*front, color="#9ca3af", linewidth=1.2, zorder=1, label="nothing beats these")
+    for group, (colour, marker) in LOOKS.items():
+        if places := [standing.place for standing in standings if standing.group == group]:
+            x, y = np.transpose(places)
+            axes.scatter(x, y, marker=marker, color=colour, s=42, zorder=2, label=group)
     axes.margins(0.12)
     axes.grid(which="both", color="#e5e7eb", linewidth=0.6)
     axes.set_axisbelow(True)
@@ -101,26 +109,6 @@ def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
     figure.draw_without_rendering()  # so that extents are known
     _label(axes, standings)
     return figure
-
-
-def _draw_front(axes: Axes, front: Sequence[Standing]) -> None:
-    x = [standing.milliseconds for standing in front]
-    y = [_drawn(standing.error) for standing in front]
-    axes.plot(x, y, color="#9ca3af", linewidth=1.2, zorder=1, label="nothing beats these")
-
-
-def _draw_group(axes: Axes, members: Sequence[Standing], group: str, marker: str) -> None:
-    if not members:
-        return
-    axes.scatter(
-        [standing.milliseconds for standing in members],
-        [_drawn(standing.error) for standing in members],
-        marker=marker,
-        color=COLOURS[group],
-        s=42,
-        zorder=2,
-        label=group,
-    )
 
 
 def _label(axes: Axes, standings: Sequence[Standing]) -> None:
@@ -154,8 +142,7 @@ def _label(axes: Axes, standings: Sequence[Standing]) -> None:
 
 def _on_screen(axes: Axes, standings: Sequence[Standing]) -> NDArray[np.float64]:
     """Markers of some methods, float64 (n, 2), pixels."""
-    places = [(standing.milliseconds, _drawn(standing.error)) for standing in standings]
-    return axes.transData.transform(places)
+    return axes.transData.transform([standing.place for standing in standings])
 
 
 def _meets(line: NDArray[np.float64], box: Bbox) -> bool:
@@ -167,10 +154,10 @@ def _candidates(axes: Axes, standing: Standing) -> Iterator[tuple[int, Annotatio
     """Labels to choose from, the nearest first, each with the number of its distance."""
     for step, distance in enumerate(DISTANCES):
         for x, y in zip(np.cos(DIRECTIONS), np.sin(DIRECTIONS), strict=True):
-            right, up = (0 if abs(part) < 0.1 else int(np.sign(part)) for part in (x, y))
+            right, up = round(x), round(y)  # -1, 0 or 1
             annotation = axes.annotate(
                 standing.label,
-                (standing.milliseconds, _drawn(standing.error)),
+                standing.place,
                 xytext=(distance * x, distance * y),
                 textcoords="offset points",
                 ha=("center", "left", "right")[right],
@@ -201,10 +188,6 @@ def _gaps(box: Bbox, places: NDArray[np.float64]) -> NDArray[np.float64]:
     beyond = np.maximum(np.maximum(box.min - places, places - box.max), 0)
     gaps: NDArray[np.float64] = np.hypot(*beyond.T)
     return gaps
-
-
-def _drawn(error: float) -> float:
-    return max(error, LEAST_ERROR)
 
 
 def _few_digits(value: float, _: object) -> str:

@@ -1,9 +1,9 @@
 """Levels of visibility, and an alarm that does not change at every scan."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Self
+from typing import Any
 
 from derain.errors import InputError
 from derain.weather.visibility import NOT_KNOWN, Visibility
@@ -59,29 +59,25 @@ ERROR = Threshold(15.0, 20.0)
 HOLD = 5
 
 
-@dataclass(frozen=True)
+@dataclass
 class Latch:
-    """One level, on or off: a state that is replaced by the one after it.
+    """One level, on or off.
 
     Attributes:
         threshold: Where it begins, and where it ends.
         hold: So many scans in a row change it.
         on: Whether it is on.
-        against: How many of the last scans in a row speak for a change.
+        against: How many of the last scans in a row speak for a change; before the first scan one
+            less than ``hold``, so that it alone can change the level.
     """
 
     threshold: Threshold
     hold: int
+    against: int
     on: bool = False
-    against: int = 0
 
-    @classmethod
-    def first(cls, threshold: Threshold, hold: int) -> Self:
-        """The state before any scan, which the first one alone can change."""
-        return cls(threshold, hold, against=hold - 1)
-
-    def after(self, visibility: Visibility) -> Self:
-        """The state after a scan.
+    def update(self, visibility: Visibility) -> None:
+        """Takes the visibility of the next scan.
 
         A scan whose interval lies on both sides of the threshold changes nothing, and neither does
         one of which nothing is known: the count goes on with the scan after it.
@@ -91,13 +87,12 @@ class Latch:
             for_change, for_stay = least >= self.threshold.above, most < self.threshold.above
         else:
             for_change, for_stay = most < self.threshold.below, least >= self.threshold.below
-        if for_stay:
-            return replace(self, against=0)
-        if not for_change:
-            return self
-        if self.against + 1 < self.hold:
-            return replace(self, against=self.against + 1)
-        return replace(self, on=not self.on, against=0)
+        if for_change:
+            self.against += 1
+        if self.against == self.hold:
+            self.on, self.against = not self.on, 0
+        elif for_stay:
+            self.against = 0
 
 
 class Alarm:
@@ -146,16 +141,15 @@ class Alarm:
                 "Give it smaller numbers.",
             )
         self._dry = dry
-        self._latches = (Latch.first(warning, hold), Latch.first(error, hold))
+        self._latches = {
+            Level.WARNING: Latch(warning, hold, hold - 1),
+            Level.ERROR: Latch(error, hold, hold - 1),
+        }
 
     @property
     def level(self) -> Level:
         """The level after the scans so far; clear before the first."""
-        on = (
-            level
-            for level, latch in zip((Level.WARNING, Level.ERROR), self._latches, strict=True)
-            if latch.on
-        )
+        on = (level for level, latch in self._latches.items() if latch.on)
         return max(on, default=Level.CLEAR)
 
     def update(self, visibility: Visibility, reach: Visibility = NOT_KNOWN) -> Level:
@@ -164,11 +158,8 @@ class Alarm:
         Returns:
             The level after it.
         """
-        warning, error = (
-            latch.after(self._deciding(latch.threshold, visibility, reach))
-            for latch in self._latches
-        )
-        self._latches = (warning, error)
+        for latch in self._latches.values():
+            latch.update(self._deciding(latch.threshold, visibility, reach))
         return self.level
 
     def level_of(self, visibility: Visibility, reach: Visibility = NOT_KNOWN) -> Level | None:
@@ -179,7 +170,7 @@ class Alarm:
             interval does not show clear sight either.
         """
         clear, level = True, Level.CLEAR
-        for each, latch in zip((Level.WARNING, Level.ERROR), self._latches, strict=True):
+        for each, latch in self._latches.items():
             seen = self._deciding(latch.threshold, visibility, reach)
             clear = clear and seen.at_least >= latch.threshold.below
             level = each if seen.at_most < latch.threshold.below else level

@@ -3,16 +3,16 @@
 import json
 import math
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import lightning
+from lightning import LightningModule, Trainer
 from lightning.pytorch.callbacks import Callback, ModelCheckpoint
 from tqdm import tqdm
 
-from derain.workflows.lightning_silence import quiet_lightning
-from derain.workflows.training import run_trainer
+from derain.workflows.training import quiet_lightning, run_trainer
 
 
 @dataclass(frozen=True)
@@ -63,15 +63,9 @@ def fit(
             be written, or data that cannot be read.
     """
     options = fit_options(config, settings or {})
-    if quiet:
-        with quiet_lightning():
-            run = run_trainer(
-                ["fit", *options],
-                trainer={"enable_progress_bar": False, "callbacks": [EpochBar()]},
-            )
-    else:
-        run = run_trainer(["fit", *options])
-    trainer = run.trainer
+    defaults = {"enable_progress_bar": False, "callbacks": [EpochBar()]} if quiet else {}
+    with quiet_lightning() if quiet else nullcontext():
+        trainer = run_trainer(["fit", *options], trainer=defaults).trainer
     best = trainer.checkpoint_callback
     assert isinstance(best, ModelCheckpoint)  # every run has one
     return FitResults(
@@ -98,23 +92,17 @@ def fit_options(config: str | Path | None, settings: Mapping[str, Any]) -> list[
 class EpochBar(Callback):
     """A progress bar over the epochs of a training, on terminals alone."""
 
-    def on_train_start(
-        self, trainer: lightning.Trainer, pl_module: lightning.LightningModule
-    ) -> None:
+    def on_train_start(self, trainer: Trainer, pl_module: LightningModule) -> None:
         """Shows the bar."""
         hidden = None if trainer.is_global_zero else True
         self.bar = tqdm(desc="training", total=trainer.max_epochs, unit="epoch", disable=hidden)
 
-    def on_train_epoch_end(
-        self, trainer: lightning.Trainer, pl_module: lightning.LightningModule
-    ) -> None:
+    def on_train_epoch_end(self, trainer: Trainer, pl_module: LightningModule) -> None:
         """Moves it on, with the IoU on the validation scans."""
         if "val_iou" in trainer.callback_metrics:
             self.bar.set_postfix(IoU=f"{trainer.callback_metrics['val_iou']:.3f}", refresh=False)
         self.bar.update()
 
-    def on_train_end(
-        self, trainer: lightning.Trainer, pl_module: lightning.LightningModule
-    ) -> None:
+    def on_train_end(self, trainer: Trainer, pl_module: LightningModule) -> None:
         """Removes it."""
         self.bar.close()

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from derain.annotation.held_out import FEWEST_SCANS
+from derain.annotation.manifest import FEWEST_SCANS
 from derain.datamodules.taught import Taught
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from derain.evaluation.answers import Answers, AnswersOfScan, coarse_bands, total
-from derain.evaluation.counts import Counts
 from derain.evaluation.text_tables import markdown_table, number_text
 from derain.files.atomic import replacing
 from derain.pictures.answers import removed_figure, teacher_figure
@@ -127,9 +126,20 @@ def write_report(results: LearnResults) -> None:
 
 def as_markdown(results: LearnResults) -> str:
     """The text of the report."""
-    parts = [f"# What was learnt from {results.title}", _in_short(results)]
-    parts += ["## What could not be learnt, and when not to trust it", _doubts_text(results)]
-    parts += [f"## The teacher: {results.teacher}", _teacher_table(results.taught)]
+    held_out = len(results.scans) - results.trained_on
+    parts = [
+        f"# What was learnt from {results.title}",
+        str(results),
+        f"{results.trained_on:,} scans to learn from, {held_out:,} held out: these choose the best "
+        "epoch and measure the student, which does not learn from them. No person's label is read "
+        "for any of this.",
+        "## What could not be learnt, and when not to trust it",
+        "\n".join([*(f"- {doubt}" for doubt in doubts(results)), ALWAYS]),
+    ]
+    parts += [
+        f"## The teacher: {results.teacher}",
+        _teacher_table(results.taught),
+    ]
     parts += _pictures(results.pictures, "teacher")
     if results.evaluated:
         parts += [
@@ -215,39 +225,27 @@ def _doubts_of_student(results: LearnResults) -> Iterator[str]:
         )
 
 
-def _in_short(results: LearnResults) -> str:
-    held_out = len(results.scans) - results.trained_on
-    return (
-        f"{results}\n\n{results.trained_on:,} scans to learn from, {held_out:,} held out: these "
-        "choose the best epoch and measure the student, which does not learn from them. No "
-        "person's label is read for any of this."
-    )
-
-
-def _doubts_text(results: LearnResults) -> str:
-    return "\n".join([*(f"- {doubt}" for doubt in doubts(results)), ALWAYS])
-
-
 def _teacher_table(answers: Answers) -> str:
     rows = [
         [name, f"{band.points:,}", *(f"{share:.1%}" for share in band.shares)]
-        for name, band in {"all": answers, **coarse_bands(answers)}.items()
-        if band.points
+        for name, band in _bands(answers).items()
     ]
     return markdown_table(("range", "points", "not rain", "rain", "not known"), rows)
 
 
 def _student_table(answers: Answers) -> str:
-    rows = [
-        [name, f"{band.points:,}", f"{band.removed:.1%}", *_scores(band.agreement)]
-        for name, band in {"all": answers, **coarse_bands(answers)}.items()
-        if band.points
-    ]
+    rows = []
+    for name, band in _bands(answers).items():
+        counts = band.agreement
+        scores = map(number_text, (counts.precision, counts.recall, counts.iou))
+        rows.append([name, f"{band.points:,}", f"{band.removed:.1%}", *scores])
     return markdown_table(("range", "points", "removed", "P", "R", "IoU"), rows)
 
 
-def _scores(counts: Counts) -> list[str]:
-    return [number_text(score) for score in (counts.precision, counts.recall, counts.iou)]
+def _bands(answers: Answers) -> dict[str, Answers]:
+    """The answers in all, and in each band of range that has points."""
+    bands = {"all": answers, **coarse_bands(answers)}
+    return {name: band for name, band in bands.items() if band.points}
 
 
 def _pictures(pictures: Mapping[Path, str], beginning: str) -> list[str]:

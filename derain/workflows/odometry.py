@@ -122,12 +122,15 @@ def find_poses(
             for frame in tqdm(source, "odometry", unit="scan", disable=None)
         ]
     )
-    return [
-        _written(
-            FoundPoses(file, recording, [next(registrations) for _ in recording], seconds), form
-        )
-        for file, recording, seconds in zip(files, recordings, times, strict=True)
-    ]
+    found = []
+    for file, recording, seconds in zip(files, recordings, times, strict=True):
+        poses = FoundPoses(file, recording, [next(registrations) for _ in recording], seconds)
+        try:
+            _write(poses, form)
+        except InputError as error:  # the other recordings go on
+            poses = replaced(poses, fault=error)
+        found.append(poses)
+    return found
 
 
 def placed(source: Source, poses: str | None, threads: int = 0) -> Source:
@@ -168,15 +171,6 @@ def _register(frame: Frame, odometry: FrameOdometry, guard: Guard, watch: Watch)
         warn(f"{frame.name}: not to be trusted: {registration.reason}")
     watch(frame, registration, stopwatch)
     return registration
-
-
-def _written(found: FoundPoses, form: PoseFormat) -> FoundPoses:
-    """Writes the poses of a recording; the other recordings go on where that fails."""
-    try:
-        _write(found, form)
-    except InputError as error:
-        return replaced(found, fault=error)
-    return found
 
 
 def _write(found: FoundPoses, form: PoseFormat) -> None:
@@ -266,24 +260,22 @@ def _folders(recording: Sequence[Frame]) -> Iterator[Path]:
 
 
 def _times(recording: Sequence[Frame], form: PoseFormat) -> list[float]:
-    """When the scans of a recording were taken, seconds; empty where not all of it is known."""
+    """When the scans of a recording were taken, seconds; empty where not all of it is known.
+
+    Raises:
+        InputError: Times that are missing or do not ascend, for ``tum``.
+    """
     times = [time for frame in recording if (time := frame.time) is not None]
-    if len(times) == len(recording):
-        if form == "tum":
-            _refuse_times_that_turn_back(times, recording)
-        return times
-    if form == "tum":
+    if form != "tum":
+        return times if len(times) == len(recording) else []
+    if len(times) < len(recording):
         lacking = next(frame for frame in recording if frame.time is None)
         raise InputError(
             lacking.name,
             "nothing says when it was taken, and a line of TUM's form begins with the time",
             "Write a times.txt beside the scans, a line of seconds each, or take --format kitti.",
         )
-    return []
-
-
-def _refuse_times_that_turn_back(times: Sequence[float], recording: Sequence[Frame]) -> None:
-    """Refuses times by which poses could not be found again: they have to ascend."""
+    # Poses are found again by their times, which have to ascend.
     for (earlier, later), frame in zip(pairwise(times), recording[1:], strict=True):
         if later <= earlier:
             raise InputError(
@@ -292,3 +284,4 @@ def _refuse_times_that_turn_back(times: Sequence[float], recording: Sequence[Fra
                 "TUM's form go by ascending time",
                 "Name the scans in the order that they were taken in, or take --format kitti.",
             )
+    return times

@@ -56,9 +56,11 @@ def logging_to_run_folder() -> Iterator[None]:
         yield
     except OSError as error:
         # A logger that cannot write either when it is closed hides what it was closed for.
-        for earlier in _chain(error):
+        earlier: BaseException | None = error
+        while earlier is not None:
             if isinstance(earlier, InputError):
                 raise earlier from None
+            earlier = earlier.__context__
         if error.errno not in REFUSALS:
             raise
         raise InputError(
@@ -66,10 +68,3 @@ def logging_to_run_folder() -> Iterator[None]:
             f"cannot be written ({error.strerror})",
             "Choose a folder that is writable and has room: --trainer.logger.save_dir.",
         ) from error
-
-
-def _chain(error: BaseException) -> Iterator[BaseException]:
-    earlier: BaseException | None = error
-    while earlier is not None:
-        yield earlier
-        earlier = earlier.__context__

@@ -16,10 +16,10 @@ class Steps:
 
     Args:
         show: Receives each line.
-        total: Number of all steps; 0 where it is not shown.
+        total: Number of all steps.
     """
 
-    def __init__(self, show: Show = show_nothing, total: int = 0) -> None:
+    def __init__(self, show: Show, total: int) -> None:
         self.show = show
         self._total = total
         self._begun = 0
@@ -28,7 +28,7 @@ class Steps:
     def begin(self, title: str) -> None:
         """Shows what the next step does, and how many steps there are."""
         self._begun += 1
-        self.show(f"{title} (step {self._begun} of {self._total})" if self._total else title)
+        self.show(f"{title} (step {self._begun} of {self._total})")
         self._step = time.monotonic()
 
     def end(self, result: str) -> None:

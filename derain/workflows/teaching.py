@@ -1,24 +1,29 @@
 """Labels recordings by a method, and counts what it labels."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from derain.annotation.manifest import HELD_OUT_PART, Manifest
-from derain.annotation.taught_labels import TAUGHT_CARD
-from derain.annotation.teach import teach
-from derain.annotation.truth import TruthRecord
+from derain.annotation.teach import TAUGHT_CARD, teach
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.answers import Answers
+from derain.evaluation.counts import Counts
+from derain.evaluation.rain_counts import RainCounts
+from derain.evaluation.text_tables import number_text, plain_table
+from derain.sources.frame import Frame
+from derain.sources.judgement import Judgement
 from derain.sources.judging import Answer, Guard, unguarded
 from derain.sources.method import Method
+from derain.sources.reader import FrameReader
 from derain.sources.recordings import irregularities
 from derain.sources.source import Source
 from derain.system.notices import Notices, warn
+from derain.views.morton import first_rows
 from derain.views.scan_issues import much_removed
 
 
@@ -55,7 +60,7 @@ class TeachResults:
     manifest: Manifest
     judged: int
     answers: Answers
-    record: TruthRecord | None
+    record: "TruthRecord | None"
 
     @property
     def held_out(self) -> int:
@@ -87,41 +92,31 @@ def teach_recordings(
     """
     for sentence in irregularities(source, method.window):
         warn(sentence)
-    counting = _Counting(method, source, card, watch)
-    manifest = teach(method, source, out, card, guard, counting.add)
-    counting.notices.warn_of_repeats()
-    results = TeachResults(manifest, counting.judged, counting.answers, counting.record)
-    _warn_of_little(results)
-    return results
+    frames = {frame.key: frame for frame in source}
+    measured = card is not None and any(frame.has_labels for frame in source)
+    record = TruthRecord(card) if card is not None and measured else None
+    notices, judged, counts = Notices(), 0, Answers.none()
 
-
-class _Counting:
-    """Counts labels scan by scan, and warns of what is odd."""
-
-    def __init__(self, method: Method, source: Source, card: DataCard | None, watch: Watch) -> None:
-        self.method = method
-        self.frames = {frame.key: frame for frame in source}
-        self.watch = watch
-        self.judged = 0
-        self.answers = Answers.none()
-        self.notices = Notices()
-        measured = card is not None and any(frame.has_labels for frame in source)
-        self.record = TruthRecord(card) if card is not None and measured else None
-
-    def add(self, answer: Answer, labels: NDArray[np.uint32]) -> None:
-        """Counts one scan."""
+    def count(answer: Answer, labels: NDArray[np.uint32]) -> None:
+        nonlocal judged, counts
         frame, judgement, stopwatch = answer
-        self.judged += 1
-        odd = [*self.method.issues(judgement), *much_removed(judgement.share_of_rain)]
-        self.notices.warn(frame.name, odd)
+        judged += 1
+        odd = [*method.issues(judgement), *much_removed(judgement.share_of_rain)]
+        notices.warn(frame.name, odd)
         answers = Answers.of(judgement.scan.with_label(labels), TAUGHT_CARD)
-        self.answers += answers
-        self.watch(LabelledScan(frame.name, answers, dict(stopwatch.milliseconds)))
-        if self.record is not None:
+        counts += answers
+        watch(LabelledScan(frame.name, answers, dict(stopwatch.milliseconds)))
+        if record is not None:
             try:
-                self.record.add(self.frames[frame.key], judgement)
+                record.add(frames[frame.key], judgement)
             except InputError as error:
                 warn(f"not measured: {error}")
+
+    manifest = teach(method, source, out, card, guard, count)
+    notices.warn_of_repeats()
+    results = TeachResults(manifest, judged, counts, record)
+    _warn_of_little(results)
+    return results
 
 
 def _warn_of_little(results: TeachResults) -> None:
@@ -131,3 +126,58 @@ def _warn_of_little(results: TeachResults) -> None:
         warn("no rain was found: a network would learn that nothing is rain")
     if not results.held_out:
         warn("no scan is held out, for that a sequence needs three: all are for training")
+
+
+class TruthRecord:
+    """Measures a teacher's answers by the scans' own labels, where there are any.
+
+    Args:
+        card: Data card of the scans.
+
+    Attributes:
+        scans: Number of scans with labels.
+    """
+
+    def __init__(self, card: DataCard) -> None:
+        self.card = card
+        self.scans = 0
+        self._all, self._sure = (
+            RainCounts(card.classes, card.rain, unknown=card.unknown) for _ in range(2)
+        )
+
+    def add(self, frame: Frame, judgement: Judgement) -> None:
+        """Measures one scan; one without labels is skipped.
+
+        Args:
+            frame: The scan's frame, with its own labels.
+            judgement: What the teacher returned for it.
+
+        Raises:
+            InputError: Labels that cannot be read, or that the data card does not name.
+        """
+        if not frame.has_labels:
+            return
+        scan = FrameReader(self.card).with_labels(judgement.scan, frame)
+        rows = first_rows(scan) if self.card.deduplicate else scan.valid.nonzero()[0]
+        self._all.add(scan.take(rows), judgement.rain[rows])
+        sure = rows[judgement.answered[rows]]
+        self._sure.add(scan.take(sure), judgement.rain[sure])
+        self.scans += 1
+
+    def __str__(self) -> str:
+        scores = [["", "points", "precision", "recall", "IoU"]]
+        for name, measured in (("all points", self._all), ("points it is sure of", self._sure)):
+            scores.append([name, *_scores(measured.pooled())])
+        classes = [["class", "points", "called rain", "of those it is sure of"]]
+        sure = self._sure.by_class()
+        for name, counts in self._all.by_class().items():
+            if counts.points:
+                of_sure = number_text(sure[name].share_lost, ".2%")
+                title = f"{name} (rain)" if counts.rain else name
+                classes.append([title, f"{counts.points:,}", f"{counts.share_lost:.2%}", of_sure])
+        return f"{plain_table(scores)}\n{plain_table(classes)}"
+
+
+def _scores(counts: Counts) -> list[str]:
+    points = sum(astuple(counts))
+    return [f"{points:,}", *map(number_text, (counts.precision, counts.recall, counts.iou))]

@@ -1,6 +1,7 @@
 """Training and measuring networks by Lightning's Trainer, from configurations and options."""
 
 import argparse
+import logging
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -48,18 +49,20 @@ from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
 from derain.system.open3d_import import warn_where_tensorboard_cannot_start
 from derain.system.workers import exit_with_launcher
 from derain.workflows.configurations import own_configurations, with_packaged_configs
-from derain.workflows.lightning_silence import silence_advertisements
 from derain.workflows.run_folder import (
     WholeConfig,
     folder_of_run,
     logging_to_run_folder,
 )
 from derain.workflows.start import START_HELP, checkpoint_of
-from derain.workflows.training_errors import as_input_error, read_configuration
-from derain.workflows.training_options import known_options
+from derain.workflows.training_errors import as_input_error, known_options, read_configuration
 
 # What `--ckpt_path` may be besides a file: checkpoints that Lightning looks for itself.
 FOUND_BY_LIGHTNING = ("last", "hpc")
+
+# The logger of messages that one process of several writes, and those above all of Lightning's.
+MESSAGES = logging.getLogger("lightning.pytorch.utilities.rank_zero")
+LOGGERS = ("lightning.pytorch", "lightning.fabric")
 
 # Numbers that Lightning and the callbacks take as they are.
 LEAST = {
@@ -269,9 +272,24 @@ def run_trainer(
         )
 
 
+@contextmanager
+def quiet_lightning() -> Iterator[None]:
+    """Hides Lightning's messages and advice, such as what hardware it found, in the block."""
+    levels = {logger: logger.level for logger in map(logging.getLogger, LOGGERS)}
+    try:
+        for logger in levels:
+            logger.setLevel(logging.WARNING)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", module=r"lightning\.")
+            yield
+    finally:
+        for logger, level in levels.items():
+            logger.setLevel(level)
+
+
 def _prepare_process(method: str) -> None:
     """Sets what holds for the whole process: messages, threads and memory."""
-    silence_advertisements()
+    MESSAGES.addFilter(lambda record: "Tip: " not in record.getMessage())  # of what to install
     if method == "fit":
         warn_where_tensorboard_cannot_start()
     # Lightning warns where sys.argv has options too; the arguments alone are used.

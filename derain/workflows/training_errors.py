@@ -1,15 +1,19 @@
-"""One line for what Lightning's command line cannot use: an option, a key or a value."""
+"""The options of Lightning's command line, and one line for what it cannot use."""
 
 import difflib
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from jsonargparse import ArgumentParser
 
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.models.former_names import FORMER_OPTIONS
-from derain.workflows.training_options import IMPLIED
+
+# Steps of a key in a file that an option on the command line leaves out.
+IMPLIED = ("class_path", "init_args")
 
 # How jsonargparse names an option that it does not know, on the command line and in a file.
 _UNKNOWN = (
@@ -27,6 +31,26 @@ HINT = "All options: --help-all."
 
 # What only says that something below it went wrong, or where.
 _HEADINGS = ("Parser key", "Does not validate", "Subtypes:", "Errors:", "Problem with", "Given ")
+
+
+def known_options(parser: ArgumentParser, classes: Mapping[str, Iterable[type]]) -> set[str]:
+    """Options of a parser, and those of what can be chosen in it, without their dashes.
+
+    Args:
+        parser: A subcommand's parser.
+        classes: What can be chosen, by the option that chooses it.
+    """
+    parsers = [parser]
+    for name, chosen in classes.items():
+        for each in chosen:
+            parsers.append(ArgumentParser())
+            parsers[-1].add_class_arguments(each, name)
+    return {
+        ".".join(step for step in key.split(".") if step not in IMPLIED)
+        for each in parsers
+        for key in each.get_defaults().keys()  # noqa: SIM118
+        if "__" not in key  # so begins what jsonargparse enters for itself
+    }
 
 
 def read_configuration(path: Path, known: Collection[str]) -> Entry:

@@ -43,10 +43,10 @@ def test_heights_are_distances_and_positive_above() -> None:
 
 def test_the_same_search_finds_the_same_plane() -> None:
     points = np.concatenate([road(MOST_POINTS), rain(1000)])  # more than are looked at
-    assert len({find_plane(points, PlaneSearch(), "test") for _ in range(3)}) == 1
-    assert find_plane(points, PlaneSearch(seed=1), "test") != find_plane(
-        points, PlaneSearch(), "test"
+    first, again, other = (
+        find_plane(points, PlaneSearch(iterations=100, seed=seed), "test") for seed in (0, 0, 1)
     )
+    assert first == again != other
 
 
 def test_the_normal_points_up_whatever_the_order_of_the_points() -> None:
@@ -55,13 +55,10 @@ def test_the_normal_points_up_whatever_the_order_of_the_points() -> None:
         assert find_plane(points, PlaneSearch(), "test").normal[2] > 0.9
 
 
-def test_a_wall_is_no_road() -> None:
+def test_a_wall_and_too_few_points_are_no_road() -> None:
     wall = road(500)[:, [2, 1, 0]]
     with pytest.raises(InputError, match=r"scan: .* 8[0-9] degrees"):
         find_plane(wall, PlaneSearch(), "scan")
-
-
-def test_too_few_points_are_refused() -> None:
     assert find_plane(road(9), PlaneSearch(), "scan").normal[2] > 0.9
     with pytest.raises(InputError, match="8 points over the road are too few"):
         find_plane(road(8), PlaneSearch(), "scan")

@@ -38,18 +38,18 @@ corrections:
 """
 
 
+ROAD = "road: [[0, 0], [1, 0], [0, 1]]\n"
+BOX = "{class: car, centre: [0, 0, 0], size: [1, 1, 1]}"
+
+
 def written(path: Path, text: str) -> Path:
     path.write_text(text, "utf-8")
     return path
 
 
-def test_every_key_of_a_scene_is_read(tmp_path: Path) -> None:
+def test_every_key_of_a_scene_is_read_and_the_road_is_all_that_it_needs(tmp_path: Path) -> None:
     assert read_scene(written(tmp_path / "scene.yaml", TEXT)) == SCENE
-
-
-def test_the_road_is_all_that_a_scene_needs(tmp_path: Path) -> None:
-    path = written(tmp_path / "scene.yaml", "road: [[0, 0], [1, 0], [0, 1]]")
-    assert read_scene(path) == Scene(((0, 0), (1, 0), (0, 1)))
+    assert read_scene(written(tmp_path / "road.yaml", ROAD)) == Scene(((0, 0), (1, 0), (0, 1)))
 
 
 def test_the_example_of_the_description_can_be_read(tmp_path: Path) -> None:
@@ -69,48 +69,26 @@ def test_corrections_hold_in_their_sequence_alone() -> None:
     assert corrected["mast_1"] == SCENE.boxes["mast_1"]
 
 
-ROAD = "road: [[0, 0], [1, 0], [0, 1]]\n"
-BOX = "{class: car, centre: [0, 0, 0], size: [1, 1, 1]}"
-
-
 @pytest.mark.parametrize(
     ("text", "key", "reason"),
     [
-        ("", "", "it is empty"),
         ("boxes: {}", "", "road is missing"),
         (ROAD + "roof: 1", "roof", "there is no such key"),
         ("road: [[0, 0], [1, 0]]", "road", "2 corners make no polygon"),
         ("road: [[0, 0], [1, 0], [0, .nan]]", "road[2][1]", "nan is not a finite number"),
         ("road: [[0, 0], [1, 0], [0, 1, 2]]", "road[2]", "are not 2 numbers"),
-        ("road: 5", "road", "5 is not a list"),
         ("road: [[0, 0], [1, 0], [0, 1e300]]", "road[2][1]", "1e+300 is not within"),
         (ROAD + "height: -1e300", "height", "-1e+300 is not within"),
         (ROAD + "plane: {distance: 1e300}", "plane.distance", "1e+300 is not within"),
-        (ROAD + f"height: 1{'0' * 400}", "height", "the number is too large"),
-        (ROAD + "corrections: []", "corrections", "[] is not a mapping"),
-        (ROAD + "height: high", "height", "'high' is not a finite number"),
         (ROAD + "plane: {points: 2}", "plane.points", "2 is not a whole number from 3 to 100"),
         (ROAD + "plane: {distance: 0}", "plane.distance", "0 is not above 0"),
         (ROAD + "plane: {iterations: 1000000000000}", "plane.iterations", "is not a whole number"),
-        (ROAD + "plane: {seed: true}", "plane.seed", "True is not a whole number"),
-        (ROAD + "boxes: [1]", "boxes", "[1] is not a mapping"),
         (ROAD + "boxes: {a: {class: car}}", "boxes.a", "centre is missing"),
-        (ROAD + f"boxes: {{1: {BOX}}}", "boxes", "the key 1 is no text"),
         (ROAD + f"boxes: {{a: {BOX.replace('car', 'cart')}}}", "boxes.a.class", "no class 'cart'"),
-        (
-            ROAD + f"boxes: {{a: {BOX.replace('car', 'c' * 10**5)}}}",
-            "boxes.a.class",
-            "no class 'ccc",
-        ),
         (ROAD + f"boxes: {{a: {BOX.replace('1]', '1e300]')}}}", "boxes.a.size[2]", "not within"),
         (ROAD + f"boxes: {{a: {BOX.replace('1]', '0]')}}}", "boxes.a.size[2]", "0 is not above 0"),
         (ROAD + f"boxes: {{a: {BOX.replace('1]', '1, 1]')}}}", "boxes.a.size", "are not 3 numbers"),
-        (ROAD + "corrections: {010: {boxes: {}}}", "corrections", "the key 8 is no text"),
-        (
-            ROAD + "corrections: {'010': {boxes: {a: {}}}}",
-            "corrections.010.boxes.a",
-            "no such box",
-        ),
+        (ROAD + "corrections: {a: {boxes: {b: {}}}}", "corrections.a.boxes.b", "no such box"),
     ],
 )
 def test_what_cannot_be_meant_is_named_by_its_key(
@@ -122,13 +100,3 @@ def test_what_cannot_be_meant_is_named_by_its_key(
     assert str(raised.value.subject) == (f"{path}: {key}" if key else str(path))
     assert reason in raised.value.reason
     assert raised.value.remedy.endswith(".")
-    assert len(str(raised.value)) < len(str(path)) + 300
-
-
-@pytest.mark.parametrize("content", [b"road: [", b"\xff\xfe"])
-def test_a_file_that_is_not_yaml_is_refused(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "scene.yaml").write_bytes(content)
-    with pytest.raises(InputError, match=r"cannot be read as \.yaml"):
-        read_scene(tmp_path / "scene.yaml")
-    with pytest.raises(InputError, match="no such file"):
-        read_scene(tmp_path / "none.yaml")

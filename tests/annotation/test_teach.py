@@ -10,8 +10,7 @@ import pytest
 from window_method import Between, Dimmer
 
 from derain.annotation.manifest import CARD, LABELS, TAUGHT_MANIFEST, Manifest
-from derain.annotation.taught_labels import labels_of
-from derain.annotation.teach import teach
+from derain.annotation.teach import labels_of, teach
 from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
@@ -100,8 +99,7 @@ def test_truth_changes_no_byte(make_drive: MakeDrive, tmp_path: Path) -> None:
     assert files(tmp_path / "with") == files(tmp_path / "garbage") == files(tmp_path / "without")
 
 
-@pytest.mark.parametrize("labelled", [True, False])
-@pytest.mark.parametrize("out", [".", "velodyne/..", "labels/.."])
+@pytest.mark.parametrize(("labelled", "out"), [(True, "."), (False, "."), (True, "velodyne/..")])
 def test_labels_of_the_recording_stay(make_drive: MakeDrive, labelled: bool, out: str) -> None:
     drive = make_drive(labelled=labelled)
     (drive.parent / LABELS).mkdir(exist_ok=True)
@@ -182,13 +180,11 @@ def test_a_teacher_that_knows_nothing_writes_nothing(make_drive: MakeDrive, tmp_
     assert not (tmp_path / "out").exists()
 
 
-def test_scans_in_no_file_are_refused(tmp_path: Path) -> None:
+def test_scans_in_no_file_or_of_a_name_that_is_no_text_are_refused(
+    make_drive: MakeDrive, tmp_path: Path
+) -> None:
     with pytest.raises(InputError, match="is in no file"):
         teach(Between(), Frames.of_scans([Scan.of(scene(9), name="mine")] * 3), tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_name_that_is_no_text_is_refused(make_drive: MakeDrive, tmp_path: Path) -> None:
     drive = make_drive(scans=3)
     os.rename(drive / "000001.bin", os.fsencode(drive) + b"/\xff.bin")
     with pytest.raises(InputError, match="its name is no text"):

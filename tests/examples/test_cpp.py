@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnxruntime
 import pytest
 from numpy.typing import NDArray
 
@@ -147,32 +148,18 @@ def test_a_model_that_it_does_not_know_is_refused(
     assert not (tmp_path / "view").exists()
 
 
-@pytest.mark.parametrize("text", ["", "{", '{"spec": {}} more', '{"spec": [1, 2', "[" * 10_000])
-def test_what_is_no_metadata_is_refused(show_view: Program, tmp_path: Path, text: str) -> None:
-    scene(50).tofile(tmp_path / "scan.bin")
-    (tmp_path / "metadata.json").write_text(text)
-    done = show_view(tmp_path / "metadata.json", tmp_path / "scan.bin", tmp_path / "view")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-
-
-def test_a_file_that_is_not_whole_rows_is_refused(
-    show_view: Program, specs: dict[str, Spec], tmp_path: Path
-) -> None:
-    metadata = metadata_at(tmp_path / "metadata.json", specs["default"].as_dict())
-    (tmp_path / "scan.bin").write_bytes(bytes(40))
-    for scan, reason in (("scan.bin", "40 bytes are not whole rows"), ("none", "cannot be read")):
-        done = show_view(metadata, tmp_path / scan, tmp_path / "view")
+def test_what_is_no_metadata_and_no_scan_is_refused(show_view: Program, tmp_path: Path) -> None:
+    metadata, scan = tmp_path / "metadata.json", tmp_path / "scan.bin"
+    scene(50).tofile(scan)
+    for text in ("", "{", '{"spec": {}} more', '{"spec": [1, 2', "[" * 10_000):
+        metadata.write_text(text)
+        done = show_view(metadata, scan, tmp_path / "view")
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    session = onnxruntime.InferenceSession(default_model(), providers=["CPUExecutionProvider"])
+    metadata.write_text(session.get_modelmeta().custom_metadata_map[METADATA_KEY])
+    assert show_view(metadata, scan, tmp_path / "view").returncode == 0
+    scan.write_bytes(bytes(40))
+    for name, reason in ((scan, "40 bytes are not whole rows"), ("none", "cannot be read")):
+        done = show_view(metadata, name, tmp_path / "view")
         assert done.returncode == 2
         assert reason in done.stderr
-
-
-def test_the_metadata_that_show_view_takes_is_that_of_a_model(
-    show_view: Program, tmp_path: Path
-) -> None:
-    import onnxruntime
-
-    session = onnxruntime.InferenceSession(default_model(), providers=["CPUExecutionProvider"])
-    metadata, scan = tmp_path / "metadata.json", tmp_path / "scan.bin"
-    metadata.write_text(session.get_modelmeta().custom_metadata_map[METADATA_KEY])
-    scene(100).tofile(scan)
-    assert show_view(metadata, scan, tmp_path / "view").returncode == 0

@@ -50,49 +50,37 @@ def agree(reader: ModuleType, path: Path, points: NDArray[np.float32]) -> NDArra
     return rain
 
 
-@pytest.mark.parametrize("points", SCANS.values(), ids=SCANS)
-def test_of_neighbours_it_makes_what_the_default_model_makes(
-    reader: ModuleType, points: NDArray[np.float32]
+def test_of_neighbours_it_makes_what_derain_makes(
+    reader: ModuleType, judging_candidates: Path
 ) -> None:
-    agree(reader, default_model(), points)
-
-
-def test_the_scan_it_is_compared_on_has_rain_and_other_points(reader: ModuleType) -> None:
+    for model in (default_model(), judging_candidates, KEPT):  # the last of an early derain
+        for points in SCANS.values():
+            agree(reader, model, points)
     assert 0 < agree(reader, default_model(), hard_points()).mean() < 0.9
 
 
-@pytest.mark.parametrize("points", SCANS.values(), ids=SCANS)
-def test_it_judges_candidates_as_derain_does(
-    reader: ModuleType, judging_candidates: Path, points: NDArray[np.float32]
-) -> None:
-    agree(reader, judging_candidates, points)
-
-
-@pytest.mark.parametrize("points", SCANS.values(), ids=SCANS)
-def test_of_images_it_makes_what_derain_makes(
-    reader: ModuleType, image_onnx: Path, points: NDArray[np.float32]
-) -> None:
-    agree(reader, image_onnx, points)
+def test_of_images_it_makes_what_derain_makes(reader: ModuleType, image_onnx: Path) -> None:
+    for points in SCANS.values():
+        agree(reader, image_onnx, points)
 
 
 @pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
 @pytest.mark.parametrize("azimuth", [(-180.0, 180.0), (-60.0, 75.0)], ids=["circle", "sector"])
-@pytest.mark.parametrize("bounded", [False, True], ids=["all", "candidates"])
 def test_it_carries_scores_of_pixels_back_in_every_way(
     reader: ModuleType,
     salsanext_onnx: Path,
     tmp_path: Path,
     way_back: str,
     azimuth: tuple[float, float],
-    bounded: bool,
     candidates: Candidates,
 ) -> None:
     proto, spec = onnx.load(salsanext_onnx), Derainer(salsanext_onnx).spec
     grid = {**spec.view["grid"], "azimuth": azimuth}
     view = {"kind": "range", "grid": grid, "way_back": way_back}
-    changed = replace(spec, view=view, candidates=candidates if bounded else None)
-    (tmp_path / "changed.onnx").write_bytes(with_metadata(proto, {"spec": changed.as_dict()}))
-    agree(reader, tmp_path / "changed.onnx", np.concatenate([hard_points(), scene(800)]))
+    for bounds in (None, candidates):
+        changed = replace(spec, view=view, candidates=bounds)
+        (tmp_path / "changed.onnx").write_bytes(with_metadata(proto, {"spec": changed.as_dict()}))
+        agree(reader, tmp_path / "changed.onnx", np.concatenate([hard_points(), scene(800)]))
 
 
 @pytest.mark.parametrize("text", [b'"numpy"', b'"sha256"'], ids=["versions", "checksum"])
@@ -103,10 +91,6 @@ def test_a_model_that_has_changed_is_refused(
     model.write_bytes(default_model().read_bytes().replace(text, text.upper()))
     with pytest.raises(SystemExit, match="its checksum differs or is missing"):
         reader.Model(str(model))
-
-
-def test_a_model_of_an_early_derain_is_read(reader: ModuleType) -> None:
-    agree(reader, KEPT, scene(50))
 
 
 def test_from_the_command_line_it_writes_labels(tmp_path: Path) -> None:

@@ -108,16 +108,6 @@ def test_what_it_learnt_is_rain_in_scans_it_never_saw(
     assert (rain & DROPS).sum() / (rain | DROPS).sum() > 0.8
 
 
-def test_it_is_given_no_candidates_for_it_takes_none(
-    run_derain, checkpoint: Path, root: Path, tmp_path: Path
-) -> None:
-    options = ["--out", tmp_path / "toy.onnx", "--candidates", root / "sequences/00/velodyne"]
-    outcome = run_derain("export", checkpoint, *options, "--card", "wads")
-    assert (outcome.code, outcome.out) == (2, "")
-    assert outcome.err.splitlines()[-1].startswith("derain: --candidates: toy judges every point")
-    assert not (tmp_path / "toy.onnx").exists()
-
-
 def test_it_is_benched_beside_others(
     run_derain, model: Path, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

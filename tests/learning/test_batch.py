@@ -31,6 +31,7 @@ SAMPLES = [sample(points) for points in SIZES]
 
 def test_a_batch_is_its_scans_one_after_the_other() -> None:
     batch = Batch.of(SAMPLES)
+    assert batch.cells == list(SIZES)
     assert list(batch.inputs) == ["points", "distances", "neighbours"]
     inputs = [batch.split(tensor) for tensor in batch.inputs.values()]
     assert batch.target is not None
@@ -46,30 +47,20 @@ def test_a_batch_is_its_scans_one_after_the_other() -> None:
         )
 
 
-def test_scores_are_split_by_the_points_of_each_scan() -> None:
-    scores = torch.rand(sum(SIZES), 2)
-    parts = Batch.of(SAMPLES).split(scores)
-    assert [len(part) for part in parts] == list(SIZES)
-    assert torch.equal(torch.cat(parts), scores)
-
-
-def test_a_batch_of_an_empty_scan_is_an_empty_batch() -> None:
-    batch = Batch.of([sample(0)])
-    assert {len(tensor) for tensor in batch.inputs.values()} == {0}
-    assert [len(part) for part in batch.split(torch.zeros(0, 2))] == [0]
-
-
 @pytest.mark.parametrize("unlabelled", [1, 2])
 def test_a_batch_has_targets_only_if_every_scan_has(unlabelled: int) -> None:
     samples = [sample(9, labelled=False)] * unlabelled + [sample(5)] * (2 - unlabelled)
     assert Batch.of(samples).target is None
 
 
-@pytest.mark.parametrize(
+views = pytest.mark.parametrize(
     "view",
     [NeighbourView(5), RangeView(SphericalGrid.even(8, 30, (-30, 30)))],
     ids=["neighbours", "range"],
 )
+
+
+@views
 def test_cells_of_unknown_points_are_not_to_be_judged(view: View) -> None:
     card = DataCard("ours", {0: "ground", 3: "rain", 9: "unknown"}, rain=(3,), unknown=(9,))
     rng = np.random.default_rng(0)
@@ -77,6 +68,7 @@ def test_cells_of_unknown_points_are_not_to_be_judged(view: View) -> None:
     viewed = view(scan)
     target = Sample.of(scan, viewed, card).target
     assert target is not None
+    assert Sample.of(scan.with_label(None), viewed, card).target is None
     # Rows as cells see them: the first of those at one position, the nearest in a pixel.
     row = viewed.first if isinstance(viewed, Neighbourhoods) else viewed.winner
     expected = np.array([0, 0, 0, 1, 0, 0, 0, 0, 0, IGNORED])[scan.label[row]]
@@ -84,11 +76,7 @@ def test_cells_of_unknown_points_are_not_to_be_judged(view: View) -> None:
     assert set(expected.tolist()) == {0, 1, IGNORED}
 
 
-@pytest.mark.parametrize(
-    "view",
-    [NeighbourView(5), RangeView(SphericalGrid.even(8, 30, (-30, 30)))],
-    ids=["neighbours", "range"],
-)
+@views
 def test_a_batch_that_is_measured_carries_the_scans_and_one_that_is_not_tensors_alone(
     view: View,
 ) -> None:
@@ -114,12 +102,6 @@ def test_a_batch_that_is_measured_carries_the_scans_and_one_that_is_not_tensors_
     # Of a point its coordinates, intensity, range and pixel; of a pixel what it shows.
     most = sum(44 * len(scan) + 4 * viewed.size for scan, viewed in zip(scans, seen, strict=True))
     assert len(pickle.dumps(told)) < tensors + most + 5000
-
-
-def test_a_scan_without_labels_has_no_target() -> None:
-    scan = Scan.of(scene(20))
-    card = DataCard("ours", {3: "rain"}, rain=(3,))
-    assert Sample.of(scan, NeighbourView(5)(scan), card).target is None
 
 
 def test_tensors_follow_to_another_device_and_scans_stay() -> None:

@@ -10,7 +10,7 @@ from derain.cards.card import DataCard, load_card
 from derain.datamodules.in_memory import InMemory
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.learning.task import EXAMPLE_SCANS, Task, agree_on_task
+from derain.learning.task import EXAMPLE_SCANS, agree_on_task
 from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNext
@@ -84,10 +84,3 @@ def test_to_be_measured_a_model_must_have_been_trained() -> None:
     assert data.task is None
     with pytest.raises(InputError, match=r"has not been trained\. Give a checkpoint"):
         data.test_dataloader()
-
-
-def test_a_task_is_not_changed() -> None:
-    task = agree_on_task(OutDet(), InMemory(scans(1), card=CARD))
-    with pytest.raises(AttributeError):
-        task.card = CARD  # type: ignore[misc]
-    assert isinstance(task, Task)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from derain.evaluation.operating_points import ThresholdCounts
 from derain.evaluation.rain_counts import ClassCounts
@@ -16,6 +17,12 @@ def table_of(figure: Figure) -> tuple[list[str], list[str]]:
     (axes,) = figure.axes
     names = [label.get_text() for label in axes.get_yticklabels()]
     return names, [text.get_text() for text in axes.texts]
+
+
+def chosen_point(figure: Figure) -> Line2D:
+    """The mark of the chosen threshold on the curve."""
+    (chosen,) = (line for line in figure.axes[0].lines if str(line.get_label())[:6] == "chosen")
+    return chosen
 
 
 def test_the_table_has_shares_and_points_with_rain_first() -> None:
@@ -48,17 +55,14 @@ def test_the_curve_is_marked_where_the_threshold_is() -> None:
     probability = np.clip(rng.normal(np.where(rain, 0.7, 0.3), 0.2), 0, 1).astype(np.float32)
     metric = ThresholdCounts([0.123])
     metric.update(probability, rain)
-    curve, _ = operating_points_figure(metric.points(), 0.123, "title").axes
-    (chosen,) = (line for line in curve.lines if str(line.get_label()).startswith("chosen"))
+    chosen = chosen_point(operating_points_figure(metric.points(), 0.123, "title"))
     called = probability > 0.123
     assert chosen.get_xdata() == pytest.approx([(called & rain).sum() / rain.sum()])
     assert chosen.get_ydata() == pytest.approx([(called & rain).sum() / called.sum()])
     assert "threshold 0.123" in str(chosen.get_label())
 
-
-def test_a_threshold_that_nothing_exceeds_has_no_precision() -> None:
+    # A threshold that nothing exceeds has no precision.
     metric = ThresholdCounts()
     metric.update(np.full(10, 0.5, np.float32), np.arange(10) < 5)
-    curve, _ = operating_points_figure(metric.points(), 1.0, "title").axes
-    (chosen,) = (line for line in curve.lines if str(line.get_label()).startswith("chosen"))
+    chosen = chosen_point(operating_points_figure(metric.points(), 1.0, "title"))
     assert "precision -, recall 0.000, IoU 0.000" in str(chosen.get_label())

@@ -5,15 +5,12 @@ import numpy as np
 from derain.pictures.palette import OUTCOMES, PROBABILITY, outcomes, rgb, shades
 
 
-def test_shades_lie_between_their_colours_and_stay_at_the_ends() -> None:
+def test_shades_lie_between_their_colours_and_the_more_probable_is_brighter() -> None:
     share = np.array([-1.0, 0.0, 0.25, 0.5, 1.0, 2.0])
     first, middle, last = (np.array(rgb(colour)) for colour in PROBABILITY)
     between = np.round((first + middle) / 2)
     expected = np.array([first, first, between, middle, last, last])
     np.testing.assert_array_equal(shades(PROBABILITY, share), expected)
-
-
-def test_what_is_more_probable_is_brighter() -> None:
     # Source: luma of ITU-R BT.601.
     luma = shades(PROBABILITY, np.linspace(0, 1, 101)) @ np.array([0.299, 0.587, 0.114])
     assert (np.diff(luma) > 0).all()

@@ -17,12 +17,8 @@ from derain.pictures.scan_pictures import before_after_figure, judgement_figure,
 from derain.scan import Scan
 
 
-def dots(figure: Figure, panel: int) -> np.ndarray:
-    """Places and colours, (N, 2 + 4), of the dots in a panel."""
-    return dots_in(figure.axes[panel])
-
-
 def dots_in(axes: Axes) -> np.ndarray:
+    """Places and colours, (N, 2 + 4), of the dots in a panel."""
     parts = [np.zeros((0, 6))]
     for drawn in axes.collections:  # each of one colour
         places = np.asarray(drawn.get_offsets())
@@ -32,7 +28,7 @@ def dots_in(axes: Axes) -> np.ndarray:
 
 
 def dots_of(figure: Figure, panel: int, outcome: str) -> int:
-    colours = dots(figure, panel)[:, 2:]
+    colours = dots_in(figure.axes[panel])[:, 2:]
     return int(np.isclose(colours, to_rgba(OUTCOMES[outcome])).all(axis=1).sum())
 
 
@@ -77,7 +73,7 @@ def test_the_panels_of_a_judgement_count_what_became_of_the_points(
             found = {outcome: dots_of(figure, panel, outcome) for outcome in OUTCOMES}
             assert found == {o: int((outcomes.get(o, ~seen) & seen).sum()) for o in OUTCOMES}
     for panel in range(len(figure.axes)):
-        assert len(dots(figure, panel)) == seen.sum() == 196
+        assert len(dots_in(figure.axes[panel])) == seen.sum() == 196
 
 
 def test_rare_outcomes_are_drawn_larger_and_on_top() -> None:
@@ -97,9 +93,11 @@ def test_the_two_views_are_in_the_sensor_frame() -> None:
     scan = Scan.of(np.array([[2, 1, 0, 9], [1, -1, 1, 9]], np.float32))
     figure = before_after_figure(scan, np.array([False, False]), "two points")
     above, ahead = list(panels(figure).values())[-1]
-    np.testing.assert_allclose(sorted(dots(figure, above)[:, :2].tolist()), [[-1, 2], [1, 1]])
     np.testing.assert_allclose(
-        sorted(dots(figure, ahead)[:, :2].tolist()),
+        sorted(dots_in(figure.axes[above])[:, :2].tolist()), [[-1, 2], [1, 1]]
+    )
+    np.testing.assert_allclose(
+        sorted(dots_in(figure.axes[ahead])[:, :2].tolist()),
         [
             [-np.degrees(np.arctan2(1, 2)), 0],
             [45, np.degrees(np.arctan2(1, np.sqrt(2)))],
@@ -119,32 +117,28 @@ def test_before_and_after_differ_by_what_was_found(
     assert titles[-1] == f"after: {196 - removed} points"
     for before, after in zip(*(panels(figure)[titles[end]] for end in (0, -1)), strict=True):
         assert dots_of(figure, before, "rain, removed") == removed
-        assert len(dots(figure, before)) == 196
-        assert dots_of(figure, after, "solid, kept") == len(dots(figure, after)) == 196 - removed
+        assert len(dots_in(figure.axes[before])) == 196
+        assert (
+            dots_of(figure, after, "solid, kept")
+            == len(dots_in(figure.axes[after]))
+            == 196 - removed
+        )
 
 
-HARD_TO_DRAW = (
-    *("empty", "one point", "nothing valid", "NaN and infinite rows", "near and far together"),
-    *("on a line", "intensity 0", "no intensity"),
-)
+HARD_TO_DRAW = ("empty", "nothing valid", "near and far together", "on a line", "intensity 0")
 
 
 @pytest.mark.parametrize(
-    ("name", "scan"), [case for case in hard_cases() if case[0] in HARD_TO_DRAW]
+    ("name", "scan"), [case for case in hard_cases(200) if case[0] in HARD_TO_DRAW]
 )
 def test_a_hard_case_is_drawn_without_a_warning(name: str, scan: Scan) -> None:
     found = scan.valid & (np.arange(len(scan)) % 2 == 0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # Matplotlib's word for what it does about points that all lie in one direction.
-        change = before_after_figure(scan, found, name)
-        judgement = judgement_figure(scan, found, scan.valid, name)
-        change.draw_without_rendering()
-        judgement.draw_without_rendering()
+        figure = before_after_figure(scan, found, name)
+        figure.draw_without_rendering()
     judged, left = int(scan.valid.sum()), int((scan.valid & ~found).sum())
-    for axes, drawn in zip(
-        [*change.axes, *judgement.axes], [judged, left, judged, left, *[judged] * 8], strict=True
-    ):
+    for axes, drawn in zip(figure.axes, [judged, left, judged, left], strict=True):
         places = dots_in(axes)[:, :2]
         assert len(places) == drawn
         # Something of what is there is in sight.
@@ -158,19 +152,14 @@ def test_a_picture_is_saved_as_png(
     scan, predicted, _ = judged
     path = tmp_path / "new" / "picture.png"
     save(before_after_figure(scan, predicted, "a scan"), path)
-    height, width, _ = imread(path).shape
-    assert width > height > 500
+    assert imread(path).shape == (990, 1540, 4)
     assert [file.name for file in path.parent.iterdir()] == ["picture.png"]
 
 
-@pytest.mark.parametrize("name", ["picture", "picture.xyz"])
-def test_a_picture_of_no_known_format_is_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match=r"no format of pictures\. Name it"):
-        save(Figure(), tmp_path / name)
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_picture_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
+def test_a_picture_of_no_known_format_or_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
+    for name in ("picture", "picture.xyz"):
+        with pytest.raises(InputError, match=r"no format of pictures\. Name it"):
+            save(Figure(), tmp_path / name)
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"picture\.png: cannot be written"):
         save(Figure(), tmp_path / "file" / "picture.png")

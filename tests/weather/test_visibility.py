@@ -34,8 +34,9 @@ def drawn(
     return np.bincount(place[~ends], minlength=100), np.bincount(place[ends], minlength=100)
 
 
-@pytest.mark.parametrize("rate", [0.001, 0.005, 0.02, 0.1])
-@pytest.mark.parametrize("walls", [(3, 30), (1, 12), (30, 40)])
+@pytest.mark.parametrize(
+    ("rate", "walls"), [(0.001, (1, 12)), (0.005, (3, 30)), (0.02, (30, 40)), (0.1, (1, 12))]
+)
 def test_drops_at_a_rate_have_the_visibility_of_that_rate_wherever_the_walls_are(
     rate: float, walls: tuple[float, float]
 ) -> None:
@@ -59,7 +60,7 @@ def test_a_ray_more_that_meets_rain_makes_visibility_no_better(
 
 
 @given(counts, counts, st.integers(2, 5))
-def test_the_same_scan_several_times_over_has_a_narrower_interval(
+def test_ends_enclose_the_estimate_and_the_more_rays_the_more_closely(
     other: NDArray[np.int64], rain: NDArray[np.int64], times: int
 ) -> None:
     once, often = visibility_of(other, rain), visibility_of(times * other, times * rain)
@@ -67,6 +68,9 @@ def test_the_same_scan_several_times_over_has_a_narrower_interval(
     assert often.at_most <= once.at_most
     if once.metres is not None:
         assert often.metres == pytest.approx(once.metres)
+    for seen in (once, reach_of(other + rain, 0.95)):
+        assert 0 <= seen.at_least <= CLEAR_AIR
+        assert seen.at_least <= seen.shown <= seen.at_most
 
 
 @pytest.mark.parametrize("count", [0, 1, 3, 10, 100])
@@ -111,31 +115,15 @@ def test_clear_air_is_as_far_as_so_many_rays_can_show() -> None:
     assert few.at_least == pytest.approx(-10 * math.log(0.9) / 0.01, rel=0.02)
 
 
-def test_so_few_rays_show_nothing() -> None:
-    other = np.zeros(BINS, np.int64)
+def test_few_rays_show_nothing_and_nothing_but_rain_is_next_to_no_visibility() -> None:
+    ends = np.zeros(BINS, np.int64)
     for rays in (0, 99):
-        other[20] = rays
-        for seen in (visibility_of(other, 0 * other), reach_of(other, 0.99)):
+        ends[4] = rays
+        for seen in (visibility_of(ends, 0 * ends), reach_of(ends, 0.99)):
             assert seen == NOT_KNOWN
-            assert not seen.known
-            assert str(seen) == "not known"
-
-
-def test_nothing_but_rain_is_next_to_no_visibility() -> None:
-    rain = np.zeros(BINS, np.int64)
-    rain[4] = 1000
-    seen = visibility_of(0 * rain, rain)
-    assert seen.known
-    assert seen.at_most < 0.3
-
-
-@given(counts, counts)
-def test_ends_enclose_the_estimate(other: NDArray[np.int64], rain: NDArray[np.int64]) -> None:
-    for seen in (visibility_of(other, rain), reach_of(other + rain, 0.95)):
-        assert 0 <= seen.at_least <= CLEAR_AIR
-        assert seen.at_least <= seen.at_most
-        if seen.metres is not None:
-            assert seen.at_least <= seen.metres <= seen.at_most
+            assert (seen.known, str(seen)) == (False, "not known")
+    ends[4] = 1000
+    assert 0 < visibility_of(0 * ends, ends).at_most < 0.3
 
 
 def test_reach_is_the_range_within_which_a_share_of_the_rays_end() -> None:

@@ -20,8 +20,6 @@ from derain.scan import Scan
 from derain.simulation.campaign import Campaign
 from derain.system.open3d_import import import_open3d
 from derain.workflows.demo import (
-    DEMO_NETWORKS,
-    STREETS,
     DemoConfig,
     clean_own_scans,
     removed_by_range,
@@ -88,7 +86,7 @@ def test_the_model_that_comes_with_derain_cleans_your_own_scans(
         scene(500, number).tofile(mine / f"{number}.bin")
     np.full((60, 4), 1e5, np.float32).tofile(mine / "far.bin")
     out, lines = tmp_path / "out", []
-    report = clean_own_scans(mine, DEFAULT_COLUMNS, out, Steps(lines.append))
+    report = clean_own_scans(mine, DEFAULT_COLUMNS, out, Steps(lines.append, 1))
     assert sum(scan.points for scan in report.scans) == 1000
     assert [Path(error.subject).name for error in report.failures] == ["far.bin"]
     assert "far.bin: left whole" in capsys.readouterr().err
@@ -124,10 +122,3 @@ def test_a_step_that_fails_ends_the_demonstration(capsys: pytest.CaptureFixture[
     outcome = capsys.readouterr()
     assert "Tuning" not in outcome.out
     assert "demo/simulated: holds something other than" in outcome.err
-
-
-def test_the_streets_have_rain_to_choose_by_and_to_test_on() -> None:
-    for part in ("validation", "test"):
-        rates = [STREETS.rain_rate[name] for name in STREETS.split[part]]
-        assert max(rates) == max(STREETS.rain_rates)
-    assert set(DEMO_NETWORKS.values()) == {"outdet", "salsanext", "lisnownet"}

@@ -37,25 +37,17 @@ def test_a_network_without_a_configuration_has_that_of_a_network_of_the_same_vie
     assert settings("on_images")[0] == "salsanext_taught.yaml"
 
 
-@pytest.mark.parametrize(
-    ("teacher", "poses", "beside", "needed"),
-    [
-        ("persistence", None, False, True),
-        ("persistence", None, True, False),
-        ("persistence", "standing", False, False),
-        ("persistence", "poses.txt", False, False),
-        ("persistence", "odometry", True, True),
-        ("dror", None, False, False),
-    ],
-)
-def test_odometry_is_needed_where_there_are_no_poses(
-    tmp_path: Path, teacher: str, poses: str | None, beside: bool, needed: bool
-) -> None:
+def test_odometry_is_needed_where_there_are_no_poses(tmp_path: Path) -> None:
     folder = tmp_path / "drive/velodyne"
     folder.mkdir(parents=True)
     for number in range(3):
         np.zeros((2, 4), np.float32).tofile(folder / f"{number}.bin")
-    if beside:
-        (tmp_path / "drive/poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
-    config = LearnConfig([folder], Path("out.onnx"), teacher=teacher, poses=poses)
-    assert config.needs_odometry(named_frames([folder])) == needed
+
+    def needed(teacher: str, poses: str | None) -> bool:
+        config = LearnConfig([folder], Path("out.onnx"), teacher=teacher, poses=poses)
+        return config.needs_odometry(named_frames([folder]))
+
+    given = [("persistence", poses) for poses in (None, "standing", "poses.txt", "odometry")]
+    assert [needed(*each) for each in [*given, ("dror", None)]] == [True, False, False, True, False]
+    (tmp_path / "drive/poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
+    assert [needed(*each) for each in given] == [False, False, False, True]

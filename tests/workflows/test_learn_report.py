@@ -80,15 +80,11 @@ def test_the_tables_hold_the_counts() -> None:
     assert not any(row[:1] == ["0-10 m"] for row in rows)  # no point is there
     assert ALWAYS in text
     assert f"to an IoU of {iou:.3f}, and removes 9.3%" in str(results_of(GOOD, GOOD))
-
-
-def test_a_band_without_rain_has_no_scores() -> None:
+    # A band without rain has no scores.
     text = as_markdown(results_of(GOOD, answers(500, 0)))
     (row,) = [line for line in text.splitlines() if line.startswith("| 10-20 m |    500 |")]
     assert [cell.strip() for cell in row.split("|")[3:-1]] == ["0.0%", "-", "-", "-"]
-
-
-def test_before_the_training_the_report_is_of_the_teacher_alone() -> None:
+    # Before the training, the report is of the teacher alone.
     text = as_markdown(results_of(GOOD, pictures={Path("work/teacher.png"): "shares"}))
     assert "![shares](teacher.png)" in text
     assert "## The student" not in text

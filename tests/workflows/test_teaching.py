@@ -4,14 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from derain.annotation.truth import TruthRecord
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
 from derain.sources.frame import MemoryFrame
 from derain.sources.judgement import Judgement
+from derain.workflows.teaching import TruthRecord
 
 CARD = DataCard("yard", {0: "wall", 1: "drop", 2: "car", 9: "nobody knows"}, (1,), (9,))
 
@@ -21,9 +22,8 @@ CALLED = np.array([1, 1, 0, 1, 0, 0, 1, 1, 0, 1], bool)
 SURE = np.array([1, 0, 1, 1, 1, 1, 0, 1, 1, 1], bool)
 
 
-def frame_and_judgement(sure: bool = True) -> tuple[MemoryFrame, Judgement]:
+def frame_and_judgement(known: NDArray[np.bool_] | None = SURE) -> tuple[MemoryFrame, Judgement]:
     scan = Scan.of(scene(len(TRUTH)))
-    known = SURE if sure else None
     every = np.ones(len(TRUTH), bool)
     judgement = Judgement(CALLED.astype(np.float32), CALLED, every, scan, known=known)
     return MemoryFrame(key="0", scan=scan.with_label(TRUTH)), judgement
@@ -41,13 +41,10 @@ def test_all_points_and_sure_ones_are_counted_apart() -> None:
         ["drop", "(rain)", "4", "75.00%", "66.67%"],
         ["car", "2", "50.00%", "50.00%"],
     ]
-
-
-def test_a_method_without_doubt_is_sure_of_all() -> None:
-    record = TruthRecord(CARD)
-    record.add(*frame_and_judgement(sure=False))
-    first, second = str(record).splitlines()[1:3]
-    assert first.split()[-4:] == second.split()[-4:]
+    without_doubt = TruthRecord(CARD)
+    without_doubt.add(*frame_and_judgement(known=None))
+    first, second = str(without_doubt).splitlines()[1:3]
+    assert first.split()[-4:] == second.split()[-4:] == lines[1].split()[-4:]
 
 
 def test_points_at_one_position_count_once_where_the_card_says_so() -> None:
