@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import shown
-from derain.recordings.evidence import combined_log_odds
+from derain.recordings.evidence import (
+    RayEvidence,
+    combined_log_odds,
+    mean_evidence,
+    ray_evidence,
+    vote,
+)
 from derain.recordings.known_points import ScanPoints
-from derain.recordings.pose_search import FrameOdometry
+from derain.recordings.odometry import FrameOdometry
 from derain.recordings.recording_method import RecordingMethod
 from derain.recordings.registry import METHODS
-from derain.recordings.seen_through import RayEvidence, mean_evidence, ray_evidence
-from derain.recordings.vote import vote
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.judgement import Judgement

@@ -228,3 +228,11 @@ class MemoryFrame(Frame):
     def without_labels(self) -> Self:
         """The same frame, whose labels nobody reads."""
         return replace(self, label_path=None, reads_labels=False)
+
+
+def time_of(frame: Frame) -> float | None:
+    """When a frame was taken, seconds; None where no record says so, or a damaged one."""
+    try:
+        return frame.time
+    except InputError:
+        return None

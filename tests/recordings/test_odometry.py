@@ -8,9 +8,8 @@ import pytest
 
 from derain.files import read_scan
 from derain.recordings.odometry import Odometry
-from derain.recordings.registration import Registration, shift_of, turn_of
+from derain.recordings.registration import FEWEST_USUAL, Registration, shift_of, turn_of
 from derain.recordings.surfaces import FARTHEST, FEWEST_SURFACES, Surfaces
-from derain.recordings.trust import FEWEST_USUAL
 from derain.scan import Scan
 
 from .street import HEIGHT, motion, scan_from
@@ -44,7 +43,10 @@ def test_known_motions_are_found_through_noise_and_drops(driven) -> None:
     found = [odometry.register(scan) for scan in scans]
     assert all(each.trusted and not each.reason for each in found)
     assert_is(found[0].pose, np.eye(4), 1e-12, 1e-6)
+    product = np.eye(4)
     for each, step, pose in zip(found[1:], STEPS, poses[1:], strict=True):
+        product = product @ each.motion
+        np.testing.assert_allclose(each.pose, product, atol=1e-12)
         assert_is(each.motion, step, 0.03, 0.1)
         assert_is(each.pose, pose, 0.05, 0.2)
         assert 0 < each.residual < 0.05
@@ -52,18 +54,9 @@ def test_known_motions_are_found_through_noise_and_drops(driven) -> None:
         assert each.distance == pytest.approx(1.3, abs=0.1)
 
 
-def test_a_pose_is_the_product_of_all_motions(driven) -> None:
-    odometry = Odometry()
-    pose = np.eye(4)
-    for scan in driven[0]:
-        found = odometry.register(scan)
-        pose = pose @ found.motion
-        np.testing.assert_allclose(found.pose, pose, atol=1e-12)
-
-
 def test_a_sensor_that_stands_does_not_move() -> None:
     odometry = Odometry()
-    for seed in range(4):
+    for seed in range(3):
         found = odometry.register(scan_from(np.eye(4), seed))
         assert found.trusted
         assert shift_of(found.pose) < 0.02
@@ -71,7 +64,7 @@ def test_a_sensor_that_stands_does_not_move() -> None:
 
 
 def test_threads_copies_and_what_came_before_change_no_bit(driven) -> None:
-    scans, _ = driven
+    scans = driven[0][:3]
     copies = [scan.take(np.repeat(np.arange(len(scan)), 2)) for scan in scans]
     empty_rows = np.full((5, 3), np.nan, np.float32)
     with_holes = [Scan.of(np.concatenate([empty_rows, scan.xyz])) for scan in scans]
@@ -110,7 +103,7 @@ def test_scans_out_of_order_are_told(driven) -> None:
 
 def around(generator: np.random.Generator) -> np.ndarray:
     """A place that is nothing like the street."""
-    ball = generator.normal(size=(5_000, 3))
+    ball = generator.normal(size=(2_000, 3))
     ball /= np.linalg.norm(ball, axis=1, keepdims=True)
     return generator.uniform(20, 40, (len(ball), 1)) * ball
 
@@ -119,8 +112,10 @@ def around(generator: np.random.Generator) -> np.ndarray:
     ("other", "reason"),
     [
         (NOTHING, "has only 0 surfaces in reach"),
-        (Scan.of(np.full((100, 3), 2 * FARTHEST)), "has only 0 surfaces in reach"),
-        (Scan.of(np.full((100, 3), np.nan)), "has only 0 surfaces in reach"),
+        (
+            Scan.of(np.repeat([[2 * FARTHEST] * 3, [np.nan] * 3], 50, axis=0)),
+            "has only 0 surfaces in reach",
+        ),
         (Scan.of(np.full((100, 3), 10.0)), "has only 1 surfaces in reach"),
         (Scan.of(around(np.random.default_rng(0))), "of its surfaces are where the scan before"),
     ],
@@ -196,13 +191,14 @@ def test_a_turn_is_told_to_the_last_digits(degrees: float) -> None:
     assert turn_of(motion(5, 5, yaw=degrees)) == pytest.approx(degrees, abs=1e-10)
 
 
-def registered(folder: Path, every: int = 1) -> list[Registration]:
+def registered(folder: Path, number: int, every: int = 1) -> list[Registration]:
     odometry = Odometry()
-    return [odometry.register(read_scan(path)) for path in sorted(folder.glob("*.bin"))[::every]]
+    paths = sorted(folder.glob("*.bin"))[:number:every]
+    return [odometry.register(read_scan(path)) for path in paths]
 
 
 def test_snowykitti_stands(shared: Path) -> None:
-    found = registered(shared / "data/snowykitti/velodyne")
+    found = registered(shared / "data/snowykitti/velodyne", 5)
     assert len(found) == 5
     assert all(each.trusted for each in found)
     assert max(each.distance for each in found) < 0.02
@@ -211,8 +207,8 @@ def test_snowykitti_stands(shared: Path) -> None:
 
 def test_the_wads_drive_goes_on_evenly(shared: Path) -> None:
     folder = shared / "data/wads/drive/velodyne"
-    found, skipping = registered(folder), registered(folder, every=2)
-    assert len(found) == 20
+    found, skipping = registered(folder, 9), registered(folder, 9, every=2)
+    assert len(found) == 9
     assert all(each.trusted for each in (*found, *skipping))
     assert all(1.2 < each.distance < 1.4 for each in found[1:])
     for place, each in enumerate(skipping[1:], 1):

@@ -22,14 +22,14 @@ from derain.sources.judging import judgements
 # Of every scan the last points are drops.
 DROPS = 60
 
-STEP = np.radians(0.35)
+STEP = np.radians(0.5)
 
 
 def seen_from(x: float, seed: int) -> NDArray[np.float64]:
     """A yard with a floor, walls and drops, seen by a sensor at (x, 0, 0), float64 (N, 3)."""
     generator = np.random.default_rng(seed)
     azimuth = np.arange(-np.pi, np.pi, STEP)
-    inclination = (np.arange(48) - 36) * STEP
+    inclination = (np.arange(34) - 25) * STEP
     azimuth, inclination = (a.ravel() for a in np.meshgrid(azimuth, inclination))
     rays = np.stack([np.cos(azimuth), np.sin(azimuth), np.tan(inclination)], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
