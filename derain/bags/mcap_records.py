@@ -32,7 +32,7 @@ from mcap.records import (
     Statistics,
 )
 
-from derain.bags.unpacking import check_size, unpack
+from derain.bags.unpacking import PORTION, check_size, unpack
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -58,9 +58,6 @@ SPECIFIED = range(1, max(Opcode) + 1)
 HEAD, MESSAGE_HEAD = struct.Struct("<BQ"), struct.Struct("<HIQQ")
 CHECKSUM = struct.Struct("<I")
 FOOTER_SIZE = 20
-
-# Bytes that are read at once for a checksum.
-PORTION = 2**22
 
 
 class Place(NamedTuple):

@@ -1,10 +1,7 @@
 """Options of commands that read bags, the same in each."""
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
-
-from derain.bags.names import within
 
 if TYPE_CHECKING:
     from derain.sources.cleaned_bags import BagOptions
@@ -15,16 +12,6 @@ def add_topic(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--topic", metavar="NAME", help="topic of point clouds, for bags with several"
     )
-
-
-def in_topic(paths: list[Path], arguments: argparse.Namespace) -> list[Path]:
-    """The paths that a user names, of which those to bags lead to the topic that is meant.
-
-    Raises:
-        InputError: A topic, and no bag.
-    """
-    # Commands that have no such option take the topic in the path.
-    return within(paths, getattr(arguments, "topic", None))
 
 
 def add_cleaned_bags(parser: argparse.ArgumentParser) -> None:

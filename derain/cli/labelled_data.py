@@ -4,8 +4,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from derain.bags.names import within
 from derain.cards.card import packaged_cards
-from derain.cli.bag_options import add_topic, in_topic
+from derain.cli.bag_options import add_topic
 from derain.cli.scan_options import add_columns, add_intensity_scale
 
 if TYPE_CHECKING:
@@ -57,5 +58,6 @@ def labelled(arguments: argparse.Namespace, paths: list[Path]) -> "ScanData":
         intensity_scale=arguments.intensity_scale,
         deduplicate=getattr(arguments, "distinct", None),
     )
-    paths = in_topic(paths, arguments)
+    # A command without the option takes the topic in the path.
+    paths = within(paths, getattr(arguments, "topic", None))
     return labelled_scans(paths, card_of(paths, arguments.card), loading)

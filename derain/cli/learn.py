@@ -3,8 +3,9 @@
 import argparse
 from pathlib import Path
 
+from derain.bags.names import within
 from derain.cli.arguments import count, file_named
-from derain.cli.bag_options import add_topic, in_topic
+from derain.cli.bag_options import add_topic
 from derain.cli.outputs import print_lines
 from derain.cli.pose_options import add_poses
 from derain.cli.scan_options import add_columns
@@ -89,7 +90,7 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.rerun is not None:
         refuse_unusable(arguments.rerun)
     config = LearnConfig(
-        recordings=in_topic(arguments.recording, arguments),
+        recordings=within(arguments.recording, arguments.topic),
         out=arguments.out,
         folder=arguments.work,
         model=arguments.model,

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
+from derain.bags.names import within
 from derain.cards.card import load_card
 from derain.cards.known import layouts_for
-from derain.cli.bag_options import in_topic
 from derain.cli.outputs import print_lines
 from derain.errors import InputError
 from derain.export.methods import load_method, named_method, split_title
@@ -51,7 +51,7 @@ def view_recording(arguments: argparse.Namespace) -> int:
     methods = _methods(arguments.methods, arguments.threads)
     card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
-        in_topic(arguments.scans, arguments),
+        within(arguments.scans, arguments.topic),
         arguments.columns,
         labelled=card is not None,
         layouts=layouts_for(card),

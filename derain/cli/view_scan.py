@@ -4,9 +4,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from derain.bags.names import within
 from derain.cards.card import DataCard, load_card
 from derain.cards.known import layouts_for
-from derain.cli.bag_options import in_topic
 from derain.cli.outputs import print_lines
 from derain.errors import InputError
 from derain.sources.bag_frame import NUMBER, BagFrame
@@ -33,7 +33,7 @@ def view_scan(arguments: argparse.Namespace) -> None:
     """
     from derain.export.bench.bench_entries import bench_entries
 
-    path = in_topic(arguments.scans, arguments)[0]
+    path = within(arguments.scans, arguments.topic)[0]
     if not (arguments.out or arguments.window):
         raise InputError(path, "no output is named", "Give --out, --window or --rerun.")
     require("view", MATPLOTLIB, *((OPEN3D,) if arguments.window else ()))
