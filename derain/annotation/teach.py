@@ -27,9 +27,8 @@ from derain.files.labels import write_labels
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.judging import Answer, Guard, judgements, unguarded
-from derain.sources.label_sink import LabelSink
 from derain.sources.method import Method
-from derain.sources.sink import FolderSink
+from derain.sources.sink import FolderSink, LabelSink
 from derain.sources.source import Source
 
 # The folder of the labels until all of them are known.

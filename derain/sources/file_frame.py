@@ -87,7 +87,10 @@ class FileFrame(Frame):
 
     def checksums(self) -> tuple[str, str | None]:
         """SHA-256 of its file and of that of its labels, in hexadecimal digits."""
-        return _sha256(self.path), _sha256(self.label_path) if self.label_path else None
+        return self._checksum(), _sha256(self.label_path) if self.label_path else None
+
+    def _checksum(self) -> str:
+        return _sha256(self.path)
 
 
 def _sha256(path: Path) -> str:

@@ -9,14 +9,13 @@ from itertools import groupby
 from pathlib import Path
 
 from derain.bags.names import SUFFIXES as BAG_SUFFIXES
-from derain.bags.names import is_bag, split
+from derain.bags.names import bags_at, is_bag, split
 from derain.cards.known import known_layouts, label_of
 from derain.cards.layout import Layout, sequence_of
 from derain.files import DEFAULT_COLUMNS, RECORDS, find_scans
 from derain.files.format import FORMATS
 from derain.files.names import scan_stem, scan_suffix
 from derain.files.reading import reading
-from derain.sources.bag_frame import bag_frames, bag_paths
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.records import Records
@@ -71,7 +70,7 @@ def named_frames(
         folders = _scan_folders_in(path, layouts)
         of_data_set = of_data_set or len(folders) > 1
         scans += listed_scans(folders or [path])
-    where = partial(label_of, layouts=layouts) if labelled else _nowhere
+    where = partial(label_of, layouts=layouts) if labelled else lambda _: None
     by_path = of_data_set or (recordings and len({scan.parent for scan in scans}) > 1)
     return frames_of(scans, where, columns, relative_keys(scans) if by_path else None)
 
@@ -92,15 +91,12 @@ def frame_of(
         InputError: A bag that cannot be read.
     """
     if split(scan) is not None:
+        from derain.sources.bag_frame import bag_frames
+
         return bag_frames(scan, labelled=True)[0]
-    return FileFrame(
-        key=scan_stem(scan),
-        sequence=sequence_of(scan),
-        label_path=label_of(scan, layouts),
-        path=scan,
-        columns=tuple(columns),
-        records=Records(scan.parent),
-    )
+    frame = frames_of([scan], partial(label_of, layouts=layouts), columns)[0]
+    assert isinstance(frame, FileFrame)
+    return frame
 
 
 def frames_of(
@@ -234,11 +230,10 @@ def _holds_scans(folder: Path) -> bool:
 
 
 def _paths_into_bags(path: Path, layouts: Sequence[Layout] | None) -> list[Path]:
-    """The paths into bags that a path stands for; of a folder of scans or of a data set, none."""
-    folder = os.path.isdir(path)
-    if folder and (_holds_scans(path) or find_layout(path, layouts) is not None):
+    """The path where it leads into a bag, or the bags of a folder that holds no scans."""
+    if os.path.isdir(path) and (_holds_scans(path) or find_layout(path, layouts) is not None):
         return []
-    return bag_paths(path)
+    return [path] if split(path) is not None else bags_at(path)
 
 
 def _with_bags(
@@ -250,6 +245,8 @@ def _with_bags(
     recordings: bool,
 ) -> Frames:
     """Frames of bags, and of whatever else is named between them, in that order."""
+    from derain.sources.bag_frame import bag_frames  # what reads bags, only where there are some
+
     several = len(paths) > 1 or len(in_bags[paths[0]]) > 1
     frames: list[Frame] = []
     for of_bags, group in groupby(paths, lambda path: bool(in_bags[path])):
@@ -284,7 +281,3 @@ def _kind(entry: os.DirEntry[str]) -> str:
         return "folder of a bag" if is_bag(Path(entry.path)) else ""
     suffix = scan_suffix(Path(entry.name))
     return suffix if suffix in FORMATS or suffix in BAG_SUFFIXES else ""
-
-
-def _nowhere(scan: Path) -> Path | None:
-    return None

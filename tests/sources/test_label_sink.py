@@ -7,7 +7,7 @@ import pytest
 
 from derain.errors import InputError
 from derain.sources.folders import frames_of, relative_keys
-from derain.sources.label_sink import LabelSink
+from derain.sources.sink import LabelSink
 from derain.sources.source import Frames, Source
 
 

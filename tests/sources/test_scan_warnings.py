@@ -15,8 +15,7 @@ from derain.filters import DROR, SSR, FilterDerainer
 from derain.recordings.persistence import PersistenceDerainer
 from derain.scan import Scan
 from derain.sources.judgement import Judgement
-from derain.sources.method import Method
-from derain.sources.scan_warnings import ScanWarnings
+from derain.sources.method import Method, ScanWarnings
 from derain.views.scan_issues import ScanIssue
 
 
