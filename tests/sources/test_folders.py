@@ -28,12 +28,6 @@ def touch(*paths: Path) -> None:
         path.touch()
 
 
-def test_one_path_is_named_as_a_list_of_it_is(tmp_path: Path) -> None:
-    touch(tmp_path / "a.bin", tmp_path / "b.bin")
-    for named in (tmp_path, str(tmp_path), [str(tmp_path)]):
-        assert [frame.key for frame in named_frames(named)] == ["a", "b"]
-
-
 @pytest.fixture
 def wads(tmp_path: Path) -> Path:
     """A data set of two sequences of two scans each, and one that is not finished."""
@@ -87,13 +81,11 @@ def test_several_data_sets_and_scans_keep_apart(
 
 
 def test_scans_beside_folders_of_scans_are_what_is_meant(tmp_path: Path) -> None:
-    touch(tmp_path / "own.bin", tmp_path / "velodyne/0.bin")
-    assert [frame.key for frame in named_frames([tmp_path])] == ["own"]
-
-
-def test_texts_are_scans_where_there_is_nothing_else(tmp_path: Path) -> None:
-    touch(tmp_path / "scan.csv")
-    assert [frame.name for frame in named_frames([tmp_path])] == [str(tmp_path / "scan.csv")]
+    touch(tmp_path / "own.bin", tmp_path / "velodyne/0.bin", tmp_path / "texts/scan.csv")
+    for named in (tmp_path, str(tmp_path), [str(tmp_path)]):
+        assert [frame.key for frame in named_frames(named)] == ["own"]
+    (text,) = named_frames(tmp_path / "texts")  # there is nothing else
+    assert text.name == str(tmp_path / "texts/scan.csv")
 
 
 @pytest.mark.parametrize("folder", ["", "sequences/00/velodyne", "sequences/01/velodyne"])

@@ -10,7 +10,6 @@ import pytest
 from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.files import write_scan
 from derain.files.labels import write_labels
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
@@ -58,12 +57,6 @@ def test_labels_that_the_card_does_not_know_are_named(labelled: FileFrame) -> No
     assert (scan.label == 110).sum() == 10
     with pytest.raises(InputError, match=r"scan\.label: ids \[110\] are no classes of REHEARSE-3D"):
         FrameReader(load_card("rehearse3d")).read(labelled)
-
-
-@pytest.mark.parametrize("suffix", [".bin", ".pcd", ".bin.gz", ".npy"])
-def test_points_are_counted_as_they_are_read(tmp_path: Path, suffix: str) -> None:
-    write_scan(tmp_path / f"scan{suffix}", Scan.of(scene(37)))
-    assert frame_of(tmp_path / f"scan{suffix}").count_points() == 37
 
 
 def test_columns_are_those_of_the_frame(tmp_path: Path) -> None:

@@ -26,17 +26,12 @@ def test_scans_frames_and_paths_stand_in_the_order_they_are_given(tmp_path: Path
     np.testing.assert_array_equal(source[1].read_label(10), np.arange(10))
 
 
-def test_scans_in_memory_are_one_sequence_however_they_are_called() -> None:
-    source = source_of([Scan.of(scene(30), name) for name in ("/far/away.bin", "array", "array")])
-    assert [frame.key for frame in source] == ["000000", "000001", "000002"]
-    assert source[2].follows(source[1])
-    with pytest.raises(InputError, match="array: it has no labels"):
-        source[1].read_label(30)
-
-
 def test_one_scan_is_a_source_and_a_source_stays_what_it_is() -> None:
     scan = Scan.of(scene(30))
     assert [frame.read().xyz.shape for frame in source_of(scan)] == [(30, 3)]
+    twice = source_of([scan, scan])
+    assert [frame.key for frame in twice] == ["000000", "000001"]
+    assert twice[1].follows(twice[0])
     source = Frames.of_scans([scan])
     assert source_of(source) is source
 
