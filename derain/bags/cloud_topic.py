@@ -52,7 +52,7 @@ class CloudTopic:
         """One of the messages, from 0.
 
         Raises:
-            InputError: A bag that cannot be read, or that has fewer clouds than its index says.
+            InputError: A bag that cannot be read, or that has fewer clouds than its index names.
         """
         with self._lock:
             if self._process != os.getpid():  # an open file of a process before the fork

@@ -157,7 +157,7 @@ class McapRecords:
     def in_chunk(self, chunk: Chunk) -> Iterator[tuple[int, Any]]:
         """Kind and content of each record of a chunk; None is the content of private records.
 
-        Records that nobody reads, such as indexes of messages, are left out.
+        Records that are not needed, such as indexes of messages, are left out.
 
         Raises:
             ValueError: It is damaged.
@@ -197,7 +197,7 @@ class McapRecords:
         found, size = HEAD.unpack(self._bytes(offset, HEAD.size))
         if found != kind:
             raise ValueError(f"another record than expected at byte {offset:,}")
-        if kind != Opcode.ATTACHMENT:  # which may be whatever somebody put into the file
+        if kind != Opcode.ATTACHMENT:  # which may be of any size
             check_size(size)
         return self._bytes(offset + HEAD.size, size)
 

@@ -41,7 +41,7 @@ STEP_EPSILON, USUAL_STEPS = 1e-3, 1.0
 FLATTEST, USUAL_SCATTER, SPREAD_OF_SCATTER = 1e-4, -4.5, 2.0
 USUAL_RANGE = 10.0
 
-# The least step between rays, radians: a scan of a smaller one has too few points to tell it.
+# The least step between rays, radians: a scan of a smaller one has too few points.
 LEAST_STEP = 1e-5
 
 # Log-odds of rain: of any point; for each share of rays that end at it, and that went through.

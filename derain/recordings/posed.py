@@ -1,4 +1,4 @@
-"""Frames with poses: told by a file, those of a sensor that stands, or found by odometry."""
+"""Frames with poses: of a file, of a sensor that stands, or found by odometry."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -111,7 +111,7 @@ def _with_file_poses(source: Sequence[Frame], path: Path) -> Frames:
 def _poses(recording: Sequence[Frame], trajectory: Trajectory) -> Iterator[NDArray[np.float64]]:
     """The pose of each frame."""
     names = [Path(frame.name).name for frame in recording]
-    if trajectory.times is not None:  # else the scans' own are not asked for, damaged or not
+    if trajectory.times is not None:  # else the scans' own are not read, damaged or not
         times = [time for frame in recording if (time := frame.time) is not None]
         if len(times) == len(recording) and trajectory.is_by_time(times):
             yield from map(trajectory.at, times, names)
@@ -122,7 +122,7 @@ def _poses(recording: Sequence[Frame], trajectory: Trajectory) -> Iterator[NDArr
 
 
 def _scan_of(frame: Frame) -> Scan | None:
-    """The scan of a frame; None where it cannot be read, which whoever needs it is told then."""
+    """The scan of a frame; None where it cannot be read, an error of whatever needs it later."""
     try:
         return frame.read()
     except InputError:

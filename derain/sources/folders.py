@@ -42,7 +42,7 @@ def named_frames(
 
     Args:
         paths: One path or several: scans, folders with scans directly in them, data sets or parts
-            of them whose folders are called as a layout says, bags, and paths into bags
+            of them whose folders are named as in a layout, bags, and paths into bags
             (:func:`~derain.sources.bag_frame.bag_frames`).
         columns: Names of the columns of files that do not name them.
         labelled: Whether labels are to be read, from where :func:`~derain.cards.known.label_of`
@@ -217,7 +217,7 @@ def _scan_folders_in(path: Path, layouts: Sequence[Layout] | None) -> list[Path]
 def _holds_scans(folder: Path) -> bool:
     """Whether scans lie directly in a folder, not only texts that may be something else.
 
-    The first that is met says so: a folder of a hundred thousand is not listed twice.
+    It ends at the first of them: a folder of a hundred thousand scans is not listed twice.
     """
     with reading(folder), os.scandir(folder) as entries:
         return any(

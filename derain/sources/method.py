@@ -63,8 +63,8 @@ class Method(ABC):
     """Says which points of a recording are rain: a model, a filter, or what sees several scans.
 
     Frames go in by :meth:`push`, one after the other. A method that sees one scan at a time answers
-    at once; one that asks for scans after the one that it judges answers when they are there, and
-    for the last ones by :meth:`flush`. So whoever cleans a recording does the same for each::
+    at once; one that needs scans after the one that it judges answers when they are there, and for
+    the last ones by :meth:`flush`. So a recording is cleaned in the same way by each::
 
         for frame in source:
             if method.starts_new_recording(frame):
@@ -87,11 +87,11 @@ class Method(ABC):
     @property
     @abstractmethod
     def window(self) -> Window:
-        """How many scans before and after the one that it judges it asks for."""
+        """How many scans it needs before and after the one that it judges."""
 
     @property
     def gives_probabilities(self) -> bool:
-        """Whether it says how probable rain is, and not only which points are rain."""
+        """Whether it gives the probability of rain, and not only which points are rain."""
         return True
 
     @property
@@ -101,7 +101,7 @@ class Method(ABC):
 
     @abstractmethod
     def starts_new_recording(self, frame: Frame) -> bool:
-        """Whether pushing a frame would let go of those that wait: it does not follow them."""
+        """Whether pushing a frame would drop those that wait, because it does not follow them."""
 
     @abstractmethod
     def push(
@@ -110,7 +110,7 @@ class Method(ABC):
         """Takes the next frame of a recording.
 
         A frame of another sequence, or after a gap, starts anew: call :meth:`flush` before it, or
-        the frames that still wait are let go of.
+        the frames that still wait are dropped.
 
         Args:
             frame: A frame, which is read; or a Scan, or (N, ≥ 3) numbers: x, y, z in metres in the
@@ -118,7 +118,7 @@ class Method(ABC):
             stopwatch: Takes the times of the stages, such as read, view, network and back.
 
         Returns:
-            What the method says of the frame that has all of its window by now; None until there is
+            The judgement of the frame that has all of its window by now; None until there is
             one.
 
         Raises:
@@ -144,11 +144,11 @@ class Method(ABC):
         """What is odd about a scan that it judged, as far as that matters to the method.
 
         Args:
-            judgement: What it said of the scan.
+            judgement: Its judgement of the scan.
         """
 
     def with_warnings(self, judgement: Judgement) -> Judgement:
-        """Gives back what it said of a scan, after a warning where something is odd about it."""
+        """Returns a judgement, after a warning where something is odd about the scan."""
         if self.warns:
             self._warnings.check(judgement)
         return judgement
@@ -159,7 +159,7 @@ class Method(ABC):
 
     @abstractmethod
     def as_dict(self) -> dict[str, Any]:
-        """What it is, for whoever repeats its work: ``method``, its name, and its parameters.
+        """What it takes to make it again: ``method``, its name, and its parameters.
 
         Texts, finite numbers, true, false, or nothing; or lists and mappings of these.
         """

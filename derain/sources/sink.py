@@ -25,8 +25,7 @@ class FolderSink:
         folder: The folder, made if missing.
         option: What a user calls it, for messages.
         again: Whether a source may give a scan twice, as where two patterns find it.
-        removed: Folder for what is taken away of the scans, named like these; None where nobody
-            asks for it.
+        removed: Folder for what is taken away of the scans, named like these; None to drop it.
     """
 
     def __init__(
@@ -46,7 +45,7 @@ class FolderSink:
         return self.folder / f"{frame.key}{frame.suffix or '.pcd'}"
 
     def removed_path(self, frame: Frame) -> Path | None:
-        """Where what is taken away of a scan is written; None where nobody asks for it."""
+        """Where what is taken away of a scan is written; None where it is dropped."""
         if self.removed is None:
             return None
         return self.removed / self.scan_path(frame).relative_to(self.folder)
@@ -100,7 +99,7 @@ class FolderSink:
             frame: The frame.
             scan: What is left of the scan; None where only labels are of interest.
             label: Class ids or a bool mask of the scan that the labels are for, (N,).
-            removed: What was taken away of the scan; None where nobody asks for it.
+            removed: What was taken away of the scan; None where it is dropped.
 
         Raises:
             InputError: It cannot be written.
@@ -136,8 +135,8 @@ class FolderSink:
 class LabelSink(FolderSink):
     """A folder of labels alone, ``<key>.label``.
 
-    They may lie with the scans, and where the labels of scans are looked for: whoever writes no
-    scans may be labelling these. Labels that are there already stay.
+    They may lie with the scans, and where the labels of scans are looked for: they may be meant for
+    these. Labels that are there already stay.
 
     Args:
         folder: The folder, made if missing.
