@@ -1,4 +1,4 @@
-"""Scans in files and folders, as a user names them."""
+"""Scans as a user names them, in files and folders, or as a program gives them."""
 
 import os
 from collections import Counter
@@ -12,18 +12,23 @@ from derain.bags.names import SUFFIXES as BAG_SUFFIXES
 from derain.bags.names import bags_at, is_bag, split
 from derain.cards.known import known_layouts, label_of
 from derain.cards.layout import Layout, sequence_of
+from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, RECORDS, find_scans
 from derain.files.format import FORMATS
 from derain.files.names import scan_stem, scan_suffix
 from derain.files.reading import reading
+from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
-from derain.sources.frame import Frame
+from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.records import Records
-from derain.sources.source import Frames
+from derain.sources.source import Frames, Source
 from derain.system.notices import warn_once
 
 # Scans may be written as text, but beside folders of scans a text is a note or a record.
 TEXTS = (".csv", ".txt")
+
+# What a program gives: one of them, or several of one kind or another.
+GivenScans = Source | Scan | Frame | str | Path | Iterable[Scan | Frame | str | Path]
 
 
 def named_frames(
@@ -73,6 +78,28 @@ def named_frames(
     where = partial(label_of, layouts=layouts) if labelled else lambda _: None
     by_path = of_data_set or (recordings and len({scan.parent for scan in scans}) > 1)
     return frames_of(scans, where, columns, relative_keys(scans) if by_path else None)
+
+
+def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> Source:
+    """The source that a program means, with the labels that its scans have.
+
+    Args:
+        scans: A source; or one or more scans in memory, frames, files and folders of scans.
+        columns: Names of the columns of files that do not name them.
+
+    Raises:
+        InputError: No scans, something else than scans, a path that does not exist, or a folder
+            without scans.
+    """
+    if isinstance(scans, Source):
+        return scans
+    given = [scans] if isinstance(scans, Scan | Frame | str | Path) else list(scans)
+    frames = [
+        frame for place, item in enumerate(given) for frame in _frames_of(item, place, columns)
+    ]
+    if not frames:
+        raise InputError("scans", "there are none", "Give one or more.")
+    return Frames(frames)
 
 
 def frame_of(
@@ -281,3 +308,16 @@ def _kind(entry: os.DirEntry[str]) -> str:
         return "folder of a bag" if is_bag(Path(entry.path)) else ""
     suffix = scan_suffix(Path(entry.name))
     return suffix if suffix in FORMATS or suffix in BAG_SUFFIXES else ""
+
+
+def _frames_of(item: object, place: int, columns: Sequence[str]) -> Sequence[Frame]:
+    match item:
+        case Frame():
+            return [item]
+        case Scan():
+            return [MemoryFrame(key=f"{place:06d}", number=place, scan=item)]
+        case str() | Path():
+            return named_frames([Path(item)], columns, labelled=True)
+    raise InputError(
+        "scans", f"{type(item).__name__} is no scan", "Give Scans, or paths of files and folders."
+    )

@@ -1,6 +1,7 @@
 """Odometry finds known motions, the same on any number of threads, and says where it fails."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,21 @@ import pytest
 
 from derain.files import read_scan
 from derain.recordings.odometry import Odometry
-from derain.recordings.registration import FEWEST_USUAL, Registration, shift_of, turn_of
-from derain.recordings.surfaces import FARTHEST, FEWEST_SURFACES, Surfaces
+from derain.recordings.registration import (
+    FEWEST_USUAL,
+    LARGEST_CHANGE,
+    LARGEST_TURN,
+    LEAST_FACING,
+    LEAST_MATCHED,
+    MOST_APART,
+    TIMES_THE_USUAL,
+    WELL_ENOUGH,
+    Registration,
+    Trust,
+    shift_of,
+    turn_of,
+)
+from derain.recordings.surfaces import FARTHEST, FEWEST_SURFACES, Fit, Surfaces
 from derain.scan import Scan
 
 from .street import HEIGHT, motion, scan_from
@@ -166,18 +180,6 @@ def test_what_nothing_tells_the_way_along_is_not_trusted(
     assert "too little stands across some direction" in found.reason
 
 
-def test_surfaces_that_lie_farther_apart_than_usual_are_not_trusted(driven) -> None:
-    rough = np.random.default_rng(9)
-    odometry = Odometry()
-    for seed in range(FEWEST_USUAL + 1):
-        usual = odometry.register(scan_from(np.eye(4), seed))
-    blurred = scan_from(np.eye(4), 50)
-    found = odometry.register(Scan.of(blurred.xyz + rough.normal(0, 0.25, blurred.xyz.shape)))
-    assert usual.trusted
-    assert not found.trusted
-    assert found.residual > usual.residual
-
-
 def test_few_surfaces_are_counted_as_they_are() -> None:
     corners = np.mgrid[10:30:2, 0:40:2, 0:1].reshape(3, -1).T
     few = Surfaces(Scan.of(corners), 1)
@@ -214,3 +216,59 @@ def test_the_wads_drive_goes_on_evenly(shared: Path) -> None:
     for place, each in enumerate(skipping[1:], 1):
         composed = found[2 * place - 1].motion @ found[2 * place].motion
         assert_is(composed, each.motion, 0.03, 0.1)
+
+
+GOOD = Fit(np.eye(4), converged=True, residual=0.03, matched=0.9, facing=0.05)
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        ({"matched": LEAST_MATCHED - 0.01}, "only 49% of its surfaces"),
+        ({"residual": MOST_APART + 0.001}, "its surfaces lie 0.131 m from those"),
+        ({"facing": LEAST_FACING / 2}, "too little stands across some direction"),
+        ({"converged": False}, "did not come to rest"),
+    ],
+)
+def test_each_fault_is_told(fault: dict[str, float], reason: str) -> None:
+    assert reason in Trust().misfit(replace(GOOD, **fault))
+
+
+def test_what_is_usual_is_learnt_from_trusted_scans_alone() -> None:
+    trust = Trust()
+    poor = replace(GOOD, residual=TIMES_THE_USUAL * GOOD.residual + 0.001)
+    for _ in range(FEWEST_USUAL):
+        trust.remember(poor, trusted=False)
+        assert trust.misfit(poor) == ""
+    for _ in range(FEWEST_USUAL):
+        trust.remember(GOOD, trusted=True)
+    assert "where 0.090 m is the most" in trust.misfit(poor)
+    assert trust.misfit(replace(GOOD, residual=0.089)) == ""
+
+
+def test_a_sensor_that_drives_off_is_trusted_though_it_fitted_better_standing() -> None:
+    trust = Trust()
+    for _ in range(10):
+        trust.remember(replace(GOOD, residual=0.001), trusted=True)
+    assert trust.misfit(replace(GOOD, residual=WELL_ENOUGH)) == ""
+    assert trust.misfit(replace(GOOD, residual=WELL_ENOUGH + 0.01)) != ""
+
+
+def test_a_motion_is_likely_where_it_is_near_the_last_or_the_last_trusted_one() -> None:
+    trust = Trust()
+    assert trust.unlikely(motion(5)) == ""  # nothing is known of the speed as yet
+    trust.remember(replace(GOOD, motion=motion(1.3)), trusted=True)
+    assert trust.unlikely(motion(1.3 + 0.9 * LARGEST_CHANGE)) == ""
+    jump = motion(1.3 + 2 * LARGEST_CHANGE)
+    assert "1.0 m off what the motion so far leads to" in trust.unlikely(jump)
+    trust.remember(replace(GOOD, motion=jump), trusted=False)
+    assert trust.unlikely(motion(1.4)) == ""
+    assert trust.unlikely(jump) == ""
+
+
+def test_a_sudden_turn_is_not_likely() -> None:
+    trust = Trust()
+    assert "a turn by 25 degrees" in trust.unlikely(motion(yaw=LARGEST_TURN + 5))
+    trust.remember(GOOD, trusted=True)
+    assert trust.unlikely(motion(yaw=9)) == ""
+    assert trust.unlikely(motion(yaw=15)) != ""

@@ -9,8 +9,8 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.scan import Scan
+from derain.sources.folders import source_of
 from derain.sources.frame import MemoryFrame
-from derain.sources.given import source_of
 from derain.sources.source import Frames
 
 
