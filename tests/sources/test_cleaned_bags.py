@@ -1,7 +1,6 @@
 """Bags without their rain: what `derain run` writes of them, and what it leaves as it is."""
 
 import os
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -70,10 +69,11 @@ def test_only_the_clouds_change_and_as_files_do(
     tmp_path: Path, storage: Storage, run_derain, rain_of_files: list[NDArray[np.bool_]]
 ) -> None:
     bag = small_bag(tmp_path, storage)
-    outcome = run_derain(*RUN, bag, "--out", tmp_path / "out")
+    for _ in range(2):  # the second time in place of an earlier bag
+        outcome = run_derain(*RUN, bag, "--out", tmp_path / "out")
+        assert (outcome.code, outcome.said) == (0, [])
     made = bag_path(tmp_path / "out", storage)
 
-    assert (outcome.code, outcome.said) == (0, [])
     assert sorted(os.listdir(tmp_path / "out")) == [made.name]
     before, after = read_bag(bag), read_bag(made)
     assert [m[:3] for m in after] == [m[:3] for m in before]
@@ -180,24 +180,6 @@ def test_nothing_is_left_of_a_bag_that_breaks_off(
     assert os.listdir(tmp_path / "out") == []
 
 
-def test_a_bag_is_written_in_place_of_an_earlier_one_and_of_nothing_else(
-    tmp_path: Path, storage: Storage, run_derain
-) -> None:
-    bag, out = small_bag(tmp_path, storage), tmp_path / "out"
-    for _ in range(2):
-        assert run_derain(*RUN, bag, "--out", out).code == 0
-    assert len(read_bag(bag_path(out, storage))) == len(read_bag(bag))
-    assert len(os.listdir(out)) == 1
-
-    assert f"would overwrite {bag}" in run_derain(*RUN, bag, "--out", tmp_path).err
-    if storage != "ros1":
-        shutil.rmtree(out / "drive")
-        (out / "drive").mkdir()
-        (out / "drive" / "notes.txt").write_text("mine")
-        assert "is there already, and no bag" in run_derain(*RUN, bag, "--out", out).err
-        assert (out / "drive" / "notes.txt").read_text() == "mine"
-
-
 def test_several_bags_and_scans_are_cleaned_in_one_run(tmp_path: Path, run_derain) -> None:
     """And one cloud of a bag as a file."""
     bags = [small_bag(tmp_path, "mcap", "a"), small_bag(tmp_path, "ros1", "b")]
@@ -284,13 +266,18 @@ NAMES = ["a b", "/a\nb", "/a\udcff", "/a//b", "/a/", "/é", ""]  # that no topic
         ("out", ("--removed-topic", "a b"), "--removed-topic: 'a b' is not a name of a topic"),
         ("out", ("--cleaned-topic", "/imu/data"), "has a topic /imu/data already"),
         ("drive/cleaned", (), "is inside"),
+        ("mine", (), "is there already, and no bag"),
+        ("", (), "would overwrite"),
     ],
 )
 def test_what_cannot_be_written_is_refused_before_any_work(
     tmp_path: Path, run_derain, out: str, options: tuple[str, ...], reason: str
 ) -> None:
     bag = small_bag(tmp_path, "mcap")
+    (tmp_path / "mine/drive").mkdir(parents=True)
+    (tmp_path / "mine/drive/notes.txt").touch()
+    before = sorted(tmp_path.rglob("*"))
     outcome = run_derain(*RUN, bag, "--out", tmp_path / out, *options)
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert reason in outcome.err
-    assert not (tmp_path / out).exists()
+    assert sorted(tmp_path.rglob("*")) == before

@@ -97,23 +97,19 @@ def test_checksums_are_those_that_everybody_computes(labelled: FileFrame, tmp_pa
     )
 
 
-def test_a_pose_that_is_told_goes_before_the_record_beside_the_scan(labelled: FileFrame) -> None:
+def test_a_given_pose_goes_before_the_record_beside_the_scan(labelled: FileFrame) -> None:
     (labelled.path.parent / "poses.txt").write_text("damaged")
     pose = np.eye(4)
     assert labelled.with_pose(pose).pose is pose
     with pytest.raises(InputError, match="line 1 is not 12 numbers"):
         labelled.pose  # noqa: B018
-    in_memory = MemoryFrame(key="0", scan=labelled.read())
-    assert in_memory.pose is None
-    assert in_memory.with_pose(pose).pose is pose
 
 
 def test_a_scan_in_memory_is_a_frame_like_any(labelled: FileFrame) -> None:
     scan = Scan.of(scene(50), "mine").with_label(labelled.read_label(50))
-    pose = np.eye(4)
-    frame = MemoryFrame(key="0", scan=scan, seconds=1.5, sensor_to_world=pose)
+    frame = MemoryFrame(key="0", scan=scan, seconds=1.5)
     assert (frame.name, frame.suffix, frame.time, frame.count_points()) == ("mine", "", 1.5, 50)
-    assert frame.pose is pose
+    assert frame.pose is None
     assert frame.has_labels
     assert frame.read().label is None
     np.testing.assert_array_equal(frame.read_label(50), scan.label)

@@ -5,11 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from derain.cards.card import load_card
 from derain.export.model_file import ModelFile
 from derain.sources.folders import named_frames
 from derain.sources.source import Source
+from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import (
     MOST_NAMES,
     record_of_scans,
@@ -65,3 +68,15 @@ def test_a_record_stays_small(scans: Source, monkeypatch: pytest.MonkeyPatch) ->
     assert record_of_scans(scans) == {
         "scans": tuple(sorted(frame.fingerprint() for frame in scans[::2]))
     }
+
+
+@given(st.integers(0, 60), st.integers(1, 20))
+def test_items_are_spread_evenly_from_first_to_last(count: int, most: int) -> None:
+    items = list(range(count))
+    spaced = evenly_spaced(items, most)
+    assert len(spaced) == min(count, most)
+    steps = np.diff(spaced)
+    assert (steps > 0).all()
+    assert not len(steps) or steps.max() - steps.min() <= 1
+    if count and most > 1:
+        assert (spaced[0], spaced[-1]) == (0, count - 1)
