@@ -38,6 +38,20 @@ class CloudTopic:
         self.topic = topic
         self._forget()
 
+    def _forget(self) -> None:
+        """Begins anew, as another process does."""
+        self._lock = threading.Lock()
+        self._process = os.getpid()
+        self._messages: Iterator[Message] = iter(())  # first, so that it ends before the bag closes
+        self._open = ExitStack()  # closed with the last reference to this object
+        self._reader: Any = None
+        self._next: int | None = None  # number of the cloud that the messages yield next
+        self._last: tuple[int, Message] | None = None  # the cloud that they yielded last
+        self._times: NDArray[np.int64] | None = None
+        self._layouts: set[tuple[PointField, ...]] = set()
+        self._first_of_stamp: dict[int, int] = {}
+        self._warned_of_stamps = False
+
     def __len__(self) -> int:
         return self.topic.messages
 
@@ -85,20 +99,6 @@ class CloudTopic:
         if self._times is None and self._last is not None and self._last[0] == number:
             return 1e-9 * self._taken(self._last[1])
         return 1e-9 * float(self._times_of_all()[self._row(number), 1])
-
-    def _forget(self) -> None:
-        """Begins anew, as another process does."""
-        self._lock = threading.Lock()
-        self._process = os.getpid()
-        self._messages: Iterator[Message] = iter(())  # first, so that it ends before the bag closes
-        self._open = ExitStack()  # closed with the last reference to this object
-        self._reader: Any = None
-        self._next: int | None = None  # number of the cloud that the messages yield next
-        self._last: tuple[int, Message] | None = None  # the cloud that they yielded last
-        self._times: NDArray[np.int64] | None = None
-        self._layouts: set[tuple[PointField, ...]] = set()
-        self._first_of_stamp: dict[int, int] = {}
-        self._warned_of_stamps = False
 
     def _read(self, number: int) -> Message:
         if self._next is None or not 0 <= number - self._next <= NEAR:
