@@ -20,11 +20,17 @@ from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import NamedScans
 from derain.evaluation.counts import Counts
-from derain.recordings.evidence import combined_log_odds, ray_log_odds, surroundings_log_odds
+from derain.recordings.evidence import (
+    RayEvidence,
+    combined_log_odds,
+    mean_evidence,
+    ray_evidence,
+    ray_log_odds,
+    surroundings_log_odds,
+    vote,
+)
 from derain.recordings.known_points import ScanPoints
 from derain.recordings.posed import with_poses
-from derain.recordings.seen_through import RayEvidence, mean_evidence, ray_evidence
-from derain.recordings.vote import vote
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
 from derain.system.cores import usable_cores

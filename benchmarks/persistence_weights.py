@@ -24,9 +24,8 @@ from sklearn.linear_model import LogisticRegression
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading
 from derain.datamodules.labelled import NamedScans
+from derain.recordings.evidence import mean_evidence, ray_evidence, surroundings_features
 from derain.recordings.known_points import ScanPoints
-from derain.recordings.seen_through import mean_evidence, ray_evidence
-from derain.recordings.surroundings import surroundings_features
 from derain.sources.frame import Frame
 from derain.sources.recordings import recordings_of
 from derain.system.cores import usable_cores

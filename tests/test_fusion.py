@@ -1,4 +1,4 @@
-"""LiDAR and radar joined: pairs in time by brute force, rows in order, and the parts had back."""
+"""LiDAR and radar joined: pairs in time and labels by brute force, and the parts had back."""
 
 import math
 from dataclasses import replace
@@ -6,14 +6,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.files import read_scan, write_scan
 from derain.files.extrinsics import Extrinsics
-from derain.fusion import NO_DETECTIONS, UNKNOWN, fuse, nearest_in_time
+from derain.fusion import (
+    LABEL_WITHIN,
+    NO_DETECTIONS,
+    UNKNOWN,
+    fuse,
+    nearest_in_time,
+    transfer_labels,
+)
 from derain.scan import Scan
 
 PLACE = Extrinsics.of_pose(1.5, -0.3, -0.7, 1, -2, 3)
@@ -50,14 +57,6 @@ def test_pairs_in_time_are_those_that_brute_force_finds(
     found = nearest_in_time(np.array(times), np.array(among), within)
     assert found.tolist() == expected
     assert found.dtype == np.int64
-
-
-def test_a_radar_of_another_rate_is_paired_within_half_its_period() -> None:
-    epoch = 1_700_000_000
-    lidar, radar = epoch + np.arange(294) / 10, epoch + 0.013 + np.arange(496) / 16.5
-    pairs = nearest_in_time(lidar, radar, within=0.5 / 16.5 + 1e-6)
-    assert (pairs >= 0).all()
-    assert (np.diff(pairs) >= 1).all()
 
 
 def test_the_lidar_comes_first_and_both_keep_their_order() -> None:
@@ -114,15 +113,6 @@ def test_what_no_lidar_point_is_near_is_of_unknown_label(ars548: Scan, shared: P
     expected = np.where(distance.min(axis=1) <= 1, lidar.label[distance.argmin(axis=1)], UNKNOWN)
     np.testing.assert_array_equal(fused.label[fused.radar], expected)
     assert 0 < (expected == UNKNOWN).sum() < len(expected)
-
-
-def test_a_label_is_sought_in_the_frame_of_the_lidar() -> None:
-    lidar = Scan(np.array([[10, 0, 0]], np.float32)).with_label(np.array([4]))
-    radar = Scan(np.array([[9, 0, 0], [10, 0, 0]], np.float32))
-    ahead = Extrinsics.of_pose(1, 0, 0, 0, 0, 0)
-    fused = fuse(lidar, radar, ahead, label_within=0.5)
-    assert fused.label is not None
-    assert fused.label.tolist() == [4, 4, UNKNOWN]
 
 
 def test_a_radar_that_knows_its_labels_keeps_them() -> None:
@@ -187,3 +177,57 @@ def test_every_hard_case_is_fused_from_either_side(name: str, scan: Scan) -> Non
         fused = fuse(lidar, radar, HERE)
         valid = np.concatenate([lidar.valid, radar.valid])
         np.testing.assert_array_equal(fused.valid, valid)
+
+
+def labelled(xyz: object, label: object) -> Scan:
+    return Scan(np.asarray(xyz, np.float32), label=np.asarray(label, np.int64))
+
+
+@settings(deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 40), st.integers(0, 40), st.floats(0.01, 5))
+def test_labels_are_those_that_brute_force_finds(
+    seed: int, sources: int, queries: int, within: float
+) -> None:
+    random = np.random.default_rng(seed)
+    # On a coarse lattice, off which the queries lie: many duplicates, no other ties.
+    scan = labelled(random.integers(1, 4, (sources, 3)), np.arange(sources))
+    xyz = (random.integers(1, 4, (queries, 3)) + random.uniform(0, 0.3, (queries, 3))).astype("f4")
+    expected = []
+    for query in xyz.astype(float):
+        distance = np.linalg.norm(scan.xyz - query, axis=1)
+        near = len(distance) > 0 and distance.min() <= within
+        expected.append(distance.argmin() if near else UNKNOWN)  # argmin takes the first of equals
+    assert transfer_labels(scan, xyz, within).tolist() == expected
+
+
+def test_the_bound_is_inclusive() -> None:
+    scan = labelled([[5, 0, 0]], [7])
+    xyz = np.array([[5, 0.5, 0], [5, np.nextafter(np.float32(0.5), 1), 0]], np.float32)
+    assert transfer_labels(scan, xyz, within=0.5).tolist() == [7, UNKNOWN]
+    assert LABEL_WITHIN == 1  # the default
+    assert transfer_labels(scan, xyz + np.float32([0, 0.4, 0])).tolist() == [7, 7]
+    assert transfer_labels(scan, xyz + np.float32([0, 0.6, 0])).tolist() == [UNKNOWN, UNKNOWN]
+
+
+def test_points_that_cannot_be_judged_neither_give_nor_get_labels() -> None:
+    scan = labelled([[0, 0, 0], [np.nan, 0, 0], [0.1, 3, 0], [3, 0, 0]], [1, 2, 3, UNKNOWN])
+    xyz = np.array([[0.1, 0, 0], [0.2, 3, 0], [3, 0, 0.1]], np.float32)
+    assert transfer_labels(scan, xyz).tolist() == [UNKNOWN, 3, UNKNOWN]
+    near = labelled([[0.1, 0, 0]], [1])
+    lost = np.array([[0, 0, 0], [np.nan, 0, 0], [np.inf, 0, 0]], np.float32)
+    assert transfer_labels(near, lost).tolist() == 3 * [UNKNOWN]
+
+
+@pytest.mark.parametrize(("name", "scan"), list(hard_cases(3000)))
+def test_every_hard_case_gives_labels_and_gets_them(name: str, scan: Scan) -> None:
+    ordinary = Scan.of(scene(200)).with_label(np.arange(200))
+    gets = transfer_labels(ordinary, scan.xyz)
+    assert gets.shape == (len(scan),)
+    assert (gets[~scan.valid] == UNKNOWN).all()
+    gives = transfer_labels(scan.with_label(np.ones(len(scan), np.int64)), ordinary.xyz)
+    assert set(gives) <= {1, UNKNOWN}
+
+
+def test_a_scan_without_labels_is_refused() -> None:
+    with pytest.raises(InputError, match="array: it has no labels"):
+        transfer_labels(Scan.of(scene(5)), scene(5)[:, :3])

@@ -31,9 +31,8 @@ from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
 from derain.sources.judging import Answer, Guard, judgements, unguarded
-from derain.sources.label_sink import LabelSink
 from derain.sources.method import Method
-from derain.sources.sink import FolderSink
+from derain.sources.sink import FolderSink, LabelSink
 from derain.sources.source import Source
 
 # Class ids of a teacher's answers.

@@ -176,7 +176,8 @@ class Bag:
             chosen = [c for c in reader.connections if topic is None or topic.has(c)]
             if not chosen:
                 return
-            compression = "zstd" if self._packs_messages else ""
+            packed = self.metadata is not None and self.metadata.compression == MESSAGE
+            compression = "zstd" if packed else ""
             stored = None
             if topic is None and start is None:
                 stored = reader.stored_messages() if self._is_mcap else stored_messages(reader)
@@ -215,10 +216,6 @@ class Bag:
     @property
     def _is_mcap(self) -> bool:
         return self.storage == "mcap"
-
-    @property
-    def _packs_messages(self) -> bool:
-        return self.metadata is not None and self.metadata.compression == MESSAGE
 
     def _encoding_of(self, connection: Any) -> str:
         if self._is_mcap:

@@ -92,7 +92,7 @@ class BagCopy:
             The path of the copy.
 
         Raises:
-            InputError: The bag cannot be read on, has more clouds than its index says, or the copy
+            InputError: The bag cannot be read on, has more clouds than its index names, or the copy
                 cannot be written.
         """
         for message in self._messages:

@@ -102,9 +102,9 @@ class CloudMessage:
         write.number("I", cloud.point_step)
         write.number("I", cloud.row_step)
         write.number("I", len(cloud.data))
-        write.append(cloud.data)
+        write.message += cloud.data
         write.number("B", cloud.is_dense)
-        write.append(self.tail)
+        write.message += self.tail
         return bytes(write.message)
 
 
@@ -194,7 +194,4 @@ class _Writer:
     def string(self, text: str) -> None:
         content = text.encode(*TEXT) + (b"\0" if self.encoding == CDR else b"")
         self.number("I", len(content))
-        self.append(content)
-
-    def append(self, content: bytes | memoryview) -> None:
         self.message += content

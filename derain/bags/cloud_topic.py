@@ -8,9 +8,8 @@ import os
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from itertools import islice
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,25 +25,6 @@ from derain.system.notices import warn
 NEAR = 8
 
 
-@dataclass(frozen=True, eq=False)
-class Stamps:
-    """When the clouds of a topic were recorded and taken.
-
-    Attributes:
-        recorded: Nanoseconds, int64 (M,), of the bag's clock.
-        taken: Nanoseconds, int64 (M,), of the publisher's clock; as ``recorded`` where a cloud has
-            no stamp.
-    """
-
-    recorded: NDArray[np.int64]
-    taken: NDArray[np.int64]
-
-    @property
-    def in_order(self) -> bool:
-        """Whether the times of recording never decrease."""
-        return bool((np.diff(self.recorded) >= 0).all())
-
-
 class CloudTopic:
     """The clouds of a topic.
 
@@ -53,32 +33,30 @@ class CloudTopic:
         topic: The topic, one of point clouds.
     """
 
-    # State of this process: the open bag, the number of the cloud that it yields next, the message
-    # that it yielded last, and what is known of all clouds.
-    _reader: Any
-    _messages: Iterator[Message]
-    _next: int | None
-    _last: tuple[int, Message] | None
-    _stamps: Stamps | None
-    _layouts: set[tuple[PointField, ...]]
-    _first_of_stamp: dict[int, int]
-    _warned_of_stamps: bool
-
     def __init__(self, bag: Bag, topic: Topic) -> None:
         self.bag = bag
         self.topic = topic
         self._forget()
 
+    def _forget(self) -> None:
+        """Begins anew, as another process does."""
+        self._lock = threading.Lock()
+        self._process = os.getpid()
+        self._messages: Iterator[Message] = iter(())  # first, so that it ends before the bag closes
+        self._open = ExitStack()  # closed with the last reference to this object
+        self._reader: Any = None
+        self._next: int | None = None  # number of the cloud that the messages yield next
+        self._last: tuple[int, Message] | None = None  # the cloud that they yielded last
+        self._times: NDArray[np.int64] | None = None
+        self._layouts: set[tuple[PointField, ...]] = set()
+        self._first_of_stamp: dict[int, int] = {}
+        self._warned_of_stamps = False
+
     def __len__(self) -> int:
         return self.topic.messages
 
-    def __getstate__(self) -> dict[str, Any]:
-        # Other processes open the bag themselves.
-        return {"bag": self.bag, "topic": self.topic}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.bag, self.topic = state["bag"], state["topic"]
-        self._forget()
+    def __reduce__(self) -> tuple[type[Self], tuple[Bag, Topic]]:
+        return type(self), (self.bag, self.topic)  # another process opens the bag itself
 
     def name_of(self, number: int) -> str:
         """The path of one of the clouds, which names it in messages."""
@@ -88,7 +66,7 @@ class CloudTopic:
         """One of the messages, from 0.
 
         Raises:
-            InputError: A bag that cannot be read, or that has fewer clouds than its index says.
+            InputError: A bag that cannot be read, or that has fewer clouds than its index names.
         """
         with self._lock:
             if self._process != os.getpid():  # an open file of a process before the fork
@@ -118,39 +96,13 @@ class CloudTopic:
         Raises:
             InputError: As for :meth:`message`, or a damaged cloud.
         """
-        if self._stamps is None and self._last is not None and self._last[0] == number:
-            return 1e-9 * self._taken(number, self._last[1])
-        return 1e-9 * float(self.stamps.taken[self._known(number)])
-
-    @property
-    def stamps(self) -> Stamps:
-        """When all the clouds were recorded and taken; the first access reads through the topic."""
-        if self._stamps is None:
-            times = [
-                (message.time, self._taken(number, message))
-                for number, message in enumerate(self.bag.messages(self.topic))
-            ]
-            both = np.array(times, np.int64).reshape(-1, 2)
-            self._stamps = Stamps(both[:, 0], both[:, 1])
-        return self._stamps
-
-    def _forget(self) -> None:
-        self._lock = threading.Lock()
-        self._process = os.getpid()
-        self._open = ExitStack()  # closed with the last reference to this object
-        self._reader = None
-        self._messages = iter(())
-        self._next = None
-        self._last = None
-        self._stamps = None
-        self._layouts = set()
-        self._first_of_stamp = {}
-        self._warned_of_stamps = False
+        if self._times is None and self._last is not None and self._last[0] == number:
+            return 1e-9 * self._taken(self._last[1])
+        return 1e-9 * float(self._times_of_all()[self._row(number), 1])
 
     def _read(self, number: int) -> Message:
         if self._next is None or not 0 <= number - self._next <= NEAR:
-            self._begin_near(number)
-        assert self._next is not None
+            self._next = self._begin_near(number)
         ahead, self._next = number - self._next, None  # until it went well
         message = next(islice(self._messages, ahead, None), None)
         if message is None:
@@ -158,26 +110,39 @@ class CloudTopic:
         self._next = number + 1
         return message
 
-    def _begin_near(self, number: int) -> None:
-        """Begins to read shortly before a cloud, or at it."""
+    def _begin_near(self, number: int) -> int:
+        """Begins to read shortly before a cloud, or at it, and returns the number of the first."""
         first, start = 0, None
-        if number > NEAR and self.stamps.in_order:
-            # Several may have been recorded at one time.
-            start = int(self.stamps.recorded[self._known(number)])
-            first = int(np.searchsorted(self.stamps.recorded, start))
+        if number > NEAR:
+            recorded = self._times_of_all()[:, 0]
+            if (np.diff(recorded) >= 0).all():
+                start = int(recorded[self._row(number)])
+                first = int(np.searchsorted(recorded, start))  # several may have one time
         if self._reader is None:
             self._reader = self._open.enter_context(self.bag.opened())
         self._messages = self.bag.messages_of(self._reader, self.topic, start)
-        self._next = first
+        return first
 
-    def _taken(self, number: int, message: Message) -> int:
+    def _times_of_all(self) -> NDArray[np.int64]:
+        """When the clouds were recorded and taken, nanoseconds, (M, 2).
+
+        The first call reads through the topic.
+        """
+        if self._times is None:
+            times = [(each.time, self._taken(each)) for each in self.bag.messages(self.topic)]
+            self._times = np.array(times, np.int64).reshape(-1, 2)
+        return self._times
+
+    def _taken(self, message: Message) -> int:
+        """The stamp of a cloud; when it was recorded, where it has none."""
         try:
             return stamp_of(message.data, self.topic.encoding) or message.time
         except ValueError:  # reading the cloud raises it
             return message.time
 
-    def _known(self, number: int) -> int:
-        if number >= len(self.stamps.recorded):
+    def _row(self, number: int) -> int:
+        """The row of a cloud in the times of all; the index may name more than there are."""
+        if number >= len(self._times_of_all()):
             raise self._too_few()
         return number
 

@@ -82,7 +82,7 @@ class McapFile:
             start: The first time of interest, nanoseconds; None for the beginning.
 
         Raises:
-            ValueError: A damaged file, or one that has other messages than it says.
+            ValueError: A damaged file, or one that has other messages than it states.
         """
         parts = self._in_chunks(channels, start or 0), self._outside_chunks(channels, start or 0)
         count = 0

@@ -39,23 +39,21 @@ class McapReader:
     Args:
         path: The bag, for errors.
         files: Its files, in the order of time.
+
+    Attributes:
+        files: The same, open.
     """
 
     def __init__(self, path: Path, files: Sequence[Path]) -> None:
         self.path = path
+        self.files: list[McapFile] = []
         self._paths = files
-        self._files: list[McapFile] = []
-
-    @property
-    def files(self) -> list[McapFile]:
-        """Its files, open, in the order of time."""
-        return self._files
 
     @property
     def connections(self) -> list[McapConnection]:
         """Its connections, in the order of the files."""
         counts: dict[McapConnection, int] = {}
-        for file in self._files:
+        for file in self.files:
             for number, connection in _connections(file).items():
                 counts[connection] = counts.get(connection, 0) + file.counts[number]
         return [replace(each, msgcount=count) for each, count in counts.items()]
@@ -63,17 +61,17 @@ class McapReader:
     @property
     def message_count(self) -> int:
         """Number of messages."""
-        return sum(file.counts.total() for file in self._files)
+        return sum(file.counts.total() for file in self.files)
 
     @property
     def start_time(self) -> int:
         """When the first message was recorded, nanoseconds; 0 where there is none."""
-        return min((file.start for file in self._files if file.counts.total()), default=0)
+        return min((file.start for file in self.files if file.counts.total()), default=0)
 
     @property
     def duration(self) -> int:
         """Nanoseconds from the first to the last message."""
-        last = max((file.end for file in self._files if file.counts.total()), default=0)
+        last = max((file.end for file in self.files if file.counts.total()), default=0)
         return last - self.start_time
 
     def messages(
@@ -93,7 +91,7 @@ class McapReader:
             ValueError: A damaged file.
         """
         wanted = {replace(each, msgcount=0): each for each in connections}
-        for file in self._files:
+        for file in self.files:
             of_file = _connections(file)
             channels = {n: wanted[each] for n, each in of_file.items() if each in wanted}
             for found in file.messages(channels, start):
@@ -106,13 +104,13 @@ class McapReader:
         Raises:
             ValueError: As for McapFile.check_whole.
         """
-        for file in self._files:
+        for file in self.files:
             file.check_whole()
         return self.message_count
 
     def private_records(self) -> Iterator[bytes]:
         """Records of kinds that MCAP leaves to applications, byte for byte."""
-        for file in self._files:
+        for file in self.files:
             yield from file.records.private()
 
     def attachments_and_metadata(self) -> Iterator[Attachment | Metadata]:
@@ -122,7 +120,7 @@ class McapReader:
             InputError: One is damaged.
         """
         try:
-            for file in self._files:
+            for file in self.files:
                 yield from file.attachments_and_metadata()
         except Exception as error:
             raise InputError(
@@ -134,8 +132,8 @@ class McapReader:
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             for path in self._paths:
-                self._files.append(McapFile(path))
-                stack.callback(self._files[-1].close)
+                self.files.append(McapFile(path))
+                stack.callback(self.files[-1].close)
             self._stack = stack.pop_all()
         return self
 

@@ -32,7 +32,7 @@ from mcap.records import (
     Statistics,
 )
 
-from derain.bags.unpacking import check_size, unpack
+from derain.bags.unpacking import PORTION, check_size, unpack
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -58,9 +58,6 @@ SPECIFIED = range(1, max(Opcode) + 1)
 HEAD, MESSAGE_HEAD = struct.Struct("<BQ"), struct.Struct("<HIQQ")
 CHECKSUM = struct.Struct("<I")
 FOOTER_SIZE = 20
-
-# Bytes that are read at once for a checksum.
-PORTION = 2**22
 
 
 class Place(NamedTuple):
@@ -160,7 +157,7 @@ class McapRecords:
     def in_chunk(self, chunk: Chunk) -> Iterator[tuple[int, Any]]:
         """Kind and content of each record of a chunk; None is the content of private records.
 
-        Records that nobody reads, such as indexes of messages, are left out.
+        Records that are not needed, such as indexes of messages, are left out.
 
         Raises:
             ValueError: It is damaged.
@@ -200,7 +197,7 @@ class McapRecords:
         found, size = HEAD.unpack(self._bytes(offset, HEAD.size))
         if found != kind:
             raise ValueError(f"another record than expected at byte {offset:,}")
-        if kind != Opcode.ATTACHMENT:  # which may be whatever somebody put into the file
+        if kind != Opcode.ATTACHMENT:  # which may be of any size
             check_size(size)
         return self._bytes(offset + HEAD.size, size)
 

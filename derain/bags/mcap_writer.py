@@ -4,7 +4,7 @@ import os
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import yaml
 from mcap.records import Attachment, Metadata
@@ -21,8 +21,6 @@ from derain.bags.ros2_metadata import (
     small_yaml,
 )
 from derain.system.extras import ZSTANDARD
-
-T = TypeVar("T")
 
 # The metadata record in which ROS 2 repeats the metadata.yaml, and the name of its entry.
 ROS2_RECORD, ROS2_NOTE = "rosbag2", "serialized_metadata"
@@ -159,7 +157,7 @@ class McapWriter:
             return deepcopy(self.metadata.content)
         for record in self.bag.attachments_and_metadata():
             if isinstance(record, Metadata) and record.name == ROS2_RECORD:
-                return _from_yaml(record.metadata.get(ROS2_NOTE, ""), dict) or {}
+                return dict(_from_yaml(record.metadata.get(ROS2_NOTE, ""), dict))
         return {}
 
     def _version(self) -> int:
@@ -176,7 +174,7 @@ def _topic_metadata(
     notes = dict(connection.notes)
     profiles: Any = notes.get(QOS, "")
     if version >= NEWEST_VERSION:
-        profiles = _from_yaml(profiles, list) or []
+        profiles = _from_yaml(profiles, list)
     made: dict[str, Any] = {
         "name": connection.topic,
         "type": connection.msgtype,
@@ -187,13 +185,13 @@ def _topic_metadata(
     return made | known.get(connection.topic, {})
 
 
-def _from_yaml(note: str, kind: type[T]) -> T | None:
-    """The value of a note in YAML; None where it is damaged or of another kind."""
+def _from_yaml(note: str, kind: type) -> Any:
+    """The value of a note in YAML; an empty one where it is damaged or of another kind."""
     try:
         value = small_yaml(note)
     except ValueError:
-        return None
-    return value if isinstance(value, kind) else None
+        return kind()
+    return value if isinstance(value, kind) else kind()
 
 
 def _pack(file: Path) -> None:

@@ -42,7 +42,8 @@ def bags_at(path: Path) -> list[Path]:
     if not os.path.isdir(path):
         return []
     with reading(path):
-        return sorted(each for each in path.iterdir() if _is_visible(each) and is_bag(each))
+        inside = sorted(path.iterdir())
+    return [each for each in inside if not each.name.startswith(".") and is_bag(each)]
 
 
 def is_bag(path: Path) -> bool:
@@ -114,7 +115,3 @@ def stem(bag: Path) -> str:
     """The name of a bag without the suffix of its storage."""
     path = Path(os.path.abspath(bag))
     return path.stem if path.suffix.lower() in SUFFIXES else path.name
-
-
-def _is_visible(path: Path) -> bool:
-    return not path.name.startswith(".")

@@ -69,7 +69,7 @@ class PointCloud:
         point_step: Bytes of a point.
         row_step: Bytes of a row, with padding at its end if it has any.
         data: Bytes of all rows.
-        is_dense: Whether all points are finite, as the driver says.
+        is_dense: Whether all points are finite, as the driver states.
 
     Raises:
         ValueError: Fields, steps and bytes that contradict each other.

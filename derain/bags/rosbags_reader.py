@@ -57,15 +57,6 @@ def rosbags_reader(path: Path, is_ros1: bool) -> Iterator[Any]:
         reader.close()
 
 
-def compressions_of(reader: Any) -> set[str]:
-    """How the chunks of a bag of ROS 1 are compressed.
-
-    Args:
-        reader: What :func:`rosbags_reader` lends.
-    """
-    return {chunk.decompressor.compression for chunk in reader.chunks.values()}
-
-
 def other_tables(reader: Any) -> list[str]:
     """Names of tables in the databases of a bag that are none of ROS 2.
 
@@ -88,7 +79,7 @@ def stored_messages(reader: Any) -> int:
             database with messages of none of its topics, or of several.
     """
     if not hasattr(reader, "chunks"):
-        return sum(map(_stored_in_database, _databases(reader)))
+        return sum(map(_messages_of_database, _databases(reader)))
     if reader.chunks.keys() != set(_chunk_places(reader.path)):
         raise ValueError("its index does not name all chunks")
     for chunk in reader.chunks.values():
@@ -98,7 +89,7 @@ def stored_messages(reader: Any) -> int:
     return sum(map(len, reader.indexes.values()))
 
 
-def _stored_in_database(database: Any) -> int:
+def _messages_of_database(database: Any) -> int:
     stored: int = database.metadata.message_count
     of_topics = sum(topic.msgcount for topic in database.connections)
     if of_topics != stored:

@@ -7,7 +7,7 @@ import yaml
 
 from derain.bags.bag import Bag, Message
 from derain.bags.ros2_metadata import NEWEST_VERSION, OLDER_VERSION
-from derain.bags.rosbags_reader import compressions_of, other_tables
+from derain.bags.rosbags_reader import other_tables
 from derain.system.extras import LZ4, ROSBAGS
 from derain.system.notices import warn
 
@@ -100,7 +100,7 @@ class RosbagsWriter:
 def _ros1(reader: Any, path: Path) -> Any:
     """A writer of ROS 1 that compresses as the other bag does."""
     library = ROSBAGS.load(path, "rosbag1")
-    used = compressions_of(reader)
+    used = {chunk.decompressor.compression for chunk in reader.chunks.values()}
     writer = library.Writer(path)
     for format_ in library.Writer.CompressionFormat:
         if format_.name.lower() in used:

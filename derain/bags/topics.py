@@ -70,7 +70,7 @@ def cloud_topic(bag: Path, topics: Sequence[Topic], name: str = "") -> Topic:
     """
     clouds = [topic for topic in topics if topic.type == POINT_CLOUD]
     if name:
-        return _named(bag, topics, name)
+        return _named(bag, topics, clouds, name)
     filled = [topic for topic in clouds if topic.messages]
     if len(filled) == 1:
         return filled[0]
@@ -96,8 +96,7 @@ def decoder_of(message_type: str) -> str | None:
     return PACKET_DECODERS.get(message_type.replace("/msg/", "/"))
 
 
-def _named(bag: Path, topics: Sequence[Topic], name: str) -> Topic:
-    clouds = [topic for topic in topics if topic.type == POINT_CLOUD]
+def _named(bag: Path, topics: Sequence[Topic], clouds: Sequence[Topic], name: str) -> Topic:
     same = [topic for topic in topics if topic.name.strip("/") == name.strip("/")]
     for topic in same:
         if topic in clouds:

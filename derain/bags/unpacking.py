@@ -8,7 +8,6 @@ import bz2
 import shutil
 import tempfile
 import weakref
-from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +21,7 @@ from derain.system.extras import LZ4, ZSTANDARD
 # The most that a chunk or a message may take, bytes: a cloud of eight million points of 32 bytes.
 MOST_UNPACKED = 2**28
 
-# Bytes of a file that are written at once, and that are left on the disk for others.
+# Bytes of a file that are read at once, and that are left on the disk for others.
 PORTION, LEFT = 2**22, 2**30
 
 
@@ -36,9 +35,19 @@ def unpack(data: bytes, compression: str) -> bytes:
     Raises:
         ValueError: Another compression, damaged bytes, or more than MOST_UNPACKED.
     """
-    if compression not in UNPACKERS:
-        raise ValueError(f"the compression '{compression}' is not known")
-    unpacked = UNPACKERS[compression](data)
+    match compression:
+        case "" | "none":
+            unpacked = data
+        case "bz2":
+            unpacked = _whole(bz2.BZ2Decompressor(), data)
+        case "lz4":
+            unpacked = _whole(LZ4.load("bags", "frame").LZ4FrameDecompressor(), data)
+        case "zstd":
+            library = ZSTANDARD.load("bags")
+            check_size(library.frame_content_size(data))  # -1 where the frame has none
+            unpacked = library.decompress(data, MOST_UNPACKED)
+        case _:
+            raise ValueError(f"the compression '{compression}' is not known")
     check_size(len(unpacked))
     return unpacked
 
@@ -56,35 +65,11 @@ def check_size(size: int) -> None:
         raise ValueError(f"a chunk or message of more than {MOST_UNPACKED // 10**6} MB")
 
 
-def _bz2(data: bytes) -> bytes:
-    return _whole(bz2.BZ2Decompressor(), data)
-
-
-def _lz4(data: bytes) -> bytes:
-    return _whole(LZ4.load("bags", "frame").LZ4FrameDecompressor(), data)
-
-
-def _zstd(data: bytes) -> bytes:
-    library = ZSTANDARD.load("bags")
-    check_size(library.frame_content_size(data))  # -1 where the frame has none
-    unpacked: bytes = library.decompress(data, MOST_UNPACKED)
-    return unpacked
-
-
 def _whole(decompressor: Any, data: bytes) -> bytes:
     unpacked: bytes = decompressor.decompress(data, MOST_UNPACKED + 1)
     if not decompressor.eof and len(unpacked) <= MOST_UNPACKED:
         raise ValueError("compressed data that ends too early")
     return unpacked
-
-
-UNPACKERS: Mapping[str, Callable[[bytes], bytes]] = {
-    "": bytes,
-    "none": bytes,
-    "bz2": _bz2,
-    "lz4": _lz4,
-    "zstd": _zstd,
-}
 
 
 @dataclass(frozen=True, eq=False)

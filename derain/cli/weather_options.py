@@ -16,9 +16,10 @@ from derain.files.atomic import replacing, require_writable
 from derain.files.reading import is_file, reading
 from derain.sources.cleaning import CleanedScan
 from derain.sources.folders import named_frames
+from derain.sources.frame import time_of
 from derain.sources.judgement import Judgement
 from derain.sources.spread import evenly_spaced
-from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions, time_of
+from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions
 from derain.system.notices import warn
 from derain.weather.alarm import ERROR, HOLD, WARNING, Level, Threshold
 from derain.weather.record import WEATHER_COLUMNS, weather_row

@@ -1,45 +1,184 @@
-"""What speaks for rain at each point: other scans' rays, and its surroundings in its own scan.
+"""What speaks for rain at each point: rays of other scans, its surroundings, and its neighbours.
 
-Both are weighed as witnesses who do not know of each other: log-odds of each alone, added. Their
-weights are fitted to simulated drives (``benchmarks/persistence_weights.py``), whose truth is
-known: no label of a real scan had a part in them. Intensity is not asked for.
+Rays of other scans pass the place of a drop, and end at the place of anything solid. In its own
+scan a drop has nothing near it, and lies on no surface. The log-odds of both are added, as of two
+independent witnesses, with weights fitted to simulated drives, whose truth is known
+(``benchmarks/persistence_weights.py``): no label of a real scan and no intensity is used. Then each
+point and its neighbours vote, because drops fly among drops and surfaces hang together.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.recordings.known_points import ScanPoints
-from derain.recordings.seen_through import RayEvidence
-from derain.recordings.surroundings import surroundings_features
+from derain.recordings.known_points import ScanPoints, range_of
+from derain.views.scatter import scatter_through_space
+
+# Rays of the other scan that are looked up for each place. They lie on two or three of its beams:
+# one more drop does not decide.
+RAYS = 8
+
+# Rays count that pass a place by no more than this angle, degrees, or by so many steps of a coarser
+# sensor. The wider the bound, the more places have rays, and the more rays pass edges.
+WITHIN, WITHIN_STEPS = 0.6, 1.8
+
+# A ray that ends at the place: metres, and metres more for each metre of range, by which steps and
+# registration make ends differ. One that ends farther behind it than the other bound went through.
+ENDS_AT = (0.1, 0.01)
+WENT_THROUGH = (0.5, 0.01)
+
+# A ray that passes the place by this angle, degrees, has half the weight of one that meets it. From
+# a sensor that stands the same ray comes back, and shows more than all those around it; from one
+# that moves no ray passes nearer, because its poses are true to a tenth of a degree.
+HALF_WEIGHT_AT = 0.1
+
+# The least sum of weights: where no ray passes near, all of them together count less.
+LEAST_WEIGHT = 0.2
+
+# What is added before a logarithm is taken, and what then takes the usual value to 0.
+STEP_EPSILON, USUAL_STEPS = 1e-3, 1.0
+FLATTEST, USUAL_SCATTER, SPREAD_OF_SCATTER = 1e-4, -4.5, 2.0
+USUAL_RANGE = 10.0
+
+# The least step between rays, radians: a scan of a smaller one has too few points.
+LEAST_STEP = 1e-5
 
 # Log-odds of rain: of any point; for each share of rays that end at it, and that went through.
 RAY_WEIGHTS = (-1.41, -9.29, 3.94)
 
-# Log-odds of rain for what ``surroundings_features`` says of its surroundings, in that order.
+# Log-odds of rain for each of ``surroundings_features``, in that order.
 SURROUNDINGS_WEIGHTS = (-3.13, 7.13, 1.76, -1.27, -2.06, -0.31, -3.63, -0.79, -3.71, -1.97)
 
-# Log-odds of rain in the simulated drives, which both witnesses count, and the sum only once.
+# Log-odds of rain in the simulated drives. Both witnesses include them, the sum only once.
 PRIOR = -2.49
+
+# A neighbour at this distance has half the weight of the point itself: metres, and metres more for
+# each metre of range, a step of a sensor of 64 beams.
+HALF_AT = (0.1, 0.01)
+
+# The bound on the vote of a single point, log-odds: beyond it, a point outvotes no more neighbours.
+LARGEST_LOG_ODDS = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class RayEvidence:
+    """What the rays of another scan, or of several, show at the places of M points.
+
+    Attributes:
+        ending: Share of the rays near a place that end at it, float64 (M,), weighted by how near
+            they pass.
+        through: Share of them that went through it to something behind, float64 (M,).
+    """
+
+    ending: NDArray[np.float64]
+    through: NDArray[np.float64]
+
+
+def ray_evidence(
+    points: ScanPoints, other: ScanPoints, to_other: NDArray[np.float64]
+) -> RayEvidence:
+    """Finds how the rays of another scan pass the places of a scan's points.
+
+    It does not matter how the sensor scans: its rays are where its returns are. Each of two returns
+    of a ray is the end of a ray of its own: that of a solid thing went through the drop before it.
+
+    Args:
+        points: The points, M of them.
+        other: The other scan.
+        to_other: Takes the frame of the points to that of the other scan, float64 (4, 4), metres.
+
+    Returns:
+        The evidence; zeros where no ray is near.
+    """
+    if not len(other):
+        return RayEvidence(np.zeros(len(points)), np.zeros(len(points)))
+    places = points.xyz @ to_other[:3, :3].T + to_other[:3, 3]
+    reach = range_of(places)
+    rays, angles = other.rays_near(places / reach[:, None], RAYS)
+    near = angles <= max(np.radians(WITHIN), WITHIN_STEPS * points.step)
+    behind = other.range.take(rays) - reach[:, None]
+    at, through = (offset + slope * reach[:, None] for offset, slope in (ENDS_AT, WENT_THROUGH))
+    weight = near / (1 + np.square(angles / np.radians(HALF_WEIGHT_AT)))
+    total_weight = np.maximum(weight.sum(axis=1), LEAST_WEIGHT)
+    return RayEvidence(
+        (weight * (np.abs(behind) <= at)).sum(axis=1) / total_weight,
+        (weight * (behind > through)).sum(axis=1) / total_weight,
+    )
+
+
+def mean_evidence(evidence: list[RayEvidence]) -> RayEvidence:
+    """The mean of the evidence of several scans, at least one."""
+    return RayEvidence(
+        np.mean([one.ending for one in evidence], axis=0),
+        np.mean([one.through for one in evidence], axis=0),
+    )
+
+
+def surroundings_features(points: ScanPoints) -> NDArray[np.float64]:
+    """Describes the surroundings of each point by three numbers, their squares and products.
+
+    The numbers are logarithms: of the mean distance of a point's neighbours in steps of the
+    sensor's rays at its range; of the smallest eigenvalue of their covariance over the sum of all
+    three, which is 0 on a surface; and of its range. None of them depends on the sensor.
+
+    Args:
+        points: M points of a scan.
+
+    Returns:
+        One, the numbers, and their six squares and products, float64 (M, 10), finite.
+    """
+    step = max(points.step, LEAST_STEP)
+    steps_apart = points.distances[:, 1:].mean(axis=1) / (points.range * step)
+    scatter = scatter_through_space(points.xyz, points.neighbours)
+    apart = np.log(steps_apart + STEP_EPSILON) - USUAL_STEPS
+    rough = (np.log(scatter + FLATTEST) - USUAL_SCATTER) / SPREAD_OF_SCATTER
+    far = np.log(points.range / USUAL_RANGE)
+    return np.stack(
+        [
+            *(np.ones_like(apart), apart, rough, far),
+            *(apart**2, rough**2, far**2, apart * rough, apart * far, rough * far),
+        ],
+        axis=1,
+    )
 
 
 def surroundings_log_odds(points: ScanPoints) -> NDArray[np.float64]:
     """Log-odds of rain by each point's surroundings alone, float64 (M,)."""
-    told: NDArray[np.float64] = surroundings_features(points) @ np.array(SURROUNDINGS_WEIGHTS)
-    return told
+    log_odds: NDArray[np.float64] = surroundings_features(points) @ np.array(SURROUNDINGS_WEIGHTS)
+    return log_odds
 
 
 def ray_log_odds(evidence: RayEvidence) -> NDArray[np.float64]:
-    """Log-odds of rain by what other scans' rays say alone, float64 (M,)."""
+    """Log-odds of rain by the rays of other scans alone, float64 (M,)."""
     any_point, ending, through = RAY_WEIGHTS
     return any_point + ending * evidence.ending + through * evidence.through
 
 
 def combined_log_odds(points: ScanPoints, evidence: RayEvidence | None) -> NDArray[np.float64]:
-    """Log-odds of rain by all that is known of each point by itself, float64 (M,).
+    """Log-odds of rain of each point without its neighbours' votes, float64 (M,).
 
     Args:
         points: M points of a scan.
-        evidence: What other scans' rays say; None where there is no other scan.
+        evidence: That of the rays of other scans; None where there is no other scan.
     """
     alone = surroundings_log_odds(points)
     return alone if evidence is None else alone + ray_log_odds(evidence) - PRIOR
+
+
+def vote(points: ScanPoints, log_odds: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Log-odds of rain of each point and its neighbours together.
+
+    Args:
+        points: M points.
+        log_odds: Those of each point by itself, float64 (M,).
+
+    Returns:
+        float64 (M,).
+    """
+    offset, slope = HALF_AT
+    half_at = (offset + slope * points.range)[:, None]
+    weight = 1 / (1 + np.square(points.distances / half_at))
+    votes = np.clip(log_odds, -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS).take(points.neighbours)
+    total: NDArray[np.float64] = (weight * votes).sum(axis=1)
+    return total

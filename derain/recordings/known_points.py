@@ -1,4 +1,4 @@
-"""A scan's distinct points with their neighbours, and their rays as other scans are asked about."""
+"""A scan's distinct points with their neighbours, and its rays by their directions."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,17 +1,21 @@
 """Where a sensor was, scan by scan, from nothing but its scans."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.recordings.registration import Registration
+from derain.recordings.registration import Registration, Trust
 from derain.recordings.surfaces import Fit, Surfaces
-from derain.recordings.trust import Trust
 from derain.scan import Scan
+from derain.sources.frame import Frame, time_of
 from derain.system.cores import threads_of
 
 # How far apart partners may be, metres: around the motion that is expected, and where nothing is
 # expected: six scans of WADS on, 7.9 m, are found by the wider one.
 WITHIN, WITHIN_AT_FIRST = 1.5, 8.0
+
+NO_POINTS = Scan.of(np.zeros((0, 3), np.float32))
 
 
 class Odometry:
@@ -89,3 +93,45 @@ class Odometry:
         self._pose = self._pose @ motion
         residual, matched = (np.nan, 0.0) if fit is None else (fit.residual, fit.matched)
         return Registration(motion, self._pose, residual, matched, not reason, reason)
+
+
+class FrameOdometry:
+    """Odometry of frame after frame, which starts anew with each recording.
+
+    Args:
+        threads: Threads to use; 0 takes every core this process may use.
+    """
+
+    def __init__(self, threads: int = 0) -> None:
+        self._odometry = Odometry(threads)
+        self._before: Frame | None = None
+
+    def register(self, frame: Frame, scan: Scan | None) -> Registration:
+        """Takes the next frame.
+
+        Args:
+            frame: The frame.
+            scan: Its scan; None where it cannot be read.
+
+        Returns:
+            Where it was taken, in the frame of the first scan of its recording. Besides what
+            :class:`~derain.recordings.odometry.Odometry` returns, it is not trusted where the frame
+            was taken before the one that it follows, as far as their times are known.
+        """
+        before, self._before = self._before, frame
+        if before is None or not frame.follows(before):
+            self._odometry.restart()
+            before = None
+        registration = self._odometry.register(NO_POINTS if scan is None else scan)
+        if scan is None:
+            return replace(registration, trusted=False, reason="it cannot be read")
+        late = None if before is None else _too_late(frame, before)
+        return registration if late is None else replace(registration, trusted=False, reason=late)
+
+
+def _too_late(frame: Frame, before: Frame) -> str | None:
+    """The reason not to trust a frame taken before the one that it follows; None without one."""
+    time, earlier = time_of(frame), time_of(before)
+    if time is None or earlier is None or time > earlier:
+        return None
+    return f"it was taken at {time:.3f} s, the scan before at {earlier:.3f} s: out of order"

@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.documents import shown
-from derain.recordings.evidence import combined_log_odds
+from derain.recordings.evidence import (
+    RayEvidence,
+    combined_log_odds,
+    mean_evidence,
+    ray_evidence,
+    vote,
+)
 from derain.recordings.known_points import ScanPoints
-from derain.recordings.pose_search import FrameOdometry
+from derain.recordings.odometry import FrameOdometry
 from derain.recordings.recording_method import RecordingMethod
 from derain.recordings.registry import METHODS
-from derain.recordings.seen_through import RayEvidence, mean_evidence, ray_evidence
-from derain.recordings.vote import vote
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.judgement import Judgement
@@ -83,7 +87,7 @@ class _Placed:
 
 @METHODS.add("persistence")
 class PersistenceDerainer(RecordingMethod):
-    """Calls rain what is not where it was, by what rays of other scans say and how it lies.
+    """Calls rain what is not where it was, by rays of other scans and its surroundings.
 
     Solid things are where they were a tenth of a second ago; a drop is not, and the rays that pass
     its place in the scans before and after go through it. What moves, as cars do, hangs together
@@ -106,7 +110,7 @@ class PersistenceDerainer(RecordingMethod):
         threads: Threads to use; 0 takes every core this process may use.
 
     Source: free and occupied space as evidence follows occupancy grids (A. Elfes, "Using Occupancy
-        Grids for Mobile Robot Perception and Navigation", 1989), asked by rays instead of cells.
+        Grids for Mobile Robot Perception and Navigation", 1989), with rays instead of cells.
     """
 
     HELP: ClassVar[str] = "rain is not where it was: rays of other scans went through its place"
@@ -145,7 +149,7 @@ class PersistenceDerainer(RecordingMethod):
     ) -> Judgement | None:
         """Takes the next frame of a recording; see :meth:`derain.sources.method.Method.push`.
 
-        The stages are read, odometry where no pose is told, view, network (the evidence) and back.
+        The stages are read, odometry where no pose is given, view, network (the evidence) and back.
         """
         stopwatch = stopwatch or Stopwatch()
         if not isinstance(frame, Frame):
@@ -194,15 +198,15 @@ class PersistenceDerainer(RecordingMethod):
         self._placed: WeakKeyDictionary[Scan, _Placed] = WeakKeyDictionary()
         self._doubts: WeakKeyDictionary[Scan, list[ScanIssue]] = WeakKeyDictionary()
         self._stretch = 0
-        self._poses_are_told: bool | None = None  # not before the first frame
+        self._poses_are_given: bool | None = None  # not before the first frame
 
     def _place(self, frame: Frame, scan: Scan) -> tuple[NDArray[np.float64], int]:
         """Where a frame was taken, and in which stretch of its recording."""
         pose = self._given_pose(frame, scan)
-        told = pose is not None
-        if self._poses_are_told not in (None, told) or self._recent.starts_new_recording(frame):
+        given = pose is not None
+        if self._poses_are_given not in (None, given) or self._recent.starts_new_recording(frame):
             self._stretch += 1  # another world
-        self._poses_are_told = told
+        self._poses_are_given = given
         if pose is not None:
             return pose, self._stretch
         registration = self._odometry.register(frame, scan)
@@ -212,7 +216,7 @@ class PersistenceDerainer(RecordingMethod):
         return registration.pose, self._stretch
 
     def _given_pose(self, frame: Frame, scan: Scan) -> NDArray[np.float64] | None:
-        """The pose that is told with a frame; None without one, and of a record that is damaged."""
+        """The pose that is given with a frame; None without one, and of a damaged record."""
         try:
             return frame.pose
         except InputError as error:
@@ -235,15 +239,15 @@ class PersistenceDerainer(RecordingMethod):
         return self.with_warnings(judgement)
 
     def _evidence(self, scans: WindowOfScans) -> RayEvidence | None:
-        """What the rays of the other scans say of the places of the points; None without any."""
+        """The evidence of the rays of the other scans; None without any."""
         own = self._placed[scans.scan]
         others = [self._placed[each.scan] for each in (*scans.before, *scans.after)]
-        told = [
+        found = [
             ray_evidence(own.points, other.points, np.linalg.inv(other.pose) @ own.pose)
             for other in others
             if other.stretch == own.stretch and len(other.points)
         ]
-        return mean_evidence(told) if told else None
+        return mean_evidence(found) if found else None
 
 
 def _by_row(
@@ -253,7 +257,7 @@ def _by_row(
     known: NDArray[np.bool_],
     frame: Frame,
 ) -> Judgement:
-    """What is said of points, for the rows of their scan."""
+    """The judgement of the rows of a scan, by that of its points."""
     judged = points.inverse >= 0
     of_rows = points.inverse[judged]
     probability = np.zeros(len(scan), np.float32)

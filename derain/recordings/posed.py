@@ -1,4 +1,4 @@
-"""Frames with poses: told by a file, those of a sensor that stands, or found by odometry."""
+"""Frames with poses: of a file, of a sensor that stands, or found by odometry."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.reading import reading
-from derain.recordings.pose_search import FrameOdometry
+from derain.recordings.odometry import FrameOdometry
 from derain.recordings.registration import Registration
 from derain.scan import Scan
 from derain.sources.frame import Frame
@@ -48,37 +48,26 @@ def with_poses(
         InputError: A record that is damaged, or does not fit the scans.
     """
     if poses == STANDING:
-        return with_identity_poses(source)
+        return Frames(frame.with_pose(np.eye(4)) for frame in source)
     if poses == ODOMETRY:
-        return with_odometry_poses(source, threads, on_registration)
+        return _with_odometry_poses(source, threads, on_registration)
     if poses is not None:
-        return with_file_poses(source, Path(poses))
+        return _with_file_poses(source, Path(poses))
     found: list[Frame] = []
     for recording in recordings_of(source):
         known = all(frame.pose is not None for frame in recording)
-        found += recording if known else with_odometry_poses(recording, threads, on_registration)
+        found += recording if known else _with_odometry_poses(recording, threads, on_registration)
     return Frames(found)
 
 
-def with_identity_poses(source: Sequence[Frame]) -> Frames:
-    """The same frames of a sensor that stands still: each has the identity for its pose."""
-    return Frames(frame.with_pose(np.eye(4)) for frame in source)
-
-
-def with_odometry_poses(
-    source: Sequence[Frame], threads: int = 0, on_registration: OnRegistration | None = None
+def _with_odometry_poses(
+    source: Sequence[Frame], threads: int, on_registration: OnRegistration | None
 ) -> Frames:
     """The same frames with poses found from their scans, which are all read once.
 
-    Args:
-        source: The frames.
-        threads: Threads to use; 0 takes every core.
-        on_registration: Called with each frame and its registration as soon as that is found.
-
-    Returns:
-        The frames, those of each recording in the frame of its first scan. One that cannot be read
-        or registered is where the sensor would be if it had gone on as it did, and neither follows
-        the one before it nor is followed by the one after.
+    The poses of a recording are in the frame of its first scan. A scan that cannot be read or
+    registered is where the sensor would be if it had gone on as it did, and neither follows the
+    one before it nor is followed by the one after.
     """
     odometry = FrameOdometry(threads)
     posed: list[Frame] = []
@@ -93,14 +82,11 @@ def with_odometry_poses(
     return Frames(posed)
 
 
-def with_file_poses(source: Sequence[Frame], path: Path) -> Frames:
-    """The same frames with the poses of a file.
+def _with_file_poses(source: Sequence[Frame], path: Path) -> Frames:
+    """The same frames with the poses of a file, or of the files of a folder.
 
-    Args:
-        source: The frames.
-        path: A file of one recording's poses, or a folder with one for each: ``<sequence>.txt``.
-            Poses with times go to the scans by them where those have times of the same clock, else
-            line by line as in :func:`~derain.sources.records.line_of`.
+    Poses with times belong to the scans by these where the scans have times of the same clock, else
+    line by line as in :func:`~derain.sources.records.line_of`.
 
     Raises:
         InputError: A file that is missing, damaged, of another recording or of another length.
@@ -125,7 +111,7 @@ def with_file_poses(source: Sequence[Frame], path: Path) -> Frames:
 def _poses(recording: Sequence[Frame], trajectory: Trajectory) -> Iterator[NDArray[np.float64]]:
     """The pose of each frame."""
     names = [Path(frame.name).name for frame in recording]
-    if trajectory.times is not None:  # else the scans' own are not asked for, damaged or not
+    if trajectory.times is not None:  # else the scans' own are not read, damaged or not
         times = [time for frame in recording if (time := frame.time) is not None]
         if len(times) == len(recording) and trajectory.is_by_time(times):
             yield from map(trajectory.at, times, names)
@@ -136,7 +122,7 @@ def _poses(recording: Sequence[Frame], trajectory: Trajectory) -> Iterator[NDArr
 
 
 def _scan_of(frame: Frame) -> Scan | None:
-    """The scan of a frame; None where it cannot be read, which whoever needs it is told then."""
+    """The scan of a frame; None where it cannot be read, an error of whatever needs it later."""
     try:
         return frame.read()
     except InputError:

@@ -31,7 +31,7 @@ THICKNESS = 1e-3
 # Steps of the search; it comes to rest in one to four where it starts near, in fourteen from 4 m.
 MOST_ITERATIONS = 20
 
-# How far apart partners are whose distances tell how well scans lie on one another, metres.
+# How far apart partners may be whose distances measure the fit of two scans, metres.
 PARTNERS = 1.5
 
 # With fewer surfaces nothing is laid upon anything. Of indoor scans, moved by known motions through

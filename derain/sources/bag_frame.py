@@ -5,16 +5,12 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from derain.bags.bag import Bag
 from derain.bags.cloud_topic import CloudTopic, damaged_cloud
-from derain.bags.names import bags_at, split, stem
+from derain.bags.names import split, stem
 from derain.bags.point_cloud import scan_of_cloud
 from derain.errors import InputError
 from derain.files.labels import LABEL
-from derain.files.reading import reading
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 
@@ -50,11 +46,6 @@ class BagFrame(FileFrame):
         """When it was taken, seconds: the stamp of its header, or if that is 0, of the bag."""
         return self.clouds.seconds(self.number)
 
-    @property
-    def pose(self) -> NDArray[np.float64] | None:
-        """Sensor to world, float64 (4, 4), where it is known."""
-        return self.sensor_to_world
-
     def read(self) -> Scan:
         """Reads the scan, without labels."""
         cloud = self.clouds.cloud(self.number).cloud
@@ -73,13 +64,6 @@ class BagFrame(FileFrame):
     def fingerprint(self) -> str:
         """First 16 hexadecimal digits of the SHA-256 of its message."""
         return self._checksum()[:16]
-
-    def checksums(self) -> tuple[str, str | None]:
-        """SHA-256 of its message and of its file of labels, in hexadecimal digits."""
-        if self.label_path is None:
-            return self._checksum(), None
-        with reading(self.label_path):
-            return self._checksum(), sha256(self.label_path.read_bytes()).hexdigest()
 
     def _checksum(self) -> str:
         return sha256(self.clouds.message(self.number).data).hexdigest()
@@ -158,16 +142,3 @@ def _topic_and_number(bag: Bag, inner: str) -> tuple[str, int | None]:
     if match is None or any(topic.name.strip("/") == inner for topic in bag.topics):
         return inner, None
     return match["topic"] or "", int(match["number"])
-
-
-def bag_paths(path: Path) -> list[Path]:
-    """The paths into bags that a path stands for.
-
-    Args:
-        path: What a user names.
-
-    Returns:
-        The path itself where it leads to a bag or into one; where it is a folder that holds bags,
-        those; none where it has nothing to do with bags.
-    """
-    return [path] if split(path) is not None else bags_at(path)

@@ -8,8 +8,8 @@ from tqdm import tqdm
 
 from derain.errors import InputError, printable
 from derain.sources.clean_sink import CleanSink
+from derain.sources.folders import GivenScans, source_of
 from derain.sources.frame import Frame
-from derain.sources.given import GivenScans, source_of
 from derain.sources.judgement import Judgement
 from derain.sources.judging import Failures, judgements
 from derain.sources.method import Method

@@ -16,7 +16,7 @@ from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.records import Records
 
-# Bytes at either end of a file that tell it from others; no two scans begin and end alike.
+# Bytes at either end of a file that identify it; no two scans begin and end alike.
 ENDS = 2**16
 
 
@@ -27,7 +27,7 @@ class FileFrame(Frame):
     Attributes:
         path: The file.
         columns: Names of its columns, where it does not name them itself.
-        records: Times and poses of the scans in its folder; None where nobody is to look for them.
+        records: Times and poses of the scans in its folder; None where none are to be read.
     """
 
     path: Path
@@ -51,7 +51,7 @@ class FileFrame(Frame):
 
     @property
     def pose(self) -> NDArray[np.float64] | None:
-        """Sensor to world, float64 (4, 4), as it was told, or else as its records say."""
+        """Sensor to world, float64 (4, 4), as it was given, or else of its records."""
         if self.sensor_to_world is not None or self.records is None:
             return self.sensor_to_world
         return self.records.pose_of(self.path)
@@ -72,11 +72,11 @@ class FileFrame(Frame):
         return semantic(read_labels(self.label_path, points))
 
     def count_points(self) -> int:
-        """Number of points of the scan; the size of a file of plain rows tells it."""
+        """Number of points of the scan; of plain rows, by the size of the file."""
         return count_points(self.path, self.columns)
 
     def fingerprint(self) -> str:
-        """What tells the content of its file from that of others, 16 hexadecimal digits."""
+        """A fingerprint of the content of its file, 16 hexadecimal digits."""
         with reading(self.path):
             size = file_size(self.path)
             with self.path.open("rb") as file:
@@ -87,7 +87,10 @@ class FileFrame(Frame):
 
     def checksums(self) -> tuple[str, str | None]:
         """SHA-256 of its file and of that of its labels, in hexadecimal digits."""
-        return _sha256(self.path), _sha256(self.label_path) if self.label_path else None
+        return self._checksum(), _sha256(self.label_path) if self.label_path else None
+
+    def _checksum(self) -> str:
+        return _sha256(self.path)
 
 
 def _sha256(path: Path) -> str:

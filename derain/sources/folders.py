@@ -1,4 +1,4 @@
-"""Scans in files and folders, as a user names them."""
+"""Scans as a user names them, in files and folders, or as a program gives them."""
 
 import os
 from collections import Counter
@@ -9,22 +9,26 @@ from itertools import groupby
 from pathlib import Path
 
 from derain.bags.names import SUFFIXES as BAG_SUFFIXES
-from derain.bags.names import is_bag, split
+from derain.bags.names import bags_at, is_bag, split
 from derain.cards.known import known_layouts, label_of
 from derain.cards.layout import Layout, sequence_of
+from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS, RECORDS, find_scans
 from derain.files.format import FORMATS
 from derain.files.names import scan_stem, scan_suffix
 from derain.files.reading import reading
-from derain.sources.bag_frame import bag_frames, bag_paths
+from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
-from derain.sources.frame import Frame
+from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.records import Records
-from derain.sources.source import Frames
+from derain.sources.source import Frames, Source
 from derain.system.notices import warn_once
 
 # Scans may be written as text, but beside folders of scans a text is a note or a record.
 TEXTS = (".csv", ".txt")
+
+# What a program gives: one of them, or several of one kind or another.
+GivenScans = Source | Scan | Frame | str | Path | Iterable[Scan | Frame | str | Path]
 
 
 def named_frames(
@@ -43,7 +47,7 @@ def named_frames(
 
     Args:
         paths: One path or several: scans, folders with scans directly in them, data sets or parts
-            of them whose folders are called as a layout says, bags, and paths into bags
+            of them whose folders are named as in a layout, bags, and paths into bags
             (:func:`~derain.sources.bag_frame.bag_frames`).
         columns: Names of the columns of files that do not name them.
         labelled: Whether labels are to be read, from where :func:`~derain.cards.known.label_of`
@@ -71,9 +75,31 @@ def named_frames(
         folders = _scan_folders_in(path, layouts)
         of_data_set = of_data_set or len(folders) > 1
         scans += listed_scans(folders or [path])
-    where = partial(label_of, layouts=layouts) if labelled else _nowhere
+    where = partial(label_of, layouts=layouts) if labelled else lambda _: None
     by_path = of_data_set or (recordings and len({scan.parent for scan in scans}) > 1)
     return frames_of(scans, where, columns, relative_keys(scans) if by_path else None)
+
+
+def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> Source:
+    """The source that a program means, with the labels that its scans have.
+
+    Args:
+        scans: A source; or one or more scans in memory, frames, files and folders of scans.
+        columns: Names of the columns of files that do not name them.
+
+    Raises:
+        InputError: No scans, something else than scans, a path that does not exist, or a folder
+            without scans.
+    """
+    if isinstance(scans, Source):
+        return scans
+    given = [scans] if isinstance(scans, Scan | Frame | str | Path) else list(scans)
+    frames = [
+        frame for place, item in enumerate(given) for frame in _frames_of(item, place, columns)
+    ]
+    if not frames:
+        raise InputError("scans", "there are none", "Give one or more.")
+    return Frames(frames)
 
 
 def frame_of(
@@ -92,15 +118,12 @@ def frame_of(
         InputError: A bag that cannot be read.
     """
     if split(scan) is not None:
+        from derain.sources.bag_frame import bag_frames
+
         return bag_frames(scan, labelled=True)[0]
-    return FileFrame(
-        key=scan_stem(scan),
-        sequence=sequence_of(scan),
-        label_path=label_of(scan, layouts),
-        path=scan,
-        columns=tuple(columns),
-        records=Records(scan.parent),
-    )
+    frame = frames_of([scan], partial(label_of, layouts=layouts), columns)[0]
+    assert isinstance(frame, FileFrame)
+    return frame
 
 
 def frames_of(
@@ -221,7 +244,7 @@ def _scan_folders_in(path: Path, layouts: Sequence[Layout] | None) -> list[Path]
 def _holds_scans(folder: Path) -> bool:
     """Whether scans lie directly in a folder, not only texts that may be something else.
 
-    The first that is met says so: a folder of a hundred thousand is not listed twice.
+    It ends at the first of them: a folder of a hundred thousand scans is not listed twice.
     """
     with reading(folder), os.scandir(folder) as entries:
         return any(
@@ -234,11 +257,10 @@ def _holds_scans(folder: Path) -> bool:
 
 
 def _paths_into_bags(path: Path, layouts: Sequence[Layout] | None) -> list[Path]:
-    """The paths into bags that a path stands for; of a folder of scans or of a data set, none."""
-    folder = os.path.isdir(path)
-    if folder and (_holds_scans(path) or find_layout(path, layouts) is not None):
+    """The path where it leads into a bag, or the bags of a folder that holds no scans."""
+    if os.path.isdir(path) and (_holds_scans(path) or find_layout(path, layouts) is not None):
         return []
-    return bag_paths(path)
+    return [path] if split(path) is not None else bags_at(path)
 
 
 def _with_bags(
@@ -250,6 +272,8 @@ def _with_bags(
     recordings: bool,
 ) -> Frames:
     """Frames of bags, and of whatever else is named between them, in that order."""
+    from derain.sources.bag_frame import bag_frames  # what reads bags, only where there are some
+
     several = len(paths) > 1 or len(in_bags[paths[0]]) > 1
     frames: list[Frame] = []
     for of_bags, group in groupby(paths, lambda path: bool(in_bags[path])):
@@ -286,5 +310,14 @@ def _kind(entry: os.DirEntry[str]) -> str:
     return suffix if suffix in FORMATS or suffix in BAG_SUFFIXES else ""
 
 
-def _nowhere(scan: Path) -> Path | None:
-    return None
+def _frames_of(item: object, place: int, columns: Sequence[str]) -> Sequence[Frame]:
+    match item:
+        case Frame():
+            return [item]
+        case Scan():
+            return [MemoryFrame(key=f"{place:06d}", number=place, scan=item)]
+        case str() | Path():
+            return named_frames([Path(item)], columns, labelled=True)
+    raise InputError(
+        "scans", f"{type(item).__name__} is no scan", "Give Scans, or paths of files and folders."
+    )

@@ -26,7 +26,7 @@ class Frame(ABC):
         number: Its place in its sequence, from 0.
         label_path: Where its labels are, or should be; None where none are to be read.
         intensity_scale: What takes its intensities to the unit in which they are to be seen.
-        sensor_to_world: Its pose, float64 (4, 4), metres, where somebody told it; None leaves it to
+        sensor_to_world: Its pose, float64 (4, 4), metres, where it is given; None leaves it to
             what lies beside the scan.
         label_map: Takes its labels to the classes of several data sets that it is one of; None
             leaves them as they are.
@@ -52,7 +52,7 @@ class Frame(ABC):
 
     @property
     def time(self) -> float | None:
-        """When it was taken, seconds of the recording's clock; None where nothing says so.
+        """When it was taken, seconds of the recording's clock; None where it is not known.
 
         Raises:
             InputError: A record of times that is damaged or does not fit the scans.
@@ -63,7 +63,7 @@ class Frame(ABC):
     def pose(self) -> NDArray[np.float64] | None:
         """From the sensor's frame to one that stays where it is, float64 (4, 4), metres.
 
-        None where nothing says so.
+        None where it is not known.
 
         Raises:
             InputError: A record of poses that is damaged or does not fit the scans.
@@ -123,7 +123,7 @@ class Frame(ABC):
 
     @abstractmethod
     def fingerprint(self) -> str:
-        """What tells its points from those of other scans, 16 hexadecimal digits.
+        """A fingerprint of its points, 16 hexadecimal digits.
 
         Raises:
             InputError: A file that cannot be read.
@@ -142,11 +142,11 @@ class Frame(ABC):
         return self.sequence == other.sequence and self.number == other.number + 1
 
     def without_labels(self) -> Self:
-        """The same frame, whose labels nobody reads."""
+        """The same frame without its labels."""
         return replace(self, label_path=None)
 
     def with_pose(self, pose: NDArray[np.float64]) -> Self:
-        """The same frame at a pose that is told, whatever lies beside the scan.
+        """The same frame at a given pose, whatever lies beside the scan.
 
         Args:
             pose: Sensor to world, float64 (4, 4), metres.
@@ -191,7 +191,7 @@ class MemoryFrame(Frame):
 
     @property
     def time(self) -> float | None:
-        """When it was taken, as it was told."""
+        """When it was taken, as it was given."""
         return self.seconds
 
     @property
@@ -214,7 +214,7 @@ class MemoryFrame(Frame):
         return len(self.scan)
 
     def fingerprint(self) -> str:
-        """What tells its points from those of other scans, 16 hexadecimal digits."""
+        """A fingerprint of its points, 16 hexadecimal digits."""
         return self.checksums()[0][:16]
 
     def checksums(self) -> tuple[str, str | None]:
@@ -226,5 +226,13 @@ class MemoryFrame(Frame):
         return sha256(points).hexdigest(), of_label
 
     def without_labels(self) -> Self:
-        """The same frame, whose labels nobody reads."""
+        """The same frame without its labels."""
         return replace(self, label_path=None, reads_labels=False)
+
+
+def time_of(frame: Frame) -> float | None:
+    """When a frame was taken, seconds; None without a record, or with a damaged one."""
+    try:
+        return frame.time
+    except InputError:
+        return None

@@ -1,4 +1,4 @@
-"""What a method says of a scan."""
+"""The answer of a method for a scan."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +13,7 @@ from derain.weather.scan_weather import ScanWeather
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """What a method says of a scan, in input order.
+    """The answer of a method for a scan, in input order.
 
     Attributes:
         probability: That each point is rain, float32 (N,); 0 for rows that were not judged. Of a
@@ -36,7 +36,7 @@ class Judgement:
 
     @property
     def answered(self) -> NDArray[np.bool_]:
-        """True for rows that were judged, and for sure where the method says so, bool (N,)."""
+        """True for rows that were judged, and for sure where the method knows doubt, bool (N,)."""
         return self.judged if self.known is None else self.judged & self.known
 
     @property

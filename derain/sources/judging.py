@@ -1,4 +1,4 @@
-"""Frame after frame of whole recordings given to a method, and what it says of each."""
+"""Gives whole recordings to a method, frame after frame, and yields its answers."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -11,11 +11,11 @@ from derain.sources.judgement import Judgement
 from derain.sources.method import Method
 from derain.system.stopwatch import Stopwatch
 
-# Surrounds the work on a frame, so that one which fails may be told of and passed over.
+# Surrounds the work on a frame, so that one that fails can be reported and passed over.
 Guard = Callable[[Frame], AbstractContextManager[None]]
 
 
-# A frame, what a method says of it, and the times of the stages since the answer before.
+# A frame, its judgement, and the times of the stages since the answer before.
 Answer = tuple[Frame, Judgement, Stopwatch]
 
 
@@ -56,7 +56,7 @@ class Failures:
 def judgements(
     method: Method, frames: Iterable[Frame], guard: Guard = unguarded
 ) -> Iterator[Answer]:
-    """All that a method has to say of recordings.
+    """Judges the frames of recordings.
 
     Args:
         method: The method.
@@ -64,7 +64,7 @@ def judgements(
         guard: Surrounds the work on each; where it holds an error back, the frame has no answer.
 
     Yields:
-        What the method says of each frame, in the order of the frames.
+        Each frame with its judgement, in the order of the frames.
 
     Raises:
         InputError: A frame that cannot be read or judged, where the guard lets that through.
@@ -83,7 +83,7 @@ def judgements(
 
 
 def _flushed(method: Method, last: Frame, guard: Guard) -> Iterator[Answer]:
-    """What it says of frames that wait for others, where the last of a recording was pushed."""
+    """The answers for the frames that wait, after the last of a recording was pushed."""
     while method.waiting:  # where one fails, the others go on waiting
         with guard(last):
             stopwatch = Stopwatch()

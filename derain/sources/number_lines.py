@@ -18,7 +18,7 @@ def read_numbers(path: Path, *columns: int, comments: bool = False) -> NDArray[n
 
     Args:
         path: The file.
-        columns: How many numbers a line may have; the first line says which of them it is.
+        columns: How many numbers a line may have; the first line decides which of them.
         comments: Whether lines that begin with # are passed over too.
 
     Returns:

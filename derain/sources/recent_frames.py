@@ -1,4 +1,4 @@
-"""The frames of a recording that a window asks for, kept as they come in."""
+"""The frames of a recording that a window needs, kept as they come in."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -50,11 +50,11 @@ class RecentFrames:
         return bool(self._kept) and not frame.follows(self._kept[-1][0])
 
     def push(self, frame: Frame, placed: PlacedScan) -> FrameInWindow | None:
-        """Takes the next frame; where it starts anew, those still waiting are let go of.
+        """Takes the next frame; where it starts anew, those still waiting are dropped.
 
         Args:
             frame: The frame.
-            placed: Its scan, and when and where it was taken as far as anyone asks for that.
+            placed: Its scan, and when and where it was taken as far as that is needed.
 
         Returns:
             The frame that has all its window by now, if there is one.

@@ -1,6 +1,6 @@
 """Frames by the recordings that they are of, and whether these are fit to be seen several at once.
 
-Most methods see one scan at a time and ask for none of this; the alarm of the weather does.
+Most methods see one scan at a time and need none of this; the alarm of the weather does.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,7 +13,7 @@ from derain.sources.frame import Frame
 from derain.views.window import Window
 
 # Seconds. Scans come ten or twenty times in one; after more than one, a car has gone so far that a
-# scan says little of the place of another's points.
+# scan shows little of the place of another's points.
 LONGEST_STEP = 1.0
 
 # The same where the numbers of files stand for times, as a multiple of their smallest step: a
@@ -53,7 +53,7 @@ def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
 
     Args:
         frames: Frames in time order, one recording after the other.
-        window: How many scans the method asks for. For one alone, everything suits, and nothing is
+        window: How many scans the method needs. For one alone, everything suits, and nothing is
             read.
     """
     if window.is_one_scan:

@@ -22,9 +22,9 @@ TIMES, POSES = "times.txt", "poses.txt"
 
 
 class Records:
-    """Times and poses of the scans in one folder, read when the first is asked for.
+    """Times and poses of the scans in one folder, read when the first is needed.
 
-    Most methods ask for neither, and then nothing is read, damaged or not.
+    Most methods need neither, and then nothing is read, damaged or not.
 
     Args:
         folder: The folder of scans. Its records lie in it, or in the folder that it lies in.
@@ -34,7 +34,7 @@ class Records:
         self.folder = folder
 
     def time_of(self, scan: Path) -> float | None:
-        """When a scan of the folder was taken, seconds; None where nothing says so.
+        """When a scan of the folder was taken, seconds; None if not known.
 
         Raises:
             InputError: A record that is damaged or does not fit the scans.

@@ -1,8 +1,7 @@
-"""Where what is made of frames goes."""
+"""Folders that take what is made of frames, each file by the key of its frame."""
 
 import os
-from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,55 +11,21 @@ from derain.cards.known import label_places
 from derain.cards.layout import folder_above
 from derain.errors import InputError
 from derain.files import write_scan
-from derain.files.labels import LABEL, write_labels
+from derain.files.labels import LABEL, label_beside, write_labels
 from derain.files.names import beside
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 
 
-class Sink(ABC):
-    """Takes what was made of the frames of a source, each by the key of its frame."""
-
-    @abstractmethod
-    def refuse_clashes(self, source: Iterable[Frame]) -> None:
-        """Refuses, before any work, a source whose own files would be overwritten.
-
-        Raises:
-            InputError: What is made of one frame would take the place of a scan, of labels, or of
-                what is made of another frame.
-        """
-
-    @abstractmethod
-    def write(
-        self,
-        frame: Frame,
-        scan: Scan | None,
-        label: NDArray[Any],
-        removed: Scan | None = None,
-    ) -> None:
-        """Takes what was made of one frame.
-
-        Args:
-            frame: The frame.
-            scan: What is left of the scan; None where only labels are of interest.
-            label: Class ids or a bool mask of the scan that the labels are for, (N,).
-            removed: What was taken away of the scan; None where nobody asks for it.
-
-        Raises:
-            InputError: It cannot be written.
-        """
-
-
-class FolderSink(Sink):
+class FolderSink:
     """A folder of files: ``<key>`` with the suffix of the frame's file, and ``<key>.label``.
 
     Args:
         folder: The folder, made if missing.
         option: What a user calls it, for messages.
         again: Whether a source may give a scan twice, as where two patterns find it.
-        removed: Folder for what is taken away of the scans, named like these; None where nobody
-            asks for it.
+        removed: Folder for what is taken away of the scans, named like these; None to drop it.
     """
 
     def __init__(
@@ -80,7 +45,7 @@ class FolderSink(Sink):
         return self.folder / f"{frame.key}{frame.suffix or '.pcd'}"
 
     def removed_path(self, frame: Frame) -> Path | None:
-        """Where what is taken away of a scan is written; None where nobody asks for it."""
+        """Where what is taken away of a scan is written; None where it is dropped."""
         if self.removed is None:
             return None
         return self.removed / self.scan_path(frame).relative_to(self.folder)
@@ -95,7 +60,12 @@ class FolderSink(Sink):
         return [path for path in paths if path is not None]
 
     def refuse_clashes(self, source: Iterable[Frame]) -> None:
-        """Refuses to overwrite a scan or labels of the source, or one result by another."""
+        """Refuses, before any work, to overwrite a scan or labels of the source, or one result.
+
+        Raises:
+            InputError: What is made of one frame would take the place of a scan, of labels, or of
+                what is made of another frame.
+        """
         if self.removed is not None and _is_same(self.removed, self.folder):
             raise InputError(
                 self.removed,
@@ -123,7 +93,17 @@ class FolderSink(Sink):
         label: NDArray[Any],
         removed: Scan | None = None,
     ) -> None:
-        """Writes the scans, then the labels: where there are labels, the scans are complete."""
+        """Writes the scans, then the labels: where there are labels, the scans are complete.
+
+        Args:
+            frame: The frame.
+            scan: What is left of the scan; None where only labels are of interest.
+            label: Class ids or a bool mask of the scan that the labels are for, (N,).
+            removed: What was taken away of the scan; None where it is dropped.
+
+        Raises:
+            InputError: It cannot be written.
+        """
         removed_path = self.removed_path(frame)
         if removed is not None and removed_path is not None:
             write_scan(removed_path, removed)
@@ -152,6 +132,36 @@ class FolderSink(Sink):
                 raise InputError(self.folder, f"holds the labels of {frame.path}", remedy)
 
 
+class LabelSink(FolderSink):
+    """A folder of labels alone, ``<key>.label``.
+
+    They may lie with the scans, and where the labels of scans are looked for: they may be meant for
+    these. Labels that are there already stay.
+
+    Args:
+        folder: The folder, made if missing.
+        option: What a user calls it, for messages.
+    """
+
+    def refuse_clashes(self, source: Iterable[Frame]) -> None:
+        """Refuses to overwrite labels that are there, or one result by another."""
+        frames = list(source)
+        # Not Path.is_file, which raises where the name has become too long by its suffix.
+        there = {os.path.realpath(label) for label in _labels_of(frames) if os.path.isfile(label)}
+        for frame in frames:
+            target = self.path(frame, LABEL)
+            if os.path.realpath(target) in there:
+                raise InputError(
+                    self.folder,
+                    f"what is found for {frame.name} would overwrite the labels {target}",
+                    f"Give {self.option} another folder.",
+                )
+        super().refuse_clashes(frames)
+
+    def _refuse_own_files(self, frame: FileFrame) -> None:
+        """No scan is written, and of labels only those matter that are there."""
+
+
 def _is_same(one: Path, other: Path) -> bool:
     """Whether two paths are of one file or folder, whatever they are written like."""
     return os.path.realpath(one) == os.path.realpath(other)
@@ -160,3 +170,11 @@ def _is_same(one: Path, other: Path) -> bool:
 def _is_one_file(one: Frame, other: Frame) -> bool:
     """Whether two frames are of the same file, so that what is made of them is the same."""
     return isinstance(one, FileFrame) and isinstance(other, FileFrame) and one.name == other.name
+
+
+def _labels_of(frames: Iterable[Frame]) -> Iterator[Path]:
+    """Where the labels of files are, or would be looked for."""
+    for frame in frames:
+        if isinstance(frame, FileFrame):
+            places = (frame.label_path, label_beside(frame.path), beside(frame.path, LABEL))
+            yield from filter(None, places)

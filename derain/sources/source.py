@@ -13,8 +13,7 @@ from derain.sources.frame import Frame, MemoryFrame
 class Source(Sequence[Frame], ABC):
     """Frames in time order, one sequence after the other.
 
-    It knows how many there are and can be asked again for any of them; nothing is read before a
-    frame is told to.
+    It has a length and gives any of them again; nothing is read before a frame's ``read``.
     """
 
     @abstractmethod

@@ -1,7 +1,7 @@
 """Which scans a network was trained on, so that it is not measured on them unawares.
 
 Sequences of a published data set are recorded by their names, and all other scans by fingerprints
-of their files: everybody's folders may be called the same.
+of their files: folders of different data may be named the same.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -49,8 +49,8 @@ def record_of_parts(
     for name, record in records:
         for kind, entries in record.items():
             # Sequences of two data sets may be called the same, fingerprints are not.
-            told = _sequences_of(name) if kind == SEQUENCES else kind
-            together.setdefault(told, set()).update(entries)
+            entry = _sequences_of(name) if kind == SEQUENCES else kind
+            together.setdefault(entry, set()).update(entries)
     return {
         kind: tuple(evenly_spaced(sorted(entries), MOST_NAMES))
         for kind, entries in together.items()
@@ -58,7 +58,7 @@ def record_of_parts(
 
 
 def training_overlap(title: str, spec: Spec, card: DataCard, frames: Sequence[Frame]) -> str | None:
-    """What is to be said of a model that was trained on some of the scans it is measured on.
+    """The warning about a model that was trained on some of the scans it is measured on.
 
     Args:
         title: What the model is called.

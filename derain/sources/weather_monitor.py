@@ -3,7 +3,6 @@
 from collections import Counter
 from dataclasses import dataclass
 
-from derain.errors import InputError
 from derain.sources.frame import Frame
 from derain.sources.recordings import unbroken_recordings
 from derain.sources.source import Source
@@ -119,14 +118,6 @@ class WeatherMonitor:
         if recording != self._recording:
             self._recording, self._alarm = recording, self._options.new_alarm()
         return self._alarm.update(weather.visibility, weather.reach)
-
-
-def time_of(frame: Frame) -> float | None:
-    """Time of a scan in seconds; None where it is not recorded, or the record is damaged."""
-    try:
-        return frame.time
-    except InputError:
-        return None
 
 
 def _recording_numbers(source: Source) -> dict[str, int]:

@@ -28,7 +28,7 @@ from derain.files import DEFAULT_COLUMNS
 from derain.filters import PointFilter
 from derain.filters.point_filter import filter_view, rain_among
 from derain.scan import Scan
-from derain.sources.given import GivenScans, source_of
+from derain.sources.folders import GivenScans, source_of
 from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import training_overlap
 from derain.spec import Spec

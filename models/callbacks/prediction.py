@@ -15,7 +15,7 @@ from derain.learning.batch import Batch
 from derain.learning.task import ReadableScans
 from derain.models.base import DerainingModule
 from derain.sources.frame import MemoryFrame
-from derain.sources.label_sink import LabelSink
+from derain.sources.sink import LabelSink
 
 
 class PredictionWriter(BasePredictionWriter):

@@ -50,7 +50,7 @@ def test_an_empty_bag_is_refused(tmp_path: Path, storage: Storage) -> None:
     assert "no point clouds" in refusal(lambda: named_frames([bag]))
 
 
-@pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 0.9, 0.999])
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.999])
 def test_a_bag_that_is_cut_off_is_refused(tmp_path: Path, storage: Storage, share: float) -> None:
     bag = small_bag(tmp_path, storage)
     file = storage_file(bag)
@@ -63,24 +63,17 @@ def test_a_bag_that_is_cut_off_is_refused(tmp_path: Path, storage: Storage, shar
 def test_an_encrypted_bag_is_refused(tmp_path: Path) -> None:
     bag = small_bag(tmp_path, "ros1")
     content = bag.read_bytes()
-    header, size = content[13:17], int.from_bytes(content[13:17], "little")
+    size = int.from_bytes(content[13:17], "little")
+    header, rest = content[17 : 17 + size], content[17 + size :]
     field = b"encryptor=rosbag/AesCbcEncryptor"
-    longer = (size + 4 + len(field)).to_bytes(4, "little") + content[17 : 17 + size]
-    longer += len(field).to_bytes(4, "little") + field
-    rest = content[17 + size :]
+    header += len(field).to_bytes(4, "little") + field
     padding = int.from_bytes(rest[:4], "little") - 4 - len(field)
-    bag.write_bytes(
-        content[:13] + longer + padding.to_bytes(4, "little") + rest[4 + 4 + len(field) :]
-    )
-    assert header != longer[:4]
+    sizes = [number.to_bytes(4, "little") for number in (len(header), padding)]
+    bag.write_bytes(content[:13] + sizes[0] + header + sizes[1] + rest[8 + len(field) :])
     assert "AesCbcEncryptor" in refusal(lambda: named_frames([bag]))
-
-
-def test_a_database_that_is_encrypted_is_refused(tmp_path: Path) -> None:
-    bag = small_bag(tmp_path, "sqlite3")
-    file = storage_file(bag)
-    file.write_bytes(np.random.default_rng(0).bytes(file.stat().st_size))
-    assert "not a database" in refusal(lambda: named_frames([bag]))
+    database = small_bag(tmp_path, "sqlite3")
+    storage_file(database).write_bytes(np.random.default_rng(0).bytes(2**14))
+    assert "not a database" in refusal(lambda: named_frames([database]))
 
 
 @pytest.mark.parametrize(
@@ -109,22 +102,27 @@ def test_metadata_may_stand_for_what_it_has_said(tmp_path: Path) -> None:
     metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
     information = metadata["rosbag2_bagfile_information"]
     information["files"][0]["duration"] = information["duration"]
-    (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
-    assert "*id001" in (bag / "metadata.yaml").read_text("utf-8")
+    text = yaml.safe_dump(metadata)
+    assert "*id001" in text
+    (bag / "metadata.yaml").write_text(text, "utf-8")
     assert read_all(bag) == 3
 
 
-def test_a_recording_that_was_not_ended_is_told(tmp_path: Path) -> None:
-    bag = small_bag(tmp_path, "ros1").rename(tmp_path / "drive.bag.active")
-    assert "rosbag reindex" in refusal(lambda: named_frames([bag]))
+@pytest.mark.parametrize(
+    ("name", "remedy"),
+    [("drive.bag.active", "rosbag reindex"), ("drive_0.db3.zstd", "Name the bag's folder")],
+)
+def test_a_file_that_is_no_whole_bag_is_told(tmp_path: Path, name: str, remedy: str) -> None:
+    (tmp_path / name).touch()
+    assert remedy in refusal(lambda: named_frames([tmp_path / name]))
 
 
 def test_clouds_of_one_stamp_are_told_of_once(
-    tmp_path: Path, storage: Storage, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    ros, clouds = Ros(storage), tables(4)
+    ros, clouds = Ros("mcap"), tables(4)
     times = (START, START + 5, START + 5, START + 5)
-    bag = small_bag(tmp_path, storage, clouds=[], more=[
+    bag = small_bag(tmp_path, "mcap", clouds=[], more=[
         Recorded("/velodyne_points", CLOUD_TYPE, time, ros.cloud(table, time))
         for table, time in zip(clouds, times, strict=True)
     ])  # fmt: skip
@@ -134,24 +132,19 @@ def test_clouds_of_one_stamp_are_told_of_once(
     assert "000002: has the stamp of" in told
 
 
-def test_a_file_compressed_as_a_whole_is_named_by_its_folder(tmp_path: Path) -> None:
-    (tmp_path / "drive_0.db3.zstd").write_bytes(b"zstd")
-    assert "Name the bag's folder" in refusal(lambda: named_frames([tmp_path / "drive_0.db3.zstd"]))
-
-
-def say_there_are(bag: Path, clouds: int) -> None:
-    """Has the index of a bag of ROS 2 name another number of clouds."""
+@pytest.mark.parametrize(
+    ("stated", "reason"), [(10**15, "messages are stated in"), (5, "than the 5 of its index")]
+)
+def test_a_bag_with_fewer_clouds_than_it_says_is_refused(
+    tmp_path: Path, stated: int, reason: str
+) -> None:
+    bag = small_bag(tmp_path, "sqlite3")
     metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
     for topic in metadata["rosbag2_bagfile_information"]["topics_with_message_count"]:
         if topic["topic_metadata"]["name"] == "/velodyne_points":
-            topic["message_count"] = clouds
+            topic["message_count"] = stated
     (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
-
-
-def test_a_bag_of_more_messages_than_bytes_is_refused(tmp_path: Path) -> None:
-    bag = small_bag(tmp_path, "sqlite3")
-    say_there_are(bag, 10**15)
-    assert "messages are stated in" in refusal(lambda: named_frames([bag]))
+    assert reason in refusal(lambda: read_all(bag))
 
 
 def test_a_topic_with_a_nul_in_its_name_is_refused(tmp_path: Path, storage: Storage) -> None:
@@ -160,7 +153,7 @@ def test_a_topic_with_a_nul_in_its_name_is_refused(tmp_path: Path, storage: Stor
     assert "NUL" in refusal(lambda: named_frames([bag]))
 
 
-@pytest.mark.parametrize("name", ["/ros 1/é.drops", "points", "/1/2"])
+@pytest.mark.parametrize("name", ["/ros 1/é.drops", "1/2"])
 def test_a_topic_of_an_odd_name_is_read_and_copied(
     tmp_path: Path, storage: Storage, name: str
 ) -> None:
@@ -181,9 +174,3 @@ def test_more_topics_than_a_recording_has_are_refused(
     for module in (bag_module, rosbags_reader):
         monkeypatch.setattr(module, "MOST_TOPICS", 2)
     assert "more than 2 topics" in refusal(lambda: named_frames([bag]))
-
-
-def test_a_bag_with_fewer_clouds_than_it_says_is_refused(tmp_path: Path) -> None:
-    bag = small_bag(tmp_path, "sqlite3")
-    say_there_are(bag, 5)
-    assert "than the 5 of its index" in refusal(lambda: read_all(bag))

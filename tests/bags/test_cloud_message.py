@@ -32,7 +32,7 @@ def made_by_library(encoding: str, points: int = 5, frame: str = "velodyne") -> 
 
 
 @pytest.mark.parametrize("encoding", [ROS1, CDR])
-@pytest.mark.parametrize("frame", ["", "a", "ab", "abc", "lidar_é"])
+@pytest.mark.parametrize("frame", ["", "a", "ab", "lidar_é"])
 def test_a_message_of_the_library_is_read_and_written_alike(encoding: str, frame: str) -> None:
     message = made_by_library(encoding, frame=frame)
     parsed = CloudMessage.parse(message, encoding)
@@ -77,11 +77,13 @@ def test_big_endian_cdr_is_read_and_written_alike() -> None:
 
 
 @pytest.mark.parametrize("encoding", [ROS1, CDR])
-def test_a_message_that_is_cut_off_is_refused(encoding: str) -> None:
+def test_a_message_that_is_cut_off_or_of_another_kind_is_refused(encoding: str) -> None:
     message = made_by_library(encoding)
     for end in range(len(message)):
         with pytest.raises(ValueError, match=r"ends too early|plain CDR|does not end"):
             CloudMessage.parse(message[:end], encoding)
+    with pytest.raises(ValueError, match="plain CDR"):
+        CloudMessage.parse(b"\x00\x03\x00\x00" + made_by_library(CDR)[4:], CDR)
 
 
 @given(st.data(), st.sampled_from([ROS1, CDR]))
@@ -96,9 +98,3 @@ def test_a_damaged_message_is_read_or_refused(data: st.DataObject, encoding: str
         return
     parsed.cloud.columns()
     parsed.cloud.take(np.zeros(len(parsed.cloud), bool)).columns()
-
-
-def test_cdr_of_another_kind_is_refused() -> None:
-    message = b"\x00\x03\x00\x00" + made_by_library(CDR)[4:]
-    with pytest.raises(ValueError, match="plain CDR"):
-        CloudMessage.parse(message, CDR)

@@ -126,22 +126,17 @@ def test_chunks_of_one_time_that_are_too_many_are_refused(
         list(Bag(bag).messages())
 
 
-def test_a_damaged_attachment_is_told(tmp_path: Path) -> None:
-    bag = record(tmp_path / "drive.mcap", Ros("mcap"))
-    content = bag.read_bytes()
-    bag.write_bytes(content.replace(b"a notea note", b"a notea n0te", 1))
-    copied = Bag(bag)
-    with (
-        pytest.raises(InputError, match="checksum of an attachment"),
-        BagCopy(copied, copied.cloud_topic(), tmp_path / "out") as copy,
-    ):
-        copy.finish()
-
-
 def copied(path: Path, out: Path) -> Path:
     bag = Bag(path)
     with BagCopy(bag, bag.cloud_topic(), out) as copy:
         return copy.finish()
+
+
+def test_a_damaged_attachment_is_told(tmp_path: Path) -> None:
+    bag = record(tmp_path / "drive.mcap", Ros("mcap"))
+    bag.write_bytes(bag.read_bytes().replace(b"a notea note", b"a notea n0te", 1))
+    with pytest.raises(InputError, match="checksum of an attachment"):
+        copied(bag, tmp_path / "out")
 
 
 @pytest.mark.parametrize(
@@ -165,13 +160,20 @@ def test_a_summary_that_differs_from_the_data_is_refused(
 PRIVATE = struct.pack("<BQ", 0x90, 5) + b"notes"
 
 
-def test_private_records_are_copied(tmp_path: Path) -> None:
+def test_private_records_are_copied_and_messages_outside_chunks_not_dropped(
+    tmp_path: Path,
+) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"))
-    bag.write_bytes(with_summary(bag.read_bytes(), list, data=PRIVATE))
-    made = copied(bag, tmp_path / "out")
-    with (made / "drive.mcap").open("rb") as file:
+    content = bag.read_bytes()
+    bag.write_bytes(with_summary(content, list, data=PRIVATE))
+    made = copied(bag, tmp_path / "out") / "drive.mcap"
+    with made.open("rb") as file:
         assert len(list(make_reader(file).iter_messages())) == 12
-    assert (made / "drive.mcap").read_bytes().count(PRIVATE) == 1
+    assert made.read_bytes().count(PRIVATE) == 1
+    message = struct.pack("<BQHIQQ", 5, 22, 1, 0, START, START)
+    bag.write_bytes(with_summary(content, list, data=message))
+    with pytest.raises(InputError, match="lacks 1 messages"):
+        copied(bag, tmp_path / "again")
 
 
 def add_stray(writer: Writer) -> None:
@@ -200,14 +202,6 @@ def test_what_a_copy_would_drop_is_refused_and_does_not_matter_to_reading(
         copied(bag, tmp_path / "out")
 
 
-def test_messages_outside_chunks_are_not_dropped(tmp_path: Path) -> None:
-    bag = record(tmp_path / "drive.mcap", Ros("mcap"))
-    message = struct.pack("<BQHIQQ", 5, 22, 1, 0, START, START)
-    bag.write_bytes(with_summary(bag.read_bytes(), list, data=message))
-    with pytest.raises(InputError, match="lacks 1 messages"):
-        copied(bag, tmp_path / "out")
-
-
 @pytest.mark.parametrize("kind", ["zstd", "not chunked"])
 def test_the_checksum_of_the_data_is_compared(tmp_path: Path, kind: str) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"), enable_data_crcs=True, **KINDS[kind])
@@ -221,8 +215,7 @@ def test_the_checksum_of_the_data_is_compared(tmp_path: Path, kind: str) -> None
 def test_a_copy_says_what_the_bag_says(tmp_path: Path, storage: Any) -> None:
     bag = Bag(small_bag(tmp_path, storage))
     (tmp_path / "out").mkdir()
-    with BagCopy(bag, bag.cloud_topic(), tmp_path / "out") as copy:
-        made = Bag(copy.finish())
+    made = Bag(copied(bag.path, tmp_path / "out"))
     assert made.topics == bag.topics
     assert {topic.name for topic in made.topics} >= {POINTS, IMU}
     assert made.cloud_topic().type == CLOUD_TYPE

@@ -114,17 +114,12 @@ def test_an_organised_cloud_can_keep_its_shape(big: bool) -> None:
     }
 
 
-def test_a_count_of_none_means_one_value() -> None:
-    cloud = PointCloud(1, 1, (PointField("x", 0, 7, 0),), False, 4, 4, b"\0\0\x80?", True)
-    assert cloud.columns()["x"].tolist() == [1.0]
-
-
-def test_one_row_needs_no_step() -> None:
-    cloud = PointCloud(1, 1, (PointField("x", 0, 7, 1),), False, 4, 0, b"\0\0\x80?", True)
-    assert cloud.columns()["x"].tolist() == [1.0]
-
-
 X = (PointField("x", 0, 7, 1),)
+
+
+def test_no_count_means_one_value_and_one_row_needs_no_step() -> None:
+    cloud = PointCloud(1, 1, (PointField("x", 0, 7, 0),), False, 4, 0, b"\0\0\x80?", True)
+    assert cloud.columns()["x"].tolist() == [1.0]
 
 
 @pytest.mark.parametrize(

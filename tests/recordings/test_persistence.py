@@ -22,14 +22,14 @@ from derain.sources.judging import judgements
 # Of every scan the last points are drops.
 DROPS = 60
 
-STEP = np.radians(0.35)
+STEP = np.radians(0.5)
 
 
 def seen_from(x: float, seed: int) -> NDArray[np.float64]:
     """A yard with a floor, walls and drops, seen by a sensor at (x, 0, 0), float64 (N, 3)."""
     generator = np.random.default_rng(seed)
     azimuth = np.arange(-np.pi, np.pi, STEP)
-    inclination = (np.arange(48) - 36) * STEP
+    inclination = (np.arange(34) - 25) * STEP
     azimuth, inclination = (a.ravel() for a in np.meshgrid(azimuth, inclination))
     rays = np.stack([np.cos(azimuth), np.sin(azimuth), np.tan(inclination)], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -105,8 +105,8 @@ def test_a_thing_that_stays_is_less_like_rain_than_one_that_comes_and_goes() -> 
 def test_a_wider_window_asks_more_scans() -> None:
     method = PersistenceDerainer(Persistence(before=2, after=3))
     assert (method.window.before, method.window.after) == (2, 3)
-    answers = judged(drive(6), before=2, after=3)
-    assert len(answers) == 6
+    answers = judged(drive(5), before=2, after=3)
+    assert len(answers) == 5
     assert recall_and_false(answers[2])[0] > 0.8
 
 
@@ -165,31 +165,18 @@ def test_damaged_records_are_done_without(tmp_path: Path) -> None:
         assert "has 1 lines for 3 scans, and none for scan_" in issue.detail
 
 
-def test_the_order_of_rows_changes_nothing() -> None:
-    frames = drive(3)
-    order = np.random.default_rng(5).permutation(len(frames[1].scan))
-    shuffled = [*frames]
-    shuffled[1] = MemoryFrame(
-        key="1",
-        number=1,
-        scan=frames[1].scan.take(order),
-        sensor_to_world=frames[1].sensor_to_world,
-    )
-    assert (judged(shuffled)[1].rain == judged(frames)[1].rain[order]).all()
-
-
-def test_intensity_and_threads_change_nothing() -> None:
-    frames = drive(3)
-    bright = []
-    for frame in frames:
-        intensity = np.random.default_rng(1).uniform(0, 255, (len(frame.scan), 1))
-        scan = Scan.of(np.hstack([frame.scan.xyz, intensity]))
-        bright.append(MemoryFrame(key=frame.key, number=frame.number, scan=scan))
-    plain = [MemoryFrame(key=f.key, number=f.number, scan=f.scan) for f in frames]
-    one = PersistenceDerainer(threads=1)
-    answers = [judgement for _, judgement, _ in judgements(one, bright)]
-    for first, second in zip(judged(plain), answers, strict=True):
-        assert (first.probability == second.probability).all()
+def test_order_intensity_and_threads_change_nothing() -> None:
+    generator, plain = np.random.default_rng(5), drive(3, posed=False)
+    other, orders = [], []
+    for frame in plain:
+        order = generator.permutation(len(frame.scan))
+        intensity = generator.uniform(0, 255, (len(order), 1))
+        scan = Scan.of(np.hstack([frame.scan.xyz, intensity])[order])
+        other.append(MemoryFrame(key=frame.key, number=frame.number, scan=scan))
+        orders.append(order)
+    answers = [judgement for _, judgement, _ in judgements(PersistenceDerainer(threads=1), other)]
+    for first, second, order in zip(judged(plain), answers, orders, strict=True):
+        np.testing.assert_array_equal(second.probability, first.probability[order])
 
 
 def test_hard_cases_are_answered() -> None:

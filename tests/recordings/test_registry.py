@@ -7,7 +7,6 @@ from derain.errors import InputError
 from derain.export.methods import load_method, load_method_of_one_scan
 from derain.export.runtimes.registry import Runtime
 from derain.recordings.registry import METHODS
-from derain.system.registry import from_parameters
 
 
 @pytest.fixture
@@ -26,20 +25,14 @@ def test_a_method_is_loaded_by_its_name_with_its_parameters() -> None:
 
 @pytest.mark.usefixtures("between")
 def test_what_it_cannot_do_is_one_error() -> None:
-    with pytest.raises(InputError, match=r"between: it has no parameter reach\. It has rain_below"):
-        load_method("between", {"reach": 1})
+    with pytest.raises(InputError, match=r"between: it has no parameter reach, way\. It has rain"):
+        load_method("between", {"way": 1, "reach": 2, "rain_below": 3.0})
     with pytest.raises(InputError, match="a method, which has no network that openvino"):
         load_method("between", {}, runtime=Runtime("openvino"))
     with pytest.raises(InputError, match="between: sees the scans around the one that it judges"):
         load_method_of_one_scan("between", {})
     with pytest.raises(InputError, match=r"one of .*dror.*, between"):
         load_method("nobody", {})
-
-
-def test_parameters_are_fields_of_a_dataclass() -> None:
-    assert from_parameters(Dimmer, "between", {}) == Dimmer()
-    with pytest.raises(InputError, match="it has no parameter a, b"):
-        from_parameters(Dimmer, "between", {"b": 1, "a": 2, "rain_below": 3.0})
 
 
 @pytest.mark.usefixtures("between")

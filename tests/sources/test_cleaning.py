@@ -73,10 +73,3 @@ def test_the_weather_of_every_scan_is_measured_where_it_is_asked_for(scans: Path
     assert all(scan.weather.rays > 0 for scan in every.scans)
     assert every.weather.total.rays == sampled.weather.total.rays
     assert every.weather.scans_at.total() == 2
-
-
-def test_the_sink_writes_removed_points(scans: Path) -> None:
-    source = derain.named_frames([scans / "0.bin"])
-    with derain.CleanSink(scans / "out", source, removed=scans / "rain") as sink:
-        (scan,) = derain.clean(source, DROR, sink, most_removed=1).scans
-    assert len(derain.read_scan(scans / "rain/0.bin")) == scan.rain > 0

@@ -4,19 +4,26 @@ import string
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from derain.cards.layout import Layout
 from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
+from derain.files.labels import write_labels
+from derain.scan import Scan
 from derain.sources.folders import (
     find_layout,
     named_frames,
     relative_keys,
     scan_folders,
     sequence_frames,
+    source_of,
 )
+from derain.sources.frame import MemoryFrame
+from derain.sources.source import Frames
 
 REHEARSE3D = Layout(scans="lidar_radar_pcd", labels="lidar_radar_labels", lidar="innoviz")
 DRIVES = Layout(sequences="drives", scans="lidar", labels="truth")
@@ -26,12 +33,6 @@ def touch(*paths: Path) -> None:
     for path in paths:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
-
-
-def test_one_path_is_named_as_a_list_of_it_is(tmp_path: Path) -> None:
-    touch(tmp_path / "a.bin", tmp_path / "b.bin")
-    for named in (tmp_path, str(tmp_path), [str(tmp_path)]):
-        assert [frame.key for frame in named_frames(named)] == ["a", "b"]
 
 
 @pytest.fixture
@@ -87,13 +88,11 @@ def test_several_data_sets_and_scans_keep_apart(
 
 
 def test_scans_beside_folders_of_scans_are_what_is_meant(tmp_path: Path) -> None:
-    touch(tmp_path / "own.bin", tmp_path / "velodyne/0.bin")
-    assert [frame.key for frame in named_frames([tmp_path])] == ["own"]
-
-
-def test_texts_are_scans_where_there_is_nothing_else(tmp_path: Path) -> None:
-    touch(tmp_path / "scan.csv")
-    assert [frame.name for frame in named_frames([tmp_path])] == [str(tmp_path / "scan.csv")]
+    touch(tmp_path / "own.bin", tmp_path / "velodyne/0.bin", tmp_path / "texts/scan.csv")
+    for named in (tmp_path, str(tmp_path), [str(tmp_path)]):
+        assert [frame.key for frame in named_frames(named)] == ["own"]
+    (text,) = named_frames(tmp_path / "texts")  # there is nothing else
+    assert text.name == str(tmp_path / "texts/scan.csv")
 
 
 @pytest.mark.parametrize("folder", ["", "sequences/00/velodyne", "sequences/01/velodyne"])
@@ -186,3 +185,40 @@ def test_keys_are_unlike_one_another_and_lead_to_the_scans(paths: set[str], whol
     ends = {str(scan).removesuffix(f"{key}.bin") for scan, key in zip(scans, keys, strict=True)}
     assert len(ends) == 1
     assert not any(Path(key).is_absolute() or ".." in Path(key).parts for key in keys)
+
+
+def test_scans_frames_and_paths_stand_in_the_order_they_are_given(tmp_path: Path) -> None:
+    for number in range(2):
+        scene(10 + number).tofile(tmp_path / f"{number}.bin")
+        write_labels(tmp_path / f"{number}.label", np.arange(10 + number))
+    scan = Scan.of(scene(30), "made")
+    frame = MemoryFrame(key="framed", scan=Scan.of(scene(40)))
+    source = source_of([scan, str(tmp_path), frame, tmp_path / "1.bin"])
+    assert [len(each.read()) for each in source] == [30, 10, 11, 40, 11]
+    assert [each.has_labels for each in source] == [False, True, True, False, True]
+    np.testing.assert_array_equal(source[1].read_label(10), np.arange(10))
+
+
+def test_one_scan_is_a_source_and_a_source_stays_what_it_is() -> None:
+    scan = Scan.of(scene(30))
+    assert [frame.read().xyz.shape for frame in source_of(scan)] == [(30, 3)]
+    twice = source_of([scan, scan])
+    assert [frame.key for frame in twice] == ["000000", "000001"]
+    assert twice[1].follows(twice[0])
+    source = Frames.of_scans([scan])
+    assert source_of(source) is source
+
+
+def test_wide_files_are_read_by_the_columns_that_are_named(tmp_path: Path) -> None:
+    np.zeros((7, 5), "<f4").tofile(tmp_path / "wide.bin")
+    (frame,) = source_of(tmp_path / "wide.bin", ["x", "y", "z", "intensity", "ring"])
+    assert len(frame.read()) == 7
+
+
+def test_what_is_no_scan_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="scans: there are none"):
+        source_of([])
+    with pytest.raises(InputError, match="scans: dict is no scan"):
+        source_of([{}])  # type: ignore[list-item]
+    with pytest.raises(InputError, match="there is no such file"):
+        source_of(tmp_path / "absent.bin")

@@ -10,7 +10,6 @@ import pytest
 from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
-from derain.files import write_scan
 from derain.files.labels import write_labels
 from derain.scan import Scan
 from derain.sources.file_frame import FileFrame
@@ -60,12 +59,6 @@ def test_labels_that_the_card_does_not_know_are_named(labelled: FileFrame) -> No
         FrameReader(load_card("rehearse3d")).read(labelled)
 
 
-@pytest.mark.parametrize("suffix", [".bin", ".pcd", ".bin.gz", ".npy"])
-def test_points_are_counted_as_they_are_read(tmp_path: Path, suffix: str) -> None:
-    write_scan(tmp_path / f"scan{suffix}", Scan.of(scene(37)))
-    assert frame_of(tmp_path / f"scan{suffix}").count_points() == 37
-
-
 def test_columns_are_those_of_the_frame(tmp_path: Path) -> None:
     wide = np.column_stack([scene(20), np.arange(20, dtype=np.float32)])
     wide.tofile(tmp_path / "wide.bin")
@@ -104,23 +97,19 @@ def test_checksums_are_those_that_everybody_computes(labelled: FileFrame, tmp_pa
     )
 
 
-def test_a_pose_that_is_told_goes_before_the_record_beside_the_scan(labelled: FileFrame) -> None:
+def test_a_given_pose_goes_before_the_record_beside_the_scan(labelled: FileFrame) -> None:
     (labelled.path.parent / "poses.txt").write_text("damaged")
     pose = np.eye(4)
     assert labelled.with_pose(pose).pose is pose
     with pytest.raises(InputError, match="line 1 is not 12 numbers"):
         labelled.pose  # noqa: B018
-    in_memory = MemoryFrame(key="0", scan=labelled.read())
-    assert in_memory.pose is None
-    assert in_memory.with_pose(pose).pose is pose
 
 
 def test_a_scan_in_memory_is_a_frame_like_any(labelled: FileFrame) -> None:
     scan = Scan.of(scene(50), "mine").with_label(labelled.read_label(50))
-    pose = np.eye(4)
-    frame = MemoryFrame(key="0", scan=scan, seconds=1.5, sensor_to_world=pose)
+    frame = MemoryFrame(key="0", scan=scan, seconds=1.5)
     assert (frame.name, frame.suffix, frame.time, frame.count_points()) == ("mine", "", 1.5, 50)
-    assert frame.pose is pose
+    assert frame.pose is None
     assert frame.has_labels
     assert frame.read().label is None
     np.testing.assert_array_equal(frame.read_label(50), scan.label)

@@ -1,7 +1,6 @@
 """Frames by recordings, and what of a recording does not suit a method of several scans."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -81,16 +80,12 @@ def test_names_that_are_numbers_break_a_recording_where_no_times_do(
     assert [len(part) for part in unbroken_recordings(named_frames([tmp_path]))] == lengths
 
 
-def test_a_method_of_one_scan_asks_for_nothing() -> None:
-    damaged = [replace(frame, sequence="a") for frame in frames(9.0, 0.0)]
-    assert list(irregularities(damaged, Window())) == []
-
-
 def test_names_that_are_numbers_tell_the_order_where_no_times_do(tmp_path: Path) -> None:
     for number in range(4):
         scene(10).tofile(tmp_path / f"{number:03d}.bin")
     inorder = [tmp_path / f"{number:03d}.bin" for number in range(4)]
     assert list(irregularities(named_frames(inorder), SEVERAL)) == []
+    assert list(irregularities(named_frames(inorder[::-1]), Window())) == []  # asks for one scan
     (sentence,) = irregularities(named_frames(inorder[::-1]), SEVERAL)
     assert "002.bin: not later than the scan before it (3 scans in all)" in sentence
 

@@ -11,12 +11,11 @@ from derain.errors import ScanWarning
 from derain.evaluation.hard_cases import scene
 from derain.export.methods import load_method
 from derain.export.runtime import Derainer
-from derain.filters import DROR, SSR, FilterDerainer
+from derain.filters import DROR, FilterDerainer
 from derain.recordings.persistence import PersistenceDerainer
 from derain.scan import Scan
 from derain.sources.judgement import Judgement
-from derain.sources.method import Method
-from derain.sources.scan_warnings import ScanWarnings
+from derain.sources.method import Method, ScanWarnings
 from derain.views.scan_issues import ScanIssue
 
 
@@ -54,12 +53,6 @@ def test_every_kind_of_method_warns_of_another_unit_once(make: Callable[[], Meth
 def test_a_warning_names_the_line_that_asked_for_the_judgement() -> None:
     found = warned(lambda: FilterDerainer(DROR())(in_millimetres()))
     assert {each.filename for each in found} == {__file__}
-
-
-def test_intensities_that_were_not_measured_are_warned_of() -> None:
-    points = scene(600)[:, :3]
-    found = warned(lambda: FilterDerainer(SSR())(points))
-    assert any("no intensity" in str(each.message) for each in found)
 
 
 def test_a_method_that_is_loaded_for_a_command_does_not_warn() -> None:

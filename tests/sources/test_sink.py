@@ -10,10 +10,10 @@ from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.scan import Scan
-from derain.sources.folders import frame_of, frames_of, named_frames
+from derain.sources.folders import frame_of, frames_of, named_frames, relative_keys
 from derain.sources.frame import MemoryFrame
-from derain.sources.sink import FolderSink
-from derain.sources.source import Frames
+from derain.sources.sink import FolderSink, LabelSink
+from derain.sources.source import Frames, Source
 
 
 def write(*paths: Path) -> None:
@@ -51,7 +51,8 @@ def test_keys_with_folders_make_folders(tmp_path: Path) -> None:
 
 def test_a_scan_from_memory_is_written_as_a_pcd(tmp_path: Path) -> None:
     (frame,) = Frames.of_scans([Scan.of(scene(30))])
-    FolderSink(tmp_path).write(frame, frame.read(), np.zeros(30, bool))
+    scan, sink = frame.read(), FolderSink(tmp_path)
+    sink.write(frame, scan, np.zeros(30, bool), scan)  # nobody asks for what is removed
     assert names(tmp_path) == ["000000.label", "000000.pcd"]
     np.testing.assert_array_equal(read_scan(tmp_path / "000000.pcd").xyz, scene(30)[:, :3])
 
@@ -120,16 +121,6 @@ def test_two_scans_of_one_key_are_refused(tmp_path: Path) -> None:
             FolderSink(tmp_path / "out").refuse_clashes(scans)
 
 
-def test_sequences_in_memory_go_to_folders_of_their_own(tmp_path: Path) -> None:
-    scans = [Scan.of(scene(30))]
-    source = Frames([*Frames.of_scans(scans, "a"), *Frames.of_scans(scans, "b")])
-    sink = FolderSink(tmp_path)
-    sink.refuse_clashes(source)
-    for frame in source:
-        sink.write(frame, None, np.zeros(30, bool))
-    assert names(tmp_path) == ["a/000000.label", "b/000000.label"]
-
-
 def test_one_scan_twice_is_refused_where_it_is_not_expected(tmp_path: Path) -> None:
     write(tmp_path / "0.bin")
     twice = [frame_of(tmp_path / "0.bin"), frame_of(tmp_path / "0.bin")]
@@ -162,9 +153,43 @@ def test_what_is_taken_away_is_refused_where_it_would_take_a_place(tmp_path: Pat
         FolderSink(out, removed=tmp_path / "scans/../out").refuse_clashes(source)
 
 
-def test_nobody_writes_what_nobody_asks_for(tmp_path: Path) -> None:
-    (frame,) = Frames.of_scans([Scan.of(scene(30))])
-    scan, sink = frame.read(), FolderSink(tmp_path)
-    assert sink.removed_path(frame) is None
-    sink.write(frame, scan, np.zeros(30, bool), scan)
-    assert names(tmp_path) == ["000000.label", "000000.pcd"]
+def labelled(root: Path, *names: str, labels: str = "labels") -> Source:
+    paths = [root / name for name in names]
+    return frames_of(
+        paths,
+        lambda path: path.parent.parent / labels / f"{path.stem}.label",
+        ("x", "y", "z", "intensity"),
+        relative_keys(paths),
+    )
+
+
+def test_labels_are_written_by_the_keys_of_their_frames(tmp_path: Path) -> None:
+    sink, frames = LabelSink(tmp_path / "out"), labelled(tmp_path, "a/0.bin", "b/0.bin")
+    sink.refuse_clashes(frames)
+    for frame, label in zip(frames, ([0, 1], [1, 0, 1]), strict=True):
+        sink.write(frame, None, np.array(label))
+    written = {path.relative_to(sink.folder).as_posix() for path in sink.folder.rglob("*.*")}
+    assert written == {"a/0.label", "b/0.label"}
+    assert np.fromfile(tmp_path / "out/b/0.label", "<u4").tolist() == [1, 0, 1]
+
+
+@pytest.mark.parametrize("own", ["a/0.label", "labels/0.label", "truth/0.label"])
+def test_labels_that_are_there_stay(tmp_path: Path, own: str) -> None:
+    frames = labelled(tmp_path, "a/0.bin", labels="truth")
+    label = tmp_path / own
+    label.parent.mkdir(parents=True)
+    sink = LabelSink(label.parent, "--labels")
+    sink.refuse_clashes(frames)  # where they would be looked for, and are not
+    label.write_bytes(b"")
+    with pytest.raises(InputError, match=r"overwrite the labels .*0\.label\. Give --labels"):
+        sink.refuse_clashes(frames)
+
+
+def test_what_is_found_for_one_scan_is_not_written_over_the_labels_of_another(
+    tmp_path: Path,
+) -> None:
+    frames = labelled(tmp_path, "0.bin", "out/0.bin")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/0.label").touch()
+    with pytest.raises(InputError, match="overwrite the labels"):
+        LabelSink(tmp_path / "out").refuse_clashes(frames)

@@ -5,12 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from derain.cards.card import load_card
 from derain.export.model_file import ModelFile
-from derain.sources.file_frame import ENDS, FileFrame
 from derain.sources.folders import named_frames
 from derain.sources.source import Source
+from derain.sources.spread import evenly_spaced
 from derain.sources.training_record import (
     MOST_NAMES,
     record_of_scans,
@@ -37,12 +39,8 @@ def test_a_sequence_is_known_by_its_name_where_the_data_are_the_same(scans: Sour
     note = training_overlap("mine", spec, CARD, scans)
     assert note is not None
     assert note.startswith(f"mine was trained on 2 of these 3 scans, such as {scans[0].name}")
-    assert (
-        training_overlap(
-            "mine", replace(spec, training=record_of_sequences(["10", "13"])), CARD, scans
-        )
-        is None
-    )
+    others = replace(spec, training=record_of_sequences(["10", "13"]))
+    assert training_overlap("mine", others, CARD, scans) is None
     # Sequences of other data may well be called the same.
     assert training_overlap("mine", replace(spec, data="other data"), CARD, scans) is None
 
@@ -64,20 +62,21 @@ def test_nothing_is_said_where_nothing_is_known(scans: Source) -> None:
     assert training_overlap("mine", replace(SPEC, training={}), CARD, scans) is None
 
 
-def test_both_ends_and_the_length_of_a_file_tell_it_from_others(tmp_path: Path) -> None:
-    content = np.random.default_rng(0).bytes(3 * ENDS)
-    contents = [content, content[:-1], b"x" + content[1:], content[:-1] + b"x", b""]
-    prints = set()
-    for content in contents:
-        (tmp_path / "scan.bin").write_bytes(content)
-        prints.add(FileFrame(key="scan", path=tmp_path / "scan.bin").fingerprint())
-    assert len(prints) == len(contents)
-    assert all(len(print_) == 16 for print_ in prints)
-
-
 def test_a_record_stays_small(scans: Source, monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(record_of_sequences(map(str, range(2 * MOST_NAMES)))["sequences"]) == MOST_NAMES
     monkeypatch.setattr("derain.sources.training_record.MOST_NAMES", 2)
     assert record_of_scans(scans) == {
         "scans": tuple(sorted(frame.fingerprint() for frame in scans[::2]))
     }
+
+
+@given(st.integers(0, 60), st.integers(1, 20))
+def test_items_are_spread_evenly_from_first_to_last(count: int, most: int) -> None:
+    items = list(range(count))
+    spaced = evenly_spaced(items, most)
+    assert len(spaced) == min(count, most)
+    steps = np.diff(spaced)
+    assert (steps > 0).all()
+    assert not len(steps) or steps.max() - steps.min() <= 1
+    if count and most > 1:
+        assert (spaced[0], spaced[-1]) == (0, count - 1)
