@@ -28,8 +28,8 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 from derain.errors import InputError
 from derain.models.layers.batch_norm import PixelBatchNorm
 from derain.models.registry import NETWORKS
-from derain.models.salsanext.plan import SalsaNextPlan
-from derain.models.salsanext.training import DeployedSalsaNext, SalsaNextModule
+from derain.models.salsanext.module import DeployedSalsaNext, SalsaNextModule
+from derain.models.salsanext.network import SalsaNextPlan
 
 
 class FoldingLayer(nn.Module):

@@ -15,8 +15,11 @@ from torch.nn import functional
 
 from derain.errors import InputError
 from derain.models.layers.batch_norm import PixelBatchNorm
+from derain.models.layers.padding import pad_to_multiple
 from derain.models.published import network_of, published_tensors
-from derain.models.salsanext.plan import SalsaNextPlan
+
+# The image is halved four times.
+STRIDE = 16
 
 # Slope of every LeakyReLU where its input is negative.
 SLOPE = 0.01
@@ -49,6 +52,49 @@ PUBLISHED_KEYS = {
     for module, published in _published_modules().items()
     for tensor in (NORM if module.endswith("norm") else CONVOLUTION)
 }
+
+
+class SalsaNextPlan(nn.Module):
+    """How features go from block to block, whatever the blocks are made of.
+
+    Attributes:
+        context: What is done at full resolution.
+        encoder: A block for each size, from full resolution downwards.
+        halve: What halves the image after each of them.
+        bottleneck: What is done to the smallest image.
+        decoder: A block for each size upwards: takes features, and the encoder's of its size.
+        head: From features to scores.
+    """
+
+    context: nn.Module
+    encoder: nn.ModuleList
+    halve: nn.ModuleList
+    bottleneck: nn.Module
+    decoder: nn.ModuleList
+    head: nn.Module
+
+    def forward(self, image: Tensor) -> Tensor:
+        """Scores every pixel.
+
+        Args:
+            image: Normalised range image, 0 in every channel where there is no return, float
+                (B, channels, H, W). Where a side is no multiple of 16, it counts as continued by
+                empty pixels at the bottom and on the right.
+
+        Returns:
+            Logits, float (B, classes, H, W).
+        """
+        height, width = image.shape[-2:]
+        features = self.context(pad_to_multiple(image, STRIDE, value=0.0))
+        skips = []
+        for block, halve in zip(self.encoder, self.halve, strict=True):
+            skips.append(block(features))
+            features = halve(skips[-1])
+        features = self.bottleneck(features)
+        for block, skip in zip(self.decoder, reversed(skips), strict=True):
+            features = block(features, skip)
+        scores: Tensor = self.head(features)[..., :height, :width]
+        return scores
 
 
 class ConvolutionLayer(nn.Module):

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.views.published_grids import PUBLISHED_GRIDS
-from derain.views.spherical_grid import SphericalGrid, grid_of
+from derain.views.spherical_grid import PUBLISHED_GRIDS, SphericalGrid, grid_of
 
 FULL = SphericalGrid.even(64, 2048, (-25, 15))
 FRONT = SphericalGrid.even(4, 8, (-20, 20), (-40, 40))

@@ -68,11 +68,6 @@ def test_the_rule_is_fitted_to_the_scans_where_it_is_not_stated() -> None:
     assert LiSnowNet(grid="wads").rule_for(scans)["ground"] == pytest.approx(-1.4, abs=0.1)
 
 
-def test_a_constant_that_the_rule_does_not_have_is_refused() -> None:
-    with pytest.raises(InputError, match=r"rule: \['height'\] are no constants of it"):
-        LiSnowNet(rule={"height": -1.8})
-
-
 def test_the_rule_travels_in_the_checkpoint(image_network: MakeModel, tmp_path: Path) -> None:
     model = image_network(LiSnowNet, rule={"residual": 0.5, "near": 3.0})
     save_model(model, tmp_path / "model.ckpt")
