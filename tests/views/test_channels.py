@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases
 from derain.scan import Scan
-from derain.views.candidates import Bound, Candidates
 from derain.views.channels import (
     DUAL_RETURN,
     USUAL_CHANNELS,
@@ -22,7 +21,6 @@ from derain.views.channels import (
     filled_values,
     with_columns,
 )
-from derain.views.returns import pair_returns
 
 from ..two_returns import Recording
 
@@ -134,9 +132,3 @@ def test_places_of_returns_stay_with_them_when_points_are_taken_out_or_turned() 
     expected = channel_of(scan, DUAL_RETURN)
     assert expected is not None
     np.testing.assert_array_equal(channel_of(part, DUAL_RETURN), expected[rows])
-
-
-def test_candidates_may_be_bounded_by_the_place_of_their_return() -> None:
-    scan = Scan.of(Recording(0).xyz)
-    candidates = Candidates((Bound(DUAL_RETURN, least=0.0),))
-    np.testing.assert_array_equal(candidates.among(scan), ~pair_returns(scan).farther)
