@@ -81,8 +81,12 @@ def channel_values(
     Returns:
         float32 (C, M), each channel in its own unit; NaN for values that the scan lacks.
     """
-    values = filled_values(scan, rows, channels, dict.fromkeys(channels, np.nan))
-    return np.ascontiguousarray(values.T)
+    values = np.full((len(channels), len(rows)), np.nan, np.float32)
+    for of_channel, name in zip(values, channels, strict=True):
+        column = channel_of(scan, name)
+        if column is not None:
+            of_channel[:] = column[rows]
+    return values
 
 
 def filled_values(
