@@ -9,7 +9,7 @@ from derain.errors import InputError
 from derain.scan import Scan
 from derain.views.grid_fit import fit_grid
 from derain.views.range_image import RangeView
-from derain.views.spherical_grid import SphericalGrid, grid_of
+from derain.views.spherical_grid import grid_of
 
 # In place of a grid's name: the one that fits the training scans.
 FITTED = "fitted"
@@ -33,15 +33,10 @@ def range_view(
     Raises:
         InputError: An unknown grid or back-projection, or a grid to fit without scans.
     """
-    return RangeView(_chosen(grid, scans), tuple(channels), back_projection)
-
-
-def _chosen(grid: str | Mapping[str, Any], scans: Sequence[Scan]) -> SphericalGrid:
-    if grid != FITTED:
-        return grid_of(grid, "grid")
-    if not scans:
+    if grid == FITTED and not scans:
         raise InputError("grid", "there are no scans to fit it to", "Give a grid by its name.")
-    return fit_grid(scans).grid
+    chosen = fit_grid(scans).grid if grid == FITTED else grid_of(grid, "grid")
+    return RangeView(chosen, tuple(channels), back_projection)
 
 
 def require_grid(grid: str | None, name: str) -> str:

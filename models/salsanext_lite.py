@@ -17,7 +17,7 @@ Workshops 2019, for joining once what a block and its layers see.
 """
 
 from copy import deepcopy
-from itertools import pairwise
+from functools import partial
 from typing import ClassVar
 
 import torch
@@ -28,8 +28,8 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 from derain.errors import InputError
 from derain.models.layers.batch_norm import PixelBatchNorm
 from derain.models.registry import NETWORKS
-from derain.models.salsanext.plan import SalsaNextPlan
-from derain.models.salsanext.training import DeployedSalsaNext, SalsaNextModule
+from derain.models.salsanext.module import DeployedSalsaNext, SalsaNextModule
+from derain.models.salsanext.network import SalsaNextPlan
 
 
 class FoldingLayer(nn.Module):
@@ -139,11 +139,6 @@ class SalsaNextLiteNetwork(SalsaNextPlan):
         classes: Number of output channels.
         dropout: Share of the features dropped in training, below full resolution.
 
-    Attributes:
-        channels: As given.
-        width: As given.
-        classes: As given.
-
     Raises:
         InputError: A width that is not positive.
     """
@@ -151,34 +146,18 @@ class SalsaNextLiteNetwork(SalsaNextPlan):
     def __init__(
         self, channels: int = 5, width: int = 16, classes: int = 2, dropout: float = 0.2
     ) -> None:
-        super().__init__()
         if width < 1:
             raise InputError("width", f"{width} is not positive", "Give 16, or a multiple of it.")
-        self.channels, self.width, self.classes = channels, width, classes
-        encoder = [width * factor for factor in (1, 2, 4, 8, 8)]
-        decoder = [width * factor for factor in (8, 4, 4, 2, 1)]
-        rates = (0.0, dropout, dropout, dropout)  # from full resolution downwards
-        self.context = nn.Sequential(
-            ResidualContext(channels, width),
-            ResidualContext(width, width),
-            ResidualContext(width, width),
+        super().__init__(
+            channels,
+            width,
+            classes,
+            dropout,
+            context=ResidualContext,
+            block=lambda inputs, outputs: JoinedLayers(inputs, outputs // 2, outputs),
+            halving=partial(nn.MaxPool2d, 2),
+            doubling=DoublingBlock,
         )
-        self.encoder = nn.ModuleList(
-            JoinedLayers(inputs, outputs // 2, outputs) for inputs, outputs in pairwise(encoder)
-        )
-        self.halve = nn.ModuleList(
-            nn.Sequential(nn.Dropout2d(rate), nn.MaxPool2d(2)) for rate in rates
-        )
-        self.bottleneck = nn.Sequential(
-            JoinedLayers(encoder[-1], decoder[0] // 2, decoder[0]), nn.Dropout2d(dropout)
-        )
-        self.decoder = nn.ModuleList(
-            DoublingBlock(inputs, skipped, outputs, rate)
-            for (inputs, outputs), skipped, rate in zip(
-                pairwise(decoder), reversed(encoder[1:]), reversed(rates), strict=True
-            )
-        )
-        self.head = nn.Conv2d(width, classes, 1)
 
     def folded(self) -> "SalsaNextLiteNetwork":
         """A copy in evaluation mode that computes the same without a BatchNorm."""

@@ -54,11 +54,6 @@ class RayReturns:
         return cls(none, none.copy(), np.full(points, -1), nowhere, "")
 
     @property
-    def count(self) -> NDArray[np.int64]:
-        """How many returns a row's ray is known to have, int64 (N,): 1, 2, or 3 in its middle."""
-        return 1 + self.nearer.astype(np.int64) + self.farther
-
-    @property
     def dual(self) -> bool:
         """Whether any ray is known to have two returns."""
         return bool(self.found_by)

@@ -15,8 +15,7 @@ from torch.nn import functional
 
 from derain.errors import InputError
 from derain.models.layers.batch_norm import PixelBatchNorm
-from derain.models.layers.image_size import pad_to_multiple
-from derain.models.layers.padding import pad_around
+from derain.models.layers.padding import pad_around, pad_to_multiple
 from derain.models.lisnownet.haar import haar, inverse_haar
 from derain.models.lisnownet.hole_filling import fill_holes
 from derain.models.published import network_of, published_tensors

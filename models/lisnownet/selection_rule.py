@@ -26,6 +26,9 @@ ABOVE_ROAD = 0.4
 # for WADS: less is what the network changes where nothing falls.
 FEWEST, LEAST_RESIDUAL = 100, 0.001
 
+# Of their logarithms, Otsu's threshold is chosen from as many values.
+OTSU_BINS = 256
+
 
 @dataclass(frozen=True)
 class SelectionRule:
@@ -115,19 +118,18 @@ class SelectionRule:
         return cls(**{**known, **stated})
 
 
-def otsu(values: NDArray[np.float32], bins: int = 256) -> float:
+def otsu(values: NDArray[np.float32]) -> float:
     """Threshold that parts values into the two groups of least variance within.
 
     Args:
         values: Finite values, float32 (N,), N > 0; all the same, they are their own threshold.
-        bins: Number of values that it is chosen from.
 
     Source: N. Otsu, "A Threshold Selection Method from Gray-Level Histograms", 1979.
     """
     lowest, highest = float(values.min()), float(values.max())
     if lowest == highest:
         return lowest
-    counts, edges = np.histogram(values.astype(np.float64), bins, (lowest, highest))
+    counts, edges = np.histogram(values.astype(np.float64), OTSU_BINS, (lowest, highest))
     centres = (edges[1:] + edges[:-1]) / 2
     below, total = np.cumsum(counts)[:-1], np.cumsum(counts * centres)[:-1]
     above = counts.sum() - below

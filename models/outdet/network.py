@@ -28,20 +28,15 @@ PUBLISHED_KEYS = {
     "distance_weight": "convs.0.conv1.dw",
     "weight1": "convs.0.conv1.weight",
     "bias1": "convs.0.conv1.b",
-    "norm1.weight": "convs.0.bn1.weight",
-    "norm1.bias": "convs.0.bn1.bias",
-    "norm1.running_mean": "convs.0.bn1.running_mean",
-    "norm1.running_var": "convs.0.bn1.running_var",
-    "norm1.num_batches_tracked": "convs.0.bn1.num_batches_tracked",
     "weight2": "convs.0.conv2.weight",
-    "norm2.weight": "convs.0.bn2.weight",
-    "norm2.bias": "convs.0.bn2.bias",
-    "norm2.running_mean": "convs.0.bn2.running_mean",
-    "norm2.running_var": "convs.0.bn2.running_var",
-    "norm2.num_batches_tracked": "convs.0.bn2.num_batches_tracked",
     "shortcut": "convs.0.downsample.weight",
     "head.weight": "fc.weight",
     "head.bias": "fc.bias",
+    **{
+        f"norm{layer}.{tensor}": f"convs.0.bn{layer}.{tensor}"
+        for layer in (1, 2)
+        for tensor in ("weight", "bias", "running_mean", "running_var", "num_batches_tracked")
+    },
 }
 
 

@@ -5,7 +5,8 @@ Segmentation of LiDAR Point Clouds for Autonomous Driving", ISVC 2020; TiagoCort
 (MIT).
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import pairwise
 from typing import Self
 
@@ -15,8 +16,11 @@ from torch.nn import functional
 
 from derain.errors import InputError
 from derain.models.layers.batch_norm import PixelBatchNorm
+from derain.models.layers.padding import pad_to_multiple
 from derain.models.published import network_of, published_tensors
-from derain.models.salsanext.plan import SalsaNextPlan
+
+# The image is halved four times.
+STRIDE = 16
 
 # Slope of every LeakyReLU where its input is negative.
 SLOPE = 0.01
@@ -49,6 +53,82 @@ PUBLISHED_KEYS = {
     for module, published in _published_modules().items()
     for tensor in (NORM if module.endswith("norm") else CONVOLUTION)
 }
+
+
+class SalsaNextPlan(nn.Module):
+    """How features go from block to block, whatever the blocks are made of.
+
+    Args:
+        channels: Number of input channels.
+        width: Number of features at full resolution; deeper down there are up to eight times as
+            many.
+        classes: Number of output channels.
+        dropout: Share of the features dropped in training, below full resolution.
+        context: Makes a block at full resolution, of numbers of inputs and outputs.
+        block: Makes a block of the encoder or the bottleneck, of the same.
+        halving: Makes a layer that halves the image.
+        doubling: Makes a block of the decoder, of numbers of inputs, of the encoder's features of
+            its size and of outputs, and of the share of features that it drops.
+
+    Attributes:
+        channels: As given.
+        width: As given.
+        classes: As given.
+    """
+
+    def __init__(
+        self,
+        channels: int,
+        width: int,
+        classes: int,
+        dropout: float,
+        *,
+        context: Callable[[int, int], nn.Module],
+        block: Callable[[int, int], nn.Module],
+        halving: Callable[[], nn.Module],
+        doubling: Callable[[int, int, int, float], nn.Module],
+    ) -> None:
+        super().__init__()
+        self.channels, self.width, self.classes = channels, width, classes
+        encoder = [width * factor for factor in (1, 2, 4, 8, 8)]
+        decoder = [width * factor for factor in (8, 4, 4, 2, 1)]
+        rates = (0.0, dropout, dropout, dropout)  # from full resolution downwards
+        self.context = nn.Sequential(
+            *(context(inputs, width) for inputs in (channels, width, width))
+        )
+        self.encoder = nn.ModuleList(block(*pair) for pair in pairwise(encoder))
+        self.halve = nn.ModuleList(nn.Sequential(nn.Dropout2d(rate), halving()) for rate in rates)
+        self.bottleneck = nn.Sequential(block(encoder[-1], decoder[0]), nn.Dropout2d(dropout))
+        self.decoder = nn.ModuleList(
+            doubling(inputs, skipped, outputs, rate)
+            for (inputs, outputs), skipped, rate in zip(
+                pairwise(decoder), reversed(encoder[1:]), reversed(rates), strict=True
+            )
+        )
+        self.head = nn.Conv2d(width, classes, 1)
+
+    def forward(self, image: Tensor) -> Tensor:
+        """Scores every pixel.
+
+        Args:
+            image: Normalised range image, 0 in every channel where there is no return, float
+                (B, channels, H, W). Where a side is no multiple of 16, it counts as continued by
+                empty pixels at the bottom and on the right.
+
+        Returns:
+            Logits, float (B, classes, H, W).
+        """
+        height, width = image.shape[-2:]
+        features = self.context(pad_to_multiple(image, STRIDE, value=0.0))
+        skips = []
+        for block, halve in zip(self.encoder, self.halve, strict=True):
+            skips.append(block(features))
+            features = halve(skips[-1])
+        features = self.bottleneck(features)
+        for block, skip in zip(self.decoder, reversed(skips), strict=True):
+            features = block(features, skip)
+        scores: Tensor = self.head(features)[..., :height, :width]
+        return scores
 
 
 class ConvolutionLayer(nn.Module):
@@ -126,17 +206,17 @@ class DilatedBlock(nn.Module):
 class DecoderBlock(nn.Module):
     """Doubles the image and joins it with what the encoder found at that size."""
 
-    def __init__(self, inputs: int, outputs: int, dropout: float) -> None:
+    def __init__(self, inputs: int, skipped: int, outputs: int, dropout: float) -> None:
         super().__init__()
         self.dropout = nn.Dropout2d(dropout)
-        self.layers = DilatedLayers(inputs // 4 + 2 * outputs, outputs)
+        self.layers = DilatedLayers(inputs // 4 + skipped, outputs)
 
     def forward(self, features: Tensor, skip: Tensor) -> Tensor:
         """Features of the doubled image.
 
         Args:
             features: Features of the smaller image, float (B, inputs, H / 2, W / 2).
-            skip: Features of the encoder, float (B, 2 outputs, H, W).
+            skip: Features of the encoder, float (B, skipped, H, W).
 
         Returns:
             Features, float (B, outputs, H, W).
@@ -161,11 +241,6 @@ class SalsaNextNetwork(SalsaNextPlan):
         classes: Number of output channels.
         dropout: Share of the features dropped in training, below full resolution.
 
-    Attributes:
-        channels: As given.
-        width: As given.
-        classes: As given.
-
     Raises:
         InputError: A width that is not a positive even number.
     """
@@ -173,32 +248,21 @@ class SalsaNextNetwork(SalsaNextPlan):
     def __init__(
         self, channels: int = 5, width: int = 32, classes: int = 2, dropout: float = 0.2
     ) -> None:
-        super().__init__()
         if width < 2 or width % 2:
             # The last pixel shuffle makes width / 2 features of 2 × width.
             raise InputError(
                 "width", f"{width} is not a positive even number", "Give 32, as published, 16 or 8."
             )
-        self.channels, self.width, self.classes = channels, width, classes
-        encoder = [width * factor for factor in (1, 2, 4, 8, 8)]
-        decoder = [width * factor for factor in (8, 4, 4, 2, 1)]
-        rates = (0.0, dropout, dropout, dropout)  # from full resolution downwards
-        self.context = nn.Sequential(
-            ContextBlock(channels, width), ContextBlock(width, width), ContextBlock(width, width)
+        super().__init__(
+            channels,
+            width,
+            classes,
+            dropout,
+            context=ContextBlock,
+            block=DilatedBlock,
+            halving=partial(nn.AvgPool2d, 3, stride=2, padding=1),
+            doubling=DecoderBlock,
         )
-        self.encoder = nn.ModuleList(DilatedBlock(*pair) for pair in pairwise(encoder))
-        self.halve = nn.ModuleList(
-            nn.Sequential(nn.Dropout2d(rate), nn.AvgPool2d(3, stride=2, padding=1))
-            for rate in rates
-        )
-        self.bottleneck = nn.Sequential(
-            DilatedBlock(encoder[-1], decoder[0]), nn.Dropout2d(dropout)
-        )
-        self.decoder = nn.ModuleList(
-            DecoderBlock(*pair, rate)
-            for pair, rate in zip(pairwise(decoder), reversed(rates), strict=True)
-        )
-        self.head = nn.Conv2d(width, classes, 1)
 
     @classmethod
     def from_published(cls, state_dict: Mapping[str, Tensor]) -> Self:

@@ -30,7 +30,7 @@ all_models = pytest.mark.parametrize("model_class", [SalsaNext, SalsaNextLite, L
 @all_models
 def test_a_grid_is_fitted_to_the_training_scans(model_class: type[DerainingModule]) -> None:
     scans = [Scan.of(scene(500, seed)) for seed in range(3)]
-    spec = model_class().spec_for(load_card("wads"), scans)
+    spec = model_class(width=2).spec_for(load_card("wads"), scans)
     expected = fit_grid(scans).grid
     assert spec.view == {
         "kind": "range",
@@ -45,7 +45,7 @@ def test_a_grid_is_fitted_to_the_training_scans(model_class: type[DerainingModul
 @all_models
 def test_a_grid_is_not_fitted_to_nothing(model_class: type[DerainingModule]) -> None:
     with pytest.raises(InputError, match=r"no scans to fit it to\. Give a grid by its name\."):
-        model_class().spec_for(load_card("wads"))
+        model_class(width=2).spec_for(load_card("wads"))
 
 
 @all_models
@@ -57,7 +57,7 @@ def test_a_grid_is_not_fitted_to_nothing(model_class: type[DerainingModule]) -> 
 def test_a_stated_grid_is_taken_whatever_the_scans(
     model_class: type[DerainingModule], grid: str | dict[str, Any]
 ) -> None:
-    model = model_class(grid=grid, back_projection="vote")
+    model = model_class(grid=grid, width=2, back_projection="vote")
     for scans in ([], [Scan.of(scene(100))]):
         expected = {"kind": "range", "grid": grid_of(grid, "").as_dict(), "way_back": "vote"}
         assert model.view_for(scans).as_dict() == expected
@@ -76,7 +76,7 @@ def test_a_view_that_there_is_not_is_refused(
     model_class: type[DerainingModule], arguments: dict[str, Any], reason: str
 ) -> None:
     with pytest.raises(InputError) as refusal:
-        model_class(**arguments).spec_for(load_card("wads")).make_view()
+        model_class(**arguments, width=2).spec_for(load_card("wads")).make_view()
     assert reason in str(refusal.value)
 
 

@@ -28,16 +28,13 @@ from derain.models.lisnownet import LiSnowNet
 from derain.models.outdet import OutDet
 from derain.scan import Scan
 
+from .two_processes import GRID, NETWORKS
+
 MakeTrainer = Callable[..., lightning.Trainer]
 SNOW = 110
 SCANS = 4
 TRAINED, VALIDATED, TESTED = range(3), (3,), (2, 3)
 LOADING = Loading(batch_size=2)
-GRID = {"rows": 16, "columns": 64, "inclination": [-30.0, 20.0]}
-NETWORKS: Mapping[str, Callable[[], DerainingModule]] = {
-    "outdet": OutDet,
-    "lisnownet": lambda: LiSnowNet(grid=GRID, width=2),
-}
 
 
 @pytest.fixture(params=NETWORKS)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from derain.views.back_projection import (
-    BACK_PROJECTIONS,
     CHUNK,
     PixelsToPoints,
     ProjectedPoints,
@@ -102,29 +101,6 @@ def test_copying_gives_every_point_its_pixels_score(
 ) -> None:
     points, score = projection
     assert copy(points, score).tolist() == [score[pixel] for pixel in points.pixel]
-
-
-@settings(deadline=None)
-@given(projections(), st.sampled_from(sorted(BACK_PROJECTIONS)), st.sampled_from([0.0, 1.0]))
-def test_a_unanimous_image_gives_every_point_its_answer(
-    projection: tuple[ProjectedPoints, NDArray[np.float32]], back_projection: str, answer: float
-) -> None:
-    points, score = projection
-    result = BACK_PROJECTIONS[back_projection](points, np.full_like(score, answer))
-    assert result.dtype == np.float32
-    assert result.tolist() == [answer] * len(points.pixel)
-
-
-@settings(deadline=None)
-@given(projections(), st.sampled_from(["nearest range", "copy"]))
-def test_points_that_are_shown_have_their_own_pixels_score(
-    projection: tuple[ProjectedPoints, NDArray[np.float32]], back_projection: str
-) -> None:
-    points, score = projection
-    shown = points.range == points.nearest.ravel()[points.pixel]
-    np.testing.assert_array_equal(
-        BACK_PROJECTIONS[back_projection](points, score)[shown], score[points.pixel[shown]]
-    )
 
 
 def test_a_wall_behind_a_drop_follows_the_wall() -> None:

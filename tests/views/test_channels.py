@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from derain.evaluation.hard_cases import hard_cases
 from derain.scan import Scan
-from derain.views.candidates import Bound, Candidates
 from derain.views.channels import (
     DUAL_RETURN,
     INTENSITY_RANK,
@@ -24,7 +23,6 @@ from derain.views.channels import (
     filled_values,
     with_columns,
 )
-from derain.views.returns import pair_returns
 
 from ..two_returns import Recording
 

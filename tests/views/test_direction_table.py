@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from derain.views.direction_table import BINS, BORDER_MARGIN, UNSURE_BELOW, height_of, turn_of
 from derain.views.directions import directions
-from derain.views.published_grids import PUBLISHED_GRIDS
-from derain.views.spherical_grid import SphericalGrid, grid_of
+from derain.views.spherical_grid import PUBLISHED_GRIDS, SphericalGrid, grid_of
 
 PUBLISHED = [grid_of(name, "test") for name in PUBLISHED_GRIDS]
 GRIDS = [

@@ -13,8 +13,7 @@ from derain.files import DEFAULT_COLUMNS, read_scan
 from derain.scan import Scan
 from derain.simulation.sensor import Sensor
 from derain.views.grid_fit import PIXELS_PER_RETURN, fit_grid
-from derain.views.published_grids import WADS_BEAMS
-from derain.views.spherical_grid import grid_of
+from derain.views.spherical_grid import WADS_BEAMS, grid_of
 
 HARD_CASES = dict(hard_cases())
 BEAMS = np.array([9.0, 5.0, 3.2, 2.0, 1.1, 0.4, -0.3, -1.0, -2.1, -4.0, -7.5, -13.0])

@@ -82,24 +82,11 @@ def test_the_order_of_the_rows_changes_nothing_but_ties(
     np.testing.assert_array_equal(shuffled.image[0], image.image[0])
 
 
-def test_row_0_is_not_lost() -> None:
-    image = RangeView(FULL)(Scan.of([[5, 0, 0, 9]]))
-    assert image.valid.sum() == 1
-    assert image.winner[image.pixel[0]] == 0
-    assert image.image[:, image.valid].ravel().tolist() == [5, 5, 0, 0, 9]
-
-
 def test_a_view_has_the_channels_it_is_asked_for_in_their_order() -> None:
     scan = Scan.of([[3, 0, 4, 7]])
     view = RangeView(SphericalGrid.even(1, 1, (-90, 90)), channels=("intensity", "z", "range"))
     assert view(scan).image.ravel().tolist() == [7, 4, 5]
     assert view(scan).image.dtype == np.float32
-
-
-def test_a_scan_without_intensity_takes_the_stand_in_and_empty_pixels_stay_zero() -> None:
-    view = RangeView(FULL, channels=("intensity",), fill_value={"intensity": 9.5})
-    image = view(Scan.of(np.ones((1, 3), np.float32)))
-    assert sorted(image.image.ravel())[-2:] == [0, 9.5]
 
 
 def test_a_pixel_shows_the_columns_of_its_nearest_point_and_a_stand_in_for_gaps() -> None:

@@ -40,7 +40,6 @@ def test_the_rays_of_a_sensor_of_two_returns_are_found(
     np.testing.assert_array_equal(returns.partner, partner)
     np.testing.assert_array_equal(returns.nearer, nearer)
     np.testing.assert_array_equal(returns.farther, farther)
-    np.testing.assert_array_equal(returns.count, 1 + recording.two)
     np.testing.assert_allclose(
         returns.partner_range[recording.two], recording.distance[partner[recording.two]], rtol=1e-5
     )
@@ -76,7 +75,7 @@ def test_pairs_are_those_of_a_brute_force_search_anywhere_on_the_sphere(
     np.testing.assert_array_equal(found[np.lexsort(found.T[::-1])], near[near[:, 0] < near[:, 1]])
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_order_of_the_rows_does_not_matter(seed: int) -> None:
     recording = Recording(seed)
     order = np.random.default_rng(seed).permutation(len(recording.xyz))
@@ -116,7 +115,7 @@ def test_three_returns_of_a_ray_are_linked_one_behind_the_other() -> None:
     xyz = np.concatenate([recording.xyz, recording.xyz[last] * np.float32(1.5)])
     returns = pair_returns(Scan.of(xyz))
     third = len(recording.xyz) + np.arange(len(last))
-    np.testing.assert_array_equal(returns.count[last], 3)
+    assert (returns.nearer & returns.farther)[last].all()
     np.testing.assert_array_equal(returns.partner[partner[last]], last)
     np.testing.assert_array_equal(returns.partner[last], third)
     np.testing.assert_array_equal(returns.partner[third], last)

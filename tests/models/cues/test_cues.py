@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from derain.datamodules.in_memory import InMemory
-from derain.datamodules.loading import Loading
+from derain.datamodules.scan_data import Loading
 from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.export.onnx_file import export

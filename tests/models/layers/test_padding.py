@@ -1,10 +1,12 @@
-"""Padding continues an image as NumPy does, and its gradient is that of NumPy's copies."""
+"""Padding is that of NumPy, and so is its gradient."""
 
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 
-from derain.models.layers.padding import pad_around
+from derain.models.layers.padding import pad_around, pad_to_multiple
 
 SIZES = [(1, 1, 1), (2, 3, 2), (5, 4, 1), (1, 4, 3), (3, 1, 4), (6, 7, 2)]
 FORMATS = [torch.contiguous_format, torch.channels_last]
@@ -35,3 +37,27 @@ def test_its_gradient_is_that_of_its_value(
 ) -> None:
     image = image_of(height, width).contiguous(memory_format=memory_format).requires_grad_()
     assert torch.autograd.gradcheck(lambda image: pad_around(image, margin), image)
+
+
+@given(
+    height=st.integers(1, 40),
+    width=st.integers(1, 40),
+    multiple=st.integers(1, 20),
+    value=st.sampled_from([0.0, -1.0]),
+)
+def test_new_pixels_are_below_and_on_the_right(
+    height: int, width: int, multiple: int, value: float
+) -> None:
+    image = np.random.default_rng(0).normal(size=(2, 3, height, width)).astype(np.float32)
+    below = next(n for n in range(multiple) if (height + n) % multiple == 0)
+    right = next(n for n in range(multiple) if (width + n) % multiple == 0)
+    expected = np.pad(image, ((0, 0), (0, 0), (0, below), (0, right)), constant_values=value)
+    padded = pad_to_multiple(torch.from_numpy(image), multiple, value)
+    np.testing.assert_array_equal(padded, expected)
+    np.testing.assert_array_equal(padded[..., :height, :width], image)
+
+
+def test_an_image_that_fits_comes_back_as_it_is() -> None:
+    image = torch.zeros(1, 2, 32, 48)
+    assert pad_to_multiple(image, 16, value=-1.0) is image
+    assert pad_to_multiple(image[..., :3].bfloat16(), 4, 0.0).dtype is torch.bfloat16

@@ -9,7 +9,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from torch import Tensor
 
-from derain.models.layers.padding import pad_around
 from derain.models.lisnownet.hole_filling import fill_holes
 
 
@@ -56,17 +55,6 @@ def test_holes_are_filled_by_the_published_formula(height: int, width: int, shar
     valid[..., ::2, 0] = True  # a value in every row after the first step
     expected = as_published(torch.where(valid, image, -1)[0].numpy())
     np.testing.assert_allclose(fill_holes(image, valid)[0], expected, atol=1e-12)
-
-
-@pytest.mark.parametrize("margin", [1, 2, 5])
-@pytest.mark.parametrize("size", [(1, 1), (1, 4), (2, 3), (3, 1), (6, 8)])
-def test_edges_are_continued_round_the_circle_and_mirrored(
-    size: tuple[int, int], margin: int
-) -> None:
-    image = torch.arange(size[0] * size[1]).reshape(size)
-    around = np.pad(image, ((0, 0), (margin, margin)), mode="wrap")
-    expected = np.pad(around, ((margin, margin), (0, 0)), mode="reflect")
-    np.testing.assert_array_equal(pad_around(image, margin), expected)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 1.0])

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import lightning
 import numpy as np
@@ -20,6 +20,7 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import write_labels
 from derain.learning.batch import Batch, Sample
+from derain.learning.task import agree_on_task
 from derain.models.checkpoint import load_model, save_model
 from derain.models.lisnownet import LiSnowNet
 from derain.models.lisnownet.deployed import cube_roots, rain_logits
@@ -30,6 +31,7 @@ from derain.models.measured import MONITOR
 from derain.scan import Scan
 from derain.sources import file_frame
 from derain.views.probability import probability_of_rain
+from derain.views.range_image import RangeImage
 from derain.views.spherical_grid import grid_of
 
 MakeModel = Callable[..., LiSnowNet]
@@ -66,11 +68,6 @@ def test_the_rule_is_fitted_to_the_scans_where_it_is_not_stated() -> None:
     assert model.selection == SelectionRule.fitted({"ground": -0.5}, scans)
     assert (model.selection.ground, model.selection.full_scale) == (-0.5, 255.0)
     assert LiSnowNet(grid="wads").rule_for(scans)["ground"] == pytest.approx(-1.4, abs=0.1)
-
-
-def test_a_constant_that_the_rule_does_not_have_is_refused() -> None:
-    with pytest.raises(InputError, match=r"rule: \['height'\] are no constants of it"):
-        LiSnowNet(rule={"height": -1.8})
 
 
 def test_the_rule_travels_in_the_checkpoint(image_network: MakeModel, tmp_path: Path) -> None:
@@ -251,12 +248,8 @@ def test_weights_need_a_grid_and_a_network_that_fits(image_network: MakeModel) -
         LiSnowNet.from_published(weights, WADS)
     with pytest.raises(InputError, match="LiSnowNet: the state_dict is of another network"):
         LiSnowNet.from_published({"logits.bias": torch.ones(2)}, WADS, "wads")
-
-
-def test_weights_of_more_channels_than_the_model_sees_are_refused() -> None:
-    weights = published(LiSnowNetwork(channels=3, width=2))
     with pytest.raises(InputError, match="channels"):
-        LiSnowNet.from_published(weights, WADS, "wads")
+        LiSnowNet.from_published(published(LiSnowNetwork(channels=3, width=2)), WADS, "wads")
 
 
 class Progress(lightning.Callback):
@@ -285,52 +278,65 @@ class Run:
     best: dict[str, Any]
 
 
-@pytest.fixture
-def train(
-    make_trainer: MakeTrainer, small_grid: dict[str, Any], tmp_path: Path
-) -> Callable[..., Run]:
-    """Trains on the scenes in a folder, from the same seed unless it is given another."""
-    for number in range(4):
-        scene(300, seed=number).tofile(tmp_path / f"{number}.bin")
-        write_labels(tmp_path / f"{number}.label", 110 * (np.arange(300) >= 270))
-
-    def fit(card: str = "wads", rule: dict[str, float] = LENIENT, seed: int = 0) -> Run:
-        lightning.seed_everything(seed)
-        parts = {"train": ["[012].bin"], "validation": ["3.bin"]}
-        data = Folder(str(tmp_path), card, **parts, loading=Loading(batch_size=3))
-        model = LiSnowNet(small_grid, width=2, learning_rate=0.05, decay=0.5, rule=rule)
-        progress = Progress()
-        best = ModelCheckpoint(tmp_path / "runs", "best", monitor=MONITOR, mode="max")
-        trainer = make_trainer(epochs=4, callbacks=[progress, best], enable_checkpointing=True)
-        trainer.fit(model, data)
-        content = torch.load(best.best_model_path, weights_only=True)
-        Path(best.best_model_path).unlink()
-        return Run(model, progress, content)
-
-    return fit
-
-
 def assert_same(one: dict[str, Tensor], other: dict[str, Tensor]) -> None:
     for name, tensor in one.items():
         assert torch.equal(tensor, other[name]), name
 
 
-def test_garbage_in_place_of_training_labels_changes_nothing(
-    train: Callable[..., Run], tmp_path: Path
+def write_scenes(folder: Path, validated: int = 300) -> Path:
+    """Writes four labelled scenes, the last of which is for validation."""
+    for number, points in enumerate((300, 300, 300, validated)):
+        scene(points, seed=number).tofile(folder / f"{number}.bin")
+        write_labels(folder / f"{number}.label", 110 * (np.arange(points) >= 0.9 * points))
+    return folder
+
+
+def without_labels(folder: Path) -> Path:
+    for label in folder.glob("*.label"):
+        label.unlink()
+    return folder
+
+
+def swap_validation_labels(folder: Path) -> None:
+    """Calls rain what is none, and the other way round."""
+    label = np.fromfile(folder / "3.label", "<u4")
+    write_labels(folder / "3.label", np.where(label == 110, 0, 110))
+
+
+def scenes_of(folder: Path, card: str = "wads") -> Folder:
+    parts = {"train": ["[012].bin"], "validation": ["3.bin"]}
+    return Folder(str(folder), card, **parts, loading=Loading(batch_size=3))
+
+
+@pytest.fixture(scope="module")
+def train(make_trainer: MakeTrainer, small_grid: dict[str, Any]) -> Callable[..., Run]:
+    """Trains on the scenes in a folder, from the same seed unless it is given another."""
+
+    def fit(folder: Path, rule: dict[str, float] = LENIENT, seed: int = 0) -> Run:
+        lightning.seed_everything(seed)
+        model = LiSnowNet(small_grid, width=2, learning_rate=0.05, decay=0.5, rule=rule)
+        progress = Progress()
+        best = ModelCheckpoint(folder / "runs", "best", monitor=MONITOR, mode="max")
+        trainer = make_trainer(epochs=4, callbacks=[progress, best], enable_checkpointing=True)
+        trainer.fit(model, scenes_of(folder))
+        return Run(model, progress, torch.load(best.best_model_path, weights_only=True))
+
+    return fit
+
+
+@pytest.fixture(scope="module")
+def labelled(train: Callable[..., Run], tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A training on scenes that have their labels; the rule's residual is stated."""
+    return train(write_scenes(tmp_path_factory.mktemp("labelled")))
+
+
+def test_training_labels_are_not_opened_and_garbage_in_them_changes_nothing(
+    train: Callable[..., Run], labelled: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first = train()
+    write_scenes(tmp_path)
     (tmp_path / "0.label").write_bytes(b"garbage")
     write_labels(tmp_path / "1.label", np.full(300, 7777))
     (tmp_path / "2.label").unlink()
-    second = train()
-    assert_same(first.model.state_dict(), second.model.state_dict())
-    assert first.progress.iou == second.progress.iou
-    assert first.model.spec == second.model.spec
-
-
-def test_training_opens_no_label_file_and_validation_only_its_own(
-    train: Callable[..., Run], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     opened, read = set(), file_frame.read_labels
 
     def recorded(path: Path, points: int) -> NDArray[np.uint32]:
@@ -338,40 +344,44 @@ def test_training_opens_no_label_file_and_validation_only_its_own(
         return read(path, points)
 
     monkeypatch.setattr(file_frame, "read_labels", recorded)
-    train()
+    run = train(tmp_path)
     assert opened == {tmp_path / "3.label"}
+    assert_same(labelled.model.state_dict(), run.model.state_dict())
+    assert labelled.progress.iou == run.progress.iou
+    assert labelled.model.spec == run.model.spec
 
 
 def test_validation_labels_measure_and_choose_nothing(
-    train: Callable[..., Run], tmp_path: Path
+    train: Callable[..., Run], labelled: Run, tmp_path: Path
 ) -> None:
-    first = train()
-    label = np.fromfile(tmp_path / "3.label", "<u4")
-    write_labels(tmp_path / "3.label", np.where(label == 110, 0, 110))
-    second = train()
-    assert first.progress.iou != second.progress.iou
-    assert len(set(first.progress.iou)) > 1
-    assert first.progress.monitor == second.progress.monitor
-    assert first.progress.monitor == [-loss for loss in first.progress.loss]
-    assert first.best["epoch"] == second.best["epoch"] == int(np.argmax(first.progress.monitor))
-    assert_same(first.best["state_dict"], second.best["state_dict"])
+    swap_validation_labels(write_scenes(tmp_path))
+    run = train(tmp_path)
+    assert labelled.progress.iou != run.progress.iou
+    assert len(set(labelled.progress.iou)) > 1
+    assert labelled.progress.monitor == run.progress.monitor
+    assert labelled.progress.monitor == [-loss for loss in labelled.progress.loss]
+    best = int(np.argmax(labelled.progress.monitor))
+    assert labelled.best["epoch"] == run.best["epoch"] == best
+    assert_same(labelled.best["state_dict"], run.best["state_dict"])
 
 
-def test_a_run_needs_no_labels_at_all(train: Callable[..., Run], tmp_path: Path) -> None:
-    labelled = train()
-    for label in tmp_path.glob("*.label"):
-        label.unlink()
-    run = train()
+def test_a_run_needs_no_labels_at_all(
+    train: Callable[..., Run], labelled: Run, tmp_path: Path
+) -> None:
+    run = train(without_labels(write_scenes(tmp_path)))
     assert run.progress.iou == []
     assert run.progress.monitor == labelled.progress.monitor
     assert_same(run.best["state_dict"], labelled.best["state_dict"])
 
 
-@pytest.fixture
-def dense(train: Callable[..., Run], tmp_path: Path) -> None:
-    """Gives the validation scan so many points that a residual can be fitted to them."""
-    scene(3000, seed=3).tofile(tmp_path / "3.bin")
-    write_labels(tmp_path / "3.label", 110 * (np.arange(3000) >= 2700))
+def test_a_stated_residual_is_not_fitted(labelled: Run) -> None:
+    assert labelled.model.selection.residual == LENIENT["residual"]
+
+
+def test_the_learning_rate_falls_after_every_epoch(labelled: Run) -> None:
+    (optimizer,) = labelled.model.trainer.optimizers
+    assert isinstance(optimizer, torch.optim.Adam)
+    assert [group["lr"] for group in optimizer.param_groups] == [pytest.approx(0.05 * 0.5**4)]
 
 
 # From this seed a network comes that moves many returns nearer and makes them brighter at once, so
@@ -382,28 +392,105 @@ SEED = 2
 UNSTATED = {"ground": -10.0, "intensity": 1.0}
 
 
-@pytest.mark.usefixtures("dense")
+class Fitted(NamedTuple):
+    """A training whose residual was fitted to the many points of a validation scan."""
+
+    folder: Path
+    run: Run
+    runs_of_the_network: int  # besides training
+
+
+@pytest.fixture(scope="module")
+def fitted(train: Callable[..., Run], tmp_path_factory: pytest.TempPathFactory) -> Fitted:
+    folder = write_scenes(tmp_path_factory.mktemp("fitted"), validated=3000)
+    return Fitted(folder, *counted(lambda: train(folder, UNSTATED, SEED)))
+
+
+def counted(fit: Callable[[], Run]) -> tuple[Run, int]:
+    """A training, and how often the network ran besides its steps."""
+    forward, training = LiSnowNetwork.forward, list[bool]()
+
+    def recorded(network: LiSnowNetwork, *seen: Tensor) -> Tensor:
+        training.append(network.training)
+        return forward(network, *seen)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(LiSnowNetwork, "forward", recorded)
+        return fit(), training.count(False)
+
+
+def best_of(fitted: Fitted) -> tuple[LiSnowNet, RangeImage]:
+    """The best checkpoint's model, and what it sees of the validation scan."""
+    model = LiSnowNet(**fitted.run.best["hyper_parameters"]).eval()
+    model.load_state_dict(fitted.run.best["state_dict"])
+    points = np.fromfile(fitted.folder / "3.bin", np.float32).reshape(-1, 4)
+    return model, model.spec.make_view()(Scan.of(points))
+
+
+@torch.no_grad()
 def test_the_residual_is_fitted_to_what_the_network_changes_in_the_validation_scans(
-    train: Callable[..., Run], tmp_path: Path
+    train: Callable[..., Run], fitted: Fitted, tmp_path: Path
 ) -> None:
-    run = train(rule=UNSTATED, seed=SEED)
-    best = LiSnowNet(**run.best["hyper_parameters"]).eval()
-    best.load_state_dict(run.best["state_dict"])
-    scan = Scan.of(np.fromfile(tmp_path / "3.bin", np.float32).reshape(-1, 4))
-    view = best.spec.make_view()(scan)
+    best, view = best_of(fitted)
     image, valid = (torch.from_numpy(array) for array in view.inputs().values())
-    with torch.no_grad():
-        seen = cube_roots(image, best.selection)
-        of_range, of_intensity = (best.network(seen, valid) - seen)[0].numpy()
+    seen = cube_roots(image, best.selection)
+    of_range, of_intensity = (best.network(seen, valid) - seen)[0].numpy()
     products = (of_range * of_intensity**3)[view.valid]
     assert np.count_nonzero(products > 0) > FEWEST
     expected = SelectionRule(**best.spec.rule).with_residual_of(products).residual
     assert best.selection.residual == pytest.approx(expected, rel=1e-3)
     assert best.selection.residual != SelectionRule().residual
-    label = np.fromfile(tmp_path / "3.label", "<u4")
-    write_labels(tmp_path / "3.label", np.where(label == 110, 0, 110))
-    again = train(rule=UNSTATED, seed=SEED)
-    assert again.best["hyper_parameters"]["spec"] == run.best["hyper_parameters"]["spec"]
+    swap_validation_labels(write_scenes(tmp_path, validated=3000))
+    with torch.enable_grad():
+        again = train(tmp_path, UNSTATED, SEED)
+    assert again.best["hyper_parameters"]["spec"] == fitted.run.best["hyper_parameters"]["spec"]
+
+
+@torch.no_grad()
+def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(fitted: Fitted) -> None:
+    best, view = best_of(fitted)
+    logits = best(**{name: torch.from_numpy(array) for name, array in view.inputs().items()})
+    found = view.back(probability_of_rain(logits.numpy())) > best.spec.threshold
+    rain = np.fromfile(fitted.folder / "3.label", "<u4") == 110
+    iou = (found & rain).sum() / (found | rain).sum()
+    assert 0 < iou < 1
+    run = fitted.run
+    assert run.progress.iou[run.best["epoch"]] == pytest.approx(iou)
+
+
+def test_the_network_runs_once_on_a_validation_scan_that_the_rule_is_fitted_to(
+    train: Callable[..., Run], fitted: Fitted, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    once = fitted.run
+    assert fitted.runs_of_the_network == 5  # four epochs, and the sanity check before them
+    write_scenes(tmp_path, validated=3000)
+    # As where batches hold other images than the rule is fitted to.
+    monkeypatch.setattr(torch, "equal", lambda *_: False)
+    again, runs = counted(lambda: train(tmp_path, UNSTATED, SEED))
+    monkeypatch.undo()
+    assert runs == 9
+    assert once.progress.loss == again.progress.loss
+    assert once.progress.iou == again.progress.iou
+    assert_same(once.model.state_dict(), again.model.state_dict())
+
+
+def test_measuring_a_model_leaves_its_rule_as_it_is(
+    fitted: Fitted, make_trainer: MakeTrainer, tmp_path: Path
+) -> None:
+    model, spec = fitted.run.model, fitted.run.model.spec
+    scene(300, seed=9).tofile(tmp_path / "9.bin")
+    data = Folder(str(tmp_path), "wads", validation=["9.bin"])
+    make_trainer(epochs=1).validate(model, data, verbose=False)
+    assert model.spec == spec
+
+
+def test_statistics_are_measured_without_labels(small_grid: dict[str, Any], tmp_path: Path) -> None:
+    model = LiSnowNet(small_grid, width=2)
+    agree_on_task(model, scenes_of(without_labels(write_scenes(tmp_path)), "simulated"))
+    points = np.concatenate([scene(300, seed=number) for number in range(3)]).astype(np.float64)
+    distance = np.linalg.norm(points[:, :3], axis=1)
+    np.testing.assert_allclose(model.spec.mean, (distance.mean(), *points[:, 2:].mean(axis=0)))
+    np.testing.assert_allclose(model.spec.std, (distance.std(), *points[:, 2:].std(axis=0)))
 
 
 def test_a_training_that_broke_off_leaves_nothing_to_the_next(
@@ -428,81 +515,3 @@ def test_a_training_that_broke_off_leaves_nothing_to_the_next(
     model._seen = lambda scan: seen.append(Path(scan.name).name) or look(scan)
     make_trainer(epochs=2).fit(model, second)
     assert seen == ["1.bin"]
-
-
-@pytest.mark.usefixtures("dense")
-def test_the_scores_of_an_epoch_are_those_of_its_checkpoint(
-    train: Callable[..., Run], tmp_path: Path
-) -> None:
-    run = train(rule=UNSTATED, seed=SEED)
-    best = LiSnowNet(**run.best["hyper_parameters"]).eval()
-    best.load_state_dict(run.best["state_dict"])
-    view = best.spec.make_view()(Scan.of(np.fromfile(tmp_path / "3.bin", "<f4").reshape(-1, 4)))
-    with torch.no_grad():
-        logits = best(**{name: torch.from_numpy(array) for name, array in view.inputs().items()})
-    found = view.back(probability_of_rain(logits.numpy())) > best.spec.threshold
-    rain = np.fromfile(tmp_path / "3.label", "<u4") == 110
-    iou = (found & rain).sum() / (found | rain).sum()
-    assert 0 < iou < 1
-    assert run.progress.iou[run.best["epoch"]] == pytest.approx(iou)
-
-
-@pytest.mark.usefixtures("dense")
-def test_the_network_runs_once_on_a_validation_scan_that_the_rule_is_fitted_to(
-    train: Callable[..., Run], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    forward, training = LiSnowNetwork.forward, list[bool]()
-
-    def recorded(network: LiSnowNetwork, *seen: Tensor) -> Tensor:
-        training.append(network.training)
-        return forward(network, *seen)
-
-    monkeypatch.setattr(LiSnowNetwork, "forward", recorded)
-    once = train(rule=UNSTATED, seed=SEED)
-    assert training.count(False) == 5  # four epochs, and the sanity check before them
-    training.clear()
-    # As where batches hold other images than the rule is fitted to.
-    monkeypatch.setattr(torch, "equal", lambda *_: False)
-    again = train(rule=UNSTATED, seed=SEED)
-    monkeypatch.undo()
-    assert training.count(False) == 9
-    assert once.progress.loss == again.progress.loss
-    assert once.progress.iou == again.progress.iou
-    assert_same(once.model.state_dict(), again.model.state_dict())
-
-
-def test_a_stated_residual_is_not_fitted(train: Callable[..., Run]) -> None:
-    assert train().model.selection.residual == LENIENT["residual"]
-
-
-def test_measuring_a_model_leaves_its_rule_as_it_is(
-    train: Callable[..., Run], make_trainer: MakeTrainer, tmp_path: Path
-) -> None:
-    model = train(rule={}).model
-    spec = model.spec
-    scene(300, seed=9).tofile(tmp_path / "9.bin")
-    data = Folder(str(tmp_path), "wads", validation=["9.bin"])
-    make_trainer(epochs=1).validate(model, data, verbose=False)
-    assert model.spec == spec
-
-
-def test_statistics_are_measured_without_labels(train: Callable[..., Run], tmp_path: Path) -> None:
-    for label in tmp_path.glob("*.label"):
-        label.unlink()
-    spec = train(card="simulated").model.spec
-    points = np.concatenate([scene(300, seed=number) for number in range(3)]).astype(np.float64)
-    distance = np.linalg.norm(points[:, :3], axis=1)
-    np.testing.assert_allclose(spec.mean, (distance.mean(), *points[:, 2:].mean(axis=0)))
-    np.testing.assert_allclose(spec.std, (distance.std(), *points[:, 2:].std(axis=0)))
-
-
-def test_the_learning_rate_falls_after_every_epoch(
-    make_trainer: MakeTrainer, small_grid: dict[str, Any], tmp_path: Path
-) -> None:
-    scene(300).tofile(tmp_path / "0.bin")
-    data = Folder(str(tmp_path), "wads", train=["0.bin"])
-    trainer = make_trainer(epochs=3, limit_val_batches=0)
-    trainer.fit(LiSnowNet(small_grid, width=2, learning_rate=0.01, decay=0.5), data)
-    (optimizer,) = trainer.optimizers
-    assert isinstance(optimizer, torch.optim.Adam)
-    assert [group["lr"] for group in optimizer.param_groups] == [pytest.approx(0.01 * 0.5**3)]

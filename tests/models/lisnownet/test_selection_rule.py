@@ -181,28 +181,6 @@ def test_a_residual_is_fitted_to_changes_that_are_all_the_same(value: float) -> 
     assert rule.residual >= 0.001
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_the_threshold_is_that_of_least_variance_within(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    values = np.concatenate([rng.normal(0, 1, 300), rng.normal(rng.uniform(1, 6), 0.7, 200)])
-    threshold = otsu(values.astype(np.float32), bins=64)
-
-    def within(limit: float) -> float:
-        groups = (values[values <= limit], values[values > limit])
-        return sum(len(group) * group.var() for group in groups)
-
-    candidates = np.linspace(values.min(), values.max(), 65)[1:-1]
-    best = min(within(limit) for limit in candidates)
-    # The variances are those of the bins' middles, not of the values themselves.
-    assert within(threshold) == pytest.approx(best, rel=0.01)
-
-
-def test_labels_are_not_looked_at() -> None:
-    scan = Scan.of(scene())
-    labelled = scan.with_label(np.full(len(scan), 110))
-    assert SelectionRule.fitted({}, [labelled]) == SelectionRule.fitted({}, [scan])
-
-
 def test_an_unknown_constant_is_refused_with_the_known_ones() -> None:
     with pytest.raises(InputError, match=r"rule: \['far', 'height'\] are no constants") as error:
         SelectionRule.fitted({"height": 1.0, "near": 2.5, "far": 9.0}, [])
