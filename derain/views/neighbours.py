@@ -191,7 +191,7 @@ class NeighbourView(View):
             InputError: A view that merges points.
         """
         if self.merged:
-            return super().with_candidates(candidates)  # which refuses them
+            super().with_candidates(candidates)  # which refuses them
         return replace(self, candidates=candidates)
 
     def __call__(self, scan: Scan) -> Neighbourhoods:

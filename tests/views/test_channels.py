@@ -136,12 +136,6 @@ def test_places_of_returns_stay_with_them_when_points_are_taken_out_or_turned() 
     np.testing.assert_array_equal(channel_of(part, DUAL_RETURN), expected[rows])
 
 
-def test_candidates_may_be_bounded_by_the_place_of_their_return() -> None:
-    scan = Scan.of(Recording(0).xyz)
-    candidates = Candidates((Bound(DUAL_RETURN, least=0.0),))
-    np.testing.assert_array_equal(candidates.among(scan), ~pair_returns(scan).farther)
-
-
 @given(
     hnp.arrays(np.uint8, st.integers(100, 300)).filter(lambda column: len(np.unique(column)) > 1),
     st.sampled_from([1 / 255, 1.0, 257.0]),
