@@ -29,6 +29,8 @@ from derain.filters import SOR as SOR
 from derain.filters import SSR as SSR
 from derain.filters import FilterDerainer as FilterDerainer
 from derain.models.checkpoint import load_model as load_model
+from derain.models.cues import CuedNetwork as CuedNetwork
+from derain.models.cues import CuedOutDet as CuedOutDet
 from derain.models.lisnownet import LiSnowNet as LiSnowNet
 from derain.models.lisnownet import LiSnowNetwork as LiSnowNetwork
 from derain.models.outdet import OutDet as OutDet

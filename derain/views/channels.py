@@ -79,10 +79,9 @@ def _intensity_rank(scan: Scan) -> NDArray[np.float32] | None:
     if intensity is None:
         return None
     levels, points = np.unique(intensity[scan.valid], return_counts=True)
-    weight = np.sqrt(points)
-    darker = np.cumsum(weight) - weight
-    steps = np.arange(1, INTENSITY_RANKS) / INTENSITY_RANKS * weight.sum()
-    first_level = np.searchsorted(darker, steps)
+    darker = np.append(0, np.cumsum(np.sqrt(points)))  # than each level, and than none
+    steps = np.arange(1, INTENSITY_RANKS) / INTENSITY_RANKS * darker[-1]
+    first_level = np.searchsorted(darker[:-1], steps)
     edges = np.append(levels, np.float32(np.inf))[first_level]
     rank = np.searchsorted(edges, intensity, side="right")
     return (rank / np.float32(INTENSITY_RANKS - 1)).astype(np.float32)

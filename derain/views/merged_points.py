@@ -37,6 +37,8 @@ def merged_points(
         return that each point is, as a row of the former, int64 (M,).
     """
     own, other = _of_one_return(xyz, neighbours, distances)
+    if not len(own):
+        return np.arange(len(rows)), np.arange(len(rows))
     by_row = np.argsort(rows)
     place = np.empty_like(by_row)
     place[by_row] = np.arange(len(rows))
@@ -54,13 +56,14 @@ def _of_one_return(
     xyz: NDArray[np.float32], neighbours: NDArray[np.int64], distances: NDArray[np.float32]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of points and neighbours that are one return, each int64 (P,)."""
+    ranges = np.linalg.norm(xyz.astype(np.float64), axis=1)
     point, place = np.nonzero(distances[:, 1:] <= 2 * RANGE_RESOLUTION)
-    other = neighbours[point, place + 1]
-    one, two = xyz[point].astype(np.float64), xyz[other].astype(np.float64)
-    range_one, range_two = np.linalg.norm(one, axis=1), np.linalg.norm(two, axis=1)
-    aside = np.linalg.norm(np.cross(one, two), axis=1)  # the sine of their angle, by both ranges
-    same = (np.abs(range_one - range_two) <= RANGE_RESOLUTION) & (
-        aside <= SAME_RAY * range_one * range_two
+    other, apart = neighbours[point, place + 1], distances[point, place + 1].astype(np.float64)
+    own, others = ranges[point], ranges[other]
+    farther = others - own
+    # The square of a chord is that of the difference of ranges, and 2 r r' (1 - cos) of the angle.
+    same = (np.abs(farther) <= RANGE_RESOLUTION) & (
+        apart * apart - farther * farther <= SAME_RAY * SAME_RAY * own * others
     )
     same &= point != other  # the farthest point found fills up where there are few
     return point[same], other[same]

@@ -15,15 +15,12 @@ namespace derain {
 constexpr double kRangeResolution = 0.05;
 constexpr double kSameRay = 4e-4;
 
-inline double length_of(const Position& p) { return std::hypot(p[0], p[1], p[2]); }
-
-inline bool are_one_return(const Position& p, const Position& q) {
-  const double range_p = length_of(p);
-  const double range_q = length_of(q);
-  const Position cross{p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2],
-                       p[0] * q[1] - p[1] * q[0]};
-  return std::abs(range_p - range_q) <= kRangeResolution &&
-         length_of(cross) <= kSameRay * range_p * range_q;
+// Whether points at two ranges and so far apart are one return. The square of a chord is that of the
+// difference of ranges, and 2 r r' (1 - cos) of the angle.
+inline bool are_one_return(double range, double other_range, double apart) {
+  const double farther = other_range - range;
+  return std::abs(farther) <= kRangeResolution &&
+         apart * apart - farther * farther <= kSameRay * kSameRay * range * other_range;
 }
 
 // The point that each of M points is one with: that of the lowest row among those that are one
@@ -33,6 +30,11 @@ inline std::vector<std::int64_t> keepers(const std::vector<Position>& positions,
                                          const std::vector<std::int64_t>& neighbours,
                                          const std::vector<float>& distances, std::size_t k) {
   const auto at = [](std::int64_t number) { return static_cast<std::size_t>(number); };
+  std::vector<double> ranges;
+  ranges.reserve(positions.size());
+  for (const Position& p : positions) {
+    ranges.push_back(std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]));
+  }
   std::vector<std::int64_t> keeper(positions.size());
   std::iota(keeper.begin(), keeper.end(), 0);
   const auto lower = [&](std::int64_t& kept, std::int64_t other) {
@@ -41,8 +43,9 @@ inline std::vector<std::int64_t> keepers(const std::vector<Position>& positions,
   for (std::size_t point = 0; point < positions.size(); ++point) {
     for (std::size_t place = 1; place < k; ++place) {
       const std::int64_t other = neighbours[point * k + place];
-      if (distances[point * k + place] > 2 * kRangeResolution) break;
-      if (!are_one_return(positions[point], positions[at(other)])) continue;
+      const float apart = distances[point * k + place];
+      if (apart > 2 * kRangeResolution) break;
+      if (at(other) == point || !are_one_return(ranges[point], ranges[at(other)], apart)) continue;
       lower(keeper[point], other);
       lower(keeper[at(other)], static_cast<std::int64_t>(point));
     }

@@ -44,8 +44,12 @@ def hard_scans() -> dict[str, NDArray[np.float32]]:
     one_intensity[np.isfinite(hard[:, 3]) & (hard[:, 3] >= 0), 3] = 7
     one_intensity = one_intensity[one_intensity[:, 3] == 7]
     unknown[:, 3] = np.nan
+    twice = np.concatenate([scene(500), scene(500)])
+    rays = twice[500:, :3] / np.linalg.norm(twice[500:, :3], axis=1, keepdims=True)
+    twice[500:, :3] += 0.004 * rays
     return {
         "ties, copies, invalid rows": hard,
+        "written twice": np.random.default_rng(4).permutation(twice).astype(np.float32),
         "one intensity": one_intensity,
         "no intensity": unknown,
         "fewer points than neighbours": np.float32([[5, 1, 0, 3], [5, 2, 0, 4], [5, 2, 0, 5]]),

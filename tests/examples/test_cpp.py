@@ -56,6 +56,10 @@ def specs() -> dict[str, Spec]:
     return {
         "circle": image(-180.0, 180.0),
         "sector": image(-20.0, 190.0),
+        "cues": replace(
+            wide(outdet, "x", "y", "z", "intensity_rank"),
+            view={"kind": "neighbours", "neighbours": 9, "merged": True},
+        ),
         "default": default,
         "intensity": outdet,
         "candidates": replace(wide(outdet, "z", "intensity", neighbours=5), candidates=CANDIDATES),
@@ -89,7 +93,7 @@ def same_view(folder: Path, view: ViewedScan) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("default", "intensity", "candidates", "other channels"),
+        *("cues", "default", "intensity", "candidates", "other channels"),
         *("one neighbour", "many neighbours", "circle", "sector"),
     ],
 )
