@@ -48,7 +48,7 @@ def main() -> None:
     worlds = arguments.worlds or out / "worlds"
     first = Stage("world", worlds / "world", 900, 60, 10, 0.005)
     second = Stage("calm", worlds / "calm", 320, 40, 4, 0.002)
-    cues = Stage("world", worlds / "others", 500, 60, 8, 0.005, 7, "cued_outdet_worlds.yaml")
+    cues = Stage("world", worlds / "others", 500, 60, 16, 0.005, 7, "cued_outdet_worlds.yaml")
     trainings, checkpoint = out / "trainings", arguments.geometry
     if checkpoint is None:
         checkpoint = trained(first, trainings / "world", arguments.seed)

@@ -169,7 +169,7 @@ class DerainingModule(MeasuredModule):
         if type(source) is not type(self):
             raise InputError(
                 source.NAME,
-                f"a model of it, from which {self.NAME} cannot start",
+                f"a model of {source.NAME}, from which {self.NAME} cannot start",
                 f"Train {source.NAME}, or give a checkpoint of {self.NAME}.",
             )
         self.load_state_dict(source.state_dict())

@@ -122,7 +122,8 @@ DEPLOYED = (
 
 def test_every_packaged_configuration_is_put_to_the_test() -> None:
     with_tests_of_their_own = {
-        *("lisnownet_rehearse3d.yaml", "outdet_mixture.yaml", "relative_outdet_worlds.yaml")
+        *("lisnownet_rehearse3d.yaml", "outdet_mixture.yaml"),
+        *("cued_outdet_worlds.yaml", "relative_outdet_worlds.yaml"),
     }
     assert packaged_configs().keys() - with_tests_of_their_own == PREPARATIONS.keys()
 

@@ -30,14 +30,17 @@ def test_worlds_are_made_trained_on_and_exported(
         pytest.skip(str(error))
     monkeypatch.chdir(tmp_path)
     Path("small.yaml").write_text(WORLD, "utf-8")
-    succeed(
-        *("fit", "--config", "relative_outdet_worlds.yaml", "--trainer.max_epochs", 1),
+    options = [
         *("--data.root", "worlds", "--data.workers", 1, "--data.loading.workers", 0),
         *("--data.campaign.train", 2, "--data.campaign.validation", 1),
         *("--data.campaign.world", "small.yaml", "--trainer.enable_progress_bar", "false"),
+        *("--trainer.max_epochs", 1, "--trainer.check_val_every_n_epoch", 1),
         *("--panels.scans", 0, "--errors.pictures", 0),
-    )
-    (checkpoint,) = Path("runs").rglob("last.ckpt")
+    ]
+    succeed("fit", "--config", "relative_outdet_worlds.yaml", *options)
+    (geometry,) = Path("runs").rglob("last.ckpt")
+    succeed("fit", "--config", "cued_outdet_worlds.yaml", "--start", geometry, *options)
+    (checkpoint,) = Path("runs/cued_outdet_worlds").rglob("last.ckpt")
     scene(500).tofile("scan.bin")
     # The whole proof has tests of its own.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from torch import Tensor
 
 from derain.models.relative_outdet import RelativeOutDetNetwork
-from derain.models.relative_outdet.network import OF_CARRIER, _without_carrier
+from derain.models.relative_outdet.network import OF_CARRIER, without_carrier
 from derain.models.relative_outdet.steps import USUAL_RANGE
 from derain.views.neighbour_search import NeighbourSearch
 
@@ -45,7 +45,7 @@ def judged(near: int, beyond: int, others: int) -> tuple[Tensor, Tensor]:
     counts = torch.tensor([near, beyond, others])
     before = torch.tensor([DROP, DROP, NO_DROP]).repeat_interleave(counts)
     ranges = torch.tensor([1.0, 4.0, 20.0]).repeat_interleave(counts)
-    return before, _without_carrier(before, torch.log(ranges / USUAL_RANGE))
+    return before, without_carrier(before, torch.log(ranges / USUAL_RANGE))
 
 
 @pytest.mark.parametrize("near", [5, 60, 3000])
@@ -72,7 +72,7 @@ def test_dense_near_rain_stays_where_a_share_of_the_scan_is_rain_beyond() -> Non
 @given(st.lists(st.tuples(st.floats(-30, 30), st.floats(0.05, 200)), max_size=30))
 def test_nothing_is_added_and_what_is_no_carrier_stays(points: list[tuple[float, float]]) -> None:
     before, ranges = torch.tensor(points).reshape(-1, 2).unbind(1)
-    after = _without_carrier(before, torch.log(ranges / USUAL_RANGE))
+    after = without_carrier(before, torch.log(ranges / USUAL_RANGE))
     assert torch.isfinite(after).all()
     assert (after <= before).all()
     farther = ranges > 1.001 * OF_CARRIER
