@@ -12,7 +12,11 @@ from derain.models.base import DerainingModule
 from derain.models.cues.network import AROUND, CuedNetwork
 from derain.models.registry import NETWORKS
 from derain.models.relative_outdet.module import RelativeOutDet
-from derain.models.relative_outdet.network import both_logits, without_carrier
+from derain.models.relative_outdet.network import (
+    RelativeOutDetNetwork,
+    both_logits,
+    without_carrier,
+)
 from derain.views.channels import INTENSITY_RANK
 
 
@@ -78,7 +82,8 @@ class CuedOutDet(RelativeOutDet):
                 "neighbours", f"{neighbours} are too few", f"Give {AROUND + 1} or more."
             )
         self.save_hyperparameters()
-        self.network = CuedNetwork(self.network, fusion)
+        geometry = RelativeOutDetNetwork(neighbours, width, of_neighbour, opinion, context)
+        self.network = CuedNetwork(geometry, fusion)
         self.adopt(spec)
 
     def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
