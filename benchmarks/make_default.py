@@ -3,14 +3,16 @@
     python -m benchmarks.make_default --out made
     python -m benchmarks.make_default --out made --clean clean/    # counts clean scans, too
     python -m benchmarks.make_default --out made1 --seed 1 --worlds made/worlds
-    python -m benchmarks.make_default --out made2 --geometry geometry.ckpt       # its cues alone
+    python -m benchmarks.make_default --out cues --cues made/model.ckpt --clean clean/
 
-Geometry is trained on one world and then, at a lower rate, on a calm one, in which whatever lies
-alone right before the sensor is of its carrier. The fusion of cues is trained on top of it, on
-other scans of the first world. Leaves ``model.onnx`` and ``model.ckpt`` in the folder, and the
-table that the threshold was chosen by. That is the one of highest IoU over scans of the last stage
-that were held out, raised until no clean scan that is given loses more than MOST_TAKEN, as long as
-that costs no more than MOST_LOST of the IoU. No label of a real scan is read.
+It is trained on one world and then, at a lower rate, on a calm one, in which whatever lies alone
+right before the sensor is of its carrier. With ``--cues`` there is one training, of the network of
+cues on a geometry that has been trained, on other scans of the first world; the model that comes
+with derain is not made so. Leaves ``model.onnx`` and ``model.ckpt`` in the folder, and the table
+that the threshold was chosen by. That is the one of highest IoU over scans of the first world that
+were held out, raised until no clean scan that is given loses more than MOST_TAKEN (with cues,
+MOST_TAKEN_BY_CUES), as long as that costs no more than MOST_LOST of the IoU. No label of a real
+scan is read.
 """
 
 import argparse
@@ -36,7 +38,7 @@ from derain.sources.folders import named_frames
 THRESHOLDS = tuple(np.round(np.arange(0.3, 0.951, 0.05), 2).tolist())
 
 # Share of a clean scan that may be taken, and of the highest IoU that may be given for it.
-MOST_TAKEN = 3e-4
+MOST_TAKEN, MOST_TAKEN_BY_CUES = 1e-3, 3e-4
 MOST_LOST = 0.02
 
 
@@ -49,18 +51,19 @@ def main() -> None:
     first = Stage("world", worlds / "world", 900, 60, 10, 0.005)
     second = Stage("calm", worlds / "calm", 320, 40, 4, 0.002)
     cues = Stage("world", worlds / "others", 500, 60, 16, 0.005, 7, "cued_outdet_worlds.yaml")
-    trainings, checkpoint = out / "trainings", arguments.geometry
-    if checkpoint is None:
+    trainings = out / "trainings"
+    if arguments.cues is None:
         checkpoint = trained(first, trainings / "world", arguments.seed)
         checkpoint = trained(second, trainings / "calm", arguments.seed, start=checkpoint)
-    checkpoint = trained(cues, trainings / "cues", arguments.seed, start=checkpoint)
+    else:
+        checkpoint = trained(cues, trainings / "cues", arguments.seed, start=arguments.cues)
     unchosen = out / "unchosen.onnx"
     model = load_model(checkpoint)
     export(model, unchosen)
     derainer = Derainer(str(unchosen))
-    iou = _iou(derainer, _held_out(cues))
+    iou = _iou(derainer, _held_out(cues if arguments.cues else first))
     taken = {Path(scan.name).name: _taken(derainer, scan) for scan in _scans(arguments.clean)}
-    threshold = chosen(iou, taken)
+    threshold = chosen(iou, taken, MOST_TAKEN_BY_CUES if arguments.cues else MOST_TAKEN)
     # Both worlds are simulated: what it was started from has the same licence.
     licence = load_card("simulated").licence
     spec = replace(model.spec, threshold=threshold, licence=licence)
@@ -76,16 +79,21 @@ def main() -> None:
     print(table)
 
 
-def chosen(iou: Mapping[float, float], taken: Mapping[str, Mapping[float, float]]) -> float:
+def chosen(
+    iou: Mapping[float, float],
+    taken: Mapping[str, Mapping[float, float]],
+    most_taken: float = MOST_TAKEN,
+) -> float:
     """The threshold of highest IoU, raised as far as clean scans ask, and no farther than it may.
 
     Args:
         iou: IoU over worlds held out, by threshold.
         taken: Of each clean scan the share of its points called rain, by threshold.
+        most_taken: Share of a clean scan that may be taken.
     """
     best = max(sorted(iou), key=lambda threshold: iou[threshold])
     possible = [t for t in sorted(iou) if t >= best and iou[t] >= iou[best] - MOST_LOST]
-    clean = [t for t in possible if all(of[t] <= MOST_TAKEN for of in taken.values())]
+    clean = [t for t in possible if all(of[t] <= most_taken for of in taken.values())]
     return clean[0] if clean else possible[-1]
 
 
@@ -143,7 +151,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument("--worlds", type=Path, help="worlds that are there (default: OUT/worlds)")
     parser.add_argument("--seed", type=int, default=0, help="of the training")
-    parser.add_argument("--geometry", type=Path, help="geometry that has been trained")
+    parser.add_argument("--cues", type=Path, help="train cues on this checkpoint's geometry")
     parser.add_argument("--clean", type=Path, nargs="*", default=[], help="clean scans")
     return parser
 
