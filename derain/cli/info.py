@@ -158,7 +158,7 @@ def _describe_default(as_json: bool) -> None:
     if os.path.exists(DEFAULT):
         raise InputError(
             DEFAULT,
-            "it is the model that comes with derain, and something here is called so too",
+            "it is the model that comes with derain, and a file or folder here has its name",
             f"Write ./{DEFAULT} for that, or ask from another folder.",
         )
     model, card = default_model(), model_card()

@@ -64,7 +64,7 @@ def method_and_scans(first: str, others: list[Path], command: str) -> tuple[str,
     if there and not _is_method_file(first):
         raise InputError(
             first,
-            "it is a method's name, and something here is called so too",
+            "it is a method's name, and a file or folder here has it, too",
             f"Write ./{first} to have that cleaned by the model that comes with derain, or "
             f"{beside} to clean others by the method.",
         )

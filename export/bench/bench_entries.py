@@ -123,7 +123,9 @@ def bench_entries(
     for title in titles:
         if titles.count(title) > 1:
             raise InputError(
-                title, "two methods are called so", "Give titles, as in `first=a.onnx second=dror`."
+                title,
+                "it is the title of two methods",
+                "Give titles, as in `first=a.onnx second=dror`.",
             )
     return rows
 

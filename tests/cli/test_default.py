@@ -84,7 +84,7 @@ def test_a_method_that_is_named_is_the_one_that_cleans(
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (["crf"], "crf: it is a method's name, and something here is called so too. Write ./crf"),
+        (["crf"], "crf: it is a method's name, and a file or folder here has it, too. Write ./crf"),
         (["dror"], "dror: it is a method, and no scans are named. Write `derain run dror SCANS"),
         (["default"], "default: it is a method, and no scans are named"),
         (["m.onnx"], "m.onnx: it is a method, and no scans are named"),
@@ -142,7 +142,7 @@ def test_a_folder_of_its_name_makes_it_unclear_what_is_asked(
 ) -> None:
     (here / "default").mkdir()
     line = refused("info", "default")
-    assert "default: it is the model that comes with derain, and something here" in line
+    assert "default: it is the model that comes with derain, and a file or folder here" in line
     scene(50).tofile(here / "default" / "0.bin")
     assert run_derain("info", here / "default").code == 0
     assert run_derain("info", "./default").code == 0

@@ -107,6 +107,12 @@ def test_uneven_rain_has_the_drops_of_the_rate_where_they_fall() -> None:
         assert kstest(kept.diameter[inside], diameters.cdf).pvalue > 1e-3
 
 
+def test_where_it_does_not_rain_no_drop_stays() -> None:
+    beams = np.array([[1.0, 0, 0], [-1.0, 0, 0]])  # the ramp starts at the sensor
+    drops = Drops(np.array([0, 1]), np.array([13.0, 13.0]), np.array([1.0, 1.0]))
+    assert thin_out(drops, beams, Ramp(), np.random.default_rng(7)).beam.tolist() == [0]
+
+
 def test_a_drop_returns_with_the_fourth_power_of_distance_until_it_fills_the_beam() -> None:
     def power(distance: float) -> float:
         return float(drop_reflectivity(drop_at(distance, 3.0), CONE)[0]) / distance**2

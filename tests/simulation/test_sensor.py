@@ -37,6 +37,13 @@ def test_beams_are_unit_vectors_over_the_field_of_view_from_top_left_to_bottom_r
     assert np.allclose(inclination, np.linspace(7.5, -17.5, SENSOR.rows)[:, None])
 
 
+def test_the_volume_of_a_beam_is_the_integral_over_its_cross_section() -> None:
+    distance = np.linspace(2, 50, 100_001)
+    radius = distance * math.tan(SENSOR.beam_divergence / 2)
+    integral = np.trapezoid(np.pi * radius**2, distance)
+    assert SENSOR.beam_volume(np.array([2.0]), np.array([50.0])) == pytest.approx(integral)
+
+
 def test_a_full_circle_holds_no_direction_twice() -> None:
     sensor = replace(SENSOR, azimuth=(-180, 180), rows=1, columns=8)
     x, y, _ = sensor.beams().T
@@ -150,6 +157,15 @@ def test_a_scan_holds_the_beams_that_returned_in_their_order() -> None:
     assert (scan.label == given.label[given.returned]).all()
     direction = scan.xyz / np.linalg.norm(scan.xyz, axis=1, keepdims=True)
     assert np.allclose(direction, SENSOR.beams()[given.returned], atol=1e-6)
+
+
+def test_two_returns_of_a_beam_lie_along_it() -> None:
+    beam = np.array([3, 3, 7])
+    given = Returns(np.array([5.0, 60, 10]), np.full(3, 0.5), np.array([3, 1, 7]), beam)
+    scan = SENSOR.measure(given, np.random.default_rng(0))
+    assert np.allclose(scan.xyz / scan.range[:, None], SENSOR.beams()[beam], atol=1e-6)
+    assert scan.label is not None
+    assert scan.label.tolist() == [3, 1, 7]
 
 
 def test_measured_distance_and_intensity_scatter_as_stated() -> None:

@@ -76,8 +76,8 @@ def test_baselines_learn_from_the_scans_that_are_given() -> None:
         (["nothing"], "nothing: no such file"),
         (["absent.onnx"], "absent.onnx: no such file"),
         (["position"], "position: it has no scans to learn from. Give --train"),
-        (["dror", "dror"], "dror: two methods are called so"),
-        (["x=dror", "x=none"], "x: two methods are called so"),
+        (["dror", "dror"], "dror: it is the title of two methods"),
+        (["x=dror", "x=none"], "x: it is the title of two methods"),
     ],
 )
 def test_a_method_that_cannot_be_used_is_refused(names: list[str], reason: str) -> None:
