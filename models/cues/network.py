@@ -10,13 +10,13 @@ from derain.models.relative_outdet.network import RelativeOutDetNetwork, both_lo
 # Log-odds beyond this are as good as certain.
 CERTAIN = 12.0
 
-# Points of lower log-odds by geometry, less than one in a hundred and fifty, are left as they are:
-# hardly any of them is rain, and three of four points need not be looked at again.
-# Source: modelling choice; of simulated streets' rain .1 % lies below.
+# Points of lower log-odds by geometry, that is of a probability below 1 in 150, keep its answer:
+# hardly any of them is rain, and most points of a scan need not be weighed.
+# Source: modelling choice.
 DOUBTFUL = -5.0
 
-# Neighbours that the fusion hears of, the point itself not counted, and those whose distances it is
-# given.
+# Neighbours whose cues the fusion weighs, the point itself not counted, and those of them whose
+# distances it weighs.
 AROUND = 8
 APART = (1, 3, AROUND)
 
@@ -77,7 +77,7 @@ class CuedNetwork(nn.Module):
     ) -> list[Tensor]:
         """Log-odds of rain after each round, float (M,).
 
-        No round changes what it is given by the one before it: gradients end there.
+        Gradients do not pass from one round to the one before it.
 
         Args:
             rain: Log-odds of rain by geometry, float (M,).
@@ -113,7 +113,7 @@ class Cues:
         points: x, y, z in metres, in the sensor's frame, and the rank of intensity, float (M, 4).
         distances: Distances to the neighbours in metres, float (M, k), ascending.
         neighbours: The point itself, then its neighbours, as rows of ``points``, int64 (M, k).
-        rows: Those that are asked about, int64 (S,).
+        rows: Points that are weighed, int64 (S,).
     """
 
     def __init__(self, points: Tensor, distances: Tensor, neighbours: Tensor, rows: Tensor) -> None:
@@ -134,7 +134,7 @@ class Cues:
         self._rows = rows
 
     def around(self, rain: Tensor) -> Tensor:
-        """What the cues give of each point asked about and of its neighbours, float (S, NUMBERS).
+        """The cues of each point that is weighed and of its neighbours, float (S, NUMBERS).
 
         Args:
             rain: Log-odds of rain, float (M,), which calibrate the cue of brightness.
@@ -145,13 +145,13 @@ class Cues:
         first = self._histograms.brightness(rows, own.sigmoid())
         first_odds = first.log_odds[cell[rows]]
         second = self._histograms.brightness(rows, (own + SHARE_ADDED * first_odds).sigmoid())
-        told = torch.stack([rain / 4, second.log_odds[cell] / 2, rain.sigmoid()], dim=1)
-        of_neighbours = functional.embedding(self._neighbours, told)
+        given = torch.stack([rain / 4, second.log_odds[cell] / 2, rain.sigmoid()], dim=1)
+        of_neighbours = functional.embedding(self._neighbours, given)
         of_shell = torch.stack([torch.log1p(second.rain) / 4, second.separation, second.share], 1)
         of_scan = torch.log1p(own.sigmoid().double().sum()).to(rain.dtype) / 4
         return torch.cat(
             [
-                told[rows][:, :2],
+                given[rows][:, :2],
                 (first_odds / 2)[:, None],
                 of_neighbours.mean(dim=1),
                 of_neighbours[:, :, :2].amax(dim=1),
