@@ -36,9 +36,16 @@ class BestCheckpoint(ModelCheckpoint):
     _earlier: Mapping[str, Any] | None = None  # state of the run that this one goes on from
 
     def setup(self, trainer: lightning.Trainer, pl_module: Any, stage: str) -> None:
-        """Takes the monitor's current name for the one in a configuration of an earlier version."""
+        """Takes the monitor's current name for the one in a configuration of an earlier version.
+
+        A training of fewer epochs than there are between two validations ends with one: without,
+        nothing of it would be kept.
+        """
         if self.monitor is not None:
             self.monitor = current_monitor(self.monitor)
+        epochs, between = trainer.max_epochs, trainer.check_val_every_n_epoch
+        if epochs is not None and between is not None and 0 < epochs < between:
+            trainer.check_val_every_n_epoch = epochs
         super().setup(trainer, pl_module, stage)
 
     @property

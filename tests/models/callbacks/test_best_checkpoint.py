@@ -210,3 +210,27 @@ def test_only_the_first_process_copies(fit: Fit, tmp_path: Path, first: bool) ->
     assert (tmp_path / "second/best.ckpt").exists() == first
     assert (best.best_model_score, best.kth_value) == (3, 3)
     assert best.best_model_path == str(tmp_path / "second/best.ckpt")
+
+
+@pytest.mark.parametrize(("epochs", "validations"), [(1, 1), (3, 1), (4, 1), (9, 2)])
+def test_a_training_too_short_for_a_validation_ends_with_one(
+    make_trainer: MakeTrainer, tmp_path: Path, epochs: int, validations: int
+) -> None:
+    class Validated(Counter):
+        validated = 0
+
+        def validation_step(self, batch: Tensor) -> None:
+            self.validated += 1
+
+    model = Validated((1.0,) * epochs)
+    trainer = make_trainer(
+        epochs,
+        callbacks=[BestCheckpoint(tmp_path, monitor="score")],
+        enable_checkpointing=True,
+        check_val_every_n_epoch=4,
+        num_sanity_val_steps=0,
+    )
+    data = torch.utils.data.DataLoader(torch.ones(1))
+    trainer.fit(model, data, data)
+    assert model.validated == validations
+    assert list(tmp_path.glob("*.ckpt"))
