@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.scan import Scan
-from derain.views.channels import INTENSITY_RANK
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
 
 # Levels that intensities are cut to, where they are.
@@ -36,8 +35,6 @@ class Augmentation:
         sector_probability: Share of scans of which only a sector is kept, so that a batch of as
             many points holds more scans.
         sector: Width of the sector, degrees.
-        shift_probability: Share of scans whose sensor is moved aside, as in a vehicle's frame.
-        shift: How far it is moved at most along x and along y, metres.
         brightness_probability: Share of scans whose intensities are made all alike, inverted, or
             cut to a few levels: on another sensor, brightness means something else.
 
@@ -53,16 +50,13 @@ class Augmentation:
     dropping: float = 0.5
     sector_probability: float = 0.0
     sector: float = 90.0
-    shift_probability: float = 0.0
-    shift: float = 3.0
     brightness_probability: float = 0.0
 
     @property
     def changes_anything(self) -> bool:
         """Whether any scan is changed."""
         of_points = self.jitter_probability, self.dropping_probability, self.sector_probability
-        of_sensor = self.shift_probability, self.brightness_probability
-        return max(*of_points, *of_sensor) > 0 or self.moves_the_sensor
+        return max(*of_points, self.brightness_probability) > 0 or self.moves_the_sensor
 
     @property
     def moves_the_sensor(self) -> bool:
@@ -90,9 +84,6 @@ class Augmentation:
             moved = moved + generator.normal(0, self.jitter, moved.shape).astype(np.float32)
         if generator.random() < self.mirror_probability:
             moved = moved @ _mirror(0.0 if sees_all_around else math.radians(left + right) / 2)
-        if self.shift_probability and generator.random() < self.shift_probability:
-            aside = generator.uniform(-self.shift, self.shift, 2)
-            moved = moved - np.array([*aside, 0], np.float32)
         xyz = scan.xyz.copy()
         xyz[valid] = moved
         changed = replace(scan, xyz=xyz)
@@ -107,10 +98,7 @@ class Augmentation:
 
 
 def _other_brightness(scan: Scan, generator: np.random.Generator) -> Scan:
-    """The scan with intensities that are alike, inverted, or of a few levels.
-
-    What its columns hold of ranks is computed anew from them.
-    """
+    """The scan with intensities that are alike, inverted, or of a few levels."""
     if scan.intensity is None:
         return scan
     change = generator.integers(3)
@@ -122,8 +110,7 @@ def _other_brightness(scan: Scan, generator: np.random.Generator) -> Scan:
     else:
         levels = np.sort(generator.choice(known, FEW_LEVELS - 1))
         intensity = np.searchsorted(levels, scan.intensity).astype(np.float32)
-    fields = {name: column for name, column in scan.fields.items() if name != INTENSITY_RANK}
-    return replace(scan, intensity=intensity, fields=fields)
+    return replace(scan, intensity=intensity)
 
 
 def _sector(scan: Scan, width: float, generator: np.random.Generator) -> Scan:

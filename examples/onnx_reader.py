@@ -44,7 +44,8 @@ class Model:
         self.spec: Spec = known["spec"]
         if not is_as_exported(Path(path).read_bytes(), known):
             raise SystemExit(f"{path}: its checksum differs or is missing")
-        if self.spec.get("schema", 1) > 1 or "dual_return" in self.spec["channels"]:
+        unknown = {"dual_return", "intensity_rank"} & {*self.spec["channels"]}
+        if self.spec.get("schema", 1) > 1 or unknown or self.spec["view"].get("merged"):
             raise SystemExit(f"{path}: its Spec asks for what this reader does not know")
         self.judge = {"neighbours": self._by_neighbours, "range": self._by_image}[
             self.spec["view"]["kind"]

@@ -68,6 +68,7 @@ _LIMITS: dict[str, Callable[[Entry], object]] = {
     "weight_decay": _number(0),
     "decay": _number(0),
     "balance": _number(0),
+    "geometry_share": _number(0),
     "warm_up": _number(0),
     "momentum": _number(0, 1),
     "dropout": _number(0, 1),

@@ -88,8 +88,12 @@ def _intensity_rank(scan: Scan) -> NDArray[np.float32] | None:
 
 
 def with_columns(scan: Scan, channels: Sequence[str]) -> Scan:
-    """The same scan with nothing in `fields` but some channels, float32, where it has them."""
-    columns = {name: channel_of(scan, name) for name in channels}
+    """The same scan with nothing in `fields` but some channels, float32, where it has them.
+
+    Ranks of intensity are left out: they are of the points that a scan has when it is viewed, of
+    which training may drop some before.
+    """
+    columns = {name: channel_of(scan, name) for name in channels if name != INTENSITY_RANK}
     present = {name: column for name, column in columns.items() if column is not None}
     return replace(scan, fields=present)
 

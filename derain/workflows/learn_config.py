@@ -137,9 +137,11 @@ def without_intensity(config: LearnConfig) -> LearnConfig:
     Raises:
         InputError: A start that sees intensity, other than by ranks, which may all be alike.
     """
-    if config.model == "cued_outdet":
-        return config
     if config.start is not None:
+        from derain.models.checkpoint import load_model
+
+        if "intensity" not in load_model(checkpoint_of(config.start)).spec.channels:
+            return config
         raise InputError(
             config.recordings[0],
             f"has no intensities, which {config.start} sees",

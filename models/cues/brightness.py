@@ -14,7 +14,8 @@ from torch import Tensor
 from derain.views.channels import INTENSITY_RANKS
 
 # Shells around the sensor, in which rain and the rest are counted apart: equal steps of the
-# logarithm of range between these, metres. What is nearer or farther is counted in the last shell.
+# logarithm of range between these, metres. What is nearer is counted in the first, what is farther
+# in the last.
 # Source: modelling choice, as are the two constants below.
 SHELLS, NEAREST, FARTHEST = 11, 1.0, 60.0
 

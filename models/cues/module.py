@@ -1,6 +1,6 @@
 """Cues: what geometry and brightness each know of a point, weighed by one fusion."""
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import torch
 from torch import Tensor
@@ -82,17 +82,9 @@ class CuedOutDet(RelativeOutDet):
                 "neighbours", f"{neighbours} are too few", f"Give {AROUND + 1} or more."
             )
         self.save_hyperparameters()
-        geometry = RelativeOutDetNetwork(neighbours, width, of_neighbour, opinion, context)
+        geometry = cast(RelativeOutDetNetwork, self.network)
         self.network = CuedNetwork(geometry, fusion)
         self.adopt(spec)
-
-    def forward(self, points: Tensor, distances: Tensor, neighbours: Tensor) -> Tensor:
-        """Logits, float (M, 2), of one scan; arguments as for :class:`CuedNetwork`."""
-        return self.network(points, distances, neighbours)
-
-    def deployed(self) -> CuedNetwork:
-        """The network as it is exported."""
-        return self.network
 
     def begin_from(self, source: DerainingModule) -> None:
         """Takes over the weights of a trained model, or of its geometry from one that has no more.
@@ -108,9 +100,13 @@ class CuedOutDet(RelativeOutDet):
     def losses(self, batch: Batch) -> tuple[dict[str, Tensor], Tensor]:
         """Loss of geometry and of the rounds of the fusion, and the logits of the last round."""
         assert batch.target is not None  # the data modules pair these scans with labels
+        geometry_learns = self.hparams["geometry_share"] > 0
         seen, answers = [], []
         for points, distances, neighbours in self.scans_of(batch):
-            rain, far = self.network.geometry.rain_and_range(points[:, :3], distances, neighbours)
+            with torch.set_grad_enabled(torch.is_grad_enabled() and geometry_learns):
+                rain, far = self.network.geometry.rain_and_range(
+                    points[:, :3], distances, neighbours
+                )
             given = without_carrier(rain, far).detach()
             seen.append(rain)
             answers.append(
@@ -120,7 +116,7 @@ class CuedOutDet(RelativeOutDet):
         target = batch.target[:, None].expand_as(of_rounds).to(of_rounds.dtype)
         fusion = functional.binary_cross_entropy_with_logits(of_rounds, target)
         geometry = self.segmentation_loss(both_logits(torch.cat(seen)), batch.target).total
-        loss = fusion if self.hparams["geometry_share"] == 0 else fusion + geometry
+        loss = fusion + geometry if geometry_learns else fusion
         losses = {"loss": loss, "geometry": geometry, "fusion": fusion}
         return losses, both_logits(of_rounds[:, -1])
 

@@ -6,6 +6,7 @@ from torch.nn import functional
 
 from derain.models.cues.brightness import Histograms
 from derain.models.relative_outdet.network import RelativeOutDetNetwork, both_logits
+from derain.models.relative_outdet.steps import NEAREST_POINT
 
 # Log-odds beyond this are as good as certain.
 CERTAIN = 12.0
@@ -20,8 +21,7 @@ DOUBTFUL = -5.0
 AROUND = 8
 APART = (1, 3, AROUND)
 
-# Ranges below this, metres, are not told apart; nor are distances below this share of the range.
-NEAREST_POINT = 0.05
+# Distances below this share of the range are not told apart.
 NEAREST_APART = 1e-4
 
 # How much of the cue of brightness is added to calibrate it once more.

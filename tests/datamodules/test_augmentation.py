@@ -12,6 +12,7 @@ from derain.datamodules.augmentation import Augmentation
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.files import read_scan
 from derain.scan import Scan
+from derain.views.channels import INTENSITY_RANK, channel_of, with_columns
 from derain.views.grid_fit import fit_grid
 from derain.views.range_image import RangeView
 
@@ -162,3 +163,31 @@ def test_a_sector_is_all_that_there_is_between_two_azimuths(seed: int) -> None:
 def test_a_sector_of_nothing_is_nothing() -> None:
     nothing = Scan.of(np.full((3, 4), np.nan))
     assert len(SECTOR(nothing, np.random.default_rng(0))) == 3
+
+
+def test_other_intensities_are_alike_inverted_or_of_few_levels_and_all_else_stays() -> None:
+    scan, seen = street(), set()
+    change = Augmentation(0, 0, brightness_probability=1)
+    for seed in range(12):
+        changed = change(scan, np.random.default_rng(seed))
+        np.testing.assert_array_equal(changed.xyz, scan.xyz)
+        np.testing.assert_array_equal(changed.label, scan.label)
+        order = np.argsort(scan.intensity)
+        steps = np.diff(changed.intensity[order])
+        if not steps.any():
+            seen.add("alike")
+        elif (steps <= 0).all():
+            seen.add("inverted")
+        else:
+            assert (steps >= 0).all()
+            assert len(np.unique(changed.intensity)) <= 7
+            seen.add("few levels")
+    assert seen == {"alike", "inverted", "few levels"}
+
+
+def test_ranks_of_intensity_are_of_the_points_that_are_left() -> None:
+    scan = with_columns(street(), [INTENSITY_RANK])
+    left = DROP(scan, np.random.default_rng(1))
+    anew = Scan(left.xyz, intensity=left.intensity)
+    ranks = [channel_of(one, INTENSITY_RANK) for one in (left, anew)]
+    np.testing.assert_array_equal(*ranks)

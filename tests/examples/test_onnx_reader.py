@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import onnx
@@ -81,6 +82,25 @@ def test_it_carries_scores_of_pixels_back_in_every_way(
         changed = replace(spec, view=view, candidates=bounds)
         (tmp_path / "changed.onnx").write_bytes(with_metadata(proto, {"spec": changed.as_dict()}))
         agree(reader, tmp_path / "changed.onnx", np.concatenate([hard_points(), scene(800)]))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"channels": ("x", "y", "intensity_rank")},
+        {"channels": ("x", "y", "dual_return")},
+        {"view": {"kind": "neighbours", "neighbours": 9, "merged": True}},
+    ],
+    ids=["ranks", "returns", "merged points"],
+)
+def test_what_it_does_not_know_is_refused(
+    reader: ModuleType, tmp_path: Path, change: dict[str, Any]
+) -> None:
+    spec = replace(Derainer(default_model(), threads=1).spec, **change)
+    model = with_metadata(onnx.load(default_model()), {"spec": spec.as_dict()})
+    (tmp_path / "model.onnx").write_bytes(model)
+    with pytest.raises(SystemExit, match="asks for what this reader does not know"):
+        reader.Model(str(tmp_path / "model.onnx"))
 
 
 @pytest.mark.parametrize("text", [b'"numpy"', b'"sha256"'], ids=["versions", "checksum"])
