@@ -1,6 +1,6 @@
-"""Writing a file whole or not at all, and the temporary files that this takes.
+"""Writing a file whole or not at all, and the temporary folders that this takes.
 
-The next run removes the temporary files of one that was killed: each is locked, and the system
+The next run removes the temporary folder of one that was killed: each is locked, and the system
 releases the lock when the process dies.
 """
 
@@ -8,7 +8,7 @@ import errno
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -17,19 +17,15 @@ from derain.errors import InputError
 
 PREFIX = ".derain-"
 
-# No format has a longer one; what follows the last point of a long name is none, and the temporary
-# name must not be longer than a name may be.
-LONGEST_SUFFIX = 16
-
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Lends a temporary file that takes the place of `path` when the block ends well.
+    """Lends the path of a temporary file that takes the place of `path` when the block ends well.
 
-    Until then `path` stays as it was; after an error the temporary file is gone. It is hidden, has
-    the same suffix where that may be one of a format, and lies in the same folder, which is created
-    if missing. What a killed process leaves there goes when the next one writes to the folder. A
-    file that is replaced passes on its permissions, and a symbolic link leads to the new file.
+    Until then `path` stays as it was; after an error the temporary file is gone. It has the same
+    name, in a hidden folder beside `path`, whose own folder is created if missing. What a killed
+    process leaves there goes when the next one writes to the folder. A file that is replaced passes
+    on its permissions, and a symbolic link leads to the new file.
 
     Nothing is synchronised to the disk: a process that is killed leaves no half-written file, but a
     machine that loses its power may.
@@ -38,7 +34,7 @@ def replacing(path: Path) -> Iterator[Path]:
         path: The file to write.
 
     Yields:
-        The temporary file, empty.
+        Where the block writes the file.
 
     Raises:
         InputError: `path` cannot be written: it is a folder or a device, its folder is not
@@ -48,8 +44,8 @@ def replacing(path: Path) -> Iterator[Path]:
         if path.exists() and not path.is_file():
             raise InputError(path, "is not a file that can be replaced", "Name a file to write.")
         target = Path(os.path.realpath(path))
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with _temporary_beside(target) as temporary:
+        with temporary_folder(target.parent) as folder:
+            temporary = folder / target.name
             yield temporary
             if target.exists():
                 shutil.copymode(target, temporary)
@@ -75,7 +71,8 @@ def require_writable(path: Path) -> None:
     Raises:
         InputError: It cannot be written.
     """
-    with suppress(_OnlyTried), replacing(path):
+    with suppress(_OnlyTried), replacing(path) as temporary:
+        temporary.touch()
         raise _OnlyTried
 
 
@@ -84,34 +81,11 @@ class _OnlyTried(Exception):  # noqa: N818, it signals no error
 
 
 @contextmanager
-def _temporary_beside(path: Path) -> Iterator[Path]:
-    """Lends an empty hidden file in the folder of another, with its suffix if a format may have it.
-
-    It is gone when the block ends. A process that is killed leaves it; it holds a lock that goes
-    with the process, so that others can tell.
-
-    Args:
-        path: The other file, which need not exist.
-
-    Raises:
-        OSError: The folder cannot be written.
-    """
-    remove_abandoned(path.parent)
-    suffix = path.suffix if len(os.fsencode(path.suffix)) <= LONGEST_SUFFIX else ""
-    temporary = path.with_name(f"{PREFIX}{secrets.token_hex(8)}{suffix}")
-    try:
-        with _holding(temporary, _made_file):
-            yield temporary
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-@contextmanager
 def temporary_folder(folder: Path) -> Iterator[Path]:
     """Lends an empty hidden folder in another, which is made if missing.
 
     It is gone when the block ends in this process, with what is in it then; a fork of the process
-    leaves it. A process that is killed leaves it; it is locked, so that others can tell.
+    leaves it. A process that is killed leaves it for :func:`remove_abandoned`.
 
     Args:
         folder: The other folder.
@@ -122,44 +96,34 @@ def temporary_folder(folder: Path) -> Iterator[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     remove_abandoned(folder)
     temporary = folder / f"{PREFIX}{secrets.token_hex(8)}"
-    process = os.getpid()
+    process, descriptor = os.getpid(), _make_locked(temporary)
     try:
-        with _holding(temporary, _made_folder):
-            yield temporary
+        yield temporary
     finally:
         if os.getpid() == process:
             shutil.rmtree(temporary, ignore_errors=True)
+        if descriptor is not None:
+            os.close(descriptor)
 
 
-@contextmanager
-def _holding(path: Path, make: Callable[[Path], int]) -> Iterator[None]:
-    """Makes a file or a folder, and keeps it locked inside the ``with`` block."""
-    while not _locked(descriptor := make(path)):
-        os.close(descriptor)
-    try:
-        yield
-    finally:
-        os.close(descriptor)
+def _make_locked(folder: Path) -> int | None:
+    """Makes a folder, and returns the descriptor that holds its lock.
 
-
-def _made_file(file: Path) -> int:
-    return os.open(file, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
-
-
-def _made_folder(folder: Path) -> int:
+    None where no folder can be opened, and so none is taken for abandoned.
+    """
     while True:
         folder.mkdir()
-        with suppress(FileNotFoundError):  # another process removed it as abandoned
-            return os.open(folder, os.O_RDONLY)
-
-
-def _locked(descriptor: int) -> bool:
-    """Locks a new file or folder; False where another process removed it before as abandoned."""
-    try:
-        lock(descriptor, wait=True)
-    except OSError:  # a file system without locks, where no process removes anything
-        return True
-    return os.fstat(descriptor).st_nlink > 0
+        try:
+            descriptor = os.open(folder, os.O_RDONLY)
+        except FileNotFoundError:  # another process has removed it as abandoned
+            continue
+        except PermissionError:  # Windows opens no folders
+            return None
+        with suppress(OSError):  # a file system without locks
+            lock(descriptor, wait=True)
+        if os.fstat(descriptor).st_nlink > 0:
+            return descriptor
+        os.close(descriptor)  # removed as abandoned before the lock
 
 
 @cache
@@ -169,13 +133,12 @@ def remove_abandoned(folder: Path) -> None:
     Args:
         folder: The folder, which need not exist.
     """
-    for file in folder.glob(f"{PREFIX}*"):
+    for left in folder.glob(f"{PREFIX}*"):
         with suppress(OSError):  # somebody else's, or gone, or on a file system without locks
-            is_folder = file.is_dir()
-            descriptor = os.open(file, os.O_RDONLY if is_folder else os.O_RDWR)
+            descriptor = os.open(left, os.O_RDONLY)
             try:
                 if lock(descriptor, wait=False):
-                    shutil.rmtree(file) if is_folder else file.unlink()
+                    shutil.rmtree(left) if left.is_dir() else left.unlink()
             finally:
                 os.close(descriptor)
 
@@ -184,7 +147,7 @@ def lock(descriptor: int, *, wait: bool) -> bool:
     """Locks an open file or folder, until it is closed, against all others that ask in this way.
 
     Args:
-        descriptor: The file, open for writing, or the folder.
+        descriptor: The file or the folder.
         wait: Whether to wait for another process that holds it.
 
     Returns:

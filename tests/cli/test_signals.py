@@ -83,7 +83,8 @@ def test_what_a_killed_command_leaves_goes_with_the_next_and_what_is_in_use_stay
         (in_use,) = tmp_path.iterdir()
         assert in_use != abandoned
         with replacing(path) as temporary:
-            assert set(tmp_path.iterdir()) == {in_use, temporary}
+            temporary.write_bytes(b"new")
+            assert set(tmp_path.iterdir()) == {in_use, temporary.parent}
         process.kill()
     assert set(tmp_path.iterdir()) == {in_use, path}
 
