@@ -104,26 +104,33 @@ class Entry:
     @classmethod
     def of_json_file(cls, path: Path, largest: int = LARGEST_DOCUMENT) -> "Entry":
         """The whole of a JSON file; arguments and errors as for :meth:`of_yaml`."""
-        with reading(path, ValueError, RecursionError):
-            return cls(path, "", _parsed_json(_text(path, largest), largest // BYTES_PER_VALUE))
+        with reading(path, ValueError):
+            text = _text(path, largest)
+        return cls.of_json(text, path, largest)
 
     @classmethod
-    def of_json(cls, text: str, source: Path | str) -> "Entry":
+    def of_json(cls, text: str, source: Path | str, largest: int = LARGEST_DOCUMENT) -> "Entry":
         """A JSON document that stands in something else, such as the metadata of a model.
 
         Args:
             text: The document.
             source: What it stands in, for messages.
+            largest: Characters that it may have.
 
         Raises:
             InputError: A text that is too large or nested too deeply, or is not JSON.
         """
         try:
-            if len(text) > LARGEST_DOCUMENT:
+            if len(text) > largest:
                 raise ValueError(f"{len(text):,} characters")
-            return cls(source, "", _parsed_json(text, LARGEST_DOCUMENT // BYTES_PER_VALUE))
+            # At least as many as there are values: what stands in texts counts as well.
+            if sum(map(text.count, ",:[{")) > largest // BYTES_PER_VALUE:
+                raise ValueError(f"more than {largest // BYTES_PER_VALUE:,} values")
+            value = json.loads(text)
+            _refuse_depth(value)
         except (ValueError, RecursionError) as error:
             raise InputError(source, f"not JSON ({error})", "Write it again.") from error
+        return cls(source, "", value)
 
     def fault(self, reason: str, remedy: str) -> InputError:
         """The error that says what is wrong here."""
@@ -287,15 +294,6 @@ def _text(path: Path, largest: int) -> str:
     if len(content) > largest:
         raise ValueError(f"more than {largest:,} bytes")
     return content.decode("utf-8")
-
-
-def _parsed_json(text: str, most: int) -> Any:
-    # At least as many as there are values: what stands in texts counts as well.
-    if sum(map(text.count, ",:[{")) > most:
-        raise ValueError(f"more than {most:,} values")
-    value = json.loads(text)
-    _refuse_depth(value)
-    return value
 
 
 def _refuse_depth(value: Any, depth: int = 0) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.scan import to_float32
 
@@ -31,15 +30,13 @@ class Extrinsics:
     matrix: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        if self.matrix.shape != (4, 4):
-            raise ValueError(f"the matrix has shape {self.matrix.shape}, not (4, 4)")
-        if not np.isfinite(self.matrix).all():
-            raise ValueError("it holds numbers that are not finite")
-        if not np.array_equal(self.matrix[3], (0, 0, 0, 1)):
-            raise ValueError(f"the matrix's last row is {self.matrix[3].tolist()}, not 0 0 0 1")
-        rotation = self.matrix[:3, :3]
-        if not _is_rotation(rotation):
-            raise ValueError("the matrix's upper left 3 x 3 numbers are not a rotation")
+        if not (
+            self.matrix.shape == (4, 4)
+            and np.array_equal(self.matrix[3], (0, 0, 0, 1))
+            and np.isfinite(self.matrix).all()
+            and _is_rotation(self.matrix[:3, :3])
+        ):
+            raise ValueError("not a rotation and a translation above the row 0 0 0 1")
 
     @classmethod
     def of_pose(
@@ -84,25 +81,20 @@ def read_extrinsics(path: Path) -> Extrinsics:
         InputError: A file that is missing or says something else, or a motion that is not rigid.
     """
     document = Entry.of_yaml(path)
-    try:
-        return _extrinsics(document)
-    except InputError:
-        raise
-    except ValueError as error:
-        raise document.fault(str(error), "Write the sensor's pose, or a rigid motion.") from error
-
-
-def _extrinsics(document: Entry) -> Extrinsics:
     values = document.members()
-    if values.keys() == {"matrix"}:
-        rows = values["matrix"].items()
-        return Extrinsics(np.array([row.numbers(4) for row in rows], np.float64))
-    if values.keys() != set(POSE):
+    if values.keys() == set(POSE):
+        return Extrinsics.of_pose(**{name: value.number() for name, value in values.items()})
+    if values.keys() != {"matrix"}:
         raise document.fault(
             f"its keys are {', '.join(values)}",
             f"It needs {', '.join(POSE)} (metres, degrees), or matrix (4 rows of 4 numbers).",
         )
-    return Extrinsics.of_pose(**{name: value.number() for name, value in values.items()})
+    matrix = values["matrix"]
+    rows = np.array([row.numbers(4) for row in matrix.items()], np.float64)
+    try:
+        return Extrinsics(rows)
+    except ValueError as error:
+        raise matrix.fault(str(error), "Write a rigid motion, or the sensor's pose.") from error
 
 
 def _is_rotation(matrix: NDArray[np.float64]) -> bool:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.files.names import COMPRESSED
-from derain.files.reading import is_file, reading
+from derain.files.reading import is_file, read_bytes, reading
 
 METADATA = "metadata.csv"
 
@@ -47,34 +47,24 @@ def read_frame_times(
             "there is no such file",
             f"Write one: a line {','.join(columns)}, then one for each scan, such as 000000,12.3.",
         )
-    times = _times(path, *columns)
+    times: dict[str, float] = {}
+    for name, text in _lines(path, columns):
+        if not name:
+            raise InputError(path, "has a line that names no scan", "Complete it or leave it out.")
+        time = _finite(path, text)
+        if times.setdefault(_key(name), time) != time:
+            raise InputError(path, f"gives {name} two times", "Leave one line for each scan.")
     for scan in scans:
         if _key(scan.name) not in times:
             raise InputError(path, f"has no line for {scan.name}", "Add it, or move the scan away.")
     return np.array([times[_key(scan.name)] for scan in scans])
 
 
-def _times(path: Path, frame: str, timestamp: str) -> dict[str, float]:
-    times: dict[str, float] = {}
-    for name, time in _lines(path, frame, timestamp):
-        seconds = _finite(path, time)
-        if not name:
-            raise InputError(path, "has a line that names no scan", "Complete it or leave it out.")
-        if times.setdefault(_key(name), seconds) != seconds:
-            raise InputError(path, f"gives {name} two times", "Leave one line for each scan.")
-    return times
-
-
-def _lines(path: Path, *columns: str) -> Iterator[list[str | None]]:
+def _lines(path: Path, columns: Sequence[str]) -> Iterator[list[str]]:
     """What every line has in some columns."""
-    with reading(path, UnicodeDecodeError, csv.Error), path.open("rb") as file:
-        if len(content := file.read(LARGEST_METADATA + 1)) > LARGEST_METADATA:
-            raise InputError(
-                path, f"has more than {LARGEST_METADATA:,} bytes", "Leave a line for each scan."
-            )
-        lines = csv.DictReader(
-            io.StringIO(content.decode("utf-8-sig"), newline=""), skipinitialspace=True
-        )
+    with reading(path, ValueError, csv.Error):
+        text = read_bytes(path, LARGEST_METADATA).decode("utf-8-sig")
+        lines = csv.DictReader(io.StringIO(text, newline=""), restval="", skipinitialspace=True)
         present = lines.fieldnames or ()
         if not set(columns) <= set(present):
             raise InputError(
@@ -92,9 +82,9 @@ def _key(name: str) -> str:
     return (stem if dot and not suffix.isdigit() else name).lstrip("0")
 
 
-def _finite(path: Path, text: str | None) -> float:
+def _finite(path: Path, text: str) -> float:
     try:
-        time = float(text or "")
+        time = float(text)
     except ValueError:
         time = math.nan
     if not math.isfinite(time):

@@ -13,8 +13,7 @@ from derain import Scan
 from derain.files import DEFAULT_COLUMNS, read_scan, write_scan
 from derain.files.columns import scan_of
 from derain.files.formats.pcd import ENCODINGS, VALUE_TYPES, PcdHeader
-from derain.files.formats.ply import PlyHeader
-from derain.files.formats.ply.header import BYTE_ORDERS
+from derain.files.formats.ply import BYTE_ORDERS, PlyHeader
 
 FLOATS = ("f4", "f8")
 TEXT_TYPES = (*VALUE_TYPES, "b1", "f2")

@@ -10,8 +10,7 @@ import pytest
 
 from derain import InputError, Scan
 from derain.files import read_scan, write_scan
-from derain.files.formats.ply import PlyHeader
-from derain.files.formats.ply.header import BYTE_ORDERS
+from derain.files.formats.ply import BYTE_ORDERS, PlyHeader
 
 HEADER = """\
 ply

@@ -1,0 +1,299 @@
+"""Points as lines of text (`.csv`, `.txt`, `.xyz`, `.asc`); REHEARSE-3D's extended radar.
+
+Source: Y. Shafranovich, "Common Format and MIME Type for Comma-Separated Values (CSV) Files",
+RFC 4180.
+"""
+
+import csv
+import io
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.errors import InputError
+from derain.files.columns import columns_of, name_columns, scan_of
+from derain.files.content import Content, check_columns
+from derain.files.format import FORMATS, Format
+from derain.files.names import scan_suffix
+from derain.files.reading import reading
+from derain.files.text import decode, encode
+from derain.scan import Scan
+
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+# What some programs put before the line of names.
+_COMMENT = re.compile(r"\s*(#|//)")
+
+# Lines that are held as text at a time, which takes ten times the memory of their numbers.
+_CHUNK = 4096
+
+
+class Line(NamedTuple):
+    """A line of a text: its number, where it begins and ends, and its content."""
+
+    number: int
+    begin: int
+    end: int
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class TableHeader:
+    """A table as it was written.
+
+    Attributes:
+        separator: What stands between the values of a line; None for white space.
+        named: Whether a line of the file names the columns.
+        text: The whole file.
+        begin: Where its lines of points begin.
+        spans: Where each point's line begins and ends in the text, in bytes, int64 (N, 2).
+        columns: Name → numbers of these lines, (N,).
+    """
+
+    separator: str | None
+    named: bool
+    text: bytes
+    begin: int
+    spans: NDArray[np.int64]
+    columns: Mapping[str, NDArray[Any]]
+
+    def take(self, rows: NDArray[Any]) -> "TableHeader":
+        """The table of some of the points only."""
+        columns = {name: column[rows] for name, column in self.columns.items()}
+        return replace(self, spans=self.spans[rows], columns=columns)
+
+    def holds(self, columns: Mapping[str, NDArray[Any]]) -> bool:
+        """Whether the lines hold just these columns, with these numbers."""
+        return tuple(columns) == tuple(self.columns) and all(
+            np.array_equal(ours, theirs, equal_nan=True)
+            for ours, theirs in zip(self.columns.values(), columns.values(), strict=True)
+        )
+
+    def lines(self) -> bytes:
+        """The line of names, if there is one, and the lines of the points, as they were written."""
+        newline = b"\r\n" if b"\r\n" in self.text else b"\n"
+        names = [self.text[: self.begin]] if self.named else []
+        points = (self.text[begin:end] for begin, end in self.spans.tolist())
+        return b"".join(line + newline for line in (*names, *points))
+
+
+@FORMATS.add(".asc", ".xyz")
+class Table(Format):
+    """Lines of numbers, perhaps under a line of names."""
+
+    HELP = "lines of numbers, perhaps under a line of names"
+    UNNAMED = "text without a line of names"
+
+    def decode(self, content: Content, columns: Sequence[str]) -> Scan:
+        """Reads a table of points.
+
+        Args:
+            content: The file: a line of names, which may begin with # or //, if there is one, then
+                one line a point, empty lines aside. Values are separated by commas if there is one
+                in the first line, else by semicolons, else by white space. They may be in quotes;
+                an empty one is NaN.
+            columns: Names of the columns of a file without a line of names.
+
+        Returns:
+            The scan. Columns of whole numbers, written without a point, are int64 (uint64 if only
+            that holds them), all others float64. A file of names alone, or an empty one, is a scan
+            of zero points.
+
+        Raises:
+            InputError: A file that has lines of different lengths or values that are not numbers,
+                names two columns alike, or has no coordinates.
+        """
+        path = content.path
+        with reading(path, ValueError, csv.Error):
+            header = _parse_table(content.data)
+        if header.named:
+            return scan_of(path, header.columns, header=header)
+        numbers = list(header.columns.values()) or [np.empty(0)] * len(columns)
+        fields = name_columns(path, numbers, columns)
+        return scan_of(path, fields, header=replace(header, columns=fields))
+
+    def encode(self, path: Path, scan: Scan) -> bytes:
+        """A scan's columns as text.
+
+        Lines that the scan comes from are written as they were. Where its columns are others, every
+        number has as many digits as give it back: in the types that `decode` states, separated as
+        in the table that the scan came from, else by commas in a .csv and by spaces in other files.
+
+        Raises:
+            InputError: A column that no table can hold.
+        """
+        columns = columns_of(scan)
+        header = scan.header if isinstance(scan.header, TableHeader) else None
+        if header is not None and header.holds(columns):
+            return header.lines()
+        separator = header.separator if header else "," if scan_suffix(path) == ".csv" else None
+        for name, column in columns.items():
+            _refuse_unreadable(path, name, column, separator)
+        values = [
+            (column.astype(np.uint8) if column.dtype == bool else column).tolist()
+            for column in columns.values()
+        ]
+        text = io.StringIO()
+        writer = csv.writer(text, delimiter=separator or " ", lineterminator="\n")
+        if header is None or header.named or tuple(header.columns) != tuple(columns):
+            writer.writerow(columns)
+        writer.writerows(zip(*values, strict=True))
+        return encode(text.getvalue())
+
+
+@FORMATS.add(".csv")
+class CommaSeparated(Table):
+    """A table that beside scans of other formats is likely to be a record of something else."""
+
+    RECORD = 1
+
+
+@FORMATS.add(".txt")
+class Text(Table):
+    """A table that is even likelier to be something else, such as notes or a list of poses."""
+
+    RECORD = 2
+
+
+def _refuse_unreadable(path: Path, name: str, column: NDArray[Any], separator: str | None) -> None:
+    """Refuses a column that could not be read again as it was."""
+    one_line = name == name.strip() and len(name.splitlines()) < 2
+    one_word = separator is not None or not set(name) & set(",; \t\"'")
+    no_comment = not name.startswith(("#", "//"))
+    number = column.dtype.kind in "biuf" and column.dtype.itemsize <= 8
+    if not (one_line and one_word and no_comment and number) or column.ndim > 1:
+        raise InputError(
+            path,
+            f"{scan_suffix(path)} has no place for the column '{name}' "
+            f"({column.dtype}, {column.ndim} axes)",
+            "Write .npz.",
+        )
+
+
+def _parse_table(text: bytes) -> TableHeader:
+    """Reads lines of numbers; empty lines are passed over.
+
+    The first line names the columns if any of its values is no number; otherwise they are called by
+    their places.
+
+    Raises:
+        ValueError: Lines of different lengths, values that are not numbers, or two columns of one
+            name.
+        csv.Error: Quotes that do not match.
+    """
+    lines = _filled_lines(text)
+    first = next(lines, None)
+    if first is None:
+        return TableHeader(",", False, text, 0, np.empty((0, 2), np.int64), {})
+    separator = next((each for each in ",;" if each in first.text), None)
+    (values,) = _rows([_COMMENT.sub("", first.text)], separator)
+    check_columns(len(values))
+    named = not all(map(_is_number, values))
+    if named:
+        titles = [name.strip() for name in values]
+        if len(set(titles)) < len(titles):
+            raise ValueError(f"line {first.number} names two columns alike: {', '.join(titles)}")
+    else:
+        titles = [f"column {number}" for number, _ in enumerate(values, 1)]
+        lines = chain([first], lines)
+    numbers, spans = _parse_lines(lines, separator, titles)
+    columns = dict(zip(titles, numbers, strict=True))
+    return TableHeader(separator, named, text, first.end if named else 0, spans, columns)
+
+
+def _filled_lines(text: bytes) -> Iterator[Line]:
+    """The lines of a text that are not empty."""
+    end = len(_BYTE_ORDER_MARK) if text.startswith(_BYTE_ORDER_MARK) else 0
+    file = io.BytesIO(text)
+    file.seek(end)
+    for number, line in enumerate(file, 1):
+        begin, end = end, end + len(line)
+        if line.strip():
+            line = line.rstrip(b"\r\n")
+            yield Line(number, begin, begin + len(line), decode(line))
+
+
+def _parse_lines(
+    lines: Iterator[Line], separator: str | None, titles: Sequence[str]
+) -> tuple[list[NDArray[Any]], NDArray[np.int64]]:
+    """The columns of lines, and their spans as in TableHeader.
+
+    Args:
+        lines: The lines.
+        separator: What stands between the values; None for white space.
+        titles: What the columns are called, for messages.
+
+    Raises:
+        ValueError: Lines of different lengths, or values that are not numbers.
+        csv.Error: Quotes that do not match.
+    """
+    columns = [_Numbers() for _ in titles]
+    spans = [np.empty((0, 2), np.int64)]
+    while chunk := list(islice(lines, _CHUNK)):
+        rows = list(_rows((line.text for line in chunk), separator))
+        if len(rows) < len(chunk):
+            raise ValueError(f"after line {chunk[0].number}, quotes run over several lines")
+        for line, row in zip(chunk, rows, strict=True):
+            if len(row) != len(titles):
+                raise ValueError(
+                    f"line {line.number} has {len(row)} values for {len(titles)} columns"
+                )
+        for title, column, texts in zip(titles, columns, zip(*rows, strict=True), strict=True):
+            if (odd := column.add(texts)) is not None:
+                raise ValueError(
+                    f"line {chunk[odd].number}: {title} is '{texts[odd]}', not a number"
+                )
+        spans.append(np.array([(line.begin, line.end) for line in chunk]))
+    return [column.values() for column in columns], np.concatenate(spans)
+
+
+class _Numbers:
+    """The numbers of one column: whole ones, as long as all are, and floating-point ones."""
+
+    def __init__(self) -> None:
+        self._whole: dict[type[Any], list[NDArray[Any]]] = {np.int64: [], np.uint64: []}
+        self._floating = [np.empty(0)]
+
+    def add(self, texts: Sequence[str]) -> int | None:
+        """Appends numbers; returns the place of the first text that is none."""
+        for kind in list(self._whole):
+            try:
+                self._whole[kind].append(np.fromiter(map(int, texts), kind, len(texts)))
+            except (ValueError, OverflowError):
+                del self._whole[kind]
+        try:
+            self._floating.append(np.fromiter(map(_number, texts), np.float64, len(texts)))
+        except ValueError:
+            return next(place for place, text in enumerate(texts) if not _is_number(text))
+        return None
+
+    def values(self) -> NDArray[Any]:
+        """All of them: int64, or uint64 if only that holds them, or else float64."""
+        return np.concatenate(
+            next((whole for whole in self._whole.values() if whole), self._floating)
+        )
+
+
+def _rows(lines: Iterable[str], separator: str | None) -> Iterator[list[str]]:
+    if separator is None:
+        return map(str.split, lines)
+    return csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=True)
+
+
+def _number(text: str) -> float:
+    """The number that a text stands for; an empty one is NaN."""
+    return float(text.strip() or "nan")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        _number(text)
+    except ValueError:
+        return False
+    return True
