@@ -6,7 +6,6 @@ order and fields of any type stay what they are.
 Source: sensor_msgs/msg/PointCloud2 and PointField of ROS, the same in ROS 1 and ROS 2.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -185,41 +184,37 @@ class PointCloud:
                 values[rows.reshape(values.shape)] = np.nan
         return replace(self, data=bytes(data), is_dense=False)
 
-    def with_columns(self, columns: Mapping[str, NDArray[np.float32]]) -> Self:
-        """The same points with fields of float32 after those that they have.
+    def with_field(self, name: str, values: NDArray[np.float32]) -> Self:
+        """The same points with a field of float32 after those that they have.
 
         One that is there already, as in a bag that was cleaned before, takes the new values.
         Padding at the end of rows goes, for there is none that would still be right.
 
         Args:
-            columns: Name → float32 (N,).
+            name: Name of the field.
+            values: Its values, float32 (N,).
 
         Raises:
-            ValueError: A field of one of the names that is not float32.
+            ValueError: A field of this name that is not one float32.
         """
-        if not columns:
-            return self
-        there = {field.name: field for field in self.fields if field.name in columns}
-        fields, step = list(self.fields), self.point_step
-        for name in columns.keys() - there.keys():
-            fields.append(PointField(name, step, FLOAT32_DATATYPE, 1))
+        fields, step = {field.name: field for field in self.fields}, self.point_step
+        if name not in fields:
+            fields[name] = PointField(name, step, FLOAT32_DATATYPE, 1)
             step += 4
-        for field in there.values():
-            if field.datatype != FLOAT32_DATATYPE or field.count > 1:
-                raise ValueError(f"it has another field '{field.name}' already")
-        wider = np.empty((len(self), step), np.uint8)
+        field = fields[name]
+        if field.datatype != FLOAT32_DATATYPE or field.count > 1:
+            raise ValueError(f"it has another field '{name}' already")
+        points = np.empty((len(self), step), np.uint8)
         if len(self):
-            wider[:, : self.point_step] = self._points
-        for field in fields:
-            if field.name in columns:
-                values = np.ascontiguousarray(columns[field.name], f"{self._order}f4")
-                wider[:, field.offset : field.offset + 4] = values.view(np.uint8).reshape(-1, 4)
+            points[:, : self.point_step] = self._points
+        written = np.ascontiguousarray(values, f"{self._order}f4").view(np.uint8).reshape(-1, 4)
+        points[:, field.offset : field.offset + 4] = written
         return replace(
             self,
-            fields=tuple(fields),
+            fields=self.fields if step == self.point_step else (*self.fields, field),
             point_step=step,
             row_step=self.width * step,
-            data=wider.tobytes(),
+            data=points.tobytes(),
         )
 
     @property

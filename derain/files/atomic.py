@@ -40,7 +40,7 @@ def replacing(path: Path) -> Iterator[Path]:
         InputError: `path` cannot be written: it is a folder or a device, its folder is not
             writable, the disk is full.
     """
-    try:
+    with writing(path):
         if path.exists() and not path.is_file():
             raise InputError(path, "is not a file that can be replaced", "Name a file to write.")
         target = Path(os.path.realpath(path))
@@ -50,6 +50,20 @@ def replacing(path: Path) -> Iterator[Path]:
             if target.exists():
                 shutil.copymode(target, temporary)
             os.replace(temporary, target)
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turns the errors of writing `path` into an InputError.
+
+    Args:
+        path: What the block writes.
+
+    Raises:
+        InputError: It cannot be written.
+    """
+    try:
+        yield
     except BrokenPipeError:  # the pipe is one that the block prints to, never the file
         raise
     except OSError as error:

@@ -8,16 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-import numpy as np
-from numpy.typing import NDArray
-
 from derain.bags.bag_copy import BagCopy, written_name
 from derain.bags.cloud_message import CloudMessage
 from derain.bags.cloud_topic import CloudTopic, damaged_cloud
 from derain.bags.names import is_bag
 from derain.bags.point_cloud import PointCloud
 from derain.errors import InputError
-from derain.files.atomic import temporary_folder
+from derain.files.atomic import temporary_folder, writing
 from derain.sources.bag_frame import BagFrame
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -105,7 +102,9 @@ class CleanedBags:
             self._write(copy, frame, judgement)
         except InputError as error:
             if error.subject != frame.name:  # not this cloud alone
-                self._give_up(frame.clouds, error)
+                self._broken[frame.clouds] = error  # raised again for its next cloud
+                self._current = None
+                self._stack.close()
             raise
 
     def __enter__(self) -> Self:
@@ -123,34 +122,28 @@ class CleanedBags:
         recorded = copy.forward_to(frame.number)
         try:
             message = CloudMessage.parse(recorded.data, frame.clouds.topic.encoding)
-            clean, removed = self._divided(message, judgement)
+            clean, removed = self._divided(message.cloud, judgement)
         except ValueError as error:
             copy.write(recorded)
             raise damaged_cloud(frame.name, error) from error
         if self.options.cleaned_topic:
             copy.write(recorded)
-        copy.write(recorded, clean, self.options.cleaned_topic)
+        copy.write(recorded, message.with_cloud(clean).to_bytes(), self.options.cleaned_topic)
         if self.options.removed_topic:
-            copy.write(recorded, removed, self.options.removed_topic)
+            copy.write(recorded, message.with_cloud(removed).to_bytes(), self.options.removed_topic)
 
-    def _divided(self, message: CloudMessage, judgement: Judgement) -> tuple[bytes, bytes]:
-        """The message without its rain, and that of its rain alone.
+    def _divided(self, cloud: PointCloud, judgement: Judgement) -> tuple[PointCloud, PointCloud]:
+        """The cloud without its rain, and its rain alone.
 
         Raises:
             ValueError: A field of the probabilities' name and another type, or coordinates that
                 cannot be NaN.
         """
-        cloud, rain = message.cloud, judgement.rain
-        columns = {RAIN_PROBABILITY: judgement.probability} if self.probability else {}
-
-        def part(rows: NDArray[np.bool_]) -> PointCloud:
-            return cloud.take(rows).with_columns({name: columns[name][rows] for name in columns})
-
-        if self.options.keep_shape and cloud.is_organised:
-            clean = cloud.blank(rain).with_columns(columns)
-        else:
-            clean = part(~rain)
-        return message.with_cloud(clean).to_bytes(), message.with_cloud(part(rain)).to_bytes()
+        rain = judgement.rain
+        if self.probability:
+            cloud = cloud.with_field(RAIN_PROBABILITY, judgement.probability)
+        whole = self.options.keep_shape and cloud.is_organised
+        return (cloud.blank(rain) if whole else cloud.take(~rain)), cloud.take(rain)
 
     def _copy_of(self, clouds: CloudTopic) -> BagCopy:
         """The copy of a bag; for its first cloud, ends the copy before and begins a new one."""
@@ -158,10 +151,8 @@ class CleanedBags:
             raise self._broken[clouds]
         if self._current is None or self._current[0] is not clouds:
             self._finish()
-            try:
+            with writing(self.out):
                 folder = self._stack.enter_context(temporary_folder(self.out))
-            except OSError as error:
-                raise _unwritable(self.out, error) from error
             copy = self._stack.enter_context(BagCopy(clouds.bag, clouds.topic, folder))
             self._current = clouds, copy
         return self._current[1]
@@ -171,20 +162,14 @@ class CleanedBags:
         if self._current is None:
             return
         clouds, copy = self._current
+        self._current = None
+        target = self.out / written_name(clouds.bag)
         try:
-            with self._stack:
-                self._current = None
-                target = self.out / written_name(clouds.bag)
+            with self._stack, writing(target):
                 _move(copy.finish(), target)
                 self.written.append(target)
         except InputError as error:
             self._broken[clouds] = error
-
-    def _give_up(self, clouds: CloudTopic, error: InputError) -> None:
-        """Removes the copy that is being written; the error is raised again for its next cloud."""
-        self._broken[clouds] = error
-        self._current = None
-        self._stack.close()
 
     def _refuse_clashes(self, clouds: CloudTopic) -> None:
         target, bag = self.out / written_name(clouds.bag), clouds.bag.path
@@ -223,18 +208,6 @@ def _whole_topics(source: Iterable[Frame]) -> list[CloudTopic]:
 
 def _move(made: Path, target: Path) -> None:
     """Moves a bag into place, over one that an earlier run wrote."""
-    try:
-        if target.is_dir() and not target.is_symlink():
-            old = made.with_name(f"{made.name}.old")  # removed with its folder
-            os.replace(target, old)
-        os.replace(made, target)
-    except OSError as error:
-        raise _unwritable(target, error) from error
-
-
-def _unwritable(path: Path, error: OSError) -> InputError:
-    return InputError(
-        path,
-        f"cannot be written ({error.strerror or error})",
-        "Choose a folder that is writable and has room.",
-    )
+    if target.is_dir() and not target.is_symlink():
+        os.replace(target, made.with_name(f"{made.name}.old"))  # removed with its folder
+    os.replace(made, target)

@@ -1,5 +1,6 @@
 """Cleans the scans of a source, and reports what was done."""
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -146,65 +147,60 @@ def clean(
     """
     source = source_of(source)
     monitor, failures = WeatherMonitor(weather, source), Failures(observer.failed)
-    scans = []
+    scans: list[CleanedScan] = []
     with nullcontext(sink) if isinstance(sink, CleanSink) else CleanSink(sink, source) as opened:
-        cleaner = _Cleaner(method, opened, monitor, most_removed, observer)
         frames = tqdm(source, unit="scan", disable=None)
         for frame, judgement, stopwatch in judgements(method, frames, failures.skipping_failures):
             with failures.skipping_failures(frame):
-                scans.append(cleaner.clean(judgement, stopwatch))
+                odd = _issues(method, judgement, most_removed)
+                observer.judged(judgement, odd)
+                _refuse_too_much_rain(frame, judgement.share_of_rain, most_removed)
+                with stopwatch.stage("weather"):
+                    measured = judgement.weather if monitor.is_due(frame) else None
+                with stopwatch.stage("write"):
+                    opened.write(judgement)
+                record = None if measured is None else monitor.add(frame, measured)
+                cleaned = _cleaned(frame, judgement, stopwatch, odd, record)
+                observer.cleaned(judgement, cleaned)
+                scans.append(cleaned)
     return CleanReport(scans, failures.errors, monitor)
 
 
-@dataclass(frozen=True)
-class _Cleaner:
-    """Writes one scan after the other."""
+def _issues(method: Method, judgement: Judgement, most_removed: float) -> list[ScanIssue]:
+    scan, share = judgement.scan, judgement.share_of_rain
+    odd = [*method.issues(judgement), *left_out(scan), *no_points(scan)]
+    return odd if share > most_removed else [*odd, *much_removed(share)]
 
-    method: Method
-    sink: CleanSink
-    weather: WeatherMonitor
-    most_removed: float
-    observer: CleaningObserver
 
-    def clean(self, judgement: Judgement, stopwatch: Stopwatch) -> CleanedScan:
-        frame, scan = judgement.frame, judgement.scan
-        assert frame is not None
-        odd = self._issues(judgement)
-        self.observer.judged(judgement, odd)
-        self._refuse_too_much_rain(frame, judgement.share_of_rain)
-        with stopwatch.stage("weather"):
-            weather = judgement.weather if self.weather.is_due(frame) else None
-        with stopwatch.stage("write"):
-            self.sink.write(judgement)
-        valid = scan.valid
-        cleaned = CleanedScan(
-            scan=frame.name,
-            points=len(scan),
-            valid=int(valid.sum()),
-            rain=int(judgement.rain.sum()),
-            share_removed=judgement.share_of_rain,
-            not_known=None if judgement.known is None else int((valid & ~judgement.answered).sum()),
-            milliseconds=dict(stopwatch.milliseconds),
-            warnings=[issue.detail for issue in odd],
-            weather=None if weather is None else self.weather.add(frame, weather),
+def _refuse_too_much_rain(frame: Frame, share: float, most_removed: float) -> None:
+    if share > most_removed:
+        raise InputError(
+            frame.name,
+            f"left whole, for {share:.1%} of its valid points are called rain, where the "
+            f"heaviest rain has {HEAVIEST_RAIN:.0%}",
+            "See whether the method suits sensor and unit of intensity, or raise --most-removed.",
         )
-        self.observer.cleaned(judgement, cleaned)
-        return cleaned
 
-    def _issues(self, judgement: Judgement) -> list[ScanIssue]:
-        scan, share = judgement.scan, judgement.share_of_rain
-        odd = [*self.method.issues(judgement), *left_out(scan), *no_points(scan)]
-        return odd if share > self.most_removed else [*odd, *much_removed(share)]
 
-    def _refuse_too_much_rain(self, frame: Frame, share: float) -> None:
-        if share > self.most_removed:
-            raise InputError(
-                frame.name,
-                f"left whole, for {share:.1%} of its valid points are called rain, where the "
-                f"heaviest rain has {HEAVIEST_RAIN:.0%}",
-                "See whether the method suits sensor and unit of intensity, or raise "
-                "--most-removed.",
-            )
+def _cleaned(
+    frame: Frame,
+    judgement: Judgement,
+    stopwatch: Stopwatch,
+    odd: Sequence[ScanIssue],
+    weather: WeatherRecord | None,
+) -> CleanedScan:
+    valid, known = judgement.scan.valid, judgement.known
+    return CleanedScan(
+        scan=frame.name,
+        points=len(valid),
+        valid=int(valid.sum()),
+        rain=int(judgement.rain.sum()),
+        share_removed=judgement.share_of_rain,
+        not_known=None if known is None else int((valid & ~judgement.answered).sum()),
+        milliseconds=dict(stopwatch.milliseconds),
+        warnings=[issue.detail for issue in odd],
+        weather=weather,
+    )
 
 
 def _counts(points: int, valid: int, rain: int) -> str:

@@ -2,10 +2,10 @@
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from glob import escape, glob
-from itertools import groupby
+from itertools import islice
 from pathlib import Path
 
 from derain.bags.names import SUFFIXES as BAG_SUFFIXES
@@ -66,18 +66,19 @@ def named_frames(
             read.
     """
     named = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
-    in_bags = {path: _paths_into_bags(path, layouts) for path in named}
-    if any(in_bags.values()):
-        return _with_bags(named, in_bags, columns, labelled, layouts, recordings)
-    scans: list[Path] = []
-    of_data_set = False
-    for path in named:
-        folders = _scan_folders_in(path, layouts)
-        of_data_set = of_data_set or len(folders) > 1
-        scans += listed_scans(folders or [path])
+    found = [_scans_or_bags(path, layouts) for path in named]
+    scans = [scan for of_path, _ in found for scan in of_path]
+    # A data set's scans lie in several folders, those of any other path in one.
+    by_path = any(_several_folders(of_path) for of_path, _ in found)
+    by_path = by_path or (recordings and _several_folders(scans))
     where = partial(label_of, layouts=layouts) if labelled else lambda _: None
-    by_path = of_data_set or (recordings and len({scan.parent for scan in scans}) > 1)
-    return frames_of(scans, where, columns, relative_keys(scans) if by_path else None)
+    files = iter(frames_of(scans, where, columns, relative_keys(scans) if by_path else None))
+    several = len(named) > 1 or any(len(bags) > 1 for _, bags in found)
+    frames: list[Frame] = []
+    for of_path, bags in found:
+        frames += islice(files, len(of_path))
+        frames += _frames_of_bags(bags, labelled, several)
+    return Frames(frames)
 
 
 def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> Source:
@@ -93,10 +94,19 @@ def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> So
     """
     if isinstance(scans, Source):
         return scans
-    given = [scans] if isinstance(scans, Scan | Frame | str | Path) else list(scans)
-    frames = [
-        frame for place, item in enumerate(given) for frame in _frames_of(item, place, columns)
-    ]
+    given = [scans] if isinstance(scans, Scan | Frame | str | Path) else scans
+    frames: list[Frame] = []
+    for place, item in enumerate(given):
+        match item:
+            case Frame():
+                frames.append(item)
+            case Scan():
+                frames.append(MemoryFrame(key=f"{place:06d}", number=place, scan=item))
+            case str() | Path():
+                frames += named_frames(item, columns, labelled=True)
+            case _:
+                reason = f"{type(item).__name__} is no scan"
+                raise InputError("scans", reason, "Give Scans, or paths of files and folders.")
     if not frames:
         raise InputError("scans", "there are none", "Give one or more.")
     return Frames(frames)
@@ -233,12 +243,31 @@ def find_layout(root: Path, layouts: Iterable[Layout] | None = None) -> Layout |
     return next((layout for layout in known if scan_folders(root, layout)), None)
 
 
-def _scan_folders_in(path: Path, layouts: Sequence[Layout] | None) -> list[Path]:
-    """The folders of scans of a data set; none for a scan or a folder of scans."""
-    if not os.path.isdir(path) or _holds_scans(path):
-        return []
-    layout = find_layout(path, layouts)
-    return [] if layout is None else scan_folders(path, layout)
+def _scans_or_bags(path: Path, layouts: Sequence[Layout] | None) -> tuple[list[Path], list[Path]]:
+    """The scans that a path stands for, or else its bags and paths into them."""
+    folders = []
+    if os.path.isdir(path):
+        if _holds_scans(path):
+            folders = [path]
+        elif (layout := find_layout(path, layouts)) is not None:
+            folders = scan_folders(path, layout)
+    if not folders and (bags := [path] if split(path) is not None else bags_at(path)):
+        _warn_of_others(path, bags)
+        return [], bags
+    return listed_scans(folders or [path]), []
+
+
+def _several_folders(scans: Iterable[Path]) -> bool:
+    return len({scan.parent for scan in scans}) > 1
+
+
+def _frames_of_bags(bags: Sequence[Path], labelled: bool, by_name: bool) -> Iterator[Frame]:
+    for bag in bags:
+        from derain.sources.bag_frame import (
+            bag_frames,
+        )  # what reads bags, only where there are some
+
+        yield from bag_frames(bag, labelled, by_name)
 
 
 def _holds_scans(folder: Path) -> bool:
@@ -254,37 +283,6 @@ def _holds_scans(folder: Path) -> bool:
             and entry.is_file()
             for entry in entries
         )
-
-
-def _paths_into_bags(path: Path, layouts: Sequence[Layout] | None) -> list[Path]:
-    """The path where it leads into a bag, or the bags of a folder that holds no scans."""
-    if os.path.isdir(path) and (_holds_scans(path) or find_layout(path, layouts) is not None):
-        return []
-    return [path] if split(path) is not None else bags_at(path)
-
-
-def _with_bags(
-    paths: Sequence[Path],
-    in_bags: Mapping[Path, Sequence[Path]],
-    columns: Sequence[str],
-    labelled: bool,
-    layouts: Sequence[Layout] | None,
-    recordings: bool,
-) -> Frames:
-    """Frames of bags, and of whatever else is named between them, in that order."""
-    from derain.sources.bag_frame import bag_frames  # what reads bags, only where there are some
-
-    several = len(paths) > 1 or len(in_bags[paths[0]]) > 1
-    frames: list[Frame] = []
-    for of_bags, group in groupby(paths, lambda path: bool(in_bags[path])):
-        if of_bags:
-            for named in group:
-                _warn_of_others(named, in_bags[named])
-                for path in in_bags[named]:
-                    frames += bag_frames(path, labelled, by_name=several)
-        else:
-            frames += named_frames(group, columns, labelled, layouts, recordings)
-    return Frames(frames)
 
 
 def _warn_of_others(path: Path, taken: Sequence[Path]) -> None:
@@ -308,16 +306,3 @@ def _kind(entry: os.DirEntry[str]) -> str:
         return "folder of a bag" if is_bag(Path(entry.path)) else ""
     suffix = scan_suffix(Path(entry.name))
     return suffix if suffix in FORMATS or suffix in BAG_SUFFIXES else ""
-
-
-def _frames_of(item: object, place: int, columns: Sequence[str]) -> Sequence[Frame]:
-    match item:
-        case Frame():
-            return [item]
-        case Scan():
-            return [MemoryFrame(key=f"{place:06d}", number=place, scan=item)]
-        case str() | Path():
-            return named_frames([Path(item)], columns, labelled=True)
-    raise InputError(
-        "scans", f"{type(item).__name__} is no scan", "Give Scans, or paths of files and folders."
-    )

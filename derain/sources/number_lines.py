@@ -27,11 +27,15 @@ def read_numbers(path: Path, *columns: int, comments: bool = False) -> NDArray[n
     Raises:
         InputError: A file that cannot be read, is too large, or has another line.
     """
-    lines = enumerate(read_lines(path), 1)
-    filled = [(place, line.split()) for place, line in lines if _has_content(line, comments)]
-    width = len(filled[0][1]) if filled and len(filled[0][1]) in columns else columns[-1]
-    rows = [finite_numbers(path, place, words, width) for place, words in filled]
-    return np.array(rows, np.float64).reshape(-1, width)
+    rows: list[list[float]] = []
+    width = 0
+    for place, line in enumerate(read_lines(path), 1):
+        words = line.split()
+        if not words or (comments and words[0].startswith("#")):
+            continue
+        width = width or (len(words) if len(words) in columns else columns[-1])
+        rows.append(finite_numbers(path, place, words, width))
+    return np.array(rows, np.float64).reshape(-1, width or columns[-1])
 
 
 def read_lines(path: Path) -> list[str]:
@@ -67,8 +71,3 @@ def finite_numbers(path: Path, place: int, words: Sequence[str], count: int) -> 
             "Write the file again, a line for each scan.",
         )
     return numbers
-
-
-def _has_content(line: str, comments: bool) -> bool:
-    words = line.strip()
-    return bool(words) and not (comments and words.startswith("#"))

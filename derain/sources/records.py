@@ -39,9 +39,8 @@ class Records:
         Raises:
             InputError: A record that is damaged or does not fit the scans.
         """
-        if self._times is None:
-            return None
-        return float(self._times[self._line(scan, TIMES, len(self._times))])
+        times = self._times
+        return None if times is None else float(times[self._line(scan, TIMES, len(times))])
 
     def pose_of(self, scan: Path) -> NDArray[np.float64] | None:
         """Sensor to world of a scan of the folder, float64 (4, 4), metres; None if not known.
@@ -52,8 +51,10 @@ class Records:
         trajectory = self._trajectory
         if trajectory is None:
             return None
-        if self._poses_by_time and (time := self.time_of(scan)) is not None:
-            return trajectory.at(time, scan.name)
+        # Where the poses have no times, those of the scans are not read, damaged or not.
+        times = None if trajectory.times is None else self._times
+        if times is not None and trajectory.is_by_time(times):
+            return trajectory.at(float(times[self._line(scan, TIMES, len(times))]), scan.name)
         pose: NDArray[np.float64] = trajectory.poses[self._line(scan, POSES, len(trajectory))]
         return pose
 
@@ -70,13 +71,6 @@ class Records:
     def _trajectory(self) -> Trajectory | None:
         path = self._beside(POSES)
         return None if path is None else read_trajectory(path)
-
-    @cached_property
-    def _poses_by_time(self) -> bool:
-        """Whether the poses have times, of the clock of the scans."""
-        if self._trajectory is None or self._trajectory.times is None or self._times is None:
-            return False
-        return self._trajectory.is_by_time(self._times)
 
     @cached_property
     def _scans(self) -> list[Path]:

@@ -81,36 +81,26 @@ class Trajectory:
         """
         assert self.times is not None
         inside = min(max(time, self.times[0]), self.times[-1])
-        before, after, share = self._around(inside)
-        if (
-            abs(inside - time) > TIME_ROUNDING
-            or self.times[after] - self.times[before] > LONGEST_GAP
-        ):
+        after = int(np.searchsorted(self.times, inside))
+        before = after if self.times[after] == inside else after - 1
+        start, end = self.times[before], self.times[after]
+        if abs(inside - time) > TIME_ROUNDING or end - start > LONGEST_GAP:
             raise InputError(
                 self.name,
                 f"has no pose for {scan}, which was taken at {time:.3f} s: the nearest are of "
-                f"{self.times[before]:.3f} and {self.times[after]:.3f} s",
+                f"{start:.3f} and {end:.3f} s",
                 "Give the poses of the whole recording, by the clock of its scans.",
             )
         one: NDArray[np.float64] = self.poses[before]
-        other: NDArray[np.float64] = self.poses[after]
-        if share == 0:
+        if before == after:
             return one
+        other: NDArray[np.float64] = self.poses[after]
+        share = float((inside - start) / (end - start))
         pose = np.eye(4)
         pose[:3, 3] = (1 - share) * one[:3, 3] + share * other[:3, 3]
         turned = slerp(quaternion_of(one[:3, :3]), quaternion_of(other[:3, :3]), share)
         pose[:3, :3] = rotation_of(turned)
         return pose
-
-    def _around(self, time: float) -> tuple[int, int, float]:
-        """Places of the poses before and after a time, and how far it is on the way, 0..1."""
-        assert self.times is not None
-        after = int(np.searchsorted(self.times, time))
-        if after == len(self) or self.times[after] == time or not after:
-            place = min(after, len(self) - 1)
-            return place, place, 0.0
-        start, end = self.times[after - 1 : after + 1]
-        return after - 1, after, float((time - start) / (end - start))
 
 
 def read_trajectory(path: Path) -> Trajectory:
@@ -169,7 +159,7 @@ def _words(numbers: NDArray[np.float64]) -> str:
 
 
 def _of_tum(path: Path, rows: NDArray[np.float64]) -> Trajectory:
-    times = rows[:, 0]
+    times, quaternions = rows[:, 0], rows[:, 4:]
     if not (np.diff(times) > 0).all():
         place = int(np.argmin(np.diff(times) > 0)) + 2
         raise InputError(
@@ -177,18 +167,19 @@ def _of_tum(path: Path, rows: NDArray[np.float64]) -> Trajectory:
             f"pose {place} is not later than the one before it",
             "Sort the lines by their time, and leave one for each.",
         )
+    with np.errstate(over="ignore"):
+        lengths = np.linalg.norm(quaternions, axis=1)
+    odd = np.flatnonzero(np.abs(lengths - 1) > ROTATION_TOLERANCE)
+    if len(odd):
+        raise InputError(
+            path,
+            f"pose {odd[0] + 1} has a quaternion of length {lengths[odd[0]]:.3g}, not 1",
+            "Write the file again: time x y z qx qy qz qw.",
+        )
     poses = np.tile(np.eye(4), (len(rows), 1, 1))
     poses[:, :3, 3] = rows[:, 1:4]
-    for place, quaternion in enumerate(rows[:, 4:], 1):
-        length = float(np.abs(quaternion).max())  # first, before a square can overflow
-        length = float(np.linalg.norm(quaternion)) if length < 2 else length
-        if abs(length - 1) > ROTATION_TOLERANCE:
-            raise InputError(
-                path,
-                f"pose {place} has a quaternion of length {length:.3g}, not 1",
-                "Write the file again: time x y z qx qy qz qw.",
-            )
-        poses[place - 1, :3, :3] = rotation_of(quaternion)
+    for pose, quaternion in zip(poses, quaternions, strict=True):
+        pose[:3, :3] = rotation_of(quaternion)
     return Trajectory(poses, times, path)
 
 

@@ -48,7 +48,7 @@ def test_a_message_of_the_library_is_read_and_written_alike(encoding: str, frame
 def test_the_library_reads_what_is_left_of_a_message(encoding: str) -> None:
     parsed = CloudMessage.parse(made_by_library(encoding), encoding)
     keep = np.array([True, False, True, True, False])
-    cloud = parsed.cloud.take(keep).with_columns({"probability": np.float32([0.1, 0.2, 0.3])})
+    cloud = parsed.cloud.take(keep).with_field("probability", np.float32([0.1, 0.2, 0.3]))
     store = ROS[encoding].store
     read = store.deserialize_ros1 if encoding == ROS1 else store.deserialize_cdr
     message = read(parsed.with_cloud(cloud).to_bytes(), CLOUD_TYPE)

@@ -79,7 +79,7 @@ def test_columns_are_what_the_bytes_say(cloud: PointCloud) -> None:
 @given(clouds())
 def test_a_column_more_leaves_the_others_in_their_place(cloud: PointCloud) -> None:
     values = np.linspace(0, 1, len(cloud), dtype=np.float32)
-    wider = cloud.with_columns({"probability": values})
+    wider = cloud.with_field("probability", values)
 
     np.testing.assert_array_equal(wider.columns()["probability"], values)
     assert [p[: cloud.point_step] for p in points_of(wider)] == points_of(cloud)
@@ -142,9 +142,9 @@ def test_contradictions_are_refused(arguments: tuple[Any, ...], reason: str) -> 
 
 def test_a_field_that_is_there_takes_the_new_values() -> None:
     cloud = cloud_of_columns({"p": np.zeros(3, "f4"), "x": np.arange(3, dtype="f4")})
-    again = cloud.with_columns({"p": np.ones(3, np.float32)})
+    again = cloud.with_field("p", np.ones(3, np.float32))
     assert again.fields == cloud.fields
     assert again.columns()["p"].tolist() == [1, 1, 1]
     assert again.columns()["x"].tolist() == [0, 1, 2]
     with pytest.raises(ValueError, match="another field 'p'"):
-        cloud_of_columns({"p": np.zeros(3, "u2")}).with_columns({"p": np.ones(3, np.float32)})
+        cloud_of_columns({"p": np.zeros(3, "u2")}).with_field("p", np.ones(3, np.float32))
