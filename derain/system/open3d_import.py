@@ -38,17 +38,16 @@ def import_open3d() -> ModuleType:
         MissingExtraError: Open3D is not installed.
         InputError: A library that it links against is missing.
     """
-    lacking = _lacking_library()
-    if lacking is not None and not lacking[0].exists():
+    if lacking := _lacking_library():
+        _, library = lacking
         with contextlib.suppress(OSError):  # importing Open3D then reports what it lacks
-            ctypes.CDLL(str(lacking[1]), ctypes.RTLD_GLOBAL)
+            ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
     return OPEN3D.load("what casts rays or shows a window")
 
 
 def warn_where_tensorboard_cannot_start() -> None:
     """Warns, with the remedy, where TensorBoard would die of Open3D's plug-in."""
-    lacking = _lacking_library()
-    if lacking is not None and not lacking[0].exists():
+    if _lacking_library():
         warn(f"TensorBoard cannot start: Open3D lacks {LIBUSB}; `{SET_UP}` links it")
 
 
@@ -56,7 +55,7 @@ def link_libusb() -> Path | None:
     """Links to libusb beside Open3D's libraries, for TensorBoard.
 
     Returns:
-        The link; None where none is needed.
+        The new link; None where none is needed.
 
     Raises:
         InputError: The folder of Open3D cannot be written.
@@ -66,9 +65,8 @@ def link_libusb() -> Path | None:
         return None
     link, library = lacking
     try:
-        if not link.exists():
-            link.unlink(missing_ok=True)  # it points to a package that was there once
-            link.symlink_to(os.path.relpath(library, link.parent))
+        link.unlink(missing_ok=True)  # it points to a package that was there once
+        link.symlink_to(os.path.relpath(library, link.parent))
     except FileExistsError:
         pass  # another process has just made it
     except OSError as error:
@@ -79,7 +77,7 @@ def link_libusb() -> Path | None:
 
 
 def _lacking_library() -> tuple[Path, Path] | None:
-    """Where a link belongs, and the library; None where Open3D has that, or is not there."""
+    """Where a link belongs, and the library; None where Open3D finds it, or is not there."""
     open3d = find_spec("open3d")
     if sys.platform != "linux" or open3d is None or open3d.origin is None:
         return None
@@ -89,8 +87,9 @@ def _lacking_library() -> tuple[Path, Path] | None:
     with contextlib.suppress(ImportError, OSError):
         import libusb_package
 
-        if library := libusb_package.get_library_path():
-            return Path(open3d.origin).parent / LIBUSB, library
+        link = Path(open3d.origin).parent / LIBUSB
+        if not link.exists() and (library := libusb_package.get_library_path()):
+            return link, library
     return None
 
 

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -45,7 +44,6 @@ def version_1(group: str, quota: int, period: int = 100_000) -> dict[str, str]:
         ("0::/a/b\n", {"a/b/cpu.max": "700000 100000", "a/cpu.max": "300000 100000"}, 3),
         ("0::/a/b\n", {"a/b/cpu.max": "max 100000", "a/cpu.max": "300000 100000"}, 3),
         ("0::/docker/1f\n", {"cpu.max": "400000 100000\n"}, 4),
-        ("0::/a:b\n", {"a:b/cpu.max": "200000 100000\n"}, 2),
         # Part of a core's time takes one more core, and there is always one.
         ("0::/\n", {"cpu.max": "250000 100000\n"}, 3),
         ("0::/\n", {"cpu.max": "1000 100000\n"}, 1),
@@ -60,9 +58,7 @@ def version_1(group: str, quota: int, period: int = 100_000) -> dict[str, str]:
         ("0::/\n", {}, 8),
         ("\xff\xfe", {}, 8),
         ("nonsense\n", {"cpu.max": "100000 100000\n"}, 8),
-        ("0::/\n", {"cpu.max": "100000\n"}, 8),
         ("0::/\n", {"cpu.max": "100000 0\n"}, 8),
-        ("0::/\n", {"cpu.max": "-100000 100000\n"}, 8),
         ("0::/\n", {"cpu.max": "9" * 5000 + " 1\n"}, 8),
     ],
 )
@@ -86,15 +82,12 @@ def test_where_there_are_no_control_groups_it_is_the_cores_it_may_run_on(
     assert usable_cores() == len(before)
 
 
-def test_no_threads_are_one_for_each_core() -> None:
+def test_threads_are_a_whole_number_and_none_are_one_for_each_core() -> None:
     assert threads_of(0) == usable_cores()
     assert threads_of(3) == 3
-
-
-@pytest.mark.parametrize("threads", [-1, 1.5, "2", None])
-def test_what_is_no_number_of_threads_is_refused(threads: Any) -> None:
-    with pytest.raises(InputError, match="threads: "):
-        threads_of(threads)
+    for threads in (-1, 1.5, "2", None):
+        with pytest.raises(InputError, match="threads: "):
+            threads_of(threads)
 
 
 @pytest.mark.parametrize(("user", "inside"), [(None, "passive"), ("active", "active")])
