@@ -1,6 +1,5 @@
 """Small documents are read within bounds, and say what is wrong with them."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -133,15 +132,6 @@ def test_values_are_cut_in_messages() -> None:
     assert len(shown(nested)) < 400
     assert len(shown({str(n): "y" * 10_000 for n in range(100)})) < 400
     assert shown(16**10_000) == "a number of very many digits"
-
-
-def test_a_document_comes_back(tmp_path: Path) -> None:
-    content = {"a": [1, 2.5, "text", None, True], "b": {"c": {"d": []}}}
-    path = tmp_path / "document.json"
-    path.write_text(json.dumps(content))
-    assert Entry.of_json_file(path).value == content
-    assert Entry.of_yaml(path).value == content
-    assert Entry.of_json(json.dumps(content), "text").value == content
 
 
 def test_kinds_of_values_are_told_apart() -> None:

@@ -2,8 +2,6 @@
 
 import gzip
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +12,6 @@ from derain import InputError, Scan, ScanWarning
 from derain.evaluation.hard_cases import scene
 from derain.files import DEFAULT_COLUMNS, find_scans, read_scan, write_scan
 from derain.files.format import FORMATS
-from derain.files.formats.pcd import PcdHeader
 from derain.files.formats.ply import PlyHeader
 from derain.files.labels import label_beside
 from derain.files.names import beside, scan_stem, scan_suffix
@@ -84,43 +81,12 @@ def test_intensity_is_found_under_its_many_names(tmp_path: Path, name: str) -> N
     assert list(scan.fields) == ["X", "Y", "Z", name]
 
 
-@pytest.mark.parametrize(
-    ("suffix", "header"),
-    [
-        *[(suffix, None) for suffix in (".bin", ".npy", ".npz", ".pcd", ".ply")],
-        (".pcd", PcdHeader((), 0, 0, 0, "binary_compressed")),
-    ],
-)
-def test_the_numbers_of_a_scan_can_be_changed_without_changing_its_columns(
-    tmp_path: Path, suffix: str, header: object
-) -> None:
-    ones, path = np.ones((3, 3), np.float32), tmp_path / f"scan{suffix}"
-    for fields in ({}, {"xyz": ones, "intensity": ones[:, 0].copy()}):
-        write_scan(path, Scan(ones, ones[:, 0], fields=fields, header=header))
-        scan = read_scan(path)
-        assert scan.intensity is not None
-        scan.xyz[:] = 7
-        scan.intensity[:] = 7
-        assert all((column == 1).all() for column in scan.fields.values())
-
-
-@pytest.mark.parametrize("suffix", [".bin", ".npy", ".npz", ".pcd", ".ply"])
-def test_every_format_reports_a_missing_file_and_an_unwritable_place(
-    tmp_path: Path, suffix: str
-) -> None:
-    path = tmp_path / f"scan{suffix.upper()}"
+def test_names_in_upper_case_and_names_as_text_are_understood(tmp_path: Path) -> None:
+    path = str(tmp_path / "scan.Pcd")
     with pytest.raises(InputError, match="there is no such file"):
         read_scan(path)
-    path.mkdir()
-    with pytest.raises(InputError, match="is a folder"):
-        read_scan(path)
-    with pytest.raises(InputError, match="is not a file that can be replaced"):
-        write_scan(path, Scan(np.ones((2, 3), np.float32)))
-
-
-def test_names_in_upper_case_and_names_as_text_are_understood(tmp_path: Path) -> None:
-    write_scan(str(tmp_path / "scan.Pcd"), np.ones((2, 4)))
-    assert len(read_scan(str(tmp_path / "scan.Pcd"))) == 2
+    write_scan(path, np.ones((2, 4)))
+    assert len(read_scan(path)) == 2
     assert len(find_scans([str(tmp_path)])) == 1
 
 
@@ -184,15 +150,6 @@ def test_files_and_folders_without_permission_are_refused(tmp_path: Path) -> Non
         find_scans([tmp_path / "locked"])
 
 
-def test_reading_scans_needs_no_heavy_library() -> None:
-    heavy = {"torch", "lightning", "open3d", "matplotlib", "onnxruntime", "pyarrow", "laspy"}
-    code = (
-        "import sys; from derain.files.format import FORMATS; assert '.las' in list(FORMATS); "
-        f"assert not {heavy} & set(sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
 def test_what_a_written_file_lacks_is_warned_of(tmp_path: Path) -> None:
     header = PlyHeader("ascii", left_out=("camera", "edge"))
     with pytest.warns(ScanWarning, match="camera, edge"):
@@ -224,20 +181,19 @@ def test_labels_of_a_compressed_scan_are_found(tmp_path: Path) -> None:
         assert label_beside(scan) == tmp_path / f"{scan.name[:6]}.label"
 
 
-@pytest.mark.parametrize("suffix", [".bin", ".npy", ".npz", ".pcd", ".ply", ".csv", ".txt"])
-def test_every_format_is_compressed_into_the_same_bytes(
+@pytest.mark.parametrize("suffix", [".bin", ".npz", ".csv"])
+def test_a_scan_is_compressed_into_the_same_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
 ) -> None:
-    points = scene(50)
-    scan = Scan(points[:, :3].copy(), points[:, 3].copy())
-    write_scan(tmp_path / f"scan{suffix}", scan)
-    write_scan(tmp_path / f"first{suffix}.gz", scan)
+    plain = tmp_path / f"plain{suffix}"
+    first, second = (tmp_path / f"{name}{suffix}.gz" for name in "12")
+    write_scan(plain, scene(50))
+    write_scan(first, scene(50))
     monkeypatch.setattr("time.time", lambda: 1e9)  # what .gz files are usually stamped with
-    write_scan(tmp_path / f"second{suffix}.gz", scan)
-    first = (tmp_path / f"first{suffix}.gz").read_bytes()
-    assert first == (tmp_path / f"second{suffix}.gz").read_bytes()
-    assert gzip.decompress(first) == (tmp_path / f"scan{suffix}").read_bytes()
-    np.testing.assert_array_equal(read_scan(tmp_path / f"first{suffix}.gz").xyz, scan.xyz)
+    write_scan(second, scene(50))
+    assert first.read_bytes() == second.read_bytes()
+    assert gzip.decompress(first.read_bytes()) == plain.read_bytes()
+    np.testing.assert_array_equal(read_scan(first).xyz, scene(50)[:, :3])
 
 
 def test_members_of_a_gzip_follow_one_another_and_damage_is_refused(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from derain import InputError, Scan
 from derain.cli.main import main
 from derain.evaluation.hard_cases import scene
 from derain.files import count_points, find_scans, read_scan, write_scan
-from derain.files.format import FORMATS, Format, format_of
+from derain.files.format import FORMATS, format_of
 from derain.filters import FilterDerainer, filter_from
 
 ALL = ("--most-removed", "1")  # a filter calls much of a made-up scan rain
@@ -82,27 +82,11 @@ def test_an_installed_format_is_known_to_the_commands(tmp_path: Path) -> None:
     assert "  .pts                    points under a line with their number\n" in told
 
 
-def test_help_says_which_files_do_not_name_their_columns(
-    capsys: pytest.CaptureFixture[str],
+def test_commands_list_the_formats_what_they_need_and_which_do_not_name_their_columns(
+    run_derain,
 ) -> None:
-    with pytest.raises(SystemExit):
-        main(["run", "--help"])
-    told = " ".join(capsys.readouterr().out.split())
-    unnamed = ".bin, .npy, .npz of one array, text without a line of names"
-    assert f"column names for files without them: {unnamed} (default: x,y,z,intensity)" in told
-
-
-def test_the_formats_are_listed_with_what_they_need(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["info", "--formats"])
-    assert end.value.code == 0
-    told = capsys.readouterr().out
-    assert all(suffix in told for suffix in FORMATS)
+    told = run_derain("info", "--formats").out
+    assert all(suffix in told and FORMATS[suffix].HELP in told for suffix in FORMATS)
     assert re.search(r"^  \.las, \.laz +laser surveys \(needs derain\[las\]\)$", told, re.M)
-
-
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_every_format_says_what_it_is(suffix: str) -> None:
-    assert isinstance(format_of(Path(f"scan{suffix.upper()}.gz")), Format)
-    assert suffix == suffix.lower()
-    assert FORMATS[suffix].HELP
+    help_of_run = " ".join(run_derain("run", "--help").out.split())
+    assert ".bin, .npy, .npz of one array, text without a line of names" in help_of_run

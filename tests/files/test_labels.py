@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from derain import InputError
-from derain.cards.known import label_of
 from derain.files.labels import instance, read_labels, semantic, write_labels
 
 LABELS = arrays(np.uint32, st.integers(0, 20))
@@ -64,16 +63,3 @@ def test_an_id_that_needs_more_than_16_bits_is_not_written(tmp_path: Path, label
 def test_another_number_of_instances_than_classes_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="2 instances for 3 classes"):
         write_labels(tmp_path / "scan.label", np.zeros(3, np.int64), np.zeros(2, np.int64))
-
-
-@pytest.mark.parametrize(
-    ("scans", "labels"), [("velodyne", "labels"), ("lidar_radar_pcd", "lidar_radar_labels")]
-)
-def test_labels_are_found_of_scans_that_are_named_from_within_their_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scans: str, labels: str
-) -> None:
-    for folder in (scans, labels):
-        (tmp_path / folder).mkdir()
-    (tmp_path / labels / "0.label").touch()
-    monkeypatch.chdir(tmp_path / scans)
-    assert label_of(Path("0.bin")) == tmp_path / labels / "0.label"

@@ -6,9 +6,6 @@ from pathlib import Path
 import laspy
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from derain import InputError, Scan
@@ -83,28 +80,6 @@ def test_a_survey_without_an_offset_keeps_its_millimetres(tmp_path: Path) -> Non
     assert scan.valid.sum() >= 2
     write_scan(tmp_path / "copy.las", scan)
     assert (tmp_path / "copy.las").read_bytes() == path.read_bytes()
-
-
-@settings(
-    max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-@given(
-    whole=arrays(np.int32, st.tuples(st.integers(0, 6), st.just(3))),
-    suffix=st.sampled_from((*SUFFIXES, ".las.gz")),
-    data=st.data(),
-)
-def test_every_stored_number_comes_back_in_order(
-    tmp_path: Path, whole: NDArray[np.int32], suffix: str, data: st.DataObject
-) -> None:
-    source = tmp_path / f"source{suffix.removesuffix('.gz')}"
-    las = write(source, whole)
-    scan = read_scan(source)
-    rows = data.draw(st.permutations(range(len(whole))))
-    path = tmp_path / f"scan{suffix}"
-    write_scan(path, scan.take(np.array(rows, int)))
-    write_scan(source, read_scan(path))
-    copy = laspy.read(source).points.array
-    assert copy.tobytes() == las.points.array[np.array(rows, int)].tobytes()
 
 
 def test_survey_points_in_many_chunks_come_back(tmp_path: Path) -> None:

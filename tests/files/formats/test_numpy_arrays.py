@@ -53,28 +53,6 @@ def test_organised_arrays_are_flattened_row_by_row_and_come_back_as_they_were(
             np.testing.assert_array_equal(copy[name], expected, strict=True)
 
 
-def test_reflectivity_comes_before_signal_as_intensity(
-    tmp_path: Path, organised: dict[str, np.ndarray]
-) -> None:
-    for names, found in (
-        (["signal"], "signal"),
-        (["reflectivity"], "reflectivity"),
-        (["signal", "reflectivity"], "reflectivity"),
-    ):
-        np.savez(tmp_path / "scan.npz", **{name: organised[name] for name in (*names, "xyz")})
-        scan = read_scan(tmp_path / "scan.npz")
-        np.testing.assert_array_equal(scan.intensity, organised[found].ravel())
-
-
-def test_separate_coordinates_are_read(tmp_path: Path) -> None:
-    x, y, z = np.arange(12.0).reshape(3, 4)
-    np.savez(tmp_path / "scan.npz", X=x, Y=y, Z=z, weights=np.ones(7), unit=np.array("m"))
-    scan = read_scan(tmp_path / "scan.npz")
-    assert scan.shape is None
-    np.testing.assert_array_equal(scan.xyz, np.stack([x, y, z], axis=1))
-    assert list(scan.fields) == ["X", "Y", "Z"]
-
-
 def test_a_table_needs_its_columns_stated(tmp_path: Path) -> None:
     rows = np.arange(20.0).reshape(4, 5)
     np.save(tmp_path / "scan.npy", rows)
@@ -106,16 +84,6 @@ def test_a_structured_array_keeps_names_types_and_grid(
     write_scan(path, scan)
     copy = np.load(path) if suffix == ".npy" else np.load(path)["points"]
     np.testing.assert_array_equal(copy, table, strict=True)
-
-
-def test_columns_of_several_values_or_types_become_a_structured_array(
-    tmp_path: Path, scan: Scan
-) -> None:
-    write_scan(tmp_path / "scan.npy", Scan(scan.xyz, fields={**scan.fields, "normal": scan.xyz}))
-    table = np.load(tmp_path / "scan.npy")
-    assert table.dtype.names == (*scan.fields, "normal")
-    np.testing.assert_array_equal(table["time"], scan.fields["time"], strict=True)
-    np.testing.assert_array_equal(table["normal"], scan.xyz, strict=True)
 
 
 class Fuse:

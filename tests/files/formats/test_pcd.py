@@ -143,22 +143,6 @@ def test_open3d_reads_what_is_written(
         np.testing.assert_array_equal(cloud.point[name].numpy().ravel(), columns[name], strict=True)
 
 
-@pytest.mark.parametrize("ascii_data", [False, True])
-@pytest.mark.parametrize("compressed", [False, True])
-def test_what_open3d_writes_is_read(
-    file: Path, scan: Scan, columns: dict[str, Any], ascii_data: bool, compressed: bool, open3d: Any
-) -> None:
-    cloud = open3d.t.geometry.PointCloud(scan.xyz)
-    for name in columns.keys() - set("xyz"):
-        cloud.point[name] = columns[name][:, None]
-    open3d.t.io.write_point_cloud(str(file), cloud, ascii_data, compressed)
-    copy = read_scan(file)
-    tolerances = (1e-6, 1e-9) if ascii_data else (0, 0)  # Open3D writes ten decimals
-    np.testing.assert_allclose(copy.xyz, scan.xyz, *tolerances)
-    for name in columns.keys() - set("xyz"):
-        np.testing.assert_allclose(copy.fields[name], columns[name], *tolerances)
-
-
 @pytest.mark.parametrize(
     ("stated", "shape"),
     [
@@ -182,22 +166,13 @@ def test_a_wrong_number_of_points_is_overruled_by_the_data(
 @pytest.mark.parametrize(
     ("encoding", "data"),
     [
-        *(("binary", data) for data in (DATA[:-1], DATA[:14], DATA + b"garba" * 3)),
+        *(("binary", data) for data in (DATA[:-1], DATA + b"garba" * 3)),
         *(
             ("ascii", b"1 2 3 4\n" + line)
-            for line in (
-                b"",
-                b"1 2 3",
-                b"1 2 3 4 5",
-                b"1 2 three 4",
-                b"1 2 3 65536",
-                b"1 2 3 4 # 5",
-            )
+            for line in (b"", b"1 2 3", b"1 2 three 4", b"1 2 3 65536", b"1 2 3 4 # 5")
         ),
         ("binary_compressed", b""),
-        ("binary_compressed", compress(column_by_column())[:-3]),
         ("binary_compressed", compress(column_by_column()[:-2])),
-        ("binary_compressed", struct.pack("<II", 9, 28) + b"\xff" * 9),
         ("binary_compressed", struct.pack("<II", 2, 28) + b"\0A"),
     ],
 )
@@ -219,33 +194,20 @@ def test_data_that_do_not_match_the_header_are_refused(
         ("FIELDS x y z intensity\n", ""),
         ("FIELDS x y z intensity", "FIELDS x y z x"),
         ("FIELDS x y z intensity", "FIELDS _ _ _ _"),
-        ("FIELDS x y z", "FIELDS x y"),
-        ("SIZE 4", "SIZE 3"),
         ("SIZE 4 4 4 2\n", ""),
         ("SIZE 4", "SIZE four"),
-        ("TYPE F F F U", "TYPE F F F Q"),
         ("TYPE F F F U", "TYPE F F F F"),
         ("TYPE F F F U\n", ""),
         ("COUNT 1 1 1 1", "COUNT 1 1 1 0"),
-        ("COUNT 1 1 1 1", "COUNT 1 1 1 -1"),
         ("COUNT 1 1 1 1", "COUNT 1 1 1"),
-        ("WIDTH 2\n", ""),
         ("WIDTH 2", "WIDTH"),
         ("WIDTH 2", "WIDTH 2.5"),
-        ("POINTS 2", "POINTS many"),
     ],
 )
 def test_headers_that_make_no_sense_are_refused(file: Path, old: str, new: str) -> None:
     assert old in HEADER
     with pytest.raises(InputError, match=r"read as \.pcd \(the header (says|has no) "):
         read_scan(write(file, HEADER.replace(old, new), DATA))
-
-
-@pytest.mark.parametrize("content", [b"", b"ply\n", bytes(range(256)) * 9])
-def test_files_that_are_no_pcd_are_refused(file: Path, content: bytes) -> None:
-    file.write_bytes(content)
-    with pytest.raises(InputError, match="the header has no DATA line"):
-        read_scan(file)
 
 
 def test_truth_values_and_foreign_byte_orders_are_written_as_pcd_spells_them(

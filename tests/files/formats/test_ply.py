@@ -15,7 +15,7 @@ from derain.files.formats.ply import BYTE_ORDERS, PlyHeader
 HEADER = """\
 ply
 format ascii 1.0
-comment made by hand
+comment made by händ
 obj_info two points
 element vertex 2
 property float x
@@ -73,24 +73,13 @@ def test_elements_before_the_vertices_are_passed_over(file: Path) -> None:
     check_points(read_scan(write(file, header.replace("ascii", "binary_little_endian"), data)))
 
 
-@pytest.mark.parametrize("encoding", BYTE_ORDERS)
-def test_encoding_comments_and_order_of_properties_survive(
-    file: Path, scan: Scan, encoding: str
-) -> None:
-    header = PlyHeader(encoding, ("comment Straße", "obj_info two  words", "comment"))
-    write_scan(file, replace(scan, header=header))
-    copy = read_scan(file)
-    assert copy.header == header
-    assert list(copy.fields) == list(scan.fields)
-    first = file.read_bytes()
-    write_scan(file, copy)
-    assert file.read_bytes() == first
-
-
 def test_a_cleaned_cloud_keeps_its_comments(file: Path) -> None:
     scan = read_scan(write(file, HEADER, DATA))
     write_scan(file, scan.take(np.array([True, False])))
-    assert b"comment made by hand\nobj_info two points\nelement vertex 1\n" in file.read_bytes()
+    assert (
+        "comment made by händ\n".encode() + b"obj_info two points\nelement vertex 1\n"
+        in file.read_bytes()
+    )
     assert read_scan(file).xyz.tolist() == [[1.5, -2.0, np.float32(0.1)]]
 
 
@@ -105,39 +94,24 @@ def test_open3d_reads_what_is_written(file: Path, scan: Scan, encoding: str, ope
         np.testing.assert_array_equal(cloud.point[name].numpy().ravel(), fields[name], strict=True)
 
 
-@pytest.mark.parametrize("ascii_data", [False, True])
-def test_what_open3d_writes_is_read(file: Path, scan: Scan, ascii_data: bool, open3d: Any) -> None:
-    cloud = open3d.t.geometry.PointCloud(scan.xyz)
-    cloud.point["intensity"] = scan.fields["intensity"][:, None]
-    open3d.t.io.write_point_cloud(str(file), cloud, ascii_data)
-    copy = read_scan(file)
-    np.testing.assert_allclose(copy.xyz, scan.xyz, rtol=1e-5 if ascii_data else 0)
-    np.testing.assert_array_equal(copy.intensity, scan.intensity)
-
-
 @pytest.mark.parametrize(
     ("header", "data"),
     [
         (HEADER, b""),
-        (HEADER, b"1 2 3 4\n"),
         (HEADER, b"1 2 3 4\n5 6 7\n"),
         (HEADER, b"1 2 3 4\n5 6 7 256\n"),
         (HEADER, b"1 2 3 4\n5 6 seven 8\n"),
         (HEADER.replace("ascii", "binary_little_endian"), binary("<")[:33]),
-        (HEADER.replace("ascii", "binary_big_endian"), b""),
         (HEADER.replace("vertex 2", "vertex 99999999999999999999"), DATA),
         (HEADER.replace("vertex 2", "vertex -2"), DATA),
         (HEADER.replace("vertex 2", "points 2"), DATA),
-        (HEADER.replace("element face 1", "element vertex 0").replace("vertex 2", "edge 2"), DATA),
         ("ply\nformat ascii 1.0\nelement vertex 2\nend_header\n", DATA),
         ("ply\nformat binary_big_endian 1.0\nelement vertex 2\nend_header\n", DATA),
         (HEADER.replace("format ascii 1.0\n", ""), DATA),
         (HEADER.replace("format ascii 1.0", "format ascii 2.0"), DATA),
-        (HEADER.replace("format ascii", "format morse"), DATA),
         (HEADER.replace("uchar intensity", "complex intensity"), DATA),
         (HEADER.replace("float32 y", "float32 x"), DATA),
         (HEADER.replace("element vertex 2\n", ""), DATA),
-        (HEADER.replace("comment", "remark"), DATA),
         (HEADER.replace("end_header\n", ""), DATA),
         (HEADER.replace("uchar intensity", "list uchar int echoes"), DATA),
         (HEADER.replace("ply", "obj"), DATA),
