@@ -5,7 +5,7 @@ of these becomes one InputError.
 """
 
 import os
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,7 @@ from derain.bags.names import ROS1_SUFFIX
 from derain.bags.ros2_metadata import FILE, MESSAGE, Ros2Metadata
 from derain.bags.rosbags_reader import MOST_TOPICS, rosbags_reader, stored_messages
 from derain.bags.topics import Topic, cloud_topic
-from derain.bags.unpacking import UnpackedBag, unpack, unpacked_bag
+from derain.bags.unpacking import unpack, unpacked_bag
 from derain.errors import InputError, reason_of
 from derain.system.extras import MCAP
 
@@ -48,7 +48,7 @@ class Bag:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._unpacked: UnpackedBag | None = None
+        self._unpacked: Path | None = None  # another process gets it by pickling
 
     @property
     def is_ros1(self) -> bool:
@@ -65,7 +65,7 @@ class Bag:
         with self.reading():
             return Ros2Metadata.read(self.path) if os.path.isdir(self.path) else None
 
-    @property
+    @cached_property
     def storage(self) -> str:
         """How it is stored: ``ros1``, ``mcap`` or ``sqlite3``.
 
@@ -83,16 +83,24 @@ class Bag:
         """Its topics, by name.
 
         Raises:
-            InputError: A bag that cannot be read.
+            InputError: A bag that cannot be read, or has names and numbers of messages that no
+                recording has.
         """
+        encoding = ROS1 if self.is_ros1 else CDR
         found: dict[tuple[str, str], Topic] = {}
         with self.opened() as reader:
             for connection in reader.connections:
                 name = (str(connection.topic), str(connection.msgtype))
+                if "\0" in name[0]:
+                    raise ValueError(f"the topic {name[0]} has a NUL in its name")
                 before = found[name].messages if name in found else 0
                 messages = before + max(int(connection.msgcount), 0)
-                found[name] = Topic(*name, messages, self._encoding_of(connection))
-            self._check(found.values())
+                written = str(connection.encoding) if self.storage == "mcap" else encoding
+                found[name] = Topic(*name, messages, written)
+            messages = sum(topic.messages for topic in found.values())
+            size = sum((self.path / name).stat().st_size for name in _names_of_files(self.metadata))
+            if messages > size:
+                raise ValueError(f"{messages:,} messages are stated in {size:,} bytes")
         return tuple(topic for _, topic in sorted(found.items()))
 
     def cloud_topic(self, name: str = "") -> Topic:
@@ -117,7 +125,9 @@ class Bag:
             metadata = self.metadata
             path = self.path
             if metadata is not None and metadata.compression == FILE:
-                path, metadata = self._unpacked_path(metadata), metadata.unpacked()
+                if self._unpacked is None or not os.path.isdir(self._unpacked):
+                    self._unpacked = unpacked_bag(self.path, metadata)
+                path, metadata = self._unpacked, metadata.unpacked()
             with self._reader(path, metadata) as reader:
                 if len(reader.connections) > MOST_TOPICS:
                     raise ValueError(f"it has more than {MOST_TOPICS:,} topics")
@@ -180,7 +190,8 @@ class Bag:
             compression = "zstd" if packed else ""
             stored = None
             if topic is None and start is None:
-                stored = reader.stored_messages() if self._is_mcap else stored_messages(reader)
+                is_mcap = self.storage == "mcap"
+                stored = reader.stored_messages() if is_mcap else stored_messages(reader)
             number = 0
             for connection, time, data, *more in reader.messages(chosen, start=start):
                 number += 1
@@ -189,38 +200,12 @@ class Bag:
                 raise ValueError(f"its topics have {number:,} of {stored:,} messages")
 
     def _reader(self, path: Path, metadata: Ros2Metadata | None) -> Any:
-        if not self._is_mcap:
+        if self.storage != "mcap":
             return rosbags_reader(path, self.is_ros1)
         MCAP.load(self.path)
         from derain.bags.mcap_reader import McapReader
 
-        return McapReader(path, [path / name for name in _names_of_files(metadata)])
-
-    def _unpacked_path(self, metadata: Ros2Metadata) -> Path:
-        """The folder with the unpacked files; another process may have unpacked them."""
-        if self._unpacked is None or not os.path.isdir(self._unpacked.path):
-            self._unpacked = unpacked_bag(self.path, metadata)
-        return self._unpacked.path
-
-    def _check(self, topics: Collection[Topic]) -> None:
-        """Refuses names and numbers of messages that no recording has."""
-        for topic in topics:
-            if "\0" in topic.name:
-                raise ValueError(f"the topic {topic.name} has a NUL in its name")
-        names = _names_of_files(self.metadata)
-        size = sum((self.path / name).stat().st_size for name in names)
-        messages = sum(topic.messages for topic in topics)
-        if messages > size:
-            raise ValueError(f"{messages:,} messages are stated in {size:,} bytes")
-
-    @property
-    def _is_mcap(self) -> bool:
-        return self.storage == "mcap"
-
-    def _encoding_of(self, connection: Any) -> str:
-        if self._is_mcap:
-            return str(connection.encoding)
-        return ROS1 if self.is_ros1 else CDR
+        return McapReader([path / name for name in _names_of_files(metadata)])
 
     @property
     def _rescuer(self) -> str:

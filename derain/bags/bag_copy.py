@@ -129,7 +129,7 @@ class BagCopy:
             raise InputError(
                 self.bag.path,
                 f"its copy cannot be written ({reason_of(error)})",
-                "Choose a folder that is writable and has room.",
+                "Choose a folder that is writable and has room; repair a bag that is damaged.",
             ) from error
 
 

@@ -1,15 +1,22 @@
 """Reads bags in MCAP, with the interface of the library that reads the other storages."""
 
-from collections.abc import Collection, Iterator, Sequence
+import heapq
+from array import array
+from collections import Counter
+from collections.abc import Collection, Container, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import Any, NamedTuple, Self
 
-from mcap.records import Attachment, Metadata
+import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Message, Metadata, Schema
 
-from derain.bags.mcap_file import McapFile
-from derain.errors import InputError, reason_of
+from derain.bags.mcap_records import McapRecords
+
+# Bytes that messages of chunks that overlap in time may take together.
+MOST_HELD = 2**29
 
 
 @dataclass(frozen=True)
@@ -33,19 +40,262 @@ class McapConnection:
     schema: tuple[str, str, bytes] | None
 
 
+class ChunkPlace(NamedTuple):
+    """Where a chunk is.
+
+    Attributes:
+        start: The earliest time in it, nanoseconds.
+        end: The latest.
+        offset: Of its record in the file.
+        channels: Those in it; None where the file does not list them.
+        compression: ``""``, ``lz4`` or ``zstd``.
+    """
+
+    start: int
+    end: int
+    offset: int
+    channels: frozenset[int] | None
+    compression: str
+
+
+class McapFile:
+    """A file of MCAP, open.
+
+    A file whose summary is missing or incomplete is read through once when it is opened.
+
+    Args:
+        path: The file.
+
+    Attributes:
+        records: Its records by their places.
+        schemas: Its schemas by their numbers.
+        channels: Its channels by their numbers.
+        counts: Number of messages of each channel.
+        start: The earliest time of a message, nanoseconds.
+        end: The latest.
+        chunks: Where chunks are.
+
+    Raises:
+        ValueError: A damaged file.
+        OSError: It cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.records = McapRecords(path)
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        try:
+            self._forget_messages()
+            if not self._read_summary():
+                self._forget_messages()
+                self._scan()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Closes the file."""
+        self.records.close()
+
+    def connections(self) -> dict[int, McapConnection]:
+        """Its channels by their numbers, without the counts of their messages.
+
+        Raises:
+            ValueError: A channel of a type that is not defined.
+        """
+        found = {}
+        for number, channel in self.channels.items():
+            schema = self.schemas.get(channel.schema_id)
+            if schema is None and channel.schema_id:
+                raise ValueError(f"{channel.topic} has a type that is defined nowhere")
+            name = "" if schema is None else schema.name
+            found[number] = McapConnection(
+                channel.topic,
+                _long_name(name),
+                0,
+                channel.message_encoding,
+                tuple(channel.metadata.items()),
+                None if schema is None else (name, schema.encoding, bytes(schema.data)),
+            )
+        return found
+
+    def messages(self, channels: Container[int], start: int | None = None) -> Iterator[Message]:
+        """Messages in the order of their times; of one time, in the order of the file.
+
+        Args:
+            channels: Those of interest.
+            start: The first time of interest, nanoseconds; None for the beginning.
+
+        Raises:
+            ValueError: A damaged file, or one that has other messages than it states.
+        """
+        parts = self._in_chunks(channels, start or 0), self._outside_chunks(channels, start or 0)
+        count = 0
+        for _, _, message in heapq.merge(*parts, key=lambda found: found[:2]):
+            count += 1
+            yield message
+        stated = sum(n for channel, n in self.counts.items() if channel in channels)
+        if start is None and count != stated:
+            raise ValueError(f"it has {count:,} messages, and its index {stated:,}")
+
+    def check_whole(self) -> None:
+        """Checks that reading all messages leaves nothing of the file unread.
+
+        Raises:
+            ValueError: A wrong checksum of the data, or a summary that differs from them in chunks,
+                messages, channels or schemas.
+        """
+        chunks, messages = set(), 0
+        for kind, offset, _ in self.records.places():
+            if kind == Opcode.CHUNK:
+                chunks.add(offset)
+            elif kind == Opcode.MESSAGE:
+                messages += 1
+            elif kind in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._define(self.records.read(offset, kind))
+            elif kind == Opcode.DATA_END:
+                self.records.check_data(offset)
+        if chunks != {chunk.offset for chunk in self.chunks}:
+            raise ValueError("its summary names other chunks than there are")
+        if messages != len(self._times):
+            raise ValueError(f"its summary lacks {messages:,} messages that are in no chunk")
+
+    def _forget_messages(self) -> None:
+        self.counts: Counter[int] = Counter()
+        self.start, self.end = 2**63 - 1, 0
+        self.chunks: list[ChunkPlace] = []
+        # Times and places of messages that are in no chunk.
+        self._times, self._offsets = array("Q"), array("Q")
+
+    def _read_summary(self) -> bool:
+        """Reads the summary, and returns whether it locates every message."""
+        statistics = None
+        for kind, record in self.records.in_summary():
+            if kind == Opcode.CHUNK_INDEX:
+                channels = frozenset(record.message_index_offsets) or None
+                self._add_chunk(record, record.chunk_start_offset, channels)
+            elif kind == Opcode.STATISTICS:
+                statistics = record
+            else:
+                self._define(record)
+        if len({chunk.offset for chunk in self.chunks}) < len(self.chunks):
+            raise ValueError("its summary names a chunk more than once")
+        if statistics is None or len(self.chunks) != statistics.chunk_count:
+            return False
+        self.counts.update(statistics.channel_message_counts)
+        self.start, self.end = statistics.message_start_time, statistics.message_end_time
+        if not self.counts.keys() <= self.channels.keys():
+            return False
+        return bool(self.chunks) or not statistics.message_count
+
+    def _scan(self) -> None:
+        """Reads through the whole file."""
+        for kind, offset, _ in self.records.places():
+            if kind == Opcode.CHUNK:
+                chunk, channels = self.records.read(offset, kind), set()
+                for inner, record in self.records.in_chunk(chunk):
+                    if inner == Opcode.MESSAGE:
+                        self._count(record)
+                        channels.add(record.channel_id)
+                    else:
+                        self._define(record)
+                self._add_chunk(chunk, offset, frozenset(channels))
+            elif kind == Opcode.MESSAGE:
+                message = self.records.read(offset, kind)
+                self._count(message)
+                self._times.append(message.log_time)
+                self._offsets.append(offset)
+            elif kind in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._define(self.records.read(offset, kind))
+
+    def _count(self, message: Message) -> None:
+        self.counts[message.channel_id] += 1
+        self.start, self.end = min(self.start, message.log_time), max(self.end, message.log_time)
+
+    def _define(self, record: Any) -> None:
+        """Notes a schema or a channel; a second one of its number must be the same."""
+        known: dict[int, Any]
+        if isinstance(record, Schema):
+            known = self.schemas
+        elif isinstance(record, Channel):
+            known = self.channels
+        else:
+            return
+        if known.setdefault(record.id, record) != record:
+            raise ValueError(f"it defines {type(record).__name__.lower()} {record.id} in two ways")
+
+    def _add_chunk(
+        self, record: Chunk | ChunkIndex, offset: int, channels: frozenset[int] | None
+    ) -> None:
+        times = record.message_start_time, record.message_end_time
+        self.chunks.append(ChunkPlace(*times, offset, channels, record.compression))
+
+    def _in_chunks(
+        self, channels: Container[int], start: int
+    ) -> Iterator[tuple[int, int, Message]]:
+        """Time, chunk and message; a chunk is unpacked when its time has come."""
+        whole = self._are_all(channels)
+        waiting: list[tuple[int, int, int, Message | None]] = [
+            (chunk.start, chunk.offset, -1, None)
+            for chunk in self.chunks
+            if chunk.end >= start
+            and (whole or chunk.channels is None or any(c in channels for c in chunk.channels))
+        ]
+        heapq.heapify(waiting)
+        held = 0
+        while waiting:
+            time, offset, _, message = heapq.heappop(waiting)
+            if message is not None:
+                held -= len(message.data)
+                yield time, offset, message
+                continue
+            parts = self.records.in_chunk(self.records.read(offset, Opcode.CHUNK))
+            for number, (kind, record) in enumerate(parts):
+                if kind != Opcode.MESSAGE:
+                    self._define(record)
+                    if whole and kind not in (Opcode.SCHEMA, Opcode.CHANNEL):
+                        raise ValueError(f"a chunk holds a record that no chunk has (kind {kind})")
+                elif record.channel_id in channels:
+                    if record.log_time >= start:
+                        held += len(record.data)
+                        heapq.heappush(waiting, (record.log_time, offset, number, record))
+                elif whole:
+                    raise _undefined(record)
+            if held > MOST_HELD:
+                raise ValueError(
+                    f"messages of more than {MOST_HELD // 10**6} MB in chunks of one time"
+                )
+
+    def _outside_chunks(
+        self, channels: Container[int], start: int
+    ) -> Iterator[tuple[int, int, Message]]:
+        """Time, place and message of those that are in no chunk."""
+        whole = self._are_all(channels)
+        for index in np.argsort(np.asarray(self._times), kind="stable"):
+            if self._times[index] >= start:
+                offset = self._offsets[index]
+                message = self.records.read(offset, Opcode.MESSAGE)
+                if message.channel_id in channels:
+                    yield message.log_time, offset, message
+                elif whole:
+                    raise _undefined(message)
+
+    def _are_all(self, channels: Container[int]) -> bool:
+        """Whether all channels are of interest, so that no message may be left out."""
+        return all(number in channels for number in self.channels)
+
+
 class McapReader:
     """The files of a bag in MCAP, open inside a ``with`` block.
 
     Args:
-        path: The bag, for errors.
         files: Its files, in the order of time.
 
     Attributes:
         files: The same, open.
     """
 
-    def __init__(self, path: Path, files: Sequence[Path]) -> None:
-        self.path = path
+    def __init__(self, files: Sequence[Path]) -> None:
         self.files: list[McapFile] = []
         self._paths = files
 
@@ -54,7 +304,7 @@ class McapReader:
         """Its connections, in the order of the files."""
         counts: dict[McapConnection, int] = {}
         for file in self.files:
-            for number, connection in _connections(file).items():
+            for number, connection in file.connections().items():
                 counts[connection] = counts.get(connection, 0) + file.counts[number]
         return [replace(each, msgcount=count) for each, count in counts.items()]
 
@@ -92,7 +342,7 @@ class McapReader:
         """
         wanted = {replace(each, msgcount=0): each for each in connections}
         for file in self.files:
-            of_file = _connections(file)
+            of_file = file.connections()
             channels = {n: wanted[each] for n, each in of_file.items() if each in wanted}
             for found in file.messages(channels, start):
                 connection = channels[found.channel_id]
@@ -117,17 +367,12 @@ class McapReader:
         """Every record that is neither a message nor about messages.
 
         Raises:
-            InputError: One is damaged.
+            ValueError: One is damaged.
         """
-        try:
-            for file in self.files:
-                yield from file.attachments_and_metadata()
-        except Exception as error:
-            raise InputError(
-                self.path,
-                f"its attachments and metadata cannot be read ({reason_of(error)})",
-                "Have it repaired by mcap recover.",
-            ) from error
+        for file in self.files:
+            for kind, offset, _ in file.records.places():
+                if kind in (Opcode.ATTACHMENT, Opcode.METADATA):
+                    yield file.records.read(offset, kind)
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
@@ -141,23 +386,8 @@ class McapReader:
         self._stack.close()
 
 
-def _connections(file: McapFile) -> dict[int, McapConnection]:
-    """The channels of a file by their numbers."""
-    found = {}
-    for number, channel in file.channels.items():
-        schema = file.schemas.get(channel.schema_id)
-        if schema is None and channel.schema_id:
-            raise ValueError(f"{channel.topic} has a type that is defined nowhere")
-        definition = None if schema is None else (schema.name, schema.encoding, bytes(schema.data))
-        found[number] = McapConnection(
-            channel.topic,
-            _long_name("" if schema is None else schema.name),
-            0,
-            channel.message_encoding,
-            tuple(channel.metadata.items()),
-            definition,
-        )
-    return found
+def _undefined(message: Message) -> ValueError:
+    return ValueError(f"a message is of channel {message.channel_id}, which nothing defines")
 
 
 def _long_name(type_: str) -> str:

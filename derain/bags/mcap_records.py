@@ -15,39 +15,26 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 from zlib import crc32
 
+from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    Channel,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    Message,
-    Metadata,
-    Schema,
-    Statistics,
-)
 
 from derain.bags.unpacking import PORTION, check_size, unpack
 
 MAGIC = b"\x89MCAP0\r\n"
 
 # What parses the records that are read; of messages, see `_message`.
-PARSERS: dict[int, Callable[[ReadDataStream], McapRecord]] = {
-    Opcode.HEADER: Header.read,
-    Opcode.FOOTER: Footer.read,
-    Opcode.SCHEMA: Schema.read,
-    Opcode.CHANNEL: Channel.read,
-    Opcode.CHUNK: Chunk.read,
-    Opcode.CHUNK_INDEX: ChunkIndex.read,
-    Opcode.ATTACHMENT: Attachment.read,
-    Opcode.STATISTICS: Statistics.read,
-    Opcode.METADATA: Metadata.read,
-    Opcode.DATA_END: DataEnd.read,
+PARSERS: dict[int, Callable[[ReadDataStream], records.McapRecord]] = {
+    Opcode.HEADER: records.Header.read,
+    Opcode.FOOTER: records.Footer.read,
+    Opcode.SCHEMA: records.Schema.read,
+    Opcode.CHANNEL: records.Channel.read,
+    Opcode.CHUNK: records.Chunk.read,
+    Opcode.CHUNK_INDEX: records.ChunkIndex.read,
+    Opcode.ATTACHMENT: records.Attachment.read,
+    Opcode.STATISTICS: records.Statistics.read,
+    Opcode.METADATA: records.Metadata.read,
+    Opcode.DATA_END: records.DataEnd.read,
 }
 
 # Kinds that the specification defines; those from 0x80 on are private records of an application.
@@ -154,7 +141,7 @@ class McapRecords:
         _check_crc("its summary", self._summary_crc, [content, footer])
         return _records(content, most=len(content))
 
-    def in_chunk(self, chunk: Chunk) -> Iterator[tuple[int, Any]]:
+    def in_chunk(self, chunk: records.Chunk) -> Iterator[tuple[int, Any]]:
         """Kind and content of each record of a chunk; None is the content of private records.
 
         Records that are not needed, such as indexes of messages, are left out.
@@ -246,12 +233,12 @@ def _parsed(kind: int, body: bytes | memoryview) -> Any:
     return PARSERS[kind](ReadDataStream(BytesIO(body)))
 
 
-def _message(body: bytes | memoryview) -> Message:
+def _message(body: bytes | memoryview) -> records.Message:
     """Parses a message; three times as fast as the library, which copies its data twice."""
     if len(body) < MESSAGE_HEAD.size:
         raise ValueError("a message is cut off")
     channel, sequence, time, published = MESSAGE_HEAD.unpack_from(body)
-    return Message(
+    return records.Message(
         channel_id=channel,
         log_time=time,
         data=bytes(body[MESSAGE_HEAD.size :]),

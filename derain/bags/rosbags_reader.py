@@ -3,7 +3,7 @@
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -54,7 +54,8 @@ def rosbags_reader(path: Path, is_ros1: bool) -> Iterator[Any]:
         reader.storage.metadata = reader.storage.metadata._replace(compression_mode=None)
         yield reader
     finally:
-        reader.close()
+        with suppress(Exception):  # where a query was given up halfway, it is "locked"
+            reader.close()
 
 
 def other_tables(reader: Any) -> list[str]:

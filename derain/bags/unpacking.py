@@ -4,15 +4,13 @@ A few kilobytes may unpack to more than there is memory, and the libraries that 
 whatever they find.
 """
 
+import atexit
 import bz2
 import shutil
 import tempfile
-import weakref
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from weakref import WeakValueDictionary
 
 from derain.bags.ros2_metadata import Ros2Metadata
 from derain.files.atomic import temporary_folder
@@ -72,26 +70,12 @@ def _whole(decompressor: Any, data: bytes) -> bytes:
     return unpacked
 
 
-@dataclass(frozen=True, eq=False)
-class UnpackedBag:
-    """A folder with the files of a compressed bag, not compressed.
-
-    The process that unpacked it removes the folder when it ends, or drops the last reference. A
-    pickled copy is the path alone: another process reads the folder and leaves it.
-
-    Attributes:
-        path: The folder.
-    """
-
-    path: Path
+# Folders of what this process has unpacked, by what identified the bag's files then.
+_UNPACKED: dict[tuple[object, ...], Path] = {}
 
 
-# What this process has unpacked and holds, by what identified the bag's files then.
-_HELD: WeakValueDictionary[tuple[object, ...], UnpackedBag] = WeakValueDictionary()
-
-
-def unpacked_bag(folder: Path, metadata: Ros2Metadata) -> UnpackedBag:
-    """Unpacks the files of a bag, unless this process holds them already.
+def unpacked_bag(folder: Path, metadata: Ros2Metadata) -> Path:
+    """The folder with the files of a bag unpacked, which this process removes when it ends.
 
     Args:
         folder: The bag's folder.
@@ -103,19 +87,17 @@ def unpacked_bag(folder: Path, metadata: Ros2Metadata) -> UnpackedBag:
     """
     files = [(folder / name).stat() for name in metadata.files]
     key = (*((f.st_dev, f.st_ino, f.st_size, f.st_mtime_ns) for f in files), repr(metadata))
-    held = _HELD.get(key)
-    if held is not None:
-        return held
-    with ExitStack() as stack:
-        lent = stack.enter_context(temporary_folder(Path(tempfile.gettempdir())))
-        lent.chmod(0o700)  # the folder of temporary files is open to all users
-        plain = metadata.unpacked()
-        for packed, file in zip(metadata.files, plain.files, strict=True):
-            _unpack_file(folder / packed, lent / file)
-        plain.write(lent)
-        made = _HELD[key] = UnpackedBag(lent)
-        weakref.finalize(made, stack.pop_all().close)
-        return made
+    if key not in _UNPACKED or not _UNPACKED[key].is_dir():
+        with ExitStack() as stack:
+            lent = stack.enter_context(temporary_folder(Path(tempfile.gettempdir())))
+            lent.chmod(0o700)  # the folder of temporary files is open to all users
+            plain = metadata.unpacked()
+            for packed, file in zip(metadata.files, plain.files, strict=True):
+                _unpack_file(folder / packed, lent / file)
+            plain.write(lent)
+            atexit.register(stack.pop_all().close)
+        _UNPACKED[key] = lent
+    return _UNPACKED[key]
 
 
 def _unpack_file(source: Path, target: Path) -> None:

@@ -74,14 +74,15 @@ def irregularities(frames: Iterable[Frame], window: Window) -> Iterator[str]:
 def _unbroken(recording: Sequence[Frame]) -> list[list[Frame]]:
     """A recording in the parts that breaks in time divide it into."""
     try:
-        times = [frame.time for frame in recording]
+        times = _times(recording)
     except InputError:
-        times = [None] * len(recording)
-    steps = [step for step in _steps(recording, times) if step is not None]
-    if len(steps) + 1 < len(recording):
+        times = None
+    places = times or _numbers(recording)
+    if places is None:
         return []
-    smallest = min((step for step in steps if step > 0), default=0.0)
-    longest = LONGEST_NUMBER_STEP * smallest if times[0] is None else LONGEST_STEP
+    steps = _steps(places)
+    smallest = min((step for step in steps if step > 0), default=0)
+    longest = LONGEST_STEP if times else LONGEST_NUMBER_STEP * smallest
     parts = [[recording[0]]]
     for frame, step in zip(recording[1:], steps, strict=True):
         if not 0 < step <= longest:
@@ -93,41 +94,43 @@ def _unbroken(recording: Sequence[Frame]) -> list[list[Frame]]:
 def _of_steps(recording: Sequence[Frame]) -> Iterator[str]:
     """What of the steps from scan to scan does not suit: the first of each kind."""
     try:
-        times = [frame.time for frame in recording]
+        times = _times(recording)
     except InputError as error:  # the method may well do without
         yield f"{recording[0].name}: when it was taken is not known: {error}"
         return
-    steps = list(zip(recording[1:], _steps(recording, times), strict=True))
-    backwards = [frame for frame, step in steps if step is not None and step <= 0]
+    steps = _steps(times or _numbers(recording) or [])
+    backwards = [frame for frame, step in zip(recording[1:], steps, strict=False) if step <= 0]
     if backwards:
         yield (
             f"{backwards[0].name}: not later than the scan before it ({_scans(len(backwards))} in "
             "all): name them in the order that they were taken in"
         )
-    apart = [frame for frame, step in steps if step is not None and step > LONGEST_STEP]
-    if apart and times[0] is not None:
+    if not times:
+        return
+    apart = [frame for frame, step in zip(recording[1:], steps, strict=True) if step > LONGEST_STEP]
+    if apart:
         yield (
             f"{apart[0].name}: more than {LONGEST_STEP:g} s after the scan before it "
             f"({_scans(len(apart))} in all): they say little of one another"
         )
 
 
-def _steps(recording: Sequence[Frame], times: Sequence[float | None]) -> list[float | None]:
-    """How far each frame but the first is from the one before it, as :func:`_step` gives it."""
-    return [
-        _step(before, after, *seconds)
-        for (before, after), seconds in zip(pairwise(recording), pairwise(times), strict=True)
-    ]
+def _times(recording: Sequence[Frame]) -> list[float] | None:
+    """When the scans were taken, seconds; None where that is not known of all."""
+    times = [time for frame in recording if (time := frame.time) is not None]
+    return times if len(times) == len(recording) else None
 
 
-def _step(before: Frame, after: Frame, first: float | None, second: float | None) -> float | None:
-    """How far on a frame is from the one before it: seconds, or numbers in the names of files."""
-    if first is not None and second is not None:
-        return second - first
-    names = [scan_stem(f.path) for f in (before, after) if isinstance(f, FileFrame)]
-    if len(names) == 2 and all(name.isascii() and name.isdigit() for name in names):
-        return float(int(names[1]) - int(names[0]))
-    return None
+def _numbers(recording: Sequence[Frame]) -> list[int] | None:
+    """The numbers that the files are named by; None where not all are."""
+    names = [scan_stem(frame.path) for frame in recording if isinstance(frame, FileFrame)]
+    digits = [name for name in names if name.isascii() and name.isdigit()]
+    return list(map(int, digits)) if len(digits) == len(recording) else None
+
+
+def _steps(places: Sequence[float]) -> list[float]:
+    """How far each scan but the first is from the one before it."""
+    return [after - before for before, after in pairwise(places)]
 
 
 def _scans(number: int) -> str:

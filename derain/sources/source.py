@@ -1,6 +1,5 @@
 """Where scans come from: frames in time order."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, overload
 
@@ -10,35 +9,10 @@ from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
 
 
-class Source(Sequence[Frame], ABC):
-    """Frames in time order, one sequence after the other.
+class Frames(Sequence[Frame]):
+    """A source of scans: frames in time order, one sequence after the other.
 
     It has a length and gives any of them again; nothing is read before a frame's ``read``.
-    """
-
-    @abstractmethod
-    def frame(self, number: int) -> Frame:
-        """One of the frames, by its place among all of them, from 0."""
-
-    @overload
-    def __getitem__(self, place: int) -> Frame: ...
-
-    @overload
-    def __getitem__(self, place: slice) -> "Frames": ...
-
-    def __getitem__(self, place: int | slice) -> "Frame | Frames":
-        numbers = range(len(self))[place]
-        if isinstance(numbers, int):
-            return self.frame(numbers)
-        return Frames(map(self.frame, numbers))
-
-    def map(self, change: Callable[[Frame], Frame]) -> "Frames":
-        """The same frames, each changed, such as to be without labels."""
-        return Frames(map(change, self))
-
-
-class Frames(Source):
-    """Frames that are known one by one.
 
     Example:
         >>> import numpy as np
@@ -77,6 +51,19 @@ class Frames(Source):
     def __len__(self) -> int:
         return len(self._frames)
 
-    def frame(self, number: int) -> Frame:
-        """One of the frames, by its place among all of them, from 0."""
-        return self._frames[number]
+    @overload
+    def __getitem__(self, place: int) -> Frame: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> "Frames": ...
+
+    def __getitem__(self, place: int | slice) -> "Frame | Frames":
+        return Frames(self._frames[place]) if isinstance(place, slice) else self._frames[place]
+
+    def map(self, change: Callable[[Frame], Frame]) -> "Frames":
+        """The same frames, each changed, such as to be without labels."""
+        return Frames(map(change, self))
+
+
+# What functions call the frames that they take.
+Source = Frames

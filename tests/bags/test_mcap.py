@@ -19,7 +19,7 @@ from benchmarks.fuzzing.false_indexes import (
     without_a_chunk,
 )
 from benchmarks.recorded_bags import CLOUD_TYPE, IMU, POINTS, START, STORAGES, Ros, drive
-from derain.bags import mcap_file
+from derain.bags import mcap_reader
 from derain.bags.bag import Bag
 from derain.bags.bag_copy import BagCopy
 from derain.errors import InputError
@@ -121,7 +121,7 @@ def test_chunks_of_one_time_that_are_too_many_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"))
-    monkeypatch.setattr(mcap_file, "MOST_HELD", 1000)
+    monkeypatch.setattr(mcap_reader, "MOST_HELD", 1000)
     with pytest.raises(InputError, match="in chunks of one time"):
         list(Bag(bag).messages())
 

@@ -29,19 +29,6 @@ def test_a_column_of_the_same_name_is_replaced_in_its_place() -> None:
     np.testing.assert_array_equal(scan.fields["ring"], np.arange(10))
 
 
-def test_a_column_has_a_value_for_each_point() -> None:
-    with pytest.raises(InputError, match="ring has 9 rows for 10 points"):
-        with_column(Scan.of(scene(10)), "ring", np.arange(9))
-
-
-@pytest.mark.parametrize("columns", ["X,y,z,intensity,x", "x,y,z,intensity,X"])
-def test_the_column_of_the_exact_name_is_the_coordinate(tmp_path: Path, columns: str) -> None:
-    path = tmp_path / "scan.bin"
-    np.arange(1, 11, dtype="<f4").reshape(2, 5).tofile(path)
-    x = columns.split(",").index("x")
-    assert read_scan(path, columns.split(",")).xyz[:, 0].tolist() == [1 + x, 6 + x]
-
-
 WITH_NAMES = [".csv", ".ply", ".pcd", ".npz", ".feather"]
 
 
