@@ -17,8 +17,8 @@ from derain.views.channels import UNITS
 
 Parsed = TypeVar("Parsed")
 
-# What the names of a data set's folders tell of scans that lie in such: nothing, what their classes
-# are called, or also which of the classes are rain.
+# What the names of a data set's folders tell of scans that lie in such, from the least to the most:
+# nothing, what their classes are called, or also which of the classes are rain.
 AutoDetect = Literal["nothing", "classes", "rain"]
 
 # What mean and std are of, in their order.

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
+from typing import get_args
 
 from derain.cards.card import AutoDetect, DataCard, load_card, packaged_cards
 from derain.cards.layout import Layout
@@ -16,9 +17,7 @@ USUAL_LABELS = Layout().labels
 @cache
 def known_layouts() -> tuple[Layout, ...]:
     """The layouts of the packaged data cards, those first whose folders tell most."""
-    cards = sorted(
-        _packaged(), key=lambda card: _DETECTION_ORDER.index(card.auto_detect), reverse=True
-    )
+    cards = sorted(_packaged(), key=lambda card: _rank(card.auto_detect), reverse=True)
     return tuple(dict.fromkeys(card.layout for card in cards))
 
 
@@ -32,15 +31,8 @@ def card_by_folders(layout: Layout, least: AutoDetect) -> DataCard | None:
     Returns:
         The card whose folders tell so much; None where none does.
     """
-    return next(
-        (
-            card
-            for card in _packaged()
-            if card.layout.scans == layout.scans
-            and _DETECTION_ORDER.index(card.auto_detect) >= _DETECTION_ORDER.index(least)
-        ),
-        None,
-    )
+    cards = [card for card in _packaged() if card.layout.scans == layout.scans]
+    return next((card for card in cards if _rank(card.auto_detect) >= _rank(least)), None)
 
 
 def layouts_for(card: DataCard | None) -> tuple[Layout, ...]:
@@ -83,5 +75,6 @@ def _packaged() -> tuple[DataCard, ...]:
     return tuple(map(load_card, packaged_cards()))
 
 
-# From the least to the most that folders tell.
-_DETECTION_ORDER: tuple[AutoDetect, ...] = ("nothing", "classes", "rain")
+def _rank(detected: AutoDetect) -> int:
+    """How much the names of folders tell: they are listed from the least to the most."""
+    return get_args(AutoDetect).index(detected)

@@ -3,7 +3,7 @@
 import sys
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -20,43 +20,6 @@ from derain.views.window import Window
 # One scan in so many is examined, the first among them. It takes 3 to 7 milliseconds of 116,000
 # points, a tenth of what a filter takes; the scans of one sensor mostly have the same fault.
 EXAMINE_EVERY = 100
-
-
-class ScanWarnings:
-    """Warns of what is odd about scans, of each kind of fault once.
-
-    Args:
-        examine: What is odd about a scan that was judged.
-        examined_of: One scan in so many is examined; the share of rain is looked at in each.
-    """
-
-    def __init__(
-        self, examine: Callable[[Judgement], Iterable[ScanIssue]], examined_of: int = EXAMINE_EVERY
-    ) -> None:
-        self._examine = examine
-        self._examined_of = examined_of
-        self._judged = 0
-        self._kinds: set[str] = set()
-
-    def check(self, judgement: Judgement) -> None:
-        """Warns of a scan that was judged, if it is its turn."""
-        odd = [*much_removed(judgement.share_of_rain)]
-        if self._judged % self._examined_of == 0:
-            odd += self._examine(judgement)
-        self._judged += 1
-        for issue in odd:
-            if issue.kind not in self._kinds:
-                self._kinds.add(issue.kind)
-                text = f"{judgement.scan.name}: {issue.detail}"
-                warnings.warn(text, ScanWarning, stacklevel=_level_of_the_user())
-
-
-def _level_of_the_user() -> int:
-    """The level of the stack, as warnings.warn counts from who calls this, outside derain."""
-    level, frame = 1, sys._getframe(1)
-    while frame.f_back and frame.f_globals.get("__name__", "").startswith("derain."):
-        level, frame = level + 1, frame.f_back
-    return level
 
 
 class Method(ABC):
@@ -83,6 +46,7 @@ class Method(ABC):
     EXAMINE_EVERY: ClassVar[int] = EXAMINE_EVERY
 
     warns: bool = True
+    _scans_checked: int = 0
 
     @property
     @abstractmethod
@@ -148,14 +112,24 @@ class Method(ABC):
         """
 
     def with_warnings(self, judgement: Judgement) -> Judgement:
-        """Returns a judgement, after a warning where something is odd about the scan."""
-        if self.warns:
-            self._warnings.check(judgement)
+        """Returns a judgement, after a warning of each kind of fault that no scan had before."""
+        if not self.warns:
+            return judgement
+        odd = [*much_removed(judgement.share_of_rain)]
+        if self._scans_checked % self.EXAMINE_EVERY == 0:
+            odd += self.issues(judgement)
+        self._scans_checked += 1
+        for issue in odd:
+            if issue.kind not in self._warned_of:
+                self._warned_of.add(issue.kind)
+                text = f"{judgement.scan.name}: {issue.detail}"
+                warnings.warn(text, ScanWarning, stacklevel=_level_of_the_user())
         return judgement
 
     @cached_property
-    def _warnings(self) -> ScanWarnings:
-        return ScanWarnings(self.issues, self.EXAMINE_EVERY)
+    def _warned_of(self) -> set[str]:
+        """Kinds of faults."""
+        return set()
 
     @abstractmethod
     def as_dict(self) -> dict[str, Any]:
@@ -163,3 +137,11 @@ class Method(ABC):
 
         Texts, finite numbers, true, false, or nothing; or lists and mappings of these.
         """
+
+
+def _level_of_the_user() -> int:
+    """The level of the stack, as warnings.warn counts from who calls this, outside derain."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back and frame.f_globals.get("__name__", "").startswith("derain."):
+        level, frame = level + 1, frame.f_back
+    return level

@@ -15,7 +15,7 @@ from derain.filters import DROR, FilterDerainer
 from derain.recordings.persistence import PersistenceDerainer
 from derain.scan import Scan
 from derain.sources.judgement import Judgement
-from derain.sources.method import Method, ScanWarnings
+from derain.sources.method import Method
 from derain.views.scan_issues import ScanIssue
 
 
@@ -59,19 +59,28 @@ def test_a_method_that_is_loaded_for_a_command_does_not_warn() -> None:
     assert not warned(lambda: load_method("dror", {}).push(in_millimetres()))
 
 
-def test_one_scan_in_so_many_is_examined_and_the_share_of_rain_looked_at_in_each() -> None:
-    examined: list[int] = []
+class Examined(FilterDerainer):
+    """Counts the scans that it examines, one in three."""
 
-    def examine(judgement: Judgement) -> Iterator[ScanIssue]:
-        examined.append(len(judgement.scan))
+    EXAMINE_EVERY = 3
+
+    def __init__(self) -> None:
+        super().__init__(DROR())
+        self.examined: list[int] = []
+
+    def issues(self, judgement: Judgement) -> Iterator[ScanIssue]:
+        self.examined.append(len(judgement.scan))
         yield ScanIssue("odd", "it is odd")
 
-    look, texts = ScanWarnings(examine, examined_of=3), []
+
+def test_one_scan_in_so_many_is_examined_and_the_share_of_rain_looked_at_in_each() -> None:
+    method, texts = Examined(), []
     for points in range(1, 6):
         rain = np.full(points, points == 2)
         answer = Judgement(rain.astype(np.float32), rain, ~rain, Scan.of(np.ones((points, 3))))
-        texts += [str(each.message) for each in warned(lambda answer=answer: look.check(answer))]
-    assert examined == [1, 4]
+        found = warned(lambda answer=answer: method.with_warnings(answer))
+        texts += [str(each.message) for each in found]
+    assert method.examined == [1, 4]
     assert texts[0] == "array: it is odd"
     assert "100% of the points are called rain" in texts[1]
     assert len(texts) == 2
