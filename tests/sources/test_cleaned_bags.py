@@ -24,7 +24,6 @@ from benchmarks.recorded_bags import (
 from derain.bags.cloud_message import CDR, ROS1, CloudMessage
 from derain.export.runtime import Derainer
 from derain.files.labels import read_labels
-from derain.sources.folders import named_frames
 
 RUN = ("run", "ror", "--set", "radius=2", "--set", "neighbours=3")
 
@@ -50,19 +49,6 @@ def rain_of_files(tmp_path: Path, run_derain) -> list[NDArray[np.bool_]]:
     return [
         read_labels(tmp_path / "masks" / f"{n}.label", len(t)) == 1 for n, t in enumerate(tables())
     ]
-
-
-def test_a_cloud_that_would_lose_too_much_stays_whole(
-    tmp_path: Path, storage: Storage, run_derain
-) -> None:
-    clouds = tables()
-    clouds[1]["x"] *= 1000  # no point has a neighbour
-    bag = small_bag(tmp_path, storage, clouds=clouds)
-    outcome = run_derain(*RUN, bag, "--out", tmp_path / "out", "--most-removed", "0.99")
-    assert outcome.code == 2
-    assert f"{bag}/velodyne_points/000001: left whole" in outcome.err
-    made = named_frames([bag_path(tmp_path / "out", storage)])
-    assert [len(frame.read()) == len(clouds[1]) for frame in made] == [False, True, False]
 
 
 def test_only_the_clouds_change_and_as_files_do(
@@ -125,38 +111,35 @@ def test_points_can_say_how_probably_they_are_rain(tmp_path: Path, run_derain) -
 
 
 def test_an_organised_cloud_can_keep_its_shape(
-    tmp_path: Path, storage: Storage, run_derain, rain_of_files: list[NDArray[np.bool_]]
+    tmp_path: Path, run_derain, rain_of_files: list[NDArray[np.bool_]]
 ) -> None:
-    ros = Ros(storage)
-    cloud = ros.cloud(tables()[0], START, shape=(10, 30))
-    bag = small_bag(tmp_path, storage, clouds=[], more=[Recorded(POINTS, CLOUD_TYPE, START, cloud)])
+    cloud = Ros("mcap").cloud(tables()[0], START, shape=(10, 30))
+    bag = small_bag(tmp_path, "mcap", clouds=[], more=[Recorded(POINTS, CLOUD_TYPE, START, cloud)])
     shapes = []
     for out, options in (("flat", []), ("whole", ["--keep-shape"])):
         assert run_derain(*RUN, bag, "--out", tmp_path / out, *options).code == 0
-        (message,) = read_bag(bag_path(tmp_path / out, storage))
-        now = cloud_of(message[3], storage).cloud
+        (message,) = read_bag(tmp_path / out / "drive")
+        now = cloud_of(message[3], "mcap").cloud
         shapes.append((now.height, now.width, int(np.isfinite(now.columns()["x"]).sum())))
     clean = int((~rain_of_files[0]).sum())
     assert shapes == [(1, clean, clean), (10, 30, clean)]
 
 
-def test_a_cloud_that_cannot_be_cleaned_stays_and_is_told(
-    tmp_path: Path, storage: Storage, run_derain
-) -> None:
-    ros, good = Ros(storage), tables(3)
-    lost = np.ones(4, [("a", "f4")])
-    bag = small_bag(tmp_path, storage, clouds=[good[0], lost, good[2][:0], good[2]])
-    outcome = run_derain(*RUN, bag, "--out", tmp_path / "out")
-    before, after = read_bag(bag), read_bag(bag_path(tmp_path / "out", storage))
+def test_a_cloud_that_cannot_be_cleaned_stays_and_is_told(tmp_path: Path, run_derain) -> None:
+    first, far, last = tables(3)
+    far["x"] *= 1000  # no point has a neighbour
+    lost, empty = np.ones(4, [("a", "f4")]), last[:0]
+    bag = small_bag(tmp_path, "mcap", clouds=[first, lost, empty, far, last])
+    outcome = run_derain(*RUN, bag, "--out", tmp_path / "out", "--most-removed", "0.99")
+    before, after = read_bag(bag), read_bag(tmp_path / "out/drive")
 
     assert outcome.code == 2
-    assert outcome.err.count("no x, y and z") == 1
-    assert "1 of 4 scans could not be cleaned" in outcome.err
+    assert outcome.err.count("000001: has no x, y and z") == 1
+    assert outcome.err.count("000003: left whole") == 1
+    assert "2 of 5 scans could not be cleaned" in outcome.err
     assert [m[:3] for m in after] == [m[:3] for m in before]
     clouds = [(b, a) for b, a in zip(before, after, strict=True) if b[0] == POINTS]
-    assert [b == a for b, a in clouds] == [False, True, True, False]
-    assert len(cloud_of(clouds[2][1][3], storage).cloud) == 0
-    assert ros.is_ros1 == (storage == "ros1")
+    assert [b == a for b, a in clouds] == [False, True, True, True, False]
 
 
 def test_nothing_is_left_of_a_bag_that_breaks_off(
@@ -256,14 +239,13 @@ def test_topics_without_definition_or_hash_are_copied(tmp_path: Path, run_derain
     ]
 
 
-NAMES = ["a b", "/a\nb", "/a\udcff", "/a//b", "/a/", "/é", ""]  # that no topic may have
+NAMES = ["a b", "/a\nb", "/a//b", "/é", ""]  # that no topic may have
 
 
 @pytest.mark.parametrize(
     ("out", "options", "reason"),
     [
         *[("out", ("--cleaned-topic", name), "is not a name of a topic") for name in NAMES],
-        ("out", ("--removed-topic", "a b"), "--removed-topic: 'a b' is not a name of a topic"),
         ("out", ("--cleaned-topic", "/imu/data"), "has a topic /imu/data already"),
         ("drive/cleaned", (), "is inside"),
         ("mine", (), "is there already, and no bag"),

@@ -1,5 +1,6 @@
 """One scan in its sequence: in a file, or in memory."""
 
+import pickle
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -16,6 +17,7 @@ from derain.sources.file_frame import FileFrame
 from derain.sources.folders import frame_of
 from derain.sources.frame import MemoryFrame
 from derain.sources.reader import FrameReader
+from derain.sources.source import Frames
 
 
 @pytest.fixture
@@ -57,14 +59,6 @@ def test_labels_that_the_card_does_not_know_are_named(labelled: FileFrame) -> No
     assert (scan.label == 110).sum() == 10
     with pytest.raises(InputError, match=r"scan\.label: ids \[110\] are no classes of REHEARSE-3D"):
         FrameReader(load_card("rehearse3d")).read(labelled)
-
-
-def test_columns_are_those_of_the_frame(tmp_path: Path) -> None:
-    wide = np.column_stack([scene(20), np.arange(20, dtype=np.float32)])
-    wide.tofile(tmp_path / "wide.bin")
-    frame = frame_of(tmp_path / "wide.bin", ("x", "y", "z", "intensity", "ring"))
-    assert frame.count_points() == 20
-    np.testing.assert_array_equal(frame.read().fields["ring"], np.arange(20))
 
 
 def test_intensities_are_seen_in_another_unit_and_kept_as_they_are(labelled: FileFrame) -> None:
@@ -120,6 +114,21 @@ def test_a_scan_in_memory_is_a_frame_like_any(labelled: FileFrame) -> None:
     other = MemoryFrame(key="0", scan=brighter)
     assert other.fingerprint() != frame.fingerprint()
     assert other.checksums()[1] == frame.checksums()[1]
+
+
+def _points(source: Frames) -> list[int]:
+    return [len(frame.read()) for frame in source]
+
+
+def test_a_source_can_be_gone_through_again() -> None:
+    scans = [Scan.of(scene(points)) for points in range(1, 6)]
+    source = Frames(iter(Frames.of_scans(scans, "drive")))
+    assert [frame.key for frame in source] == [f"drive/{number:06d}" for number in range(5)]
+    assert [frame.number for frame in source] == [*range(5)]
+    assert {frame.sequence for frame in source} == {"drive"}
+    assert _points(pickle.loads(pickle.dumps(source))) == [1, 2, 3, 4, 5]
+    assert _points(source) == _points(source) == [1, 2, 3, 4, 5]
+    assert _points(source[:0:-2]) == [5, 3]
 
 
 def test_a_frame_follows_the_one_before_it_in_its_sequence() -> None:

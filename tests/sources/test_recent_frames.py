@@ -76,15 +76,3 @@ def test_a_gap_starts_anew(number: int) -> None:
     assert recent.push(all_of_them[number], PlacedScan(SCAN, all_of_them[number].time)) is None
     assert recent.waiting == 1
     assert seen(recent.pop()) == ([], [number], [])
-
-
-def test_who_goes_on_after_flushing_sees_what_was_before() -> None:
-    recent = RecentFrames(Window(2, 1))
-    all_of_them = frames(5)
-    for frame in all_of_them[:3]:
-        recent.push(frame, PlacedScan(SCAN, frame.time))
-    assert seen(recent.pop()) == ([0, 1], [2], [])
-    assert recent.push(all_of_them[3], PlacedScan(SCAN, all_of_them[3].time)) is None
-    given_back = recent.push(all_of_them[4], PlacedScan(SCAN, all_of_them[4].time))
-    assert given_back is not None
-    assert seen(given_back) == ([1, 2], [3], [4])

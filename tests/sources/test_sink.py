@@ -36,19 +36,6 @@ def test_a_scan_and_its_labels_are_named_by_the_key(tmp_path: Path) -> None:
     assert (tmp_path / "out/1.bin").read_bytes() == scene(30)[4:].tobytes()
 
 
-def test_keys_with_folders_make_folders(tmp_path: Path) -> None:
-    for sequence in "ab":
-        write(tmp_path / f"data/sequences/{sequence}/velodyne/0.bin.gz")
-    source = named_frames([tmp_path / "data"])
-    sink = FolderSink(tmp_path / "out")
-    sink.refuse_clashes(source)
-    for frame in source:
-        sink.write(frame, None, np.zeros(30, bool))
-    assert names(tmp_path / "out") == ["a/velodyne/0.label", "b/velodyne/0.label"]
-    assert sink.scan_path(source[0]) == tmp_path / "out/a/velodyne/0.bin.gz"
-    assert sink.path(source[1], ".png") == tmp_path / "out/b/velodyne/0.png"
-
-
 def test_a_scan_from_memory_is_written_as_a_pcd(tmp_path: Path) -> None:
     (frame,) = Frames.of_scans([Scan.of(scene(30))])
     scan, sink = frame.read(), FolderSink(tmp_path)
@@ -91,15 +78,6 @@ def test_labels_that_lie_where_the_frame_says_are_not_overwritten(tmp_path: Path
     source = frames_of([scan], lambda scan: tmp_path / "truth/0.label", ("x", "y", "z", "i"))
     with pytest.raises(InputError, match="holds the labels of"):
         FolderSink(tmp_path / "truth").refuse_clashes(source)
-
-
-def test_a_data_set_is_not_overwritten_through_its_own_root(tmp_path: Path) -> None:
-    for sequence in "ab":
-        write(tmp_path / f"sequences/{sequence}/velodyne/0.bin")
-    source = named_frames([tmp_path])
-    with pytest.raises(InputError, match="would overwrite"):
-        FolderSink(tmp_path / "sequences").refuse_clashes(source)
-    FolderSink(tmp_path).refuse_clashes(source)
 
 
 def test_a_link_to_the_scans_is_their_folder(tmp_path: Path) -> None:
@@ -161,16 +139,6 @@ def labelled(root: Path, *names: str, labels: str = "labels") -> Source:
         ("x", "y", "z", "intensity"),
         relative_keys(paths),
     )
-
-
-def test_labels_are_written_by_the_keys_of_their_frames(tmp_path: Path) -> None:
-    sink, frames = LabelSink(tmp_path / "out"), labelled(tmp_path, "a/0.bin", "b/0.bin")
-    sink.refuse_clashes(frames)
-    for frame, label in zip(frames, ([0, 1], [1, 0, 1]), strict=True):
-        sink.write(frame, None, np.array(label))
-    written = {path.relative_to(sink.folder).as_posix() for path in sink.folder.rglob("*.*")}
-    assert written == {"a/0.label", "b/0.label"}
-    assert np.fromfile(tmp_path / "out/b/0.label", "<u4").tolist() == [1, 0, 1]
 
 
 @pytest.mark.parametrize("own", ["a/0.label", "labels/0.label", "truth/0.label"])

@@ -42,13 +42,6 @@ def test_a_quaternion_is_its_rotation(motion: np.ndarray) -> None:
     np.testing.assert_allclose(rotation_of(-3 * quaternion), motion[:3, :3], atol=1e-12)
 
 
-def test_known_quaternions() -> None:
-    half = np.sqrt(0.5)
-    np.testing.assert_allclose(quaternion_of(np.eye(3)), (0, 0, 0, 1), atol=1e-15)
-    np.testing.assert_allclose(quaternion_of(turned(90)), (0, 0, half, half), atol=1e-15)
-    np.testing.assert_allclose(np.abs(quaternion_of(turned(180))), (0, 0, 1, 0), atol=1e-15)
-
-
 @given(degrees, st.floats(-170, 170), st.floats(0, 1))
 def test_on_the_way_between_two_turns_lies_their_share(
     start: float, change: float, share: float
@@ -79,15 +72,10 @@ def test_what_is_written_is_read(
             np.testing.assert_allclose(found.times, times, atol=1e-6)
     lines = (folder / "poses.txt").read_text().splitlines()
     assert {len(line.split()) for line in lines} <= {8 if by_time else 12}
-
-
-def test_poses_beside_a_calibration_are_written_as_the_cameras(tmp_path: Path) -> None:
-    numbers = " ".join(map(str, TO_CAMERA[:3].ravel()))
-    (tmp_path / "calib.txt").write_text(f"Tr: {numbers}\n")
-    ahead = Extrinsics.of_pose(5, 0, 0, 0, 0, 0).matrix
-    write_trajectory(tmp_path / "poses.txt", Trajectory(ahead[None]))
-    camera = np.loadtxt(tmp_path / "poses.txt").reshape(3, 4)
-    np.testing.assert_allclose(camera[:, 3], (0, 0, 5), atol=1e-9)  # ahead is the camera's z
+    if calibrated and poses and not by_time:  # they are the camera's
+        camera = np.array(lines[0].split(), float).reshape(3, 4)
+        expected = TO_CAMERA @ poses[0] @ np.linalg.inv(TO_CAMERA)
+        np.testing.assert_allclose(camera, expected[:3], atol=1e-6)
 
 
 def tum(*lines: str) -> str:
@@ -127,11 +115,9 @@ def test_times_without_a_pose_are_refused(time: float) -> None:
     ("content", "reason"),
     [
         ("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "pose 2 is not later than the one before it"),
-        ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "pose 2 is not later than the one before it"),
         ("1 0 0 0 0 0 0 0\n", "quaternion of length 0, not 1"),
         ("1 0 0 0 1e300 0 0 1\n", "quaternion of length inf, not 1"),
         ("1 0 0 0 0 0 0 1\n1 2 3\n", "line 2 is not 8 numbers"),
-        ("1 0 0 0 0 0 0 nan\n", "line 1 is not 8 numbers"),
         ("# 1 2 3\n\n1 2 3\n", "line 3 is not 12 numbers"),
     ],
 )
