@@ -52,7 +52,7 @@ def read_scan(path: Path | str, columns: Sequence[str] = DEFAULT_COLUMNS) -> Sca
     """
     path = Path(path)
     format_ = format_of(path)
-    with reading(path):
+    with reading(path, *format_.DAMAGE):
         return format_.decode(read_content(path), columns)
 
 

@@ -167,12 +167,17 @@ def describable_columns(path: Path, scan: Scan, types: Collection[str]) -> dict[
     for name, column in columns.items():
         one_word = encode(name).split() == [encode(name)]
         if not one_word or column.dtype.str[1:] not in types or 0 in column.shape[1:]:
-            raise InputError(
-                path,
-                f"{scan_suffix(path)} has no place for the column '{name}' ({column.dtype})",
-                "Write .npz.",
-            )
+            raise no_place(path, name, column)
     return columns
+
+
+def no_place(
+    path: Path, name: str, column: NDArray[Any], remedy: str = "Write .npz."
+) -> InputError:
+    """The error of a column that a format cannot hold."""
+    shape = f" of shape {column.shape[1:]}" if column.ndim > 1 else ""
+    reason = f"{scan_suffix(path)} has no place for the column '{name}' ({column.dtype}{shape})"
+    return InputError(path, reason, remedy)
 
 
 def records(columns: Mapping[str, NDArray[Any]], row: np.dtype[Any]) -> NDArray[Any]:

@@ -30,6 +30,7 @@ class Format(ABC):
         HELP: What it is, for ``derain info --formats``.
         UNNAMED: Which of its files do not name their columns, for the help of ``--columns``; empty
             where every file does.
+        DAMAGE: What :meth:`decode` raises, besides InputError, on content that it cannot read.
         EXTRA: What must be installed for it besides what derain always needs, if anything.
         RECORD: How likely such a file is no scan but a record of something else, such as of poses:
             of a folder's files those of the lowest number are its scans.
@@ -37,6 +38,7 @@ class Format(ABC):
 
     HELP: ClassVar[str] = ""
     UNNAMED: ClassVar[str] = ""
+    DAMAGE: ClassVar[tuple[type[Exception], ...]] = (ValueError,)
     EXTRA: ClassVar[Extra | None] = None
     RECORD: ClassVar[int] = 0
 
@@ -49,7 +51,8 @@ class Format(ABC):
             columns: Names of its columns, which count where the file does not name them itself.
 
         Raises:
-            InputError: Content that it cannot read.
+            InputError: Content without what a scan needs, such as coordinates.
+            Exception: One of DAMAGE, on content that it cannot read.
         """
 
     @abstractmethod

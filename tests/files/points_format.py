@@ -10,7 +10,6 @@ from derain.errors import InputError
 from derain.files.columns import columns_of, scan_of
 from derain.files.content import Content
 from derain.files.format import FORMATS, Format
-from derain.files.reading import reading
 from derain.scan import Scan
 
 COLUMNS = ("x", "y", "z", "intensity")
@@ -28,15 +27,15 @@ class Points(Format):
     """Points under their number."""
 
     HELP = "points under a line with their number"
+    DAMAGE = (ValueError, IndexError)
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
         """Reads x, y, z and intensity."""
         lines = content.data.decode("latin-1").splitlines()
         content.budget.reserve(32 * len(lines))
-        with reading(content.path, ValueError, IndexError):
-            count = int(lines[0])
-            rows = [[float(word) for word in line.split()] for line in lines[1 : count + 1]]
-            table = np.array(rows).reshape(count, len(COLUMNS))
+        count = int(lines[0])
+        rows = [[float(word) for word in line.split()] for line in lines[1 : count + 1]]
+        table = np.array(rows).reshape(count, len(COLUMNS))
         header = PointsHeader(("remarks",) if len(lines) > count + 1 else ())
         return scan_of(content.path, dict(zip(COLUMNS, table.T, strict=True)), header=header)
 

@@ -15,11 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.errors import InputError
-from derain.files.columns import columns_of, scan_of
+from derain.files.columns import columns_of, no_place, scan_of
 from derain.files.content import Content, MemoryBudget, check_columns
 from derain.files.format import FORMATS, Format
-from derain.files.reading import reading
 from derain.scan import Scan
 from derain.system.extras import FLATBUFFERS, PYARROW, require
 
@@ -60,6 +58,7 @@ class Feather(Format):
     """Tables in Arrow's file format, compressed or not."""
 
     HELP = "Arrow tables, version 2"
+    DAMAGE = (Exception,)
     EXTRA = PYARROW
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
@@ -78,24 +77,23 @@ class Feather(Format):
         """
         arrow = PYARROW.load(content.path)
         require(content.path, FLATBUFFERS)
-        with reading(content.path, Exception):
-            if not content.data.startswith(_MAGIC):
-                raise ValueError("it does not begin as Feather version 2 does")
-            # As a stream, so that what is read are the messages that were checked.
-            stream = content.data[len(_MAGIC) :]
-            compression = _check_messages(arrow, stream, content.budget)
-            with arrow.ipc.open_stream(stream) as messages:
-                table = messages.read_all()
-            table.validate(full=True)
-            check_columns(table.num_columns)
-            content.budget.reserve(table.nbytes)
-            if len(set(table.column_names)) < table.num_columns:
-                raise ValueError("two columns have one name")
-            fields = {
-                name: column.to_numpy()
-                for name, column in zip(table.column_names, table.columns, strict=True)
-                if arrow.types.is_integer(column.type) or arrow.types.is_floating(column.type)
-            }
+        if not content.data.startswith(_MAGIC):
+            raise ValueError("it does not begin as Feather version 2 does")
+        # As a stream, so that what is read are the messages that were checked.
+        stream = content.data[len(_MAGIC) :]
+        compression = _check_messages(arrow, stream, content.budget)
+        with arrow.ipc.open_stream(stream) as messages:
+            table = messages.read_all()
+        table.validate(full=True)
+        check_columns(table.num_columns)
+        content.budget.reserve(table.nbytes)
+        if len(set(table.column_names)) < table.num_columns:
+            raise ValueError("two columns have one name")
+        fields = {
+            name: column.to_numpy()
+            for name, column in zip(table.column_names, table.columns, strict=True)
+            if arrow.types.is_integer(column.type) or arrow.types.is_floating(column.type)
+        }
         return scan_of(content.path, fields, header=FeatherHeader(table, compression))
 
     def encode(self, path: Path, scan: Scan) -> bytes:
@@ -112,9 +110,7 @@ class Feather(Format):
         held = {name: header.table[name] for name in header.table.column_names} if header else {}
         for name, column in columns_of(scan).items():
             if column.ndim > 1 or column.dtype.kind not in "biuf" or column.dtype.itemsize > 8:
-                raise InputError(
-                    path, f".feather has no place for the column '{name}'", "Write .npz."
-                )
+                raise no_place(path, name, column)
             exact = column.dtype.kind == "f"
             if name not in held or not np.array_equal(
                 held[name].to_numpy(), column, equal_nan=exact

@@ -18,11 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.files.columns import columns_of, scan_of
+from derain.files.columns import columns_of, no_place, scan_of
 from derain.files.content import Content
 from derain.files.format import FORMATS, Format
 from derain.files.names import scan_suffix
-from derain.files.reading import reading
 from derain.files.text import encode
 from derain.scan import LARGEST_COORDINATE, Scan
 from derain.system.extras import LASPY
@@ -68,6 +67,7 @@ class Las(Format):
     """Laser surveys, version 1.0 to 1.4, as they are or compressed."""
 
     HELP = "laser surveys"
+    DAMAGE = (Exception,)
     EXTRA = LASPY
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
@@ -89,11 +89,11 @@ class Las(Format):
             InputError: A file that is damaged, or laspy is not installed.
         """
         laspy = LASPY.load(content.path)
-        with reading(content.path, Exception), _panics_as_errors():
+        with _panics_as_errors():
             header, raw = _points(laspy, content)
-            whole = np.stack([raw[axis] for axis in "XYZ"], axis=1).astype(np.int64)
-            origin = _origin(whole, header.scales)
-            near = (whole - origin) * header.scales
+        whole = np.stack([raw[axis] for axis in "XYZ"], axis=1).astype(np.int64)
+        origin = _origin(whole, header.scales)
+        near = (whole - origin) * header.scales
         fields = {axis: near[:, place] for place, axis in enumerate("xyz")}
         fields |= {name: raw[name] for name in raw.dtype.names or () if name not in ("X", "Y", "Z")}
         return scan_of(content.path, fields, header=LasHeader(header, origin))
@@ -153,11 +153,7 @@ def _with_dimensions(
     for name, column in columns.items():
         known = column.ndim == 1 and column.dtype.str[1:] in EXTRA_TYPES
         if not known or len(encode(name)) > LONGEST_NAME:
-            raise InputError(
-                path,
-                f"no extra dimension can hold the column '{name}' ({column.dtype})",
-                "Write .npz.",
-            )
+            raise no_place(path, name, column)
         header.add_extra_dim(laspy.ExtraBytesParams(name, column.dtype))
     return header
 

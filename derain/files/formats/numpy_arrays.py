@@ -16,11 +16,7 @@ from derain.errors import InputError
 from derain.files.columns import columns_of, name_columns, records, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
-from derain.files.reading import reading
 from derain.scan import Scan, named
-
-# NumPy parses an array's header as Python code, which may raise anything on damaged bytes.
-_DAMAGE = Exception
 
 # What stands before each member in the directory of a ZIP file.
 _MEMBER = b"PK\x01\x02"
@@ -56,6 +52,7 @@ class Npy(Format):
 
     HELP = "one array of NumPy's"
     UNNAMED = ".npy"
+    DAMAGE = (Exception,)  # NumPy parses an array's header as Python code
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
         """Reads one array of points.
@@ -68,8 +65,7 @@ class Npy(Format):
         Raises:
             InputError: A file that is damaged, or an array of another shape.
         """
-        with reading(content.path, _DAMAGE):
-            array = _array(content.data)
+        array = _array(content.data)
         shape = _organised(content.path, _grid_of_table(array))
         fields = _columns_of_table(content.path, array, columns)
         return scan_of(content.path, fields, shape, NpyHeader(structured=bool(array.dtype.names)))
@@ -95,6 +91,7 @@ class Npz(Format):
 
     HELP = "several arrays of NumPy's, by name"
     UNNAMED = ".npz of one array"
+    DAMAGE = (Exception,)
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
         """Reads named arrays.
@@ -111,9 +108,7 @@ class Npz(Format):
         Raises:
             InputError: A file that is damaged, or that has no coordinates.
         """
-        path = content.path
-        with reading(path, _DAMAGE):
-            arrays = _arrays(content)
+        path, arrays = content.path, _arrays(content)
         table = _name_of_table(path, arrays)
         grid = _grid(path, arrays) if table is None else _grid_of_table(arrays[table])
         shape = _organised(path, grid)
@@ -128,8 +123,7 @@ class Npz(Format):
             if array.shape[: len(grid)] == grid:
                 fields[name] = array.reshape(math.prod(grid), *array.shape[len(grid) :])
             elif shape and array.shape == shape[1:]:
-                with reading(path, ValueError):
-                    content.budget.reserve(shape[0] * array.nbytes)
+                content.budget.reserve(shape[0] * array.nbytes)
                 fields[name] = np.tile(array, shape[0])
             else:
                 constants[name] = array
@@ -212,8 +206,7 @@ def _columns_of_table(
     if names := array.dtype.names:
         flat = array.reshape(-1)
         return {name: flat[name] for name in names}
-    with reading(path, ValueError):  # before an array is made of each
-        check_columns(array.shape[-1])
+    check_columns(array.shape[-1])  # before an array is made of each
     points = math.prod(array.shape[:-1])
     return name_columns(path, list(array.reshape(points, array.shape[-1]).T), columns)
 

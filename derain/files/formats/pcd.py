@@ -25,7 +25,6 @@ from derain.files.content import (
     check_columns,
 )
 from derain.files.format import FORMATS, Format
-from derain.files.reading import reading
 from derain.files.text import LARGEST_HEADER, decode, encode, format_rows, parse_rows
 from derain.scan import Scan
 
@@ -102,9 +101,8 @@ class Pcd(Format):
         Raises:
             InputError: A file that is truncated or damaged, or has no coordinates.
         """
-        with reading(content.path, ValueError):
-            header, data = _parse_header(content.data)
-            fields = _columns_of(header, data, content.budget)
+        header, data = _parse_header(content.data)
+        fields = _columns_of(header, data, content.budget)
         points = len(next(iter(fields.values())))
         organised = header.height > 1 and header.width * header.height == points
         shape = (header.height, header.width) if organised else None

@@ -12,11 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.errors import InputError
-from derain.files.columns import describable_columns, records, scan_of
+from derain.files.columns import describable_columns, no_place, records, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
-from derain.files.reading import reading
 from derain.files.text import (
     LARGEST_HEADER,
     decode,
@@ -182,8 +180,7 @@ class Ply(Format):
         Raises:
             InputError: A file that is truncated or damaged, or has no vertices with coordinates.
         """
-        with reading(content.path, ValueError):
-            header, table = _parse(content.data)
+        header, table = _parse(content.data)
         return scan_of(
             content.path, {name: table[name] for name in table.dtype.names or ()}, header=header
         )
@@ -199,11 +196,7 @@ class Ply(Format):
         columns = describable_columns(path, scan, PROPERTY_TYPES)
         for name, column in columns.items():
             if column.ndim > 1:
-                raise InputError(
-                    path,
-                    f"a vertex cannot hold the several values of '{name}'",
-                    "Write .pcd or .npz.",
-                )
+                raise no_place(path, name, column, "Write .pcd or .npz.")
         header = scan.header if isinstance(scan.header, PlyHeader) else PlyHeader()
         properties = [Property(name, column.dtype.str[1:]) for name, column in columns.items()]
         vertex = Element("vertex", len(scan), properties)

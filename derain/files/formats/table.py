@@ -16,12 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.errors import InputError
-from derain.files.columns import columns_of, name_columns, scan_of
+from derain.files.columns import columns_of, name_columns, no_place, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
 from derain.files.names import scan_suffix
-from derain.files.reading import reading
 from derain.files.text import decode, encode
 from derain.scan import Scan
 
@@ -89,6 +87,7 @@ class Table(Format):
 
     HELP = "lines of numbers, perhaps under a line of names"
     UNNAMED = "text without a line of names"
+    DAMAGE = (ValueError, csv.Error)
 
     def decode(self, content: Content, columns: Sequence[str]) -> Scan:
         """Reads a table of points.
@@ -109,9 +108,7 @@ class Table(Format):
             InputError: A file that has lines of different lengths or values that are not numbers,
                 names two columns alike, or has no coordinates.
         """
-        path = content.path
-        with reading(path, ValueError, csv.Error):
-            header = _parse_table(content.data)
+        path, header = content.path, _parse_table(content.data)
         if header.named:
             return scan_of(path, header.columns, header=header)
         numbers = list(header.columns.values()) or [np.empty(0)] * len(columns)
@@ -168,12 +165,7 @@ def _refuse_unreadable(path: Path, name: str, column: NDArray[Any], separator: s
     no_comment = not name.startswith(("#", "//"))
     number = column.dtype.kind in "biuf" and column.dtype.itemsize <= 8
     if not (one_line and one_word and no_comment and number) or column.ndim > 1:
-        raise InputError(
-            path,
-            f"{scan_suffix(path)} has no place for the column '{name}' "
-            f"({column.dtype}, {column.ndim} axes)",
-            "Write .npz.",
-        )
+        raise no_place(path, name, column)
 
 
 def _parse_table(text: bytes) -> TableHeader:

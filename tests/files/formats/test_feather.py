@@ -8,7 +8,7 @@ import pyarrow
 import pytest
 from pyarrow import feather
 
-from derain import InputError, Scan
+from derain import InputError
 from derain.files import read_scan, write_scan
 
 COMPRESSIONS = ("uncompressed", "lz4", "zstd")
@@ -81,6 +81,3 @@ def test_what_is_no_feather_of_points_is_refused(tmp_path: Path, table: pyarrow.
     feather.write_feather(table.drop(["z"]), str(path))
     with pytest.raises(InputError, match="has no x, y and z among its columns"):
         read_scan(path)
-    ones = np.ones((2, 3), np.float32)
-    with pytest.raises(InputError, match=r"\.feather has no place for the column 'normal'"):
-        write_scan(path, Scan(ones, fields={"xyz": ones, "normal": ones}))

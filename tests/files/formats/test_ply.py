@@ -122,18 +122,6 @@ def test_damaged_files_are_refused(file: Path, header: str, data: bytes) -> None
         read_scan(write(file, header, data))
 
 
-@pytest.mark.parametrize(
-    ("column", "reason"),
-    [(np.zeros((5, 3)), "several values of 'it'"), (np.zeros(5, np.int64), "no place for .* 'it'")],
-)
-def test_columns_that_no_ply_can_hold_are_refused(
-    file: Path, scan: Scan, column: np.ndarray, reason: str
-) -> None:
-    with pytest.raises(InputError, match=reason):
-        write_scan(file, replace(scan, fields={**scan.fields, "it": column}))
-    assert not file.exists()
-
-
 POINTS = np.arange(18, dtype=np.float32).reshape(6, 3)
 TRIANGLES = [(0, 1, 2), (2, 3, 4), (5, 4, 3), (1, 3, 5)]
 

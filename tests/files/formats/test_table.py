@@ -146,21 +146,3 @@ def test_lines_whose_numbers_were_changed_are_written_anew(file: Path) -> None:
     assert file.read_text() == "0.5 1 2 7\n3.0 4 5 9\n"
     write_scan(file, replace(scan, fields={**scan.fields, "ring": np.array([1, 2])}))
     assert file.read_text() == "x y z intensity ring\n0.5 1 2 7 1\n3.0 4 5 8 2\n"
-
-
-@pytest.mark.parametrize(
-    ("name", "column"),
-    [
-        ("normal", np.ones((2, 3), np.float32)),
-        ("name", np.array(["car", "tree"])),
-        ("complex", np.ones(2, np.complex64)),
-        ("#comment", np.ones(2)),
-        (" padded", np.ones(2)),
-        ("two\nlines", np.ones(2)),
-    ],
-)
-def test_what_would_not_come_back_is_not_written(file: Path, name: str, column: np.ndarray) -> None:
-    scan = Scan(np.ones((2, 3), np.float32), fields={"xyz": np.ones((2, 3)), name: column})
-    with pytest.raises(InputError, match="has no place for the column"):
-        write_scan(file, scan)
-    assert not list(file.parent.iterdir())
