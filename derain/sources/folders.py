@@ -113,9 +113,7 @@ def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> So
 
 
 def frame_of(
-    scan: Path,
-    columns: Sequence[str] = DEFAULT_COLUMNS,
-    layouts: Sequence[Layout] | None = None,
+    scan: Path, columns: Sequence[str] = DEFAULT_COLUMNS, layouts: Sequence[Layout] | None = None
 ) -> FileFrame:
     """The frame of one file, whose labels are looked for; whether it is there shows in reading.
 

@@ -29,11 +29,7 @@ class FolderSink:
     """
 
     def __init__(
-        self,
-        folder: Path,
-        option: str = "--out",
-        again: bool = True,
-        removed: Path | None = None,
+        self, folder: Path, option: str = "--out", again: bool = True, removed: Path | None = None
     ) -> None:
         self.folder = folder
         self.removed = removed
@@ -87,11 +83,7 @@ class FolderSink:
                 )
 
     def write(
-        self,
-        frame: Frame,
-        scan: Scan | None,
-        label: NDArray[Any],
-        removed: Scan | None = None,
+        self, frame: Frame, scan: Scan | None, label: NDArray[Any], removed: Scan | None = None
     ) -> None:
         """Writes the scans, then the labels: where there are labels, the scans are complete.
 

@@ -160,9 +160,7 @@ def test_a_summary_that_differs_from_the_data_is_refused(
 PRIVATE = struct.pack("<BQ", 0x90, 5) + b"notes"
 
 
-def test_private_records_are_copied_and_messages_outside_chunks_not_dropped(
-    tmp_path: Path,
-) -> None:
+def test_private_records_are_copied_and_messages_outside_chunks_not_dropped(tmp_path: Path) -> None:
     bag = record(tmp_path / "drive.mcap", Ros("mcap"))
     content = bag.read_bytes()
     bag.write_bytes(with_summary(content, list, data=PRIVATE))

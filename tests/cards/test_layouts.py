@@ -5,13 +5,7 @@ from pathlib import Path
 import pytest
 
 from derain.cards.card import load_card, packaged_cards
-from derain.cards.known import (
-    card_by_folders,
-    known_layouts,
-    label_of,
-    label_places,
-    lidar_folders,
-)
+from derain.cards.known import card_by_folders, known_layouts, label_of, label_places, lidar_folders
 from derain.cards.layout import Layout, folder_above, sequence_of
 from derain.errors import InputError
 

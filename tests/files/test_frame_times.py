@@ -53,10 +53,7 @@ def test_columns_of_other_names_can_be_stated(tmp_path: Path) -> None:
         (f"frame,timestamp\n0,1{'0' * 400}\n", "'1000"),
         (f"frame,timestamp\n0,{'a' * 10**5}\n", "'aaaa"),
         (f"frame,timestamp\n0,{'1' * 10**6}\n", "cannot be read as"),
-        (
-            f"frame,timestamp\n{'0,1' * 3 * 2**20}",
-            "cannot be read as .csv .9,437,200 bytes",
-        ),
+        (f"frame,timestamp\n{'0,1' * 3 * 2**20}", "cannot be read as .csv .9,437,200 bytes"),
         (",".join(map(str, range(10**5))), "has no columns frame and timestamp"),
         ("frame,timestamp\n0,\n", "'' is not a time"),
         ("frame,timestamp\n0\n", "'' is not a time"),

@@ -167,9 +167,7 @@ def test_a_thread_that_asks_while_another_imports_finds_all_that_there_is(
     assert found == 4 * [["brick", "cobble", "pebble"]]
 
 
-def test_one_member_may_have_several_names_and_answers_to_the_first(
-    things: Registry[type],
-) -> None:
+def test_one_member_may_have_several_names_and_answers_to_the_first(things: Registry[type]) -> None:
     class Slab:
         pass
 

@@ -17,13 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.files.columns import describable_columns, records, scan_of
-from derain.files.content import (
-    LARGEST_SCAN,
-    MOST_COLUMNS,
-    Content,
-    MemoryBudget,
-    check_columns,
-)
+from derain.files.content import LARGEST_SCAN, MOST_COLUMNS, Content, MemoryBudget, check_columns
 from derain.files.format import FORMATS, Format
 from derain.files.text import LARGEST_HEADER, decode, encode, format_rows, parse_rows
 from derain.scan import Scan

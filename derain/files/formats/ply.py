@@ -15,14 +15,7 @@ from numpy.typing import NDArray
 from derain.files.columns import describable_columns, no_place, records, scan_of
 from derain.files.content import Content, check_columns
 from derain.files.format import FORMATS, Format
-from derain.files.text import (
-    LARGEST_HEADER,
-    decode,
-    encode,
-    filled_lines,
-    format_rows,
-    parse_rows,
-)
+from derain.files.text import LARGEST_HEADER, decode, encode, filled_lines, format_rows, parse_rows
 from derain.scan import Scan
 
 BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
