@@ -98,8 +98,8 @@ class _OnlyTried(Exception):  # noqa: N818, it signals no error
 def temporary_folder(folder: Path) -> Iterator[Path]:
     """Lends an empty hidden folder in another, which is made if missing.
 
-    It is gone when the block ends in this process, with what is in it then; a fork of the process
-    leaves it. A process that is killed leaves it for :func:`remove_abandoned`.
+    It is gone when the block ends, with what is in it then. A process that is killed leaves it for
+    :func:`remove_abandoned`.
 
     Args:
         folder: The other folder.
@@ -110,12 +110,11 @@ def temporary_folder(folder: Path) -> Iterator[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     remove_abandoned(folder)
     temporary = folder / f"{PREFIX}{secrets.token_hex(8)}"
-    process, descriptor = os.getpid(), _make_locked(temporary)
+    descriptor = _make_locked(temporary)
     try:
         yield temporary
     finally:
-        if os.getpid() == process:
-            shutil.rmtree(temporary, ignore_errors=True)
+        shutil.rmtree(temporary, ignore_errors=True)
         if descriptor is not None:
             os.close(descriptor)
 

@@ -13,13 +13,12 @@ from derain.files.reading import read_bytes, reading
 LARGEST_RECORD = 2**26
 
 
-def read_numbers(path: Path, *columns: int, comments: bool = False) -> NDArray[np.float64]:
-    """Reads lines of so many finite numbers each; empty ones are passed over.
+def read_numbers(path: Path, *columns: int) -> NDArray[np.float64]:
+    """Reads lines of so many finite numbers each; empty ones and remarks (#) are passed over.
 
     Args:
         path: The file.
         columns: How many numbers a line may have; the first line decides which of them.
-        comments: Whether lines that begin with # are passed over too.
 
     Returns:
         float64 (T, columns); of a file without lines, as many as are named last.
@@ -31,7 +30,7 @@ def read_numbers(path: Path, *columns: int, comments: bool = False) -> NDArray[n
     width = 0
     for place, line in enumerate(read_lines(path), 1):
         words = line.split()
-        if not words or (comments and words[0].startswith("#")):
+        if not words or words[0].startswith("#"):
             continue
         width = width or (len(words) if len(words) in columns else columns[-1])
         rows.append(finite_numbers(path, place, words, width))

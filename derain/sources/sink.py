@@ -8,7 +8,6 @@ from typing import Any
 from numpy.typing import NDArray
 
 from derain.cards.known import label_places
-from derain.cards.layout import folder_above
 from derain.errors import InputError
 from derain.files import write_scan
 from derain.files.labels import LABEL, label_beside, write_labels
@@ -112,16 +111,11 @@ class FolderSink:
             raise InputError(
                 removed.parent, f"would overwrite {frame.path}", "Give --removed another folder."
             )
-        target = os.path.realpath(self.path(frame, LABEL))
-        places = [frame.label_path, beside(frame.path, LABEL)]
-        sequence = folder_above(folder_above(frame.path))
-        # Results that lie where labels are looked for would be taken for the truth. The data cards,
-        # which take a while to read, name only folders that lie beside that of the scans.
-        if os.path.dirname(os.path.dirname(target)) == os.path.realpath(sequence):
-            places += label_places(frame.path)
-        for labels in filter(None, places):
-            if os.path.realpath(labels) == target:
-                raise InputError(self.folder, f"holds the labels of {frame.path}", remedy)
+        # Results that lie where labels are looked for would be taken for the truth.
+        target = self.path(frame, LABEL)
+        places = (frame.label_path, beside(frame.path, LABEL), *label_places(frame.path))
+        if any(labels is not None and _is_same(labels, target) for labels in places):
+            raise InputError(self.folder, f"holds the labels of {frame.path}", remedy)
 
 
 class LabelSink(FolderSink):

@@ -22,7 +22,6 @@ from derain.files.atomic import replacing
 from derain.files.extrinsics import ROTATION_TOLERANCE, Extrinsics
 from derain.files.reading import is_file
 from derain.sources.number_lines import finite_numbers, read_lines, read_numbers
-from derain.sources.quaternions import quaternion_of, rotation_of, slerp
 
 CALIBRATION = "calib.txt"
 
@@ -36,6 +35,9 @@ KITTI, TUM = 12, 8
 # first or after the last of them, for times are rounded: to hundredths, if carelessly.
 LONGEST_GAP = 1.0
 TIME_ROUNDING = 0.005
+
+# Closer than this, in radians, two rotations are the same to every digit, and a line is an arc.
+NO_ANGLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +119,7 @@ def read_trajectory(path: Path) -> Trajectory:
         InputError: A file that cannot be read, a line that is no rigid motion, or times that do not
             ascend.
     """
-    rows = read_numbers(path, TUM, KITTI, comments=True)
+    rows = read_numbers(path, TUM, KITTI)
     if rows.shape[1] == TUM:
         return _of_tum(path, rows)
     poses = _motions(path, rows)
@@ -211,3 +213,65 @@ def _lidar_to_camera(path: Path) -> NDArray[np.float64]:
         f"has no line {LIDAR_TO_CAMERA}, which takes the LiDAR's points to the camera",
         "Add it, or move the file away if the poses beside it are the LiDAR's own.",
     )
+
+
+def rotation_of(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The rotation of a unit quaternion.
+
+    Args:
+        quaternion: x, y, z, w, float64 (4,).
+
+    Returns:
+        float64 (3, 3).
+
+    Source: J. Diebel, "Representing Attitude", Stanford 2006, eq. 125.
+    """
+    x, y, z, w = quaternion / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_of(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The unit quaternion of a rotation, x, y, z, w with w of 0 or more, float64 (4,).
+
+    Args:
+        rotation: float64 (3, 3).
+
+    Source: I. Y. Bar-Itzhack, "New Method for Extracting the Quaternion from a Rotation Matrix",
+    Journal of Guidance, Control, and Dynamics, 2000: it is exact wherever others divide by 0.
+    """
+    r = rotation
+    symmetric = np.empty((4, 4))
+    symmetric[:3, :3] = r + r.T - np.trace(r) * np.eye(3)
+    symmetric[3, :3] = symmetric[:3, 3] = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
+    symmetric[3, 3] = np.trace(r)
+    quaternion: NDArray[np.float64] = np.linalg.eigh(symmetric)[1][:, -1]
+    return -quaternion if quaternion[3] < 0 else quaternion
+
+
+def slerp(
+    first: NDArray[np.float64], second: NDArray[np.float64], share: float
+) -> NDArray[np.float64]:
+    """A rotation on the shortest way from one to another.
+
+    Args:
+        first: Unit quaternion x, y, z, w, float64 (4,).
+        second: The other one.
+        share: How far on the way, 0..1.
+
+    Source: K. Shoemake, "Animating Rotation with Quaternion Curves", SIGGRAPH 1985.
+    """
+    cosine = float(first @ second)
+    if cosine < 0:  # both signs of a quaternion are one rotation; this one is nearer
+        second, cosine = -second, -cosine
+    angle = float(np.arctan2(np.linalg.norm(second - cosine * first), cosine))
+    if angle < NO_ANGLE:
+        return first
+    weights = np.sin([(1 - share) * angle, share * angle]) / np.sin(angle)
+    mixed: NDArray[np.float64] = weights[0] * first + weights[1] * second
+    return mixed

@@ -1,12 +1,10 @@
 """Members of one kind by name, such as filters, and what a user's parameters make of them."""
 
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from importlib import import_module
 from inspect import isabstract
 from pkgutil import iter_modules
-from threading import RLock
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from derain.errors import InputError, did_you_mean
@@ -36,7 +34,7 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         mine = "my_package.my_filter"
 
     That module is imported when derain's own modules do not have a name, or when the names are
-    listed. One that cannot be imported causes a warning and adds nothing; the others stay usable.
+    listed. One that cannot be imported causes a warning; the others stay usable.
     The names are in alphabetical order.
 
     Args:
@@ -54,8 +52,6 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         self._members: dict[str, Kind] = {}
         self._has_own = False
         self._has_others = False
-        # Re-entrant: a module of another package may list the names while it is imported.
-        self._importing_others = RLock()
 
     def add(self, *names: str) -> Callable[[Member], Member]:
         """Decorates a member, which gets these names.
@@ -118,32 +114,18 @@ class Registry(Mapping[str, Kind], Generic[Kind]):
         self._has_own = True
 
     def _import_others(self) -> None:
-        """Imports the modules of other packages, once; warns of those that cannot be imported.
+        """Imports the modules of other packages, once; warns of those that cannot be imported."""
+        if self._has_others:
+            return
+        self._has_others = True  # first, because one of them may list the names
+        # Imported here, because most commands never need other packages.
+        from importlib.metadata import entry_points
 
-        A thread waits while another one imports them.
-        """
-        with self._importing_others:
-            if self._has_others:
-                return
-            self._has_others = True  # first, because one of them may list the names
-            # Imported here, because most commands never need other packages.
-            from importlib.metadata import entry_points
-
-            for entry in sorted(entry_points(group=self.group), key=lambda entry: entry.name):
-                try:
-                    entry.load()
-                except Exception as error:  # whatever the code of others raises
-                    self._forget_unfinished()
-                    _warn_of_broken(entry, error)
-
-    def _forget_unfinished(self) -> None:
-        """Removes members that a module added before it failed, which no other process could load.
-
-        Python removes a failed module from the imported ones.
-        """
-        for name, member in list(self._members.items()):
-            if getattr(member, "__module__", None) not in (None, *sys.modules):
-                del self._members[name]
+        for entry in sorted(entry_points(group=self.group), key=lambda entry: entry.name):
+            try:
+                entry.load()
+            except Exception as error:  # whatever the code of others raises
+                _warn_of_broken(entry, error)
 
 
 def from_parameters(kind: type[Made], name: str, parameters: Mapping[str, Any]) -> Made:

@@ -9,12 +9,14 @@ from hypothesis import strategies as st
 
 from derain.errors import InputError
 from derain.files.extrinsics import Extrinsics
-from derain.sources.quaternions import quaternion_of, rotation_of, slerp
 from derain.sources.trajectory import (
     LONGEST_GAP,
     TIME_ROUNDING,
     Trajectory,
+    quaternion_of,
     read_trajectory,
+    rotation_of,
+    slerp,
     write_trajectory,
 )
 
