@@ -13,7 +13,6 @@ from derain.evaluation.hard_cases import scene
 from derain.files import DEFAULT_COLUMNS, find_scans, read_scan, write_scan
 from derain.files.format import FORMATS
 from derain.files.formats.ply import PlyHeader
-from derain.files.labels import label_beside
 from derain.files.names import beside, scan_stem, scan_suffix
 
 RADAR = (
@@ -57,20 +56,6 @@ def test_real_scans_come_back_bit_for_bit(
     for title, column in scan.fields.items():
         assert copy.fields[title].dtype == column.dtype
         assert copy.fields[title].tobytes() == column.tobytes()
-
-
-@pytest.mark.parametrize(
-    "name", ["pandaset_pandar64.pcd", "hesai_at128_front.pcd", "velodyne_vlp16_dual.pcd"]
-)
-def test_real_pcds_are_read_as_open3d_reads_them(shared: Path, name: str, open3d: object) -> None:
-    path = shared / "data" / "clean" / name
-    cloud = open3d.t.io.read_point_cloud(str(path))  # type: ignore[attr-defined]
-    scan = read_scan(path)
-    for title in scan.fields.keys() - set("xyz"):
-        theirs = cloud.point[title].numpy().ravel()
-        np.testing.assert_array_equal(scan.fields[title], theirs, strict=True)
-    positions = np.stack([scan.fields[axis] for axis in "xyz"], axis=1)
-    np.testing.assert_array_equal(positions, cloud.point["positions"].numpy(), strict=True)
 
 
 @pytest.mark.parametrize("name", ["intensity", "Intensity", "i", "remission", "rcs"])
@@ -172,13 +157,6 @@ def test_stem_and_suffix_leave_the_compression_out(name: str, stem: str, suffix:
     path = Path("folder") / name
     assert (scan_stem(path), scan_suffix(path)) == (stem, suffix)
     assert beside(path, ".label") == Path("folder") / f"{stem}.label"
-
-
-def test_labels_of_a_compressed_scan_are_found(tmp_path: Path) -> None:
-    for scan in (tmp_path / "000012.bin.gz", tmp_path / "000013.bin"):
-        assert label_beside(scan).parent.name == "labels"
-        (tmp_path / f"{scan.name[:6]}.label").touch()
-        assert label_beside(scan) == tmp_path / f"{scan.name[:6]}.label"
 
 
 @pytest.mark.parametrize("suffix", [".bin", ".npz", ".csv"])

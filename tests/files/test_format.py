@@ -1,11 +1,7 @@
 """A format enters by being there: in derain, by a decorator, or named by another package."""
 
 import importlib.util
-import os
 import re
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -66,20 +62,6 @@ def test_a_decorated_format_is_read_written_found_and_cleaned(
     assert "without its remarks" in capsys.readouterr().err
     with pytest.raises(InputError, match=r"Known are .*\.ply, \.pts, \.txt"):
         format_of(Path("scan.e57"))
-
-
-def test_an_installed_format_is_known_to_the_commands(tmp_path: Path) -> None:
-    metadata = tmp_path / "points_format-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: points_format\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text("[derain.formats]\npoints = points_format\n")
-    shutil.copy(MODULE, tmp_path)
-    told = subprocess.check_output(
-        [sys.executable, "-c", "from derain.cli.main import main; main(['info', '--formats'])"],
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        text=True,
-    )
-    assert "  .pts                    points under a line with their number\n" in told
 
 
 def test_commands_list_the_formats_what_they_need_and_which_do_not_name_their_columns(

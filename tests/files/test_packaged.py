@@ -5,16 +5,7 @@ from pathlib import Path
 import pytest
 
 from derain import InputError
-from derain.files.packaged import packaged, packaged_or_own
-
-
-def test_packaged_files_are_found_by_being_there() -> None:
-    sensors = packaged("derain.simulation", "sensors")
-    assert list(sensors) == sorted(sensors)
-    assert {"mems_64", "spinning_128"} <= sensors.keys()
-    assert all(file.suffix == ".yaml" and file.is_file() for file in sensors.values())
-    assert "wads" in packaged("derain.cards")
-    assert packaged("derain.files") == {}
+from derain.files.packaged import packaged_or_own
 
 
 def test_a_name_or_a_path_is_a_file_and_anything_else_is_refused(tmp_path: Path) -> None:
