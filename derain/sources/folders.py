@@ -94,6 +94,7 @@ def source_of(scans: GivenScans, columns: Sequence[str] = DEFAULT_COLUMNS) -> So
     """
     if isinstance(scans, Source):
         return scans
+    given: Iterable[object]
     given = [scans] if isinstance(scans, Scan | Frame | str | Path) else scans
     frames: list[Frame] = []
     for place, item in enumerate(given):
