@@ -84,10 +84,13 @@ class McapFile:
         self.records = McapRecords(path)
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
+        self.counts: Counter[int] = Counter()
+        self.start, self.end = 2**63 - 1, 0
+        self.chunks: list[ChunkPlace] = []
+        # Times and places of messages that are in no chunk.
+        self._times, self._offsets = array("Q"), array("Q")
         try:
-            self._forget_messages()
             if not self._read_summary():
-                self._forget_messages()
                 self._scan()
         except BaseException:
             self.close()
@@ -160,33 +163,27 @@ class McapFile:
         if messages != len(self._times):
             raise ValueError(f"its summary lacks {messages:,} messages that are in no chunk")
 
-    def _forget_messages(self) -> None:
-        self.counts: Counter[int] = Counter()
-        self.start, self.end = 2**63 - 1, 0
-        self.chunks: list[ChunkPlace] = []
-        # Times and places of messages that are in no chunk.
-        self._times, self._offsets = array("Q"), array("Q")
-
     def _read_summary(self) -> bool:
         """Reads the summary, and returns whether it locates every message."""
-        statistics = None
+        statistics, chunks = None, list[ChunkPlace]()
         for kind, record in self.records.in_summary():
             if kind == Opcode.CHUNK_INDEX:
                 channels = frozenset(record.message_index_offsets) or None
-                self._add_chunk(record, record.chunk_start_offset, channels)
+                chunks.append(_place_of(record, record.chunk_start_offset, channels))
             elif kind == Opcode.STATISTICS:
                 statistics = record
             else:
                 self._define(record)
-        if len({chunk.offset for chunk in self.chunks}) < len(self.chunks):
+        if len({chunk.offset for chunk in chunks}) < len(chunks):
             raise ValueError("its summary names a chunk more than once")
-        if statistics is None or len(self.chunks) != statistics.chunk_count:
+        if statistics is None or len(chunks) != statistics.chunk_count:
             return False
-        self.counts.update(statistics.channel_message_counts)
+        counts = Counter(statistics.channel_message_counts)
+        if not counts.keys() <= self.channels.keys() or (statistics.message_count and not chunks):
+            return False
+        self.counts, self.chunks = counts, chunks
         self.start, self.end = statistics.message_start_time, statistics.message_end_time
-        if not self.counts.keys() <= self.channels.keys():
-            return False
-        return bool(self.chunks) or not statistics.message_count
+        return True
 
     def _scan(self) -> None:
         """Reads through the whole file."""
@@ -199,7 +196,7 @@ class McapFile:
                         channels.add(record.channel_id)
                     else:
                         self._define(record)
-                self._add_chunk(chunk, offset, frozenset(channels))
+                self.chunks.append(_place_of(chunk, offset, frozenset(channels)))
             elif kind == Opcode.MESSAGE:
                 message = self.records.read(offset, kind)
                 self._count(message)
@@ -214,21 +211,10 @@ class McapFile:
 
     def _define(self, record: Any) -> None:
         """Notes a schema or a channel; a second one of its number must be the same."""
-        known: dict[int, Any]
-        if isinstance(record, Schema):
-            known = self.schemas
-        elif isinstance(record, Channel):
-            known = self.channels
-        else:
-            return
-        if known.setdefault(record.id, record) != record:
+        defined: dict[type, dict[int, Any]] = {Schema: self.schemas, Channel: self.channels}
+        known = defined.get(type(record))
+        if known is not None and known.setdefault(record.id, record) != record:
             raise ValueError(f"it defines {type(record).__name__.lower()} {record.id} in two ways")
-
-    def _add_chunk(
-        self, record: Chunk | ChunkIndex, offset: int, channels: frozenset[int] | None
-    ) -> None:
-        times = record.message_start_time, record.message_end_time
-        self.chunks.append(ChunkPlace(*times, offset, channels, record.compression))
 
     def _in_chunks(
         self, channels: Container[int], start: int
@@ -384,6 +370,13 @@ class McapReader:
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()
+
+
+def _place_of(
+    record: Chunk | ChunkIndex, offset: int, channels: frozenset[int] | None
+) -> ChunkPlace:
+    times = record.message_start_time, record.message_end_time
+    return ChunkPlace(*times, offset, channels, record.compression)
 
 
 def _undefined(message: Message) -> ValueError:

@@ -41,9 +41,7 @@ def replacing(path: Path) -> Iterator[Path]:
             writable, the disk is full.
     """
     with writing(path):
-        if path.exists() and not path.is_file():
-            raise InputError(path, "is not a file that can be replaced", "Name a file to write.")
-        target = Path(os.path.realpath(path))
+        target = _target(path)
         with temporary_folder(target.parent) as folder:
             temporary = folder / target.name
             yield temporary
@@ -85,13 +83,15 @@ def require_writable(path: Path) -> None:
     Raises:
         InputError: It cannot be written.
     """
-    with suppress(_OnlyTried), replacing(path) as temporary:
-        temporary.touch()
-        raise _OnlyTried
+    with writing(path), temporary_folder(_target(path).parent):
+        pass
 
 
-class _OnlyTried(Exception):  # noqa: N818, it signals no error
-    """Ends a trial of :func:`replacing` before the file takes its place."""
+def _target(path: Path) -> Path:
+    """The file that a path leads to, which may be written anew."""
+    if path.exists() and not path.is_file():
+        raise InputError(path, "is not a file that can be replaced", "Name a file to write.")
+    return Path(os.path.realpath(path))
 
 
 @contextmanager
