@@ -5,14 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from derain import InputError
 from derain.files.labels import instance, read_labels, semantic, write_labels
-
-LABELS = arrays(np.uint32, st.integers(0, 20))
 
 
 def test_halves_lie_where_semantickitti_puts_them(tmp_path: Path) -> None:
@@ -24,9 +22,10 @@ def test_halves_lie_where_semantickitti_puts_them(tmp_path: Path) -> None:
     assert semantic(raw).dtype == instance(raw).dtype == np.int64
 
 
-@given(raw=LABELS)
-def test_both_halves_come_back(tmp_path_factory: pytest.TempPathFactory, raw: np.ndarray) -> None:
-    path = tmp_path_factory.mktemp("labels") / "scan.label"
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(raw=arrays(np.uint32, st.integers(0, 20)))
+def test_both_halves_come_back(tmp_path: Path, raw: np.ndarray) -> None:
+    path = tmp_path / "scan.label"
     write_labels(path, semantic(raw), instance(raw))
     assert path.read_bytes() == raw.astype("<u4").tobytes()
     np.testing.assert_array_equal(read_labels(path, len(raw)), raw)
