@@ -69,8 +69,8 @@ def named_frames(
     found = [_scans_or_bags(path, layouts) for path in named]
     scans = [scan for of_path, _ in found for scan in of_path]
     # A data set's scans lie in several folders, those of any other path in one.
-    by_path = any(_several_folders(of_path) for of_path, _ in found)
-    by_path = by_path or (recordings and _several_folders(scans))
+    of_data_set = any(_several_folders(of_path) for of_path, _ in found)
+    by_path = of_data_set or (recordings and _several_folders(scans))
     where = partial(label_of, layouts=layouts) if labelled else lambda _: None
     files = iter(frames_of(scans, where, columns, relative_keys(scans) if by_path else None))
     several = len(named) > 1 or any(len(bags) > 1 for _, bags in found)
@@ -262,9 +262,8 @@ def _several_folders(scans: Iterable[Path]) -> bool:
 
 def _frames_of_bags(bags: Sequence[Path], labelled: bool, by_name: bool) -> Iterator[Frame]:
     for bag in bags:
-        from derain.sources.bag_frame import (
-            bag_frames,
-        )  # what reads bags, only where there are some
+        # What reads bags is imported only where there are some.
+        from derain.sources.bag_frame import bag_frames
 
         yield from bag_frames(bag, labelled, by_name)
 

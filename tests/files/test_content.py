@@ -7,7 +7,7 @@ import struct
 import tracemalloc
 import zipfile
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import nullcontext
 from pathlib import Path
 
 import laspy
@@ -105,10 +105,12 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "records": (".las", las_of_records, "records in the header"),
 }
 OF_THE_FUZZER = {
-    f"{suffix} {number}": (suffix, make, "")
+    f"{suffix} {number}": (suffix, make, "scan")
     for suffix in FORMATS
     for number, make in enumerate(INPUTS[suffix]().hostile(suffix))
 }
+# Odd numbers, and faces that are left out.
+READABLE = {".bin 0", ".bin 1", ".bin 2", ".ply 2"}
 
 
 @pytest.mark.parametrize("name", HOSTILE | OF_THE_FUZZER)
@@ -120,7 +122,7 @@ def test_small_files_cannot_take_much_memory(tmp_path: Path, name: str) -> None:
     arrow = pyarrow.default_memory_pool()
     before = arrow.max_memory()
     try:
-        with suppress(InputError) if not reason else pytest.raises(InputError, match=reason):
+        with nullcontext() if name in READABLE else pytest.raises(InputError, match=reason):
             read_scan(path)
         assert tracemalloc.get_traced_memory()[1] < 2 * SMALLEST_BUDGET
         assert arrow.max_memory() == before

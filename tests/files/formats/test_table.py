@@ -146,3 +146,6 @@ def test_lines_whose_numbers_were_changed_are_written_anew(file: Path) -> None:
     assert file.read_text() == "0.5 1 2 7\n3.0 4 5 9\n"
     write_scan(file, replace(scan, fields={**scan.fields, "ring": np.array([1, 2])}))
     assert file.read_text() == "x y z intensity ring\n0.5 1 2 7 1\n3.0 4 5 8 2\n"
+    renamed = dict(zip(("x", "y", "z", "ring"), scan.fields.values(), strict=True))
+    write_scan(file, replace(scan, fields=renamed))
+    assert file.read_text() == "x y z ring\n0.5 1 2 7\n3.0 4 5 8\n"
