@@ -28,6 +28,7 @@ from derain.sources.folders import named_frames
 KINDS: dict[str, dict[str, Any]] = {
     "zstd": {},
     "lz4": {"compression": CompressionType.LZ4},
+    "not compressed": {"compression": CompressionType.NONE},
     "not chunked": {"use_chunking": False},
     "not indexed": {"index_types": IndexType.NONE, "use_statistics": False},
     "no summary": {
@@ -200,12 +201,24 @@ def test_what_a_copy_would_drop_is_refused_and_does_not_matter_to_reading(
         copied(bag, tmp_path / "out")
 
 
-@pytest.mark.parametrize("kind", ["zstd", "not chunked"])
-def test_the_checksum_of_the_data_is_compared(tmp_path: Path, kind: str) -> None:
-    bag = record(tmp_path / "drive.mcap", Ros("mcap"), enable_data_crcs=True, **KINDS[kind])
+@pytest.mark.parametrize(
+    ("kind", "changed", "reason"),
+    [
+        ("zstd", b"nobody", "its data"),
+        ("not chunked", b"nobody", "its data"),
+        ("not compressed", b"a definition", "a chunk"),
+        ("zstd", POINTS.encode(), "its summary"),
+    ],
+)
+def test_checksums_are_compared(tmp_path: Path, kind: str, changed: bytes, reason: str) -> None:
+    options = KINDS[kind] | {"enable_data_crcs": reason == "its data"}
+    bag = record(tmp_path / "drive.mcap", Ros("mcap"), **options)
     copied(bag, tmp_path / "whole")
-    bag.write_bytes(bag.read_bytes().replace(b"nobody", b"n0body", 1))
-    with pytest.raises(InputError, match="checksum of its data"):
+    content = bag.read_bytes()
+    # What is in the summary, too, is there last.
+    place = content.rindex(changed) if reason == "its summary" else content.index(changed)
+    bag.write_bytes(content[:place] + b"?" + content[place + 1 :])
+    with pytest.raises(InputError, match=f"checksum of {reason}"):
         copied(bag, tmp_path / "out")
 
 

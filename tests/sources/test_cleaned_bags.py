@@ -20,6 +20,7 @@ from benchmarks.recorded_bags import (
     Storage,
     connections_of,
     read_bag,
+    table_of,
 )
 from derain.bags.cloud_message import CDR, ROS1, CloudMessage
 from derain.export.runtime import Derainer
@@ -98,15 +99,19 @@ def test_what_was_removed_can_be_kept(
 
 
 def test_points_can_say_how_probably_they_are_rain(tmp_path: Path, run_derain) -> None:
-    storage: Storage = "mcap"
-    bag = small_bag(tmp_path, storage)
-    assert run_derain("run", "default", bag, "--out", tmp_path / "out", "--probability").code == 0
-    clouds = [m for m in read_bag(bag_path(tmp_path / "out", storage)) if m[0] == POINTS]
+    columns = {name: tables(1)[0][name] for name in ("x", "y", "z", "intensity")}
+    taken = table_of({**columns, "rain_probability": np.zeros(300, np.uint16)})
+    bag = small_bag(tmp_path, "mcap", clouds=[*tables(), taken])
+    outcome = run_derain("run", "default", bag, "--out", tmp_path / "out", "--probability")
+    assert outcome.code == 2
+    assert outcome.err.count("another field 'rain_probability'") == 1
+    *clouds, last = [m[3] for m in read_bag(tmp_path / "out/drive") if m[0] == POINTS]
+    assert last == [m[3] for m in read_bag(bag) if m[0] == POINTS][-1]  # it has no place for them
     derainer = Derainer()
-    for (_, _, _, message), table in zip(clouds, tables(), strict=True):
-        points = np.stack([table[name] for name in ("x", "y", "z", "intensity")], axis=1)
+    for message, table in zip(clouds, tables(), strict=True):
+        points = np.stack([table[name] for name in columns], axis=1)
         probability, rain = derainer.probability(points), derainer(points)
-        written = cloud_of(message, storage).cloud.columns()["rain_probability"]
+        written = cloud_of(message, "mcap").cloud.columns()["rain_probability"]
         np.testing.assert_array_equal(written, probability[~rain].astype(np.float32))
 
 
