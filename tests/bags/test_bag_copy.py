@@ -5,12 +5,14 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 from small_bags import small_bag, storage_file
 
 from benchmarks.fuzzing.false_indexes import ros1_with_index
+from benchmarks.recorded_bags import POINTS, TEXT
 from derain.bags.bag import Bag
 from derain.bags.bag_copy import BagCopy
 from derain.errors import InputError
@@ -28,27 +30,42 @@ def change_database(bag: Path, statement: str) -> None:
         database.execute(statement)
 
 
-def without_a_topic(bag: Path) -> None:
-    """Leaves a topic out of the metadata, which still has its messages in the database."""
+def change_topics(bag: Path, change: Callable[[list[dict[str, Any]]], object]) -> None:
+    """Changes the topics of the metadata; the database has the same messages as before."""
     metadata = yaml.safe_load((bag / "metadata.yaml").read_text("utf-8"))
-    topics = metadata["rosbag2_bagfile_information"]["topics_with_message_count"]
-    topics[:] = [t for t in topics if t["topic_metadata"]["name"] != "/driver"]
+    change(metadata["rosbag2_bagfile_information"]["topics_with_message_count"])
     (bag / "metadata.yaml").write_text(yaml.safe_dump(metadata), "utf-8")
 
 
+def topic_of(topics: list[dict[str, Any]], name: str) -> dict[str, Any]:
+    return next(each for each in topics if each["topic_metadata"]["name"] == name)
+
+
 @pytest.mark.parametrize(
-    "change",
+    ("change", "reason"),
     [
-        lambda bag: change_database(bag, "UPDATE messages SET topic_id = 99 WHERE id = 1"),
-        without_a_topic,
+        (
+            lambda bag: change_database(bag, "UPDATE messages SET topic_id = 99 WHERE id = 1"),
+            "its topics have 11 of 12 messages",
+        ),
+        (
+            lambda bag: change_topics(bag, lambda each: each.remove(topic_of(each, TEXT))),
+            "its topics have 9 of 12 messages",
+        ),
+        (
+            lambda bag: change_topics(
+                bag, lambda each: topic_of(each, POINTS).update(message_count=2)
+            ),
+            "more than its index has",
+        ),
     ],
 )
-def test_messages_of_unknown_topics_of_a_database_are_not_dropped(
-    tmp_path: Path, change: Callable[[Path], None]
+def test_messages_that_a_database_does_not_index_are_not_dropped(
+    tmp_path: Path, change: Callable[[Path], None], reason: str
 ) -> None:
     bag = small_bag(tmp_path, "sqlite3")
     change(bag)
-    with pytest.raises(InputError, match=r"its topics have \d+ of 12 messages"):
+    with pytest.raises(InputError, match=reason):
         copied(bag, tmp_path / "out")
 
 
