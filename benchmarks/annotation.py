@@ -19,9 +19,8 @@ from tqdm import tqdm
 
 from benchmarks.track_scene import scene_of_track
 from derain.annotation.picture import annotation_figure
-from derain.annotation.plane import Plane
 from derain.annotation.scene import Correction, Scene, inside
-from derain.annotation.steps import annotate, road_plane
+from derain.annotation.steps import Plane, annotate, road_plane
 from derain.evaluation.counts import intersection_over_union
 from derain.fusion import UNKNOWN
 from derain.pictures.scan_pictures import save

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.annotation.plane import Plane
 from derain.annotation.scene import Box, Polygon, Rectangle, Scene
+from derain.annotation.steps import Plane
 from derain.simulation.classes import TrackClass
 from derain.simulation.sensor import Sensor
 from derain.simulation.track import Track

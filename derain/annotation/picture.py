@@ -2,15 +2,14 @@
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import ArrayLike, NDArray
 
 from derain.annotation.scene import Scene
 from derain.fusion import UNKNOWN
-from derain.pictures.palette import BACKGROUND
-from derain.pictures.scan_pictures import legend_below, titled_figure
+from derain.pictures.scan_pictures import legend_below, scatter, titled_figure
 from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.views.directions import directions
@@ -25,8 +24,8 @@ CLASS_COLOURS = {
     TrackClass.PEDESTRIAN: "#ffd23f",
     TrackClass.BIKE: "#ff9a3c",
     TrackClass.TARGET: "#5ee08a",
+    UNKNOWN: "#ff6ad5",
 }
-UNKNOWN_COLOUR = "#ff6ad5"
 
 # Metres around the road polygon that are drawn from above.
 SURROUNDINGS = 3.0
@@ -41,48 +40,28 @@ def annotation_figure(scan: Scan, label: NDArray[np.int64], scene: Scene, title:
         scene: The scene it was labelled by.
         title: Heading.
     """
-    seen = scan.valid
-    points, colour = scan.xyz[seen], _colours(label[seen])
-    # Points of rare classes are drawn last, so that none covers them.
-    rarity = np.argsort(-np.bincount(label, minlength=UNKNOWN + 1)[label[seen]], kind="stable")
-    points, colour = points[rarity], colour[rarity]
-
+    points, kind = scan.xyz[scan.valid], label[scan.valid]
+    colours = np.zeros((UNKNOWN + 1, 4))
+    colours[[*CLASS_COLOURS]] = to_rgba_array([*CLASS_COLOURS.values()])
     figure = titled_figure(14, 10, title)
     above, ahead = figure.subplots(2, 1)
-    _scatter(above, points[:, 0], points[:, 1], colour)
+    scatter(above, points[:, 0], points[:, 1], colours, kind)
     _draw_scene(above, scene)
     azimuth, inclination = directions(points)
-    _scatter(ahead, -azimuth, inclination, colour)
+    scatter(ahead, -azimuth, inclination, colours, kind)
     ahead.set(xlabel="azimuth, to the right / °", ylabel="inclination / °")
-    legend_below(figure, _legend(label[seen]), ncols=9)
+    legend_below(figure, _legend(kind), ncols=9)
     return figure
-
-
-def _colours(label: NDArray[np.int64]) -> NDArray[np.float64]:
-    """RGBA of each class id, (N, 4)."""
-    palette = [UNKNOWN_COLOUR] * (UNKNOWN + 1)
-    for kind, colour in CLASS_COLOURS.items():
-        palette[kind] = colour
-    return ListedColormap(palette)(label)
 
 
 def _legend(label: NDArray[np.int64]) -> list[Patch]:
     counts = np.bincount(label, minlength=UNKNOWN + 1)
-    known = [
-        Patch(color=colour, label=f"{kind.name.lower()} {counts[kind]:,}")
+    names = {kind.value: kind.name.lower() for kind in TrackClass} | {UNKNOWN: "unknown"}
+    return [
+        Patch(color=colour, label=f"{names[kind]} {counts[kind]:,}")
         for kind, colour in CLASS_COLOURS.items()
         if counts[kind]
     ]
-    unknown = [Patch(color=UNKNOWN_COLOUR, label=f"unknown {counts[UNKNOWN]:,}")]
-    return known + unknown * bool(counts[UNKNOWN])
-
-
-def _scatter(
-    axes: Axes, x: NDArray[np.floating], y: NDArray[np.floating], colour: NDArray[np.float64]
-) -> None:
-    size = np.clip(60_000 / max(len(x), 1), 0.5, 4)
-    axes.scatter(x, y, s=size, c=colour, linewidths=0, rasterized=True)
-    axes.set_facecolor(BACKGROUND)
 
 
 def _draw_scene(axes: Axes, scene: Scene) -> None:

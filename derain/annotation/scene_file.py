@@ -13,12 +13,10 @@ Only the road is required. Where it rains beside the road, `rain_area` lists the
 in which drops are labelled. A correction may have shift, size and heading.
 """
 
-from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
-from derain.annotation.plane import PlaneSearch
-from derain.annotation.scene import Box, Correction, Polygon, Scene, Triple
+from derain.annotation.scene import Box, Correction, PlaneSearch, Polygon, Scene, Triple
+from derain.errors import InputError
 from derain.files.documents import Entry, shown
 from derain.simulation.classes import TrackClass
 
@@ -45,35 +43,29 @@ def read_scene(path: Path) -> Scene:
     """
     parsers = {
         "road": _polygon,
-        "boxes": _boxes,
+        "boxes": lambda entry: entry.each(_box),
         "rain_area": _polygon,
         "height": _metres,
         "plane": _plane_search,
-        "corrections": _itself,
+        "corrections": lambda entry: entry.each(_corrections),
     }
-    values = Entry.of_yaml(path).record(parsers, required=["road"])
-    corrections = values.pop("corrections", None)
-    scene = Scene(**values)
-    if corrections is None:
-        return scene
-    return replace(
-        scene,
-        corrections={
-            sequence: _corrections(entry, scene.boxes)
-            for sequence, entry in corrections.members().items()
-        },
-    )
+    scene = Scene(**Entry.of_yaml(path).record(parsers, required=["road"]))
+    for sequence, corrections in scene.corrections.items():
+        for name in corrections:
+            if name not in scene.boxes:
+                raise InputError(
+                    f"{path}: corrections.{sequence}.boxes.{name}",
+                    "there is no such box",
+                    f"Known are {', '.join(scene.boxes)}.",
+                )
+    return scene
 
 
 def _polygon(entry: Entry) -> Polygon:
     corners = entry.items()
     if len(corners) < 3:
         raise entry.fault(f"{len(corners)} corners make no polygon", "List three or more [x, y].")
-    return tuple((x, y) for x, y in (_place(corner, 2) for corner in corners))
-
-
-def _boxes(entry: Entry) -> dict[str, Box]:
-    return {name: _box(each) for name, each in entry.members().items()}
+    return tuple((x, y) for x, y in (corner.numbers(2, _metres) for corner in corners))
 
 
 def _box(entry: Entry) -> Box:
@@ -93,21 +85,16 @@ def _plane_search(entry: Entry) -> PlaneSearch:
     return PlaneSearch(**entry.record(parsers))
 
 
-def _corrections(entry: Entry, boxes: Mapping[str, Box]) -> dict[str, Correction]:
-    corrections: Entry = entry.record({"boxes": _itself}, required=["boxes"])["boxes"]
-    for name, correction in corrections.members().items():
-        if name not in boxes:
-            raise correction.fault("there is no such box", f"Known are {', '.join(boxes)}.")
+def _corrections(entry: Entry) -> dict[str, Correction]:
+    """The corrections of one sequence, by box."""
+    parsers = {"boxes": lambda boxes: boxes.each(_correction)}
+    corrections: dict[str, Correction] = entry.record(parsers, required=["boxes"])["boxes"]
+    return corrections
+
+
+def _correction(entry: Entry) -> Correction:
     parsers = {"shift": _triple, "size": _size, "heading": Entry.number}
-    return {
-        name: Correction(**correction.record(parsers))
-        for name, correction in corrections.members().items()
-    }
-
-
-def _itself(entry: Entry) -> Entry:
-    """Keeps a value for later: corrections name boxes, which are read first."""
-    return entry
+    return Correction(**entry.record(parsers))
 
 
 def _class(entry: Entry) -> TrackClass:
@@ -119,20 +106,13 @@ def _class(entry: Entry) -> TrackClass:
 
 
 def _triple(entry: Entry) -> Triple:
-    x, y, z = _place(entry, 3)
+    x, y, z = entry.numbers(3, _metres)
     return x, y, z
 
 
 def _size(entry: Entry) -> Triple:
-    size = _triple(entry)
-    for side in entry.items():
-        side.positive()
-    return size
-
-
-def _place(entry: Entry, axes: int) -> tuple[float, ...]:
-    entry.numbers(axes)
-    return tuple(map(_metres, entry.items()))
+    length, width, height = entry.numbers(3, _length)
+    return length, width, height
 
 
 def _metres(entry: Entry) -> float:

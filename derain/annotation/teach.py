@@ -164,10 +164,6 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
             raise InputError(
                 frame.name, "is in no file, where it could be found again", "Write it to one."
             )
-        if not _is_text(frame.path):
-            raise InputError(
-                frame.name, "its name is no text, which a list of scans could hold", "Rename it."
-            )
     # Refuses the places where the scans' own labels are or would be searched for.
     for sink in (FolderSink(out / LABELS, again=False), LabelSink(out / LABELS, again=False)):
         sink.refuse_clashes(source)
@@ -178,15 +174,6 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
             raise InputError(
                 out / name, "is there already, and no teacher's", "Give --out another folder."
             )
-
-
-def _is_text(path: Path) -> bool:
-    """Whether a path can be written in UTF-8; names of files may be any bytes."""
-    try:
-        os.path.realpath(path).encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | None) -> None:

@@ -26,8 +26,8 @@ from derain.sources.spread import evenly_spaced
 from derain.system.extras import MATPLOTLIB, OPEN3D, require
 
 if TYPE_CHECKING:
-    from derain.annotation.plane import Plane
     from derain.annotation.scene import Scene
+    from derain.annotation.steps import Plane
     from derain.scan import Scan
 
 DESCRIPTION = """\

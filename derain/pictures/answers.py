@@ -1,6 +1,7 @@
 """Pictures of a teacher's labels, and of what its student removes."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -84,31 +85,15 @@ def removed_figure(held_out: Answers, title: str) -> Figure:
     points = held_out.table.sum(axis=(1, 2))
     answers = held_out.table.sum(axis=2)
     drawn = points >= FEWEST_POINTS
-    counted = np.stack(
-        [
-            answers[:, RAIN],
-            answers[:, RAIN] + answers[:, NOT_KNOWN],
-            held_out.table[..., 1].sum(axis=1),
-        ]
-    )
+    perhaps = answers[:, RAIN] + answers[:, NOT_KNOWN]
+    counted = np.stack([answers[:, RAIN], perhaps, held_out.table[..., 1].sum(axis=1)])
     rain, perhaps, student = np.where(drawn, ratio(counted, points), np.nan)
-    edges = [*FINE_EDGES, LAST_EDGE]
-    axes.stairs(rain, edges, fill=True, color=OF_ANSWERS[RAIN], alpha=0.35)
-    axes.stairs(
-        perhaps,
-        edges,
-        baseline=rain,
-        fill=True,
-        color=OF_ANSWERS[NOT_KNOWN],
-        alpha=0.45,
-        label="teacher: not known",
-    )
-    axes.stairs(
-        rain, edges, baseline=None, color=OF_ANSWERS[RAIN], linewidth=1.5, label="teacher: rain"
-    )
-    axes.stairs(
-        student, edges, baseline=None, color=STUDENT, linewidth=2.2, label="student: removed"
-    )
+    stairs = partial(axes.stairs, edges=[*FINE_EDGES, LAST_EDGE])
+    stairs(rain, fill=True, color=OF_ANSWERS[RAIN], alpha=0.35)
+    unsure = stairs(perhaps, baseline=rain, fill=True, color=OF_ANSWERS[NOT_KNOWN], alpha=0.45)
+    unsure.set_label("teacher: not known")
+    stairs(rain, baseline=None, color=OF_ANSWERS[RAIN], linewidth=1.5, label="teacher: rain")
+    stairs(student, baseline=None, color=STUDENT, linewidth=2.2, label="student: removed")
     axes.set_xlabel(f"range / m (the last band: {FINE_EDGES[-1]} m and more)")
     axes.set_ylabel("share of the points at that range")
     axes.set_xlim(0, LAST_EDGE)

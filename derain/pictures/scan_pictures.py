@@ -154,7 +154,7 @@ def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -
     """
     seen = scan.valid
     x, y, _ = scan.xyz[seen].T
-    _scatter(axes, -y, x, *_colours(scan, outcome, seen))
+    scatter(axes, -y, x, *_colours(scan, outcome, seen))
     axes.set_aspect("equal")
     if len(x):
         nearest, farthest = np.percentile(x, [1, 97])
@@ -164,11 +164,43 @@ def draw_from_above(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -
         axes.set_ylim(middle - half, middle + half)
 
 
+def scatter(
+    axes: Axes,
+    x: NDArray[np.floating],
+    y: NDArray[np.floating],
+    colours: NDArray[np.float64],
+    number: NDArray[np.int64],
+) -> None:
+    """Draws points, the rarest colour last and largest, so that none covers it.
+
+    Args:
+        axes: Where to draw.
+        x: Where the points lie along the axis to the right, (N,).
+        y: Where they lie along the axis upwards, (N,).
+        colours: RGBA, float64 (K, 4).
+        number: Number of each point's colour, int64 (N,).
+    """
+    size = np.clip(60_000 / max(len(x), 1), 0.3, 3)  # small where there are many
+    points = np.bincount(number, minlength=len(colours))
+    is_grey = np.ptp(colours[:, :3], axis=1) < GREY
+    # Colour by colour, which is several times as fast; grey first and the rarest colour last, on
+    # top.
+    for chosen in np.lexsort([-points, ~is_grey]):
+        if not points[chosen]:
+            continue
+        rows, area = number == chosen, size
+        if not is_grey[chosen]:
+            area = np.clip(ALONE / np.sqrt(points[chosen]), size, LARGEST)
+        axes.scatter(x[rows], y[rows], s=area, color=colours[chosen], linewidths=0, rasterized=True)
+    axes.set_facecolor(BACKGROUND)
+    axes.tick_params(labelsize=8)
+
+
 def _draw_as_seen(axes: Axes, scan: Scan, outcome: NDArray[np.int64] | None) -> None:
     """Draws inclination over azimuth, in degrees, left being left."""
     seen = scan.valid
     azimuth, inclination = directions(scan.xyz[seen])
-    _scatter(axes, -azimuth, inclination, *_colours(scan, outcome, seen))
+    scatter(axes, -azimuth, inclination, *_colours(scan, outcome, seen))
     # Where all points have one direction, matplotlib chooses the limits.
     if len(azimuth) and np.ptp(azimuth) and np.ptp(inclination):
         axes.set_xlim(*np.percentile(-azimuth, [0, 100]))
@@ -188,26 +220,3 @@ def _colours(
     share = np.sqrt(np.clip(brightness, 0, 1))
     shades = np.linspace(0.25, 1, SHADES)  # from dark to bright
     return to_rgba_array([str(shade) for shade in shades]), (share * (SHADES - 1)).astype(np.int64)
-
-
-def _scatter(
-    axes: Axes,
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    colours: NDArray[np.float64],
-    number: NDArray[np.int64],
-) -> None:
-    size = np.clip(60_000 / max(len(x), 1), 0.3, 3)  # small where there are many
-    points = np.bincount(number, minlength=len(colours))
-    is_grey = np.ptp(colours[:, :3], axis=1) < GREY
-    # Colour by colour, which is several times as fast; grey first and the rarest colour last, on
-    # top.
-    for chosen in np.lexsort([-points, ~is_grey]):
-        if not points[chosen]:
-            continue
-        rows, area = number == chosen, size
-        if not is_grey[chosen]:
-            area = np.clip(ALONE / np.sqrt(points[chosen]), size, LARGEST)
-        axes.scatter(x[rows], y[rows], s=area, color=colours[chosen], linewidths=0, rasterized=True)
-    axes.set_facecolor(BACKGROUND)
-    axes.tick_params(labelsize=8)

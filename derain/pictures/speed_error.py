@@ -1,6 +1,6 @@
 """The picture of error against time, from which to choose a method."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.path import Path
-from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FuncFormatter
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
@@ -19,9 +18,15 @@ LEAST_ERROR = 1e-4
 # Colour and marker of each group.
 LOOKS = {"network": ("#1f77b4", "o"), "filter": ("#d98200", "s"), "baseline": ("#6b7280", "D")}
 
-# Places of a label around its marker, in points from it, by preference.
-DIRECTIONS = np.radians([0, 180, 45, -45, 135, -135, 90, -90])
+# Places of a label around its marker, in points from it, by preference; and on which sides of it
+# they lie, right and up, -1, 0 or 1 each.
+ANGLES = np.radians([0, 180, 45, -45, 135, -135, 90, -90])
+DIRECTIONS = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
 DISTANCES = (8, 16, 28, 42, 60, 84)
+OFFSETS = np.concatenate([distance * DIRECTIONS for distance in DISTANCES])
+SIDES = np.tile(DIRECTIONS.round().astype(int), (len(DISTANCES), 1))
+
+FONT_SIZE, POINTS_PER_INCH = 9, 72
 
 # Covering the line of the front counts as much as being so many distances farther off.
 STEPS_TO_AVOID_FRONT = 2
@@ -113,31 +118,27 @@ def speed_error_figure(standings: Sequence[Standing], title: str) -> Figure:
 
 def _label(axes: Axes, standings: Sequence[Standing]) -> None:
     """Writes each label where it covers no marker and no other label, nearest to its own marker."""
-    places, front = (_on_screen(axes, some) for some in (standings, pareto_front(standings)))
-    taken = [Bbox.from_bounds(x - 5, y - 5, 10, 10) for x, y in places]
+    markers, front = (_on_screen(axes, some) for some in (standings, pareto_front(standings)))
     legend = axes.get_legend()
     assert legend is not None
+    taken = [Bbox.from_bounds(x - 5, y - 5, 10, 10) for x, y in markers]
     taken.append(legend.get_window_extent())
     for number, standing in enumerate(standings):
-        best, least = None, np.inf
-        for step, annotation in _candidates(axes, standing):
-            letters = _letters(annotation)
-            inside = all(map(axes.bbox.contains, *letters.corners().T))
+        size = _size(axes, standing.label)
+        anchors = markers[number] + OFFSETS * axes.figure.dpi / POINTS_PER_INCH
+        boxes = [Bbox([low, low + size]) for low in anchors - size * (1 - SIDES) / 2]
+        costs = np.full(len(boxes), np.inf)
+        for place, box in enumerate(boxes):
+            step = place // len(DIRECTIONS)
+            inside = all(map(axes.bbox.contains, *box.corners().T))
             # A label without a line to its marker is taken for that of the nearest marker.
-            gaps = _gaps(letters, places)
-            clear = annotation.arrow_patch is not None or gaps[number] == gaps.min()
-            free = inside and clear and not letters.count_overlaps(taken)
-            cost = step + STEPS_TO_AVOID_FRONT * _meets(front, letters) if free else np.inf
-            if cost < least:
-                best, annotation, least = annotation, best, cost
-            if annotation is not None:
-                annotation.remove()
-            if step >= least:  # none that follows is better
-                break
-        if best is None:
-            # There is no free place: a label that covers others is better than none.
-            _, best = next(_candidates(axes, standing))
-        taken.append(_letters(best))
+            gaps = _gaps(box, markers)
+            clear = step > 0 or gaps[number] == gaps.min()
+            if inside and clear and not box.count_overlaps(taken):
+                costs[place] = step + STEPS_TO_AVOID_FRONT * _meets(front, box)
+        best = int(costs.argmin())  # where none is free, the first: it covers others
+        _annotate(axes, standing, best)
+        taken.append(boxes[best])
 
 
 def _on_screen(axes: Axes, standings: Sequence[Standing]) -> NDArray[np.float64]:
@@ -145,42 +146,17 @@ def _on_screen(axes: Axes, standings: Sequence[Standing]) -> NDArray[np.float64]
     return axes.transData.transform([standing.place for standing in standings])
 
 
+def _size(axes: Axes, label: str) -> NDArray[np.float64]:
+    """Width and height of a label, float64 (2,), pixels."""
+    text = axes.text(0, 0, label, fontsize=FONT_SIZE)
+    size = np.array(text.get_window_extent().size)
+    text.remove()
+    return size
+
+
 def _meets(line: NDArray[np.float64], box: Bbox) -> bool:
     """Whether a line through places, (n, 2), meets a box."""
     return len(line) > 1 and bool(Path(line).intersects_bbox(box, filled=False))
-
-
-def _candidates(axes: Axes, standing: Standing) -> Iterator[tuple[int, Annotation]]:
-    """Labels to choose from, the nearest first, each with the number of its distance."""
-    for step, distance in enumerate(DISTANCES):
-        for x, y in zip(np.cos(DIRECTIONS), np.sin(DIRECTIONS), strict=True):
-            right, up = round(x), round(y)  # -1, 0 or 1
-            annotation = axes.annotate(
-                standing.label,
-                standing.place,
-                xytext=(distance * x, distance * y),
-                textcoords="offset points",
-                ha=("center", "left", "right")[right],
-                va=("center", "bottom", "top")[up],
-                fontsize=9,
-                # Keeps the letters readable where the line of the Pareto front passes them.
-                bbox={"boxstyle": "square,pad=0.1", "color": "white", "alpha": 0.8},
-                arrowprops={
-                    "arrowstyle": "-",
-                    "color": "#9ca3af",
-                    "linewidth": 0.6,
-                    "relpos": ((1 - right) / 2, (1 - up) / 2),  # to the nearest of its corners
-                }
-                if step
-                else None,
-            )
-            yield step, annotation
-
-
-def _letters(annotation: Annotation) -> Bbox:
-    """Extent of a label's letters, without the line that leads to them."""
-    annotation.get_window_extent()  # positions the label first
-    return Text.get_window_extent(annotation)
 
 
 def _gaps(box: Bbox, places: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -188,6 +164,29 @@ def _gaps(box: Bbox, places: NDArray[np.float64]) -> NDArray[np.float64]:
     beyond = np.maximum(np.maximum(box.min - places, places - box.max), 0)
     gaps: NDArray[np.float64] = np.hypot(*beyond.T)
     return gaps
+
+
+def _annotate(axes: Axes, standing: Standing, place: int) -> None:
+    """Writes a label at one of ``OFFSETS``, with a line to its marker where it is not beside it."""
+    right, up = SIDES[place]
+    line = {
+        "arrowstyle": "-",
+        "color": "#9ca3af",
+        "linewidth": 0.6,
+        "relpos": ((1 - right) / 2, (1 - up) / 2),  # to the nearest of its corners
+    }
+    axes.annotate(
+        standing.label,
+        standing.place,
+        xytext=OFFSETS[place],
+        textcoords="offset points",
+        ha=("center", "left", "right")[right],
+        va=("center", "bottom", "top")[up],
+        fontsize=FONT_SIZE,
+        # Keeps the letters readable where the line of the Pareto front passes them.
+        bbox={"boxstyle": "square,pad=0.1", "color": "white", "alpha": 0.8},
+        arrowprops=line if place >= len(DIRECTIONS) else None,
+    )
 
 
 def _few_digits(value: float, _: object) -> str:

@@ -1,12 +1,16 @@
-"""Rectangles, boxes and their corrections, and polygons of a scene."""
+"""Scenes: rectangles and boxes, their corrections, polygons, and the file that describes them."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
-from derain.annotation.scene import Box, Correction, Rectangle, inside
+from derain.annotation import scene_file
+from derain.annotation.scene import Box, Correction, PlaneSearch, Rectangle, Scene, inside
+from derain.annotation.scene_file import read_scene
+from derain.errors import InputError
 from derain.simulation.classes import TrackClass
 
 lengths = st.floats(0.1, 50)
@@ -35,30 +39,11 @@ def test_the_length_runs_along_the_heading() -> None:
     assert rectangle.relative(np.array([10.0, 3.0])).tolist() == pytest.approx([3, 0])
 
 
-BOX = Box(TrackClass.CAR, (20, 1, -0.6), (4.5, 1.8, 1.5), 35)
-
-
-def test_a_box_holds_what_a_rotation_takes_into_its_frame() -> None:
-    points = np.random.default_rng(0).uniform((16, -3, -2), (24, 5, 1), (5000, 3))
-    turned = Rotation.from_euler("z", BOX.heading, degrees=True).inv().apply(points - BOX.centre)
-    expected = (np.abs(turned) <= np.array(BOX.size) / 2).all(axis=1)
-    assert 100 < expected.sum() < 4000
-    assert np.array_equal(BOX.contains(points), expected)
-
-
-def test_its_faces_are_part_of_it() -> None:
+def test_the_faces_of_a_box_are_part_of_it() -> None:
     box = Box(TrackClass.TARGET, (0, 0, 0), (2, 4, 6))
     faces = np.array([[1, 0, 0], [0, 2, 0], [0, 0, 3], [1, 2, 3]], float)
     assert box.contains(faces).all()
     assert not box.contains(np.nextafter(faces, np.inf)).any()
-
-
-def test_a_correction_changes_what_it_states_alone() -> None:
-    assert BOX.corrected(Correction()) == BOX
-    moved = BOX.corrected(Correction(shift=(1, 0, 0.25)))
-    assert moved == Box(BOX.kind, (21, 1, -0.35), BOX.size, BOX.heading)
-    resized = BOX.corrected(Correction(size=(1, 1, 1), heading=0.0))
-    assert resized == Box(BOX.kind, BOX.centre, (1, 1, 1), 0)
 
 
 def test_a_bent_road_holds_what_lies_in_one_of_its_parts() -> None:
@@ -68,3 +53,89 @@ def test_a_bent_road_holds_what_lies_in_one_of_its_parts() -> None:
     first = (x > 0) & (x < 10) & (y > 0) & (y < 2)
     second = (x > 8) & (x < 10) & (y > 0) & (y < 10)
     assert np.array_equal(inside(bend, points), first | second)
+
+
+SCENE = Scene(
+    road=((2, -4), (60, -4), (60, 4), (2, 4)),
+    boxes={
+        "car_1": Box(TrackClass.CAR, (20, 1, -0.6), (4.5, 1.8, 1.5), 5),
+        "mast_1": Box(TrackClass.SPRINKLER, (8, 4.5, 0.7), (0.3, 0.3, 4)),
+    },
+    rain_area=((0, -9), (60, -9), (60, 9), (0, 9)),
+    height=0.15,
+    plane=PlaneSearch(distance=0.2, points=3, iterations=50, scans=2, seed=7),
+    corrections={
+        "003": {"car_1": Correction((0.2, 0, 0), (4, 2, 1), 0.0)},
+        "005": {"car_1": Correction(shift=(1, 0, 0.25))},
+        "010": {},
+    },
+)
+
+TEXT = """\
+road: [[2, -4], [60, -4], [60, 4], [2, 4]]
+boxes:
+  car_1: {class: car, centre: [20, 1, -0.6], size: [4.5, 1.8, 1.5], heading: 5}
+  mast_1: {class: sprinkler, centre: [8, 4.5, 0.7], size: [0.3, 0.3, 4]}
+rain_area: [[0, -9], [60, -9], [60, 9], [0, 9]]
+height: 0.15
+plane: {distance: 0.2, points: 3, iterations: 50, scans: 2, seed: 7}
+corrections:
+  "003": {boxes: {car_1: {shift: [0.2, 0, 0], size: [4, 2, 1], heading: 0}}}
+  "005": {boxes: {car_1: {shift: [1, 0, 0.25]}}}
+  "010": {boxes: {}}
+"""
+
+ROAD = "road: [[0, 0], [1, 0], [0, 1]]\n"
+BOX = "{class: car, centre: [0, 0, 0], size: [1, 1, 1]}"
+
+
+def read(folder: Path, text: str) -> Scene:
+    path = folder / "scene.yaml"
+    path.write_text(text, "utf-8")
+    return read_scene(path)
+
+
+def test_every_key_of_a_scene_is_read_and_the_road_is_all_that_it_needs(tmp_path: Path) -> None:
+    assert read(tmp_path, TEXT) == SCENE
+    assert read(tmp_path, ROAD) == Scene(((0, 0), (1, 0), (0, 1)))
+    assert scene_file.__doc__ is not None
+    _, example, _ = scene_file.__doc__.split("\n\n")
+    assert [*read(tmp_path, example).boxes] == ["car_1", "mast_1"]
+
+
+def test_corrections_hold_in_their_sequence_and_change_what_they_state_alone() -> None:
+    assert SCENE.in_sequence("004").boxes == SCENE.boxes
+    replaced, moved = (SCENE.in_sequence(name).boxes for name in ("003", "005"))
+    assert replaced["car_1"] == Box(TrackClass.CAR, (20.2, 1, -0.6), (4, 2, 1), 0)
+    assert replaced["mast_1"] == SCENE.boxes["mast_1"]
+    assert moved["car_1"] == Box(TrackClass.CAR, (21, 1, -0.35), (4.5, 1.8, 1.5), 5)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "reason"),
+    [
+        ("boxes: {}", "", "road is missing"),
+        (ROAD + "roof: 1", "roof", "there is no such key"),
+        ("road: [[0, 0], [1, 0]]", "road", "2 corners make no polygon"),
+        ("road: [[0, 0], [1, 0], [0, .nan]]", "road[2][1]", "nan is not a finite number"),
+        ("road: [[0, 0], [1, 0], [0, 1, 2]]", "road[2]", "are not 2 numbers"),
+        ("road: [[0, 0], [1, 0], [0, 1e300]]", "road[2][1]", "1e+300 is not within"),
+        (ROAD + "height: -1e300", "height", "-1e+300 is not within"),
+        (ROAD + "plane: {distance: 1e300}", "plane.distance", "1e+300 is not within"),
+        (ROAD + "plane: {points: 2}", "plane.points", "2 is not a whole number from 3 to 100"),
+        (ROAD + "plane: {iterations: 1000000000000}", "plane.iterations", "is not a whole number"),
+        (ROAD + "boxes: {a: {class: car}}", "boxes.a", "centre is missing"),
+        (ROAD + f"boxes: {{a: {BOX.replace('car', 'cart')}}}", "boxes.a.class", "no class 'cart'"),
+        (ROAD + f"boxes: {{a: {BOX.replace('1]', '0]')}}}", "boxes.a.size[2]", "0 is not above 0"),
+        (ROAD + f"boxes: {{a: {BOX.replace('1]', '1, 1]')}}}", "boxes.a.size", "are not 3 numbers"),
+        (ROAD + "corrections: {a: {boxes: {b: {}}}}", "corrections.a.boxes.b", "no such box"),
+    ],
+)
+def test_what_cannot_be_meant_is_named_by_its_key(
+    tmp_path: Path, text: str, key: str, reason: str
+) -> None:
+    with pytest.raises(InputError) as raised:
+        read(tmp_path, text)
+    path = tmp_path / "scene.yaml"
+    assert str(raised.value.subject) == (f"{path}: {key}" if key else str(path))
+    assert reason in raised.value.reason

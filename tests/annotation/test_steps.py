@@ -1,12 +1,11 @@
-"""Points get their class from where they lie, step by step."""
+"""The road's plane is found among rain and things; points get their class from where they lie."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.annotation.plane import Plane
-from derain.annotation.scene import Box, Scene
-from derain.annotation.steps import annotate, road_plane
+from derain.annotation.scene import Box, PlaneSearch, Scene
+from derain.annotation.steps import MOST_POINTS, Plane, annotate, find_plane, road_plane
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases
 from derain.fusion import UNKNOWN
@@ -23,6 +22,65 @@ SCENE = Scene(
         "bough": Box(TrackClass.BACKGROUND, (10, 2, 1.5), (3, 3, 1)),  # and over the mast's
     },
 )
+
+
+def road(
+    points: int, slope: tuple[float, float] = (0.0, 0.0), seed: int = 0
+) -> NDArray[np.float64]:
+    """A road 1.5 m under the sensor, measured to a centimetre, float64 (points, 3)."""
+    generator = np.random.default_rng(seed)
+    x, y = generator.uniform(2, 60, points), generator.uniform(-4, 4, points)
+    z = slope[0] * x + slope[1] * y - 1.5 + generator.normal(0, 0.01, points)
+    return np.column_stack([x, y, z])
+
+
+def test_a_sloping_road_is_found_through_rain_and_heights_are_distances_from_it() -> None:
+    rain = np.random.default_rng(1).uniform((2, -4, -1.2), (20, 4, 3), (2000, 3))
+    sloping = road(3000, (0.03, -0.02))
+    plane = find_plane(np.concatenate([rain, sloping]), PlaneSearch(), "test")
+    expected = np.array([-0.03, 0.02, 1]) / np.linalg.norm([-0.03, 0.02, 1])
+    np.testing.assert_allclose(plane.normal, expected, atol=1e-3)
+    assert plane.slope == pytest.approx(np.degrees(np.arctan(np.hypot(0.03, 0.02))), abs=0.05)
+    assert np.abs(plane.height(sloping)).max() < 0.06
+    up = np.array(plane.normal)
+    np.testing.assert_allclose(plane.height(sloping + 3 * up) - plane.height(sloping), 3)
+
+
+def test_the_same_search_finds_the_same_plane() -> None:
+    points = road(MOST_POINTS + 1)  # more than are looked at
+    first, again, other = (
+        find_plane(points, PlaneSearch(iterations=100, seed=seed), "test") for seed in (0, 0, 1)
+    )
+    assert first == again != other
+
+
+def test_a_wall_and_too_few_points_are_no_road() -> None:
+    with pytest.raises(InputError, match=r"scan: .* (8[0-9]|90) degrees"):
+        find_plane(road(500)[:, [2, 1, 0]], PlaneSearch(), "scan")
+    assert find_plane(road(9), PlaneSearch(), "scan").normal[2] > 0.9
+    with pytest.raises(InputError, match="8 points over the road are too few"):
+        find_plane(road(8), PlaneSearch(), "scan")
+
+
+def test_the_plane_is_that_of_the_road_of_all_scans_though_a_wall_has_more_points() -> None:
+    generator = np.random.default_rng(0)
+    wall = np.column_stack(
+        [np.full(9000, 40), generator.uniform(5, 30, 9000), generator.uniform(-1.5, 8, 9000)]
+    )
+    roof = road(3000, seed=1) * (0.04, 0.2, 0) + (18.5, 0, -0.1)  # of the car, in its box
+    left, right = (road(2000, seed=seed) * (1, 0, 1) + (0, 2, 0.06) for seed in (2, 3))
+    right *= (1, -1, 1)
+    right[:, 2] -= 0.12
+    scans = [
+        Scan(np.concatenate([wall, roof, side]).astype(np.float32), name="scan.bin")
+        for side in (left, right)
+    ]
+    plane = road_plane(scans, SCENE)
+    assert plane.slope == pytest.approx(np.degrees(np.arctan(0.12 / 4)), abs=0.1)
+    assert plane.offset == pytest.approx(1.5, abs=0.01)
+    elsewhere = Scan(-road(2000).astype(np.float32), name="scan.bin")
+    with pytest.raises(InputError, match=r"scan\.bin: 0 points over the road"):
+        road_plane([elsewhere], SCENE)
 
 
 def label_of(*point: float, scene: Scene = SCENE) -> int:
@@ -52,7 +110,7 @@ def test_a_point_gets_its_class_from_where_it_lies(
     assert label_of(*point) == expected
 
 
-def test_rain_beside_the_road_is_labelled_where_the_scene_says_so() -> None:
+def test_rain_beside_the_road_is_labelled_where_the_scene_has_an_area_for_it() -> None:
     wider = Scene(SCENE.road, SCENE.boxes, rain_area=((0, -9), (25, -9), (25, 9), (0, 9)))
     assert label_of(15, 7, 0, scene=wider) == TrackClass.RAIN
     assert label_of(15, 7, -1.5, scene=wider) == TrackClass.BACKGROUND
@@ -66,42 +124,9 @@ def test_all_points_together_are_labelled_as_each_alone() -> None:
     assert set(together) >= {0, 1, 2, 3, 7}
 
 
-@pytest.mark.parametrize(("name", "scan"), list(hard_cases(500)))
-def test_every_row_of_a_hard_case_gets_a_class(name: str, scan: Scan) -> None:
-    label = annotate(scan, SCENE, PLANE)
-    assert label.shape == (len(scan),)
-    assert set(label[scan.valid]) <= {*TrackClass, UNKNOWN}
-    assert (label[~scan.valid] == UNKNOWN).all()
-
-
-def road_of(seed: int, points: int = 2000) -> NDArray[np.float64]:
-    generator = np.random.default_rng(seed)
-    x, y = generator.uniform(2, 60, points), generator.uniform(-4, 4, points)
-    return np.column_stack([x, y, generator.normal(-1.5, 0.01, points)])
-
-
-def test_the_plane_is_that_of_the_road_though_a_wall_has_more_points() -> None:
-    generator = np.random.default_rng(0)
-    wall = np.column_stack(
-        [np.full(9000, 40), generator.uniform(5, 30, 9000), generator.uniform(-1.5, 8, 9000)]
-    )
-    roof = road_of(1, 3000) * (0.04, 0.2, 0) + (18.5, 0, -0.1)  # of the car, in its box
-    scan = Scan(np.concatenate([wall, roof, road_of(0)]).astype(np.float32))
-    plane = road_plane([scan], SCENE)
-    assert plane.offset == pytest.approx(1.5, abs=0.01)
-    assert plane.slope < 0.1
-
-
-def test_the_scans_of_a_sequence_have_one_plane() -> None:
-    left, right = road_of(0) * (1, 0, 1) + (0, 2, 0), road_of(1) * (1, 0, 1) - (0, 2, 0)
-    left[:, 2] += 0.06
-    right[:, 2] -= 0.06
-    scans = [Scan(points.astype(np.float32)) for points in (left, right)]
-    plane = road_plane(scans, SCENE)
-    assert plane.slope == pytest.approx(np.degrees(np.arctan(0.12 / 4)), abs=0.1)
-
-
-def test_a_scene_elsewhere_has_no_plane() -> None:
-    scan = Scan(road_of(0).astype(np.float32) * np.float32(-1), name="scan.bin")
-    with pytest.raises(InputError, match=r"scan\.bin: 0 points over the road"):
-        road_plane([scan], SCENE)
+def test_every_row_of_a_hard_case_gets_a_class() -> None:
+    for name, scan in hard_cases(500):
+        label = annotate(scan, SCENE, PLANE)
+        assert label.shape == (len(scan),), name
+        assert set(label[scan.valid]) <= {*TrackClass, UNKNOWN}, name
+        assert (label[~scan.valid] == UNKNOWN).all(), name

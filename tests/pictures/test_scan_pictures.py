@@ -1,6 +1,8 @@
 """Pictures show every judged point once, in the colour of what became of it."""
 
+import sys
 import warnings
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -12,24 +14,40 @@ from matplotlib.image import imread
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
+from derain.pictures.comparison import MOST_PANELS_IN_A_ROW, comparison_figure, show_comparison
 from derain.pictures.palette import OUTCOMES
 from derain.pictures.scan_pictures import before_after_figure, judgement_figure, save
 from derain.scan import Scan
 
 
-def dots_in(axes: Axes) -> np.ndarray:
-    """Places and colours, (N, 2 + 4), of the dots in a panel."""
-    parts = [np.zeros((0, 6))]
+def dots(axes: Axes) -> dict[str, int]:
+    """Number of dots in a panel by their outcome; of none in other colours."""
+    found = dict.fromkeys(OUTCOMES, 0)
     for drawn in axes.collections:  # each of one colour
-        places = np.asarray(drawn.get_offsets())
-        colours = np.repeat(drawn.get_facecolors(), len(places), axis=0)
-        parts.append(np.column_stack([places, colours]))
-    return np.concatenate(parts)
+        colour = drawn.get_facecolors()[0]
+        outcome = [name for name, of in OUTCOMES.items() if np.allclose(colour, to_rgba(of))]
+        found[outcome[0]] += len(drawn.get_offsets())
+    return found
 
 
-def dots_of(figure: Figure, panel: int, outcome: str) -> int:
-    colours = dots_in(figure.axes[panel])[:, 2:]
-    return int(np.isclose(colours, to_rgba(OUTCOMES[outcome])).all(axis=1).sum())
+def places(axes: Axes) -> np.ndarray:
+    """Places of all dots in a panel, (N, 2)."""
+    return np.concatenate(
+        [np.zeros((0, 2)), *(np.asarray(d.get_offsets()) for d in axes.collections)]
+    )
+
+
+def panels(figure: Figure) -> dict[str, list[Axes]]:
+    """The two panels, from above and as seen, of every column, by its title."""
+    titled = [axes for axes in figure.axes if axes.get_title()]
+    columns = len(titled)
+    return {axes.get_title(): figure.axes[n::columns][:2] for n, axes in enumerate(titled)}
+
+
+def expected(predicted: np.ndarray, rain: np.ndarray, seen: np.ndarray) -> dict[str, int]:
+    """Number of seen points by their outcome."""
+    outcomes = (~rain & ~predicted, rain & predicted, rain & ~predicted, ~rain & predicted)
+    return dict(zip(OUTCOMES, (int((each & seen).sum()) for each in outcomes), strict=True))
 
 
 @pytest.fixture
@@ -43,48 +61,78 @@ def judged() -> tuple[Scan, np.ndarray, np.ndarray]:
     return scan, predicted & scan.valid, rain
 
 
-def panels(figure: Figure) -> dict[str, list[int]]:
-    """Numbers of the two panels, from above and ahead, of every column, by its title."""
-    titles = [axes.get_title() for axes in figure.axes]
-    columns = len(titles) // 2
-    return {title: [column, column + columns] for column, title in enumerate(titles[:columns])}
-
-
 def test_the_panels_of_a_judgement_count_what_became_of_the_points(
     judged: tuple[Scan, np.ndarray, np.ndarray],
 ) -> None:
     scan, predicted, rain = judged
-    figure = judgement_figure(scan, predicted, rain, "a scan")
-    shown = panels(figure)
+    shown = panels(judgement_figure(scan, predicted, rain, "a scan"))
     assert list(shown) == ["input: intensity", "truth", "prediction", "error"]
-    seen = scan.valid
-    expected = {
-        "truth": {"solid, kept": ~rain, "rain, removed": rain},
-        "prediction": {"solid, kept": ~predicted, "rain, removed": predicted},
-        "error": {
-            "solid, kept": ~rain & ~predicted,
-            "rain, removed": rain & predicted,
-            "rain, left": rain & ~predicted,
-            "solid, lost": ~rain & predicted,
-        },
-    }
-    for title, outcomes in expected.items():
-        for panel in shown[title]:
-            found = {outcome: dots_of(figure, panel, outcome) for outcome in OUTCOMES}
-            assert found == {o: int((outcomes.get(o, ~seen) & seen).sum()) for o in OUTCOMES}
-    for panel in range(len(figure.axes)):
-        assert len(dots_in(figure.axes[panel])) == seen.sum() == 196
+    for title, pair in {
+        "truth": (rain, rain),
+        "prediction": (predicted, predicted),
+        "error": (predicted, rain),
+    }.items():
+        assert [dots(axes) for axes in shown[title]] == [expected(*pair, scan.valid)] * 2
+    assert [len(places(axes)) for axes in shown["input: intensity"]] == [196] * 2
+
+
+def test_each_method_shows_what_it_removes_leaves_and_loses(
+    judged: tuple[Scan, np.ndarray, np.ndarray],
+) -> None:
+    scan, first, rain = judged
+    second = ~first & scan.valid
+    figure = comparison_figure(scan, {"first": first, "second": second}, rain, "a scan")
+    iou = [(called & rain).sum() / (called | rain).sum() for called in (first, second)]
+    shown = panels(figure)
+    assert list(shown) == [
+        "input: intensity",
+        f"truth: {rain.sum()} points of rain",
+        f"first: IoU {iou[0]:.3f}",
+        f"second: IoU {iou[1]:.3f}",
+    ]
+    for called, pair in zip((rain, first, second), [*shown.values()][1:], strict=True):
+        assert [dots(axes) for axes in pair] == [expected(called, rain, scan.valid)] * 2
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [*OUTCOMES]
+
+
+def test_without_truth_what_is_removed_is_shown() -> None:
+    called = np.arange(200) >= 180
+    figure = comparison_figure(Scan.of(scene(200)[:, :3]), {"only": called}, None, "a scan")
+    shown = panels(figure)
+    assert list(shown) == ["input", "only: 20 points removed"]
+    seen = np.ones(200, bool)
+    assert dots(shown["only: 20 points removed"][0]) == expected(called, called, seen)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["kept", "removed"]
+    nothing = np.zeros(0, bool)
+    figure = comparison_figure(Scan.of(scene(0)), {"none": nothing}, nothing, "empty")
+    assert list(panels(figure))[1:] == ["truth: 0 points of rain", "none: IoU -"]
+
+
+def test_no_row_of_panels_is_left_with_one_and_no_title_runs_into_another() -> None:
+    names = ["a method with a name so long that nobody would ever type it", "short"]
+    called = {f"{names[n % 2]} {n}": np.zeros(50, bool) for n in range(7)}
+    figure = comparison_figure(Scan.of(scene(50)), called, np.zeros(50, bool), "many")
+    figure.draw_without_rendering()
+    above = [axes for axes in figure.axes if axes.get_title()]
+    assert len(above) == 9  # with the input and the truth
+    rows = Counter(round(axes.get_position().y0, 3) for axes in above)
+    assert max(rows.values()) <= MOST_PANELS_IN_A_ROW
+    assert min(rows.values()) >= max(rows.values()) - 1
+    boxes = [axes.title.get_window_extent() for axes in above]
+    boxes += [axes.get_window_extent() for axes in figure.axes if axes.axison]
+    for number, box in enumerate(boxes[: len(above)]):
+        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1
+        assert not any(box.overlaps(other) for other in boxes[:number] + boxes[number + 1 :])
 
 
 def test_rare_outcomes_are_drawn_larger_and_on_top() -> None:
-    scan = Scan.of(scene(100_000))
-    predicted, rain = np.arange(100_000) >= 99_970, np.arange(100_000) >= 99_000
+    scan = Scan.of(scene(20_000))
+    predicted, rain = np.arange(20_000) >= 19_970, np.arange(20_000) >= 19_000
     figure = judgement_figure(scan, predicted, rain, "a scan")
-    above, _ = panels(figure)["error"]
-    drawn = figure.axes[above].collections  # from the lowest to the topmost
-    assert [len(each.get_offsets()) for each in drawn] == [99_000, 970, 30]
+    drawn = panels(figure)["error"][0].collections  # from the lowest to the topmost
+    assert [len(each.get_offsets()) for each in drawn] == [19_000, 970, 30]
     kept, left, removed = (each.get_sizes()[0] for each in drawn)
-    assert removed > 4 * left > 4 * kept
+    assert removed > 3 * left >= 3 * kept
     assert removed > 10  # points of print squared: 40 pixels and more
 
 
@@ -92,61 +140,39 @@ def test_the_two_views_are_in_the_sensor_frame() -> None:
     # One point ahead and 1 m to the left, one ahead and 1 m to the right and 1 m up.
     scan = Scan.of(np.array([[2, 1, 0, 9], [1, -1, 1, 9]], np.float32))
     figure = before_after_figure(scan, np.array([False, False]), "two points")
-    above, ahead = list(panels(figure).values())[-1]
-    np.testing.assert_allclose(
-        sorted(dots_in(figure.axes[above])[:, :2].tolist()), [[-1, 2], [1, 1]]
-    )
-    np.testing.assert_allclose(
-        sorted(dots_in(figure.axes[ahead])[:, :2].tolist()),
-        [
-            [-np.degrees(np.arctan2(1, 2)), 0],
-            [45, np.degrees(np.arctan2(1, np.sqrt(2)))],
-        ],
-        atol=1e-12,
-    )
-
-
-def test_before_and_after_differ_by_what_was_found(
-    judged: tuple[Scan, np.ndarray, np.ndarray],
-) -> None:
-    scan, predicted, _ = judged
-    figure = before_after_figure(scan, predicted, "a scan")
-    removed = int(predicted.sum())
-    titles = list(panels(figure))
-    assert titles[0].startswith("before: 196 points")
-    assert titles[-1] == f"after: {196 - removed} points"
-    for before, after in zip(*(panels(figure)[titles[end]] for end in (0, -1)), strict=True):
-        assert dots_of(figure, before, "rain, removed") == removed
-        assert len(dots_in(figure.axes[before])) == 196
-        assert (
-            dots_of(figure, after, "solid, kept")
-            == len(dots_in(figure.axes[after]))
-            == 196 - removed
-        )
+    above, ahead = (sorted(places(axes).tolist()) for axes in [*panels(figure).values()][-1])
+    np.testing.assert_allclose(above, [[-1, 2], [1, 1]])
+    left, up = np.degrees(np.arctan2(1, 2)), np.degrees(np.arctan2(1, np.sqrt(2)))
+    np.testing.assert_allclose(ahead, [[-left, 0], [45, up]], atol=1e-12)
 
 
 HARD_TO_DRAW = ("empty", "nothing valid", "near and far together", "on a line", "intensity 0")
 
 
-@pytest.mark.parametrize(
-    ("name", "scan"), [case for case in hard_cases(200) if case[0] in HARD_TO_DRAW]
-)
-def test_a_hard_case_is_drawn_without_a_warning(name: str, scan: Scan) -> None:
+@pytest.mark.parametrize("name", HARD_TO_DRAW)
+def test_before_and_after_differ_by_what_was_found_without_a_warning(name: str) -> None:
+    scan = dict(hard_cases(200))[name]
     found = scan.valid & (np.arange(len(scan)) % 2 == 0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         figure = before_after_figure(scan, found, name)
         figure.draw_without_rendering()
-    judged, left = int(scan.valid.sum()), int((scan.valid & ~found).sum())
-    for axes, drawn in zip(figure.axes, [judged, left, judged, left], strict=True):
-        places = dots_in(axes)[:, :2]
-        assert len(places) == drawn
+    seen, left = int(scan.valid.sum()), int((scan.valid & ~found).sum())
+    (title, before), (after_title, after) = panels(figure).items()
+    assert title.startswith(f"before: {seen:,} points")
+    assert after_title == f"after: {left:,} points"
+    nothing = np.zeros(len(scan), bool)
+    kept = expected(nothing, nothing, scan.valid & ~found)
+    assert [dots(axes) for axes in before] == [expected(found, found, scan.valid)] * 2
+    assert [dots(axes) for axes in after] == [kept] * 2
+    for axes in figure.axes:
         # Something of what is there is in sight.
-        (low, high) = np.transpose([axes.get_xlim(), axes.get_ylim()])
-        assert ((low <= places) & (places <= high)).all(axis=1).any() == bool(drawn)
+        low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+        at = places(axes)
+        assert ((low <= at) & (at <= high)).all(axis=1).any() == bool(len(at))
 
 
-def test_a_picture_is_saved_as_png(
+def test_a_picture_is_saved_as_png_and_nothing_stays_where_it_cannot_be(
     tmp_path: Path, judged: tuple[Scan, np.ndarray, np.ndarray]
 ) -> None:
     scan, predicted, _ = judged
@@ -154,13 +180,17 @@ def test_a_picture_is_saved_as_png(
     save(before_after_figure(scan, predicted, "a scan"), path)
     assert imread(path).shape == (990, 1540, 4)
     assert [file.name for file in path.parent.iterdir()] == ["picture.png"]
-
-
-def test_a_picture_of_no_known_format_or_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     for name in ("picture", "picture.xyz"):
         with pytest.raises(InputError, match=r"no format of pictures\. Name it"):
             save(Figure(), tmp_path / name)
-    (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"picture\.png: cannot be written"):
-        save(Figure(), tmp_path / "file" / "picture.png")
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+        save(Figure(), path / "picture.png")
+    assert [file.name for file in tmp_path.iterdir()] == ["new"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a variable tells where a screen is")
+def test_without_a_screen_a_window_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(InputError, match="there is no screen to open it on"):
+        show_comparison(Scan.of(scene(10)), {"none": np.zeros(10, bool)}, None)
