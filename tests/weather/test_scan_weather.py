@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-import derain
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.runtime import Derainer
@@ -47,7 +45,9 @@ def test_the_heavier_the_rain_the_worse_the_weather() -> None:
     derainer = Derainer(threads=1)  # the model that comes with derain
     weathers = [ScanWeather.of(scan, rain) for scan, rain in rained]
     assert weathers[0].visibility.metres is None
-    for told in (weathers, [derainer.weather(scan) for scan, _ in rained]):
+    judged = [derainer.judge(scan).weather for scan, _ in rained]
+    assert derainer.weather(scans[0]).met_rain == judged[0].met_rain
+    for told in (weathers, judged):
         reach = [weather.visibility.at_least for weather in told]
         assert reach == sorted(reach, reverse=True)
         assert len(set(reach)) == len(RATES)
@@ -59,14 +59,6 @@ def test_the_heavier_the_rain_the_worse_the_weather() -> None:
     assert (np.diff(by_sector, axis=0) > 0).all()
     by_range = weathers[-1].shares_by_range
     assert by_range[0] > by_range[2] > by_range[3]
-
-
-def test_a_method_gives_the_weather_of_what_it_judged() -> None:
-    derainer = derain.FilterDerainer(derain.DROR())
-    judgement = derainer.judge(scene())
-    expected = ScanWeather.of(scene(), judgement.rain)
-    for weather in (judgement.weather, derainer.weather(scene())):
-        np.testing.assert_array_equal(weather.ends, expected.ends)
 
 
 def test_shares_are_counts_of_rays() -> None:
@@ -85,20 +77,15 @@ def test_shares_are_counts_of_rays() -> None:
 
 def test_scans_add_up() -> None:
     first, second = scene(1000, seed=1), scene(1500, seed=2)
-    drops = [points[:, 2] > 0 for points in (first, second)]
-    parts = [
-        ScanWeather.of(points, rain) for points, rain in zip((first, second), drops, strict=True)
-    ]
+    parts = [ScanWeather.of(points, points[:, 2] > 0) for points in (first, second)]
     pooled = ScanWeather.none() + parts[0] + parts[1]
     assert pooled.rays == parts[0].rays + parts[1].rays
     assert pooled.met_rain == parts[0].met_rain + parts[1].met_rain
-    assert pooled.ends.dtype == np.int64
     lowest, highest = sorted(part.visibility.at_least for part in parts)
     assert lowest <= pooled.visibility.at_least <= highest
     assert pooled.visibility_in(*range(RAY_SECTORS)) == pooled.visibility
     # The scene lies between -90 and 90 degrees: what a sensor does not look at is not known.
     assert np.isnan(pooled.shares_by_sector[5:8]).all()
-    assert pooled.shares_by_sector[0] > 0
     assert pooled.visibility_in(0).known
     assert not pooled.visibility_in(5, 6, 7).known
     for sectors in ((12,), (-1, 0), ()):
@@ -133,6 +120,8 @@ def test_every_hard_case_has_a_defined_weather() -> None:
     for name, scan in hard_cases(500):
         for rain in (np.zeros(len(scan), bool), np.ones(len(scan), bool)):
             weather = ScanWeather.of(scan, rain)
+            assert (weather.rays > 0) == scan.valid.any(), name
+            assert weather.rays <= scan.valid.sum(), name
             shares = weather.shares[~np.isnan(weather.shares)]
             assert ((shares >= 0) & (shares <= 1)).all(), name
             assert weather.rays == 0 or weather.met_rain == rain.any() * weather.rays, name
@@ -141,7 +130,7 @@ def test_every_hard_case_has_a_defined_weather() -> None:
             assert weather.reach.known or weather.rays < 100, name
 
 
-@pytest.mark.parametrize("rain", [np.zeros(9, bool), np.zeros((10, 1), bool), np.zeros(10, int)])
-def test_a_mask_has_to_fit(rain: NDArray[np.bool_]) -> None:
-    with pytest.raises(InputError, match=r"for 10 points\. Give one truth value"):
-        ScanWeather.of(scene(10), rain)
+def test_a_mask_has_to_fit() -> None:
+    for rain in (np.zeros(9, bool), np.zeros((10, 1), bool), np.zeros(10, int)):
+        with pytest.raises(InputError, match=r"for 10 points\. Give one truth value"):
+            ScanWeather.of(scene(10), rain)
