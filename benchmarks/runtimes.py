@@ -19,7 +19,7 @@ from derain.errors import InputError
 from derain.export.machine import versions
 from derain.export.proof import compare_runtimes
 from derain.export.runtime import Derainer
-from derain.export.runtimes.registry import DEFAULT_RUNTIME
+from derain.export.runtimes.session import DEFAULT_RUNTIME
 from derain.files import read_scan
 from derain.scan import Scan
 from derain.views.view import ViewedScan

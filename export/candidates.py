@@ -12,7 +12,7 @@ from derain.cards.card import DataCard
 from derain.cards.rain_found import require_rain
 from derain.errors import InputError
 from derain.evaluation.counts import Counts
-from derain.export.evaluation_mode import evaluation_on_cpu
+from derain.export.onnx_file import evaluation_on_cpu
 from derain.models.base import DerainingModule
 from derain.scan import Scan
 from derain.views.candidate_fit import RAIN_INSIDE, fit_candidates

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import derain
-from derain.export.runtimes.registry import DEFAULT_RUNTIME, RUNTIMES
+from derain.export.runtimes.session import DEFAULT_RUNTIME, RUNTIMES
 
 
 def versions(runtimes: Iterable[str] = (DEFAULT_RUNTIME,)) -> str:

@@ -9,12 +9,14 @@ from typing import Any
 from derain.default import DEFAULT
 from derain.errors import InputError, did_you_mean, printable
 from derain.export.runtime import Derainer
-from derain.export.runtimes.registry import Runtime
+from derain.export.runtimes.session import Runtime
+from derain.files.documents import Entry
 from derain.files.reading import is_file
-from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
-from derain.filters.parameters import CANDIDATES
+from derain.filters import FILTERS, FilterDerainer, filter_from
+from derain.filters.derainer import CANDIDATES
 from derain.recordings.registry import METHODS
 from derain.sources.method import Method
+from derain.views.candidates import candidates_at
 
 PARAMETER_SUFFIXES = (".yaml", ".yml")
 CHECKPOINT_SUFFIX = ".ckpt"
@@ -30,6 +32,37 @@ def named_method(text: str) -> tuple[str, dict[str, Any]]:
         InputError: A YAML file that is missing, or names no method.
     """
     return read_parameters(text) if Path(text).suffix in PARAMETER_SUFFIXES else (text, {})
+
+
+def read_parameters(path: str | Path) -> tuple[str, dict[str, Any]]:
+    """Reads the name of a method and its parameters.
+
+    Args:
+        path: A YAML file that names a ``method``, and parameters of it by name beside it.
+
+    Returns:
+        The method, and its parameters as the file has them: texts, finite numbers, true or false;
+        ``candidates``, if there are any, as such.
+        A model is sought from the file's own folder first, wherever the command runs; where it is
+        not there, its name stays as it is.
+
+    Raises:
+        InputError: A missing file, one that names no method, or candidates that are none.
+    """
+    path = Path(path)
+    document = Entry.of_yaml(path)
+    values = document.members()
+    if "method" not in values:
+        raise document.fault(
+            "it names no method", "Write one, such as `method: dsor`, and its parameters by name."
+        )
+    method = values.pop("method").text()
+    beside = path.parent / method
+    named = str(beside) if Path(method).suffix and is_file(beside) else method
+    return named, {
+        name: candidates_at(entry) if name == CANDIDATES else entry.scalar()
+        for name, entry in values.items()
+    }
 
 
 def split_title(text: str) -> tuple[str, str]:
@@ -89,12 +122,8 @@ def load_method(
 
 
 def _loaded(name: str, parameters: Mapping[str, Any], threads: int, runtime: Runtime) -> Method:
-    if name == DEFAULT:
-        return _with_threshold(
-            Derainer(None, threads, runtime.name, runtime.precision), name, parameters
-        )
     # What has a suffix is a file, for which other packages need not be asked.
-    if not Path(name).suffix:
+    if name != DEFAULT and not Path(name).suffix:
         if name in FILTERS:
             _refuse_runtime(name, "filter", runtime)
             of_filter = {key: value for key, value in parameters.items() if key != CANDIDATES}
@@ -102,12 +131,8 @@ def _loaded(name: str, parameters: Mapping[str, Any], threads: int, runtime: Run
         if name in METHODS:
             _refuse_runtime(name, "method", runtime)
             return METHODS[name].with_parameters(parameters, threads)
-    if not is_file(Path(name)):
-        raise InputError(
-            name,
-            "no such file",
-            f"{method_hint(name)}.",
-        )
+    if name != DEFAULT and not is_file(Path(name)):
+        raise InputError(name, "no such file", f"{method_hint(name)}.")
     if Path(name).suffix == CHECKPOINT_SUFFIX:
         raise InputError(
             name,

@@ -5,6 +5,7 @@ import logging
 import platform
 import warnings
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,10 @@ import torch
 import derain
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.export.evaluation_mode import evaluation_on_cpu
 from derain.export.model_file import CHECKSUM_KEY, METADATA_KEY, NO_CHECKSUM, with_checksum
 from derain.export.proof import BF16, FINITE, FLOAT32, INT8, Proof, prove
 from derain.export.quantisation import quantised
-from derain.export.runtimes.registry import Runtime
-from derain.export.runtimes.session import FLOAT32_PRECISION
+from derain.export.runtimes.session import FLOAT32_PRECISION, Runtime
 from derain.files.atomic import replacing
 from derain.models.base import DerainingModule
 from derain.scan import Scan
@@ -77,6 +76,24 @@ def export(
         temporary.write_bytes(_described(proto, model.spec, known))
         onnx.checker.check_model(proto, full_check=True)
     return proof
+
+
+@contextmanager
+def evaluation_on_cpu(model: DerainingModule) -> Iterator[None]:
+    """Moves a model to the CPU in evaluation mode; afterwards its device and modes are restored.
+
+    Args:
+        model: The model, which is changed in place.
+    """
+    device = model.device
+    training = [module for module in model.modules() if module.training]
+    try:
+        model.eval().cpu()
+        yield
+    finally:
+        model.to(device)
+        for module in training:
+            module.training = True
 
 
 def with_metadata(proto: onnx.ModelProto, metadata: Mapping[str, Any], **texts: str) -> bytes:

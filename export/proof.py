@@ -14,7 +14,7 @@ from torch import Tensor
 from derain.evaluation.counts import or_none, ratio
 from derain.evaluation.text_tables import number_text
 from derain.export.runtime import Derainer
-from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
+from derain.export.runtimes.session import DEFAULT_RUNTIME, Runtime
 from derain.scan import Scan
 from derain.views.probability import probability_of_rain
 from derain.views.view import ViewedScan

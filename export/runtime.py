@@ -12,8 +12,13 @@ from numpy.typing import NDArray
 from derain.default import DEFAULT, default_model
 from derain.errors import InputError
 from derain.export.model_file import METADATA_KEY, ModelFile
-from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
-from derain.export.runtimes.session import FLOAT32_PRECISION, Session, TensorType
+from derain.export.runtimes.session import (
+    DEFAULT_RUNTIME,
+    FLOAT32_PRECISION,
+    Runtime,
+    Session,
+    TensorType,
+)
 from derain.scan import Scan
 from derain.sources.frame import Frame, MemoryFrame
 from derain.sources.judgement import Judgement
@@ -290,23 +295,12 @@ def _path_of(model: object) -> Path:
     """
     if isinstance(model, str | Path) and (Path(model).suffix or os.path.exists(model)):
         return Path(model)
-    # Imported here, for what runs a model needs neither.
-    from derain.filters import FILTERS, PointFilter
-    from derain.recordings.registry import METHODS
-
-    match model:
-        case PointFilter():
-            subject, remedy = model.name, "Call it by derain.FilterDerainer."
-        case str() if model in FILTERS:
-            subject = model
-            remedy = f"Call it by derain.FilterDerainer(derain.{FILTERS[model].__name__}())."
-        case str() if model in METHODS:
-            subject, remedy = model, f"Use derain.{METHODS[model].__name__}()."
-        case str() | Path():
-            return Path(model)
-        case _:
-            subject, remedy = repr(model), "Give the path of an ONNX file."
-    raise InputError(subject, "it is not a model", remedy)
+    raise InputError(
+        str(model),
+        "it is not a model",
+        "Give the path of an ONNX file; derain.FilterDerainer calls a filter such as "
+        "derain.DROR(), derain.PersistenceDerainer a recording.",
+    )
 
 
 def _refuse_other_network(session: Session, view: View, path: Path) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import scene
 from derain.export.machine import versions
 from derain.export.runtime import Derainer
-from derain.export.runtimes.registry import Runtime
+from derain.export.runtimes.session import Runtime
 from derain.files import DEFAULT_COLUMNS
 from derain.scan import Scan
 from derain.sources.folders import frame_of

@@ -18,10 +18,11 @@ from derain.cards.card import load_card, packaged_cards
 from derain.cards.layout import Layout
 from derain.evaluation.contents import find_sequences
 from derain.evaluation.hard_cases import scene
+from derain.export.methods import read_parameters
 from derain.files.documents import Entry
 from derain.files.extrinsics import read_extrinsics
 from derain.files.frame_times import read_frame_times
-from derain.filters import FILTERS, FilterDerainer, filter_from, read_parameters
+from derain.filters import FILTERS, FilterDerainer, filter_from
 from derain.simulation.campaign import Campaign
 from derain.simulation.drawn_sensor import draw_sensor
 from derain.simulation.manifest import MANIFEST, rates_of_sequences, read_manifest

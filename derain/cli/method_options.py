@@ -6,10 +6,9 @@ from typing import Any
 
 from derain.default import DEFAULT
 from derain.errors import InputError
-from derain.export.methods import load_method, named_method
-from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
-from derain.export.runtimes.session import FLOAT32_PRECISION
-from derain.filters import FILTERS, read_parameters
+from derain.export.methods import load_method, named_method, read_parameters
+from derain.export.runtimes.session import DEFAULT_RUNTIME, FLOAT32_PRECISION, Runtime
+from derain.filters import FILTERS
 from derain.recordings.registry import METHODS
 from derain.sources.method import Method
 

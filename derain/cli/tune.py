@@ -23,7 +23,7 @@ from derain.errors import InputError
 from derain.export.methods import PARAMETER_SUFFIXES
 from derain.files.atomic import replacing, require_writable
 from derain.filters import FILTERS, filter_from
-from derain.filters.parameters import CANDIDATES
+from derain.filters.derainer import CANDIDATES
 from derain.sources.training_record import training_overlap
 from derain.system.extras import OPTUNA, require
 from derain.system.notices import Notices

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.cards.card import DataCard
-from derain.evaluation.counts import Counts, ratio, table_of
-from derain.evaluation.range_bands import band_names, band_of
+from derain.evaluation.counts import Counts, band_names, band_of, ratio, table_of
 from derain.evaluation.text_tables import number_text, plain_table
 from derain.scan import Scan
 

@@ -4,7 +4,6 @@ They call every point rain, or none, those at places where training scans had ra
 are dim and near.
 """
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Self
@@ -12,10 +11,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.errors import InputError
 from derain.evaluation.counts import intersection_over_union, table_of
 from derain.scan import Scan
 from derain.views.scan_issues import ScanIssue, missing_intensity
+
+# Edge of the voxels, metres, in which it is learnt where it rains.
+VOXEL = 0.5
 
 # Bits of a voxel's number along each axis; three of them fit into an int64.
 AXIS_BITS = 21
@@ -43,23 +44,21 @@ class PositionPrior:
     have learnt the places only.
 
     Attributes:
-        voxel: Edge of the voxels in metres, which are fixed to the sensor.
-        rain: Numbers of the voxels of rain, int64 (V,), ascending. Any other voxel is not rain,
-            including those without points in training.
+        rain: Numbers of the voxels of rain, int64 (V,), ascending; the voxels are fixed to the
+            sensor. Any other voxel is not rain, including those without points in training.
     """
 
-    voxel: float
     rain: NDArray[np.int64]
 
     def __call__(self, scan: Scan) -> NDArray[np.bool_]:
         """True for the points called rain, bool (N,)."""
         valid = scan.valid
         called_rain = np.zeros(len(scan), bool)
-        called_rain[valid] = np.isin(_voxel_of(scan.xyz[valid], self.voxel), self.rain)
+        called_rain[valid] = np.isin(_voxel_of(scan.xyz[valid]), self.rain)
         return called_rain
 
     @classmethod
-    def learn(cls, scans: Iterable[tuple[Scan, NDArray[np.bool_]]], voxel: float = 0.5) -> Self:
+    def learn(cls, scans: Iterable[tuple[Scan, NDArray[np.bool_]]]) -> Self:
         """Finds the voxels that, called rain, give the greatest IoU on the training scans.
 
         They are those with the greatest shares of rain. One point with the average share of rain is
@@ -67,26 +66,20 @@ class PositionPrior:
 
         Args:
             scans: Scans, and their rain, bool (N,). One is in memory at a time.
-            voxel: Edge of the voxels, metres.
 
         Returns:
             The prior; without rain to learn from, it calls nothing rain.
-
-        Raises:
-            InputError: Voxels without an extent.
         """
-        if not (voxel > 0 and math.isfinite(voxel)):
-            raise InputError("voxel", f"{voxel:g} m", "Give a finite length above 0.")
         number = np.zeros(0, np.int64)
         points: NDArray[Any] = np.zeros(0)
         hits: NDArray[Any] = np.zeros(0)
         for scan, rain in scans:
-            own = _voxel_of(scan.xyz[scan.valid], voxel)
+            own = _voxel_of(scan.xyz[scan.valid])
             number, row = np.unique(np.append(number, own), return_inverse=True)
             # bincount adds in float64, which is exact up to 2⁵³ points.
             points = np.bincount(row, np.append(points, np.ones(len(own))), len(number))
             hits = np.bincount(row, np.append(hits, rain[scan.valid]), len(number))
-        return cls(voxel, np.sort(number[_best_called_rain(points, hits)]))
+        return cls(np.sort(number[_best_called_rain(points, hits)]))
 
 
 @dataclass(frozen=True)
@@ -173,10 +166,10 @@ def _best_called_rain(points: NDArray[np.float64], rain: NDArray[np.float64]) ->
     return order[: np.argmax(iou) + 1]
 
 
-def _voxel_of(xyz: NDArray[np.float32], voxel: float) -> NDArray[np.int64]:
+def _voxel_of(xyz: NDArray[np.float32]) -> NDArray[np.int64]:
     """Number of each point's voxel, int64 (N,); points beyond the outermost voxels lie in those."""
     half = 2 ** (AXIS_BITS - 1)
-    cell = np.clip(np.floor(xyz.astype(np.float64) / voxel), -half, half - 1).astype(np.int64)
+    cell = np.clip(np.floor(xyz.astype(np.float64) / VOXEL), -half, half - 1).astype(np.int64)
     x, y, z = (cell + half).T
     number: NDArray[np.int64] = (x << 2 * AXIS_BITS) | (y << AXIS_BITS) | z
     return number

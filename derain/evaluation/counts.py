@@ -1,13 +1,17 @@
-"""Points by truth and by answer, and the scores that follow from them."""
+"""Points by truth, by answer and by band of range, and the scores that follow from them."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 SCORES = ("precision", "recall", "f1", "iou")
+
+# Where the bands of range start, metres; the last band is open.
+RANGE_EDGES = (0, 10, 20, 40, 80)
 
 
 def ratio(part: ArrayLike, whole: ArrayLike) -> NDArray[np.float64]:
@@ -42,6 +46,24 @@ def table_of(cells: Sequence[NDArray[np.integer]], shape: tuple[int, ...]) -> ND
     """
     places = np.ravel_multi_index(tuple(cells), shape)
     return np.bincount(places, minlength=math.prod(shape)).reshape(shape)
+
+
+def band_names() -> list[str]:
+    """Names of the bands of ``RANGE_EDGES``, such as ``0-10 m`` and, for the last, ``80+ m``."""
+    names = [f"{start}-{end} m" for start, end in pairwise(RANGE_EDGES)]
+    return [*names, f"{RANGE_EDGES[-1]}+ m"]
+
+
+def band_of(range: NDArray[np.floating], edges: Sequence[float] = RANGE_EDGES) -> NDArray[np.int64]:
+    """Number of each point's band, int64 (N,).
+
+    Args:
+        range: Distance from the sensor, metres, (N,). Values that are not finite belong to the
+            last band.
+        edges: Where the bands start, metres, rising from 0.
+    """
+    finite_or_far = np.where(np.isfinite(range), range, np.inf)
+    return np.searchsorted(edges[1:], finite_or_far, side="right").astype(np.int64)
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.evaluation.counts import Counts, ratio, table_of
-from derain.evaluation.range_bands import RANGE_EDGES, band_names, band_of
+from derain.evaluation.counts import RANGE_EDGES, Counts, band_names, band_of, ratio, table_of
 from derain.scan import Scan
 
 

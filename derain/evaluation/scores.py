@@ -1,7 +1,9 @@
 """Scores of methods: over the points of all scans, and by scan, class, range and rain rate."""
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,11 +67,11 @@ def score(
             the card. A method that fails is noted in its scores.
     """
     scorings = [_Scoring(card) for _ in methods]
-    for scan in scans:
+    for scan, rate in zip(scans, repeat(None) if rain_rates is None else rain_rates, strict=False):
         counted = first_rows(scan) if distinct else np.arange(len(scan))
         for method, scoring in zip(methods, scorings, strict=True):
-            scoring.judge(method, scan, counted)
-    return [scoring.scores(rain_rates) for scoring in scorings]
+            scoring.judge(method, scan, counted, rate)
+    return [scoring.scores() for scoring in scorings]
 
 
 class _Scoring:
@@ -78,10 +80,13 @@ class _Scoring:
     def __init__(self, card: DataCard) -> None:
         self.card = card
         self.counts = RainCounts(card.classes, card.rain, unknown=card.unknown)
-        self.by_sensor: dict[str, list[Counts]] = {}
+        self.by_rain_rate: defaultdict[float, Counts] = defaultdict(Counts)
+        self.by_sensor: defaultdict[str, Counts] = defaultdict(Counts)
         self.failures: dict[str, str] = {}
 
-    def judge(self, method: ScoredMethod, scan: Scan, counted: NDArray[np.int64]) -> None:
+    def judge(
+        self, method: ScoredMethod, scan: Scan, counted: NDArray[np.int64], rate: float | None
+    ) -> None:
         """Judges a whole scan, and counts some of its rows."""
         try:
             predicted = method(scan)
@@ -90,26 +95,22 @@ class _Scoring:
             predicted = np.zeros(len(scan), bool)
         scan, predicted = scan.take(counted), predicted[counted]
         self.counts.add(scan, predicted)
+        if rate is not None:
+            self.by_rain_rate[rate] += self.counts.per_scan[-1]
         if scan.radar is not None:
             rain, known = self.card.rain_of(scan), ~self.card.unknown_of(scan)
             for sensor, points in {"LiDAR": ~scan.radar, "radar": scan.radar}.items():
                 rows = known & points
-                self.by_sensor.setdefault(sensor, []).append(Counts.of(predicted[rows], rain[rows]))
+                self.by_sensor[sensor] += Counts.of(predicted[rows], rain[rows])
 
-    def scores(self, rain_rates: Sequence[float | None] | None) -> Scores:
-        """The counts so far, given the rain rate of each scan in mm/h."""
-        per_scan = self.counts.per_scan
-        rain_rates = [None] * len(per_scan) if rain_rates is None else rain_rates
-        by_rate: dict[float, list[Counts]] = {}
-        for rate, counts in zip(rain_rates, per_scan, strict=True):
-            if rate is not None:
-                by_rate.setdefault(rate, []).append(counts)
+    def scores(self) -> Scores:
+        """The counts so far."""
         return Scores(
             self.counts.pooled(),
-            per_scan,
+            self.counts.per_scan,
             self.counts.by_class(),
             self.counts.by_range(),
-            {f"{rate:g} mm/h": sum(by_rate[rate], Counts()) for rate in sorted(by_rate)},
-            {sensor: sum(parts, Counts()) for sensor, parts in self.by_sensor.items()},
+            {f"{rate:g} mm/h": self.by_rain_rate[rate] for rate in sorted(self.by_rain_rate)},
+            self.by_sensor,
             self.failures,
         )

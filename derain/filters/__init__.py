@@ -16,7 +16,6 @@ from derain.filters.crf import CRF as CRF
 from derain.filters.derainer import FilterDerainer as FilterDerainer
 from derain.filters.distance_filters import DSOR as DSOR
 from derain.filters.distance_filters import SOR as SOR
-from derain.filters.parameters import read_parameters as read_parameters
 from derain.filters.point_filter import FILTERS as FILTERS
 from derain.filters.point_filter import PointFilter as PointFilter
 from derain.filters.point_filter import Span as Span

@@ -14,10 +14,9 @@ from derain.filters.ground import find_ground
 from derain.filters.point_filter import (
     FILTERS,
     PointFilter,
-    RainAndJudged,
+    RainAndPoints,
     Span,
     filter_view,
-    rows_of,
 )
 from derain.filters.random_field import decide_sequentially
 from derain.scan import Scan
@@ -140,8 +139,8 @@ class CRF(PointFilter):
 
     def judge_scan(
         self, scan: Scan, threads: int, candidates: Candidates | None, stopwatch: Stopwatch
-    ) -> RainAndJudged:
-        """Says which rows are rain, with neighbours of candidates; see :class:`PointFilter`."""
+    ) -> RainAndPoints:
+        """Finds the rain, with neighbours of candidates alone; see :class:`PointFilter`."""
         with stopwatch.stage("view"):
             first, inverse = distinct_rows(scan)
             view = filter_view(self.neighbours, threads)
@@ -151,8 +150,7 @@ class CRF(PointFilter):
             rain = self._rain(points, partial(search, min(self.neighbours, len(points))))
             if candidates is not None:
                 rain &= candidates.among(scan)[first]
-        with stopwatch.stage("back"):
-            return rows_of(rain, inverse), inverse >= 0
+        return rain, inverse
 
     def issues(self, scan: Scan) -> Iterator[ScanIssue]:
         """What is odd about a scan: no intensity, or another unit than the published bound's."""

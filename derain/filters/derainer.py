@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError
-from derain.filters.parameters import CANDIDATES
-from derain.filters.point_filter import PointFilter
+from derain.filters.point_filter import PointFilter, rows_of
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.judgement import Judgement
@@ -21,6 +20,9 @@ from derain.views.one_viewpoint import viewpoint_issues
 from derain.views.scan_issues import ScanIssue
 from derain.views.window import Window
 from derain.weather.scan_weather import ScanWeather
+
+# What bounds are called among the parameters of a filter; they are the same for every one.
+CANDIDATES = "candidates"
 
 
 class FilterDerainer(Method):
@@ -76,7 +78,9 @@ class FilterDerainer(Method):
             stopwatch: Takes the times of the stages view, network and back.
         """
         scan, stopwatch = Scan.of(points), stopwatch or Stopwatch()
-        rain, judged = self.filter.judge_scan(scan, self.threads, self.candidates, stopwatch)
+        of_points, point = self.filter.judge_scan(scan, self.threads, self.candidates, stopwatch)
+        with stopwatch.stage("back"):
+            rain, judged = rows_of(of_points, point), point >= 0
         return self.with_warnings(Judgement(rain.astype(np.float32), rain, judged, scan))
 
     def weather(self, points: Scan | NDArray[Any]) -> ScanWeather:

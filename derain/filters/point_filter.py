@@ -33,8 +33,9 @@ LARGEST_NUMBER = 1e100
 # Smallest and largest value of a parameter, whole numbers or not.
 Span = tuple[int, int] | tuple[float, float]
 
-# Which rows are rain, and which were judged at all, bool (N,) each.
-RainAndJudged = tuple[NDArray[np.bool_], NDArray[np.bool_]]
+# Which of M points are rain, bool (M,), and the point of each row of a scan, int64 (N,); -1 for
+# rows that cannot be judged.
+RainAndPoints = tuple[NDArray[np.bool_], NDArray[np.int64]]
 
 # Where derain's own filters look for the best number of neighbours. Tuning finds as many of every
 # point as the largest says, and keeps them in memory for all trials.
@@ -107,8 +108,8 @@ class PointFilter(ABC):
 
     def judge_scan(
         self, scan: Scan, threads: int, candidates: Candidates | None, stopwatch: Stopwatch
-    ) -> RainAndJudged:
-        """Says which rows of a scan are rain, as :meth:`judge` does of every point of a view.
+    ) -> RainAndPoints:
+        """Finds the rain of a scan, as :meth:`judge` does of every point of a view.
 
         A filter that comes to the same verdict without every point's neighbours goes its shorter
         way here.
@@ -117,17 +118,16 @@ class PointFilter(ABC):
             scan: The scan, of N rows.
             threads: Threads to use.
             candidates: Bounds outside which nothing is rain; None where anything may be.
-            stopwatch: Takes the times of the stages view, network (the filter) and back.
+            stopwatch: Takes the times of the stages view and network (the filter).
 
         Returns:
-            Rows that are rain, and those that were judged, bool (N,) each.
+            Which of the scan's distinct valid positions are rain, bool (M,), and the position of
+            each row, int64 (N,); -1 for rows that cannot be judged.
         """
         with stopwatch.stage("view"):
             view = filter_view(self.neighbours, threads)(scan)
         with stopwatch.stage("network"):
-            rain = rain_among(self, view, scan, candidates)
-        with stopwatch.stage("back"):
-            return view.back(rain.astype(np.float32)) > 0, view.judged
+            return rain_among(self, view, scan, candidates), view.inverse
 
     def issues(self, scan: Scan) -> Iterator[ScanIssue]:
         """What is odd about a scan for this filter; nothing, for one that looks at places alone.

@@ -18,9 +18,8 @@ from derain.filters.point_filter import (
     FILTERS,
     TUNED_NEIGHBOURS,
     PointFilter,
-    RainAndJudged,
+    RainAndPoints,
     Span,
-    rows_of,
 )
 from derain.scan import Scan
 from derain.system.stopwatch import Stopwatch
@@ -69,16 +68,15 @@ class RadiusFilter(PointFilter):
 
     def judge_scan(
         self, scan: Scan, threads: int, candidates: Candidates | None, stopwatch: Stopwatch
-    ) -> RainAndJudged:
-        """Says which rows of a scan are rain; see :class:`PointFilter`."""
+    ) -> RainAndPoints:
+        """Finds the rain of a scan; see :class:`PointFilter`."""
         with stopwatch.stage("view"):
             first, inverse = distinct_rows(scan)
             xyz = scan.xyz.take(first, axis=0)
         with stopwatch.stage("network"):
             among = None if candidates is None else candidates.among(scan)[first]
             few = has_few_neighbours(xyz, self.radius_at(xyz), self.neighbours, threads, among)
-        with stopwatch.stage("back"):
-            return rows_of(few, inverse), inverse >= 0
+        return few, inverse
 
 
 @FILTERS.add("ror")

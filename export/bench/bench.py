@@ -1,7 +1,6 @@
 """Runs a bench: every method on the same scans, each timed alone."""
 
 import platform
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -14,19 +13,19 @@ from tqdm import tqdm
 
 from derain.cards.card import DataCard, load_card
 from derain.cards.rain_found import warn_without_rain
+from derain.errors import reason_of
 from derain.evaluation.scores import ScoredMethod, score
 from derain.export.bench.bench_entries import BenchEntry, GivenMethod, TimedMethod, bench_entries
 from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
-from derain.export.bench.other_runtime import changes
 from derain.export.bench.report import draw_speed_error, main_table, runtimes_table, write_report
 from derain.export.bench.rows import Row, bench_rows
 from derain.export.machine import processor, versions
-from derain.export.runtimes.registry import DEFAULT_RUNTIME, Runtime
-from derain.export.runtimes.session import FLOAT32_PRECISION
+from derain.export.runtime import Derainer
+from derain.export.runtimes.session import DEFAULT_RUNTIME, FLOAT32_PRECISION, Runtime
 from derain.files import DEFAULT_COLUMNS
 from derain.filters import PointFilter
-from derain.filters.point_filter import filter_view, rain_among
+from derain.filters.point_filter import filter_view, rain_among, rows_of
 from derain.scan import Scan
 from derain.sources.folders import GivenScans, source_of
 from derain.sources.spread import evenly_spaced
@@ -189,7 +188,10 @@ def run_bench(
     Raises:
         InputError: A scan that cannot be read. The row of a method that fails states so.
     """
-    notes, notices = _notes(methods, data), Notices()
+    notices = Notices()
+    notes = [note for method in methods if (note := _overlap(method, data))]
+    for note in notes:
+        warn(note)
     timed_on = evenly_spaced(data.frames, effort.timed)
     timing = Timing(timed_on, effort.threads, effort.repeats, data.intensity_scale)
     scores = score(
@@ -207,8 +209,8 @@ def run_bench(
     ]
     notices.warn_of_repeats()
     rows = bench_rows(methods, scores, costs, np.random.default_rng(effort.seed))
-    changed = changes(methods, timing, data.read)
     facts = _facts(command, data, timing, effort.seed, methods)
+    changed = [_changed(method, timing, data) for method in methods if method.usual is not None]
     return Bench(rows, {**facts, "notes": notes, "runtimes": changed})
 
 
@@ -226,8 +228,7 @@ def scored_methods(bench_entries: Sequence[BenchEntry], threads: int) -> list[Sc
         filter: PointFilter, candidates: Candidates | None, scan: Scan
     ) -> NDArray[np.bool_]:
         seen = seen_by_filters(scan)
-        rain = rain_among(filter, seen, scan, candidates)
-        return seen.back(rain.astype(np.float32)) > 0
+        return rows_of(rain_among(filter, seen, scan, candidates), seen.inverse)
 
     return [
         partial(filtered, row.filter, row.candidates)
@@ -241,17 +242,12 @@ def _untimed(method: TimedMethod, scan: Scan) -> NDArray[np.bool_]:
     return method(scan, Stopwatch())
 
 
-def _notes(methods: Sequence[BenchEntry], data: LabelledFrames) -> list[str]:
-    """Prints and returns a note for each model that was trained on the scans it is measured on."""
-    notes = [
-        note
-        for method in methods
-        if isinstance(method.spec_or_filter, Spec)
-        and (note := training_overlap(method.title, method.spec_or_filter, data.card, data.frames))
-    ]
-    for note in notes:
-        tqdm.write(f"derain: warning: {note}", sys.stderr)
-    return notes
+def _overlap(method: BenchEntry, data: LabelledFrames) -> str | None:
+    """A note where a model was trained on the scans that it is measured on."""
+    spec = method.spec_or_filter
+    if not isinstance(spec, Spec):
+        return None
+    return training_overlap(method.title, spec, data.card, data.frames)
 
 
 def _scans(methods: Sequence[BenchEntry], data: LabelledFrames, notices: Notices) -> Iterator[Scan]:
@@ -262,6 +258,31 @@ def _scans(methods: Sequence[BenchEntry], data: LabelledFrames, notices: Notices
             if method.spec_or_filter is not None:
                 notices.warn(frame.name, method.spec_or_filter.issues(scan), method.title)
         yield scan
+
+
+def _changed(method: BenchEntry, timing: Timing, data: LabelledFrames) -> dict[str, Any]:
+    """Compares a model in another runtime with the same model in onnxruntime.
+
+    Returns:
+        By the title ``method`` its ``runtime``, and the numbers of a
+        :class:`derain.export.proof.Proof` as JSON-able primitives, or its ``failure``.
+    """
+    from derain.export.proof import compare_runtimes  # here: it loads torch
+
+    changed = {"method": method.title, "runtime": str(method.runtime)}
+    assert method.usual is not None
+    try:
+        usual, other = method.usual(timing.threads), method.ready(timing.threads)
+        assert isinstance(usual, Derainer)
+        assert isinstance(other, Derainer)
+        # Nothing holds on to a scan while the next one is read.
+        scans = ((frame.name, data.read(frame)) for frame in timing.frames)
+        proof = compare_runtimes(usual, other, scans)
+    except Exception as error:  # its row states whatever a runtime raises
+        return {**changed, "failure": reason_of(error)}
+    numbers = proof.as_dict()
+    del numbers["cases"]
+    return {**changed, **numbers, "scans": len(proof.cases)}
 
 
 def _facts(

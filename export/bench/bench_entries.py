@@ -15,7 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.errors import InputError, printable
-from derain.evaluation.baselines import IntensityRule, PositionPrior, all_points, no_points
+from derain.evaluation.baselines import (
+    VOXEL,
+    IntensityRule,
+    PositionPrior,
+    all_points,
+    no_points,
+)
 from derain.export.methods import (
     load_method_of_one_scan,
     named_method,
@@ -24,9 +30,9 @@ from derain.export.methods import (
 )
 from derain.export.model_file import number_of_weights
 from derain.export.runtime import Derainer
-from derain.export.runtimes.registry import Runtime
+from derain.export.runtimes.session import Runtime
 from derain.filters import FilterDerainer, PointFilter
-from derain.filters.parameters import CANDIDATES
+from derain.filters.derainer import CANDIDATES
 from derain.scan import Scan
 from derain.spec import Spec
 from derain.system.stopwatch import Stopwatch
@@ -182,10 +188,9 @@ def _bench_entry(method: GivenMethod, learn_from: LearnFrom | None) -> BenchEntr
             return row if method.runtime.is_default else _with_runtime(row, method.runtime)
         case _ if callable(method) and not isinstance(method, type):
             return _function(method)
-    kind = f"the class {method.__name__}" if isinstance(method, type) else type(method).__name__
     raise InputError(
         "methods",
-        f"{kind} is no method",
+        f"{method!r} is no method",
         "Give a name, a file, a derainer, a filter, or a function of a scan.",
     )
 
@@ -249,7 +254,7 @@ def _learnt(title: str, name: str, learn_from: LearnFrom | None) -> BenchEntry:
         )
     if name == "position":
         prior = PositionPrior.learn(learn_from())
-        return BenchEntry(title, name, TimedFunction(prior).ready, {"voxel": prior.voxel})
+        return BenchEntry(title, name, TimedFunction(prior).ready, {"voxel": VOXEL})
     rule = IntensityRule.best(learn_from())
     limits = f"intensity <= {rule.intensity:.4g} and range <= {rule.range:.4g} m"
     return BenchEntry(title, name, TimedFunction(rule).ready, {"rule": limits}, spec_or_filter=rule)

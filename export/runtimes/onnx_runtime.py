@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from derain.export.model_file import ModelFile
-from derain.export.runtimes.registry import DEFAULT_RUNTIME, RUNTIMES
-from derain.export.runtimes.session import Session, TensorType
+from derain.export.runtimes.session import DEFAULT_RUNTIME, RUNTIMES, Session, TensorType
 
 # NumPy's names of what onnxruntime calls the types of a view's inputs and of scores.
 NUMPY_NAMES = {"tensor(float)": "float32", "tensor(int64)": "int64", "tensor(bool)": "bool"}

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from derain.errors import InputError
 from derain.export.model_file import ModelFile
-from derain.export.runtimes.registry import RUNTIMES
-from derain.export.runtimes.session import FLOAT32_PRECISION, Session, TensorType
+from derain.export.runtimes.session import FLOAT32_PRECISION, RUNTIMES, Session, TensorType
 from derain.system.extras import OPENVINO
 
 DEVICE = "CPU"

@@ -1,17 +1,24 @@
-"""An exported network, opened by a runtime: what every runtime can do."""
+"""Runtimes by name, and what each can do: it opens an exported network, and computes its scores."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from derain.errors import InputError
+from derain.errors import InputError, did_you_mean
 from derain.export.model_file import ModelFile
+from derain.files.documents import short
+from derain.system.registry import Registry
 
-FLOAT32_PRECISION = "float32"
+# Those of this folder, and those that other packages bring.
+RUNTIMES: Registry[type["Session"]] = Registry(
+    "derain.export.runtimes", group="derain.runtimes", attribute="NAME"
+)
+
+DEFAULT_RUNTIME, FLOAT32_PRECISION = "onnxruntime", "float32"
 
 
 @dataclass(frozen=True)
@@ -92,3 +99,57 @@ class Session(ABC):
             f"not an ONNX model that {cls.NAME} can run ({reason or type(error).__name__})",
             "Give a model written by `derain export`.",
         )
+
+
+@dataclass(frozen=True)
+class Runtime:
+    """What runs a network, and the precision that it computes in.
+
+    Attributes:
+        name: One of ``RUNTIMES``.
+        precision: One of the runtime's ``PRECISIONS``.
+
+    Raises:
+        InputError: No such runtime, or a precision that it has on no processor.
+    """
+
+    name: str = DEFAULT_RUNTIME
+    precision: str = FLOAT32_PRECISION
+
+    def __post_init__(self) -> None:
+        if self.name not in RUNTIMES:
+            remedy = f"{did_you_mean(self.name, RUNTIMES)}Give {_listed(RUNTIMES)}."
+            raise InputError(short(self.name), "no such runtime", remedy)
+        if self.precision not in RUNTIMES[self.name].PRECISIONS:
+            able = [name for name, kind in RUNTIMES.items() if self.precision in kind.PRECISIONS]
+            raise InputError(
+                f"precision {short(self.precision)}",
+                f"{self.name} computes in {_listed(RUNTIMES[self.name].PRECISIONS)}",
+                f"Leave it out, or take the runtime {_listed(able)}." if able else "Leave it out.",
+            )
+
+    def open(self, file: ModelFile, threads: int) -> Session:
+        """Opens a model.
+
+        Args:
+            file: The model.
+            threads: Threads that its network computes with, 1 or more.
+
+        Raises:
+            InputError: A runtime that is not installed, a graph that it cannot run, or a precision
+                that this processor has not.
+        """
+        return RUNTIMES[self.name](file, threads, self.precision)
+
+    @property
+    def is_default(self) -> bool:
+        """Whether it is what runs models where nobody asks for another."""
+        return self == Runtime()
+
+    def __str__(self) -> str:
+        """Its name, and its precision where that is not float32."""
+        return self.name if self.precision == FLOAT32_PRECISION else f"{self.name} {self.precision}"
+
+
+def _listed(names: Iterable[str]) -> str:
+    return " or ".join(names)

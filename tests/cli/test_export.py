@@ -10,7 +10,7 @@ import pytest
 from derain.evaluation.hard_cases import scene
 from derain.export import onnx_file
 from derain.export.runtime import Derainer
-from derain.export.runtimes.registry import Runtime
+from derain.export.runtimes.session import Runtime
 from derain.files import read_scan
 from derain.models.base import DerainingModule
 from derain.models.checkpoint import save_model

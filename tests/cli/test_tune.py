@@ -9,10 +9,11 @@ import pytest
 import yaml
 
 from derain.export.bench.bench_entries import bench_entries
+from derain.export.methods import read_parameters
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import read_labels
-from derain.filters import FilterDerainer, filter_from, read_parameters
+from derain.filters import FilterDerainer, filter_from
 
 
 @pytest.fixture

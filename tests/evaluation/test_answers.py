@@ -11,12 +11,9 @@ from derain.evaluation.answers import (
     RAIN,
     Answers,
     answer_of,
-    coarse_bands,
     total,
 )
 from derain.evaluation.counts import Counts
-from derain.evaluation.hard_cases import scene
-from derain.evaluation.range_bands import RANGE_EDGES
 from derain.scan import Scan
 
 
@@ -58,29 +55,11 @@ def test_shares_and_agreement_are_those_of_the_points(
     assert answers.rain_among_known == pytest.approx((answer[sure] == RAIN).mean())
 
 
-def test_wide_bands_hold_all_points_by_their_range(
-    asked: list[tuple[Scan, np.ndarray]], card: DataCard
+def test_without_a_student_nothing_is_removed_and_of_no_points_no_share_is_defined(
+    scans: list[Scan], card: DataCard
 ) -> None:
-    scan, called = asked[0]
-    bands = coarse_bands(Answers.of(scan, card, called))
-    assert list(bands) == ["0-10 m", "10-20 m", "20-40 m", "40-80 m", "80+ m"]
-    ranges = scan.range[scan.valid]
-    for band, (start, end) in zip(
-        bands.values(), zip(RANGE_EDGES, (*RANGE_EDGES[1:], np.inf), strict=True), strict=True
-    ):
-        assert band.points == ((ranges >= start) & (ranges < end)).sum()
-
-
-def test_a_student_that_was_not_asked_calls_nothing_rain(scans: list[Scan], card: DataCard) -> None:
-    answers = Answers.of(scans[0], card)
-    assert answers.removed == 0
-    assert answers.points == 300
-
-
-def test_of_no_points_no_share_is_defined(card: DataCard) -> None:
-    empty = Scan.of(scene(0)).with_label(np.zeros(0, np.int64))
-    for answers in (Answers.none(), Answers.of(empty, card), total([])):
-        assert answers.points == 0
+    assert Answers.of(scans[0], card).removed == 0
+    for answers in (Answers.of(scans[0].take([]), card), total([])):
         assert np.isnan([answers.removed, answers.rain_among_known, *answers.shares]).all()
         assert answers.agreement == Counts()
 

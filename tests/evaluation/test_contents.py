@@ -114,18 +114,6 @@ def test_a_scan_without_labels_gives_its_points(tmp_path: Path) -> None:
         assert contents.as_dict({})["class_share"] == {}
 
 
-def test_real_scans_are_counted_as_numpy_counts_them(shared: Path) -> None:
-    root = shared / "data" / "wads"
-    assert find_layout(root) == Layout()
-    (sequence,) = find_sequences(root, Layout())
-    assert (sequence.name, len(sequence.frames)) == ("36", 10)
-    contents = count_frame(sequence.frames[0])
-    label = root / "sequences/36/labels" / f"{sequence.frames[0].key}.label"
-    raw = np.fromfile(label, np.uint32) & 0xFFFF
-    assert contents.labelled[110] == (raw == 110).sum() > 0
-    assert contents.points == contents.labelled.total() == len(raw)
-
-
 def test_the_picture_has_a_bar_for_each_class_and_rate_and_a_slice_for_each_rate() -> None:
     by_rate: dict[float | None, Contents] = {}
     for number, rate in enumerate((0.0, 10.0, 50.0, None)):

@@ -1,4 +1,4 @@
-"""The paper's tables, and ours beside them."""
+"""The paper's tables hold together under our definitions of the scores; ours stand beside them."""
 
 from dataclasses import dataclass
 
@@ -7,10 +7,45 @@ import pytest
 from derain.cards.card import DataCard, load_card
 from derain.errors import InputError
 from derain.evaluation.baselines import all_points
-from derain.evaluation.published_tables import paper_table, scans_by_group
+from derain.evaluation.counts import Counts
+from derain.evaluation.published_tables import TABLES, paper_table, scans_by_group
 from derain.evaluation.scores import Scores, score
 from derain.export.bench.report import with_published_rows
 from derain.scan import Scan
+
+ROWS = [row for name in TABLES for row in paper_table(name).rows]
+
+# In percentage points. SalsaNext's printed IoU is .026 (validation) and .036 (test) below what
+# its precision and recall give; every other score agrees within .01.
+ROUNDING, IOU_TOLERANCE = 0.011, 0.04
+
+
+def f1_and_iou(precision: float, recall: float) -> tuple[float, float]:
+    """The scores that follow from precision and recall, in percent."""
+    found = 10**9
+    counts = Counts(found, round(found * (100 / precision - 1)), round(found * (100 / recall - 1)))
+    return 100 * counts.f1, 100 * counts.iou
+
+
+def test_a_row_is_of_pooled_scores_or_of_means_over_scans_or_has_a_misprint() -> None:
+    assert [len(paper_table(name).rows) for name in TABLES] == [10, 12]
+    for row in ROWS:
+        precision, recall, f1, iou = row.scores
+        f1_off, iou_off = (
+            abs(found - printed)
+            for found, printed in zip(f1_and_iou(precision, recall), (f1, iou), strict=True)
+        )
+        fits = f1_off < ROUNDING and iou_off < IOU_TOLERANCE
+        assert fits == (row.average == "pooled" and row.misprint is None), row
+        if row.average == "scans":
+            # IoU is a convex function of F1: its mean over scans exceeds the IoU of the mean F1.
+            assert iou > 100 * f1 / (200 - f1) + 1
+
+
+def test_misprints_are_those_that_are_stated() -> None:
+    light, medium = sorted(row.scores for row in ROWS if row.misprint)
+    assert f1_and_iou(*medium[:2]) == pytest.approx((81.59, medium[3]), abs=ROUNDING)
+    assert f1_and_iou(light[0], 99.9) == pytest.approx(light[2:], abs=ROUNDING)
 
 
 @dataclass(frozen=True)
@@ -25,62 +60,8 @@ class OwnRow:
 
 @pytest.fixture
 def scores(scans: list[Scan], card: DataCard) -> Scores:
-    """What calling every point rain scores."""
+    """What calling every point rain scores: of 880 known points, 90 are rain."""
     return score([all_points], scans, card)[0]
-
-
-# The tables as they stand on the paper's pages, two groups side by side, copied by hand.
-TABLE_2 = """\
-3D-OutDet    96.35 98.48 97.40 94.94  97.23 96.61 96.92 94.03   82
-SalsaNext    95.17 99.41 97.24 94.61  95.81 99.07 97.41 94.92   97
-LiSnowNet-L1 14.42 31.94 19.55 12.44  21.22 37.70 26.07 16.86  131
-DSOR         15.50 38.18 22.05 12.39  25.73 49.33 33.82 20.35  253
-DROR          5.88 76.32 10.91  5.77  10.78 73.48 18.81 10.38  199
-"""
-TABLE_3 = """\
-3D-OutDet heavy  99.99 99.99 99.99 99.99  98.30 96.43 97.35 94.85
-3D-OutDet medium 99.99 99.99 99.99 99.99  97.88 95.89 96.87 93.93
-3D-OutDet light  99.99 99.99 99.99 99.99  98.08 98.67 98.38 96.81
-DSOR      heavy  78.58 99.59 87.85 78.33  27.08 39.46 32.12 19.13
-DSOR      medium 69.00 99.81 91.59 68.91  38.24 56.27 45.54 29.48
-DSOR      light  55.03 94.34 70.97 55.00  23.35 35.95 28.31 16.49
-"""
-
-
-# What we call the published methods.
-KINDS = {
-    **{"3D-OutDet": "outdet", "SalsaNext": "salsanext", "LiSnowNet-L1": "lisnownet"},
-    **{"DSOR": "dsor", "DROR": "dror"},
-}
-
-
-def test_table_2_is_that_of_the_paper() -> None:
-    printed = set()
-    for line in TABLE_2.splitlines():
-        method, *figures = line.split()
-        *scores, ms = map(float, figures)
-        kind = KINDS[method]
-        printed |= {
-            (method, kind, "validation", *scores[:4], ms),
-            (method, kind, "test", *scores[4:], ms),
-        }
-    rows = paper_table("table2").rows
-    assert len(rows) == len(printed) == 10
-    assert {(row.method, row.kind, row.group, *row.scores, row.ms) for row in rows} == printed
-    assert not any(row.simulated for row in rows)
-
-
-def test_table_3_is_that_of_the_paper() -> None:
-    printed = set()
-    for line in TABLE_3.splitlines():
-        method, rain, *figures = line.split()
-        scores = [float(figure) for figure in figures]
-        printed |= {(method, rain, True, *scores[:4]), (method, rain, False, *scores[4:])}
-    table = paper_table("table3")
-    assert len(table.rows) == len(printed) == 12
-    assert {(row.method, row.group, row.simulated, *row.scores) for row in table.rows} == printed
-    assert all(row.kind == KINDS[row.method] for row in table.rows)
-    assert table.groups == {"heavy": 50, "medium": 25, "light": 10}  # mm/h
 
 
 def test_our_rows_stand_under_those_of_the_same_method(scores: Scores) -> None:
@@ -88,18 +69,11 @@ def test_our_rows_stand_under_those_of_the_same_method(scores: Scores) -> None:
     rows = [OwnRow(title, kind, scores) for title, kind in names.items()]
     text = with_published_rows(paper_table("table3"), {"heavy": rows}, load_card("rehearse3d"))
     titles = [line.split("|")[1].strip() for line in text.splitlines() if line.startswith("| ")]
-    assert titles == [
-        "method",
-        "3D-OutDet, published",
-        "DSOR, published",
-        "dsor, ours",
-        "DSOR, again, ours",
-        "all, ours",
-    ]
+    published = ["method", "3D-OutDet, published", "DSOR, published"]
+    assert titles == [*published, "dsor, ours", "DSOR, again, ours", "all, ours"]
     assert "| 27.08 |  39.46 | 32.12 | 19.13 |" in text
     (own,) = [line for line in text.splitlines() if line.startswith("| dsor, ours")]
     cells = [cell.strip() for cell in own.split("|")[2:-1]]
-    # 90 of 880 points are rain: precision and IoU are 90 / 880, F1 is 180 / 970.
     assert cells == ["10.23", "100.00", "18.56", "10.23", "10", "pooled"]
     assert "(*)" not in text
 
@@ -121,8 +95,7 @@ def test_simulated_rain_stands_beside_simulated_rain_and_misprints_are_marked(
     text = with_published_rows(paper_table("table3"), ours, load_card("simulated"))
     assert "Ours on simulated rain." in text
     assert text.count("| DSOR, published (*)") == 2
-    assert "(*) DSOR, medium: F1 of this precision and recall is 81.59." in text
-    assert "(*) DSOR, light: F1 and IoU are those of a recall of 99.9, not 94.34." in text
+    assert all(f"{row.misprint}." in text for row in ROWS if row.misprint)
     assert "27.08" not in text
 
 
@@ -132,7 +105,6 @@ def test_table_3_takes_the_test_scans_of_each_rain_rate() -> None:
     table3, table2 = paper_table("table3"), paper_table("table2")
     by_rate = scans_by_group(table3, split.__getitem__, rates.get)
     assert by_rate == {"heavy": ["b"], "light": ["c"]}
-    assert list(by_rate) == ["heavy", "light"]
     assert scans_by_group(table2, split.__getitem__, rates.get) == split
     with pytest.raises(InputError, match=r"no test scan is known to have .* Give --rain-rates"):
         scans_by_group(table3, split.__getitem__, {"b": 30.0}.get)

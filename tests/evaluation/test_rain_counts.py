@@ -1,15 +1,21 @@
-"""Rain counts against scikit-learn, by class and by range."""
+"""Rain counts against scikit-learn, by class and by range; and as a metric, which adds them up.
+
+That two processes count what one counts is proved by `tests/models/test_processes.py`.
+"""
 
 import math
+import pickle
 from functools import partial
 
 import numpy as np
 import pytest
+import torch
 from numpy.typing import NDArray
 from sklearn import metrics
 
 from derain.errors import InputError
-from derain.evaluation.counts import SCORES, Counts
+from derain.evaluation.counts import SCORES, Counts, mean_over_scans
+from derain.evaluation.metrics import RainMetrics
 from derain.evaluation.rain_counts import ClassCounts, RainCounts
 from derain.scan import Scan
 
@@ -106,3 +112,26 @@ def test_what_cannot_be_counted_is_refused() -> None:
     for classes, rain in (({0: "a", 1: "a"}, [0]), ({0: "a"}, [5])):
         with pytest.raises(InputError):
             RainCounts(classes, rain)
+
+
+def test_a_metric_counts_the_same_after_a_copy_in_another_precision_and_forgets_when_reset() -> (
+    None
+):
+    metrics, expected = RainMetrics(CLASSES, RAIN, [255]), RainCounts(CLASSES, RAIN, [255])
+    for number in range(3):
+        scan, called = labelled(number, 60)
+        metrics.update(scan, called)
+        expected.add(scan, called)
+        metrics = pickle.loads(pickle.dumps(metrics)).to(torch.bfloat16)
+    counts = metrics.counts()
+    np.testing.assert_array_equal(counts.cells, expected.cells)
+    assert counts.per_scan == expected.per_scan
+    computed = metrics.compute()
+    assert {(value.shape, value.dtype) for value in computed.values()} == {((), torch.float32)}
+    for score in SCORES:
+        assert computed[score] == pytest.approx(getattr(expected.pooled(), score))
+        mean = mean_over_scans(expected.per_scan, score)
+        assert computed[f"{score}_per_scan"] == pytest.approx(mean)
+    metrics.reset()
+    assert metrics.counts().per_scan == []
+    assert metrics.counts().pooled() == Counts()

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from derain.export.model_file import ModelFile
 from derain.export.runtimes.onnx_runtime import OnnxRuntimeSession
-from derain.export.runtimes.registry import RUNTIMES
-from derain.export.runtimes.session import Session, TensorType
+from derain.export.runtimes.session import RUNTIMES, Session, TensorType
 
 # What the runtime "rainy" adds to the score of rain, by its precisions.
 RAINY = {"float32": 0.0, "bf16": 0.01, "int2": 1000.0}

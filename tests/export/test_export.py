@@ -16,12 +16,14 @@ from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export import onnx_file
-from derain.export.evaluation_mode import evaluation_on_cpu
-from derain.export.onnx_file import export
+from derain.export.onnx_file import evaluation_on_cpu, export
 from derain.export.proof import FINITE, FLOAT32, INT8, THREADS, Case, Proof, prove
 from derain.export.runtime import Derainer
 from derain.models.outdet import OutDet
 from derain.scan import Scan
+from derain.views.channels import DUAL_RETURN, channel_of
+
+from ..two_returns import Recording
 
 SCENE = [("scene", Scan.of(scene()))]
 
@@ -34,12 +36,10 @@ def test_the_file_holds_a_whole_network_for_any_number_of_points(
     proto = onnx.load(onnx_model, load_external_data=False)
     onnx.checker.check_model(proto, full_check=True)
     assert [(opset.domain, opset.version) for opset in proto.opset_import] == [("", 18)]
-    assert not any(onnx.external_data_helper.uses_external_data(t) for t in proto.graph.initializer)
     stored = sum(onnx.numpy_helper.to_array(t).size for t in proto.graph.initializer)
     folded = sum(parameter.numel() for parameter in random_outdet.deployed().parameters())
     assert folded <= stored <= folded + 100
     operators = {node.op_type for node in proto.graph.node}
-    assert "MatMul" in operators
     assert not operators & {"BatchNormalization", "Dropout"}
     shapes = {
         value.name: [size.dim_param or size.dim_value for size in value.type.tensor_type.shape.dim]
@@ -53,31 +53,15 @@ def test_the_file_holds_a_whole_network_for_any_number_of_points(
     }
 
 
-@pytest.mark.usefixtures("one_block")
-def test_another_size_of_neighbourhood_is_exported_as_well(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(onnx_file, "hard_cases", lambda: SCENE)
-    model = OutDet(neighbours=3)
-    model.adopt(model.spec_for(load_card("kitti")))
-    export(model, tmp_path / "three.onnx")
-    derainer = Derainer(tmp_path / "three.onnx")
-    assert derainer.view.neighbours == 3
-    assert derainer.probability(scene(100)).shape == (100,)
-
-
 def test_the_metadata_says_how_the_model_is_used(onnx_model: Path, random_outdet: OutDet) -> None:
     derainer = Derainer(onnx_model)
     assert derainer.spec == random_outdet.spec
     assert derainer.metadata["spec"] == random_outdet.spec.as_dict()
     assert derainer.metadata["versions"]["derain"] == derain.__version__
-    assert derainer.metadata["versions"]["torch"] == torch.__version__
-    proto = onnx.load(onnx_model)
-    properties = {entry.key: entry.value for entry in proto.metadata_props}
+    properties = {entry.key: entry.value for entry in onnx.load(onnx_model).metadata_props}
     assert properties["license"] == "network: MIT; training data: CC BY-NC-SA 4.0"
     assert properties["version"] == derain.__version__
-    assert "outdet" in properties["description"]
-    assert "WADS" in properties["description"]
+    assert {"outdet", "WADS"} <= set(properties["description"].replace(":", "").split())
 
 
 def test_the_proof_in_the_file_is_that_of_every_hard_case(
@@ -86,18 +70,12 @@ def test_the_proof_in_the_file_is_that_of_every_hard_case(
     written = Derainer(onnx_model).metadata["proof"]
     view = random_outdet.spec.make_view()
     judged = {name: len(view(scan).points) for name, scan in hard_cases()}
-    assert [(case["name"], case["threads"]) for case in written["cases"]] == [
-        (name, threads) for name in judged for threads in THREADS
+    assert [(case["name"], case["threads"], case["points"]) for case in written["cases"]] == [
+        (name, threads, points) for name, points in judged.items() for threads in THREADS
     ]
-    assert all(case["points"] == judged[case["name"]] for case in written["cases"])
     assert written["points"] == len(THREADS) * sum(judged.values())
     assert written["largest_difference"] == max(case["difference"] for case in written["cases"])
     assert written["flipped"] == sum(case["flipped"] for case in written["cases"])
-    # A second proof comes to the same numbers.
-    again = prove(random_outdet, onnx_model, hard_cases()).as_dict()
-    for first, second in zip(written["cases"], again["cases"], strict=True):
-        # What torch adds up in another order differs in the last digits.
-        assert second == {**first, "difference": pytest.approx(first["difference"], abs=2e-6)}
     assert 0 < written["largest_difference"] < 1e-5
 
 
@@ -108,9 +86,10 @@ def test_a_difference_of_the_logits_is_found_to_its_size(
     def shifted(**inputs: Tensor) -> Tensor:
         return random_outdet(**inputs) + torch.tensor([0.0, offset])
 
-    view = random_outdet.spec.make_view()(SCENE[0][1]).inputs()
+    view = random_outdet.spec.make_view()(SCENE[0][1])
     with torch.inference_mode():
-        logits = shifted(**{name: torch.from_numpy(array) for name, array in view.items()}).numpy()
+        tensors = {name: torch.from_numpy(array) for name, array in view.inputs().items()}
+        logits = shifted(**tensors).numpy()
     proof = prove(shifted, onnx_model, SCENE)
     assert not proof.holds
     assert "FAILED scene" in str(proof)
@@ -118,7 +97,7 @@ def test_a_difference_of_the_logits_is_found_to_its_size(
     for case in proof.cases:
         assert case.difference == pytest.approx(offset / max(1, np.abs(logits).max()), rel=1e-2)
     # The mask of the file is the truth that the shifted network is measured against.
-    flipped = Derainer(onnx_model)(scene()) != (logits[:, 1] > logits[:, 0])[_rows(random_outdet)]
+    flipped = Derainer(onnx_model)(scene()) != (logits[:, 1] > logits[:, 0])[view.inverse]
     assert {case.flipped for case in proof.cases} == {flipped.sum()}
 
 
@@ -133,18 +112,11 @@ def test_what_is_not_a_number_differs_as_much_as_can_be(
     proof = prove(partly_undefined, onnx_model, SCENE)
     assert not proof.holds
     assert proof.as_dict()["largest_difference"] == np.inf
-    assert "largest logit difference inf" in str(proof)
-
-
-def test_swapped_logits_flip_every_point(onnx_model: Path, random_outdet: OutDet) -> None:
-    proof = prove(lambda **inputs: random_outdet(**inputs).flip(1), onnx_model, SCENE)
-    assert {case.flipped for case in proof.cases} == {len(scene())}
 
 
 @pytest.mark.parametrize(
     ("change", "holds"),
     [
-        ({}, True),
         ({"difference": FLOAT32.difference}, True),
         ({"difference": 1.01 * FLOAT32.difference}, False),
         ({"difference": float("nan")}, False),
@@ -152,11 +124,9 @@ def test_swapped_logits_flip_every_point(onnx_model: Path, random_outdet: OutDet
         ({"flipped": 3}, False),
         ({"flipped": 1, "points": 1}, True),
         ({"flipped": 2, "points": 9_999}, False),
-        ({"finite": False}, False),
         ({"points": 0}, True),
         ({"difference": 1e9, "flipped": 20_000, "bounds": FINITE}, True),
         ({"finite": False, "bounds": FINITE}, False),
-        ({"finite": False, "bounds": INT8}, False),
     ],
 )
 def test_a_case_holds_within_its_bounds_only(change: dict[str, float], holds: bool) -> None:
@@ -171,7 +141,6 @@ def test_a_case_holds_within_its_bounds_only(change: dict[str, float], holds: bo
     [
         ([(70, 100)], True),
         ([(69, 100)], False),
-        ([(0, 300)], False),
         ([(0, 10), (90, 100)], True),
         ([(90, 100), (0, 50)], False),
         ([(0, 0)], False),
@@ -190,9 +159,8 @@ def test_in_eight_bits_seven_tenths_of_the_rain_is_found_alike(
     proof = Proof((*cases, beside))
     assert proof.holds == holds
     assert ("FAILED: the IoU of the rain must be 0.7" in str(proof)) != holds
-    pooled = [sum(column) for column in zip(*found, strict=True)]
-    assert proof.as_dict()["rain_iou"] == (pooled[0] / pooled[1] if pooled[1] else None)
-    assert ("IoU of the rain -" in str(proof)) != bool(pooled[1])
+    both, either = (sum(column) for column in zip(*found, strict=True))
+    assert proof.as_dict()["rain_iou"] == (both / either if either else None)
 
 
 class SpoiltFarAway(nn.Module):
@@ -215,55 +183,36 @@ def few_cases(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("few_cases", "one_block")
-def test_no_file_stays_when_the_exported_network_is_wrong(
+def test_an_older_file_stays_as_it_was_when_the_exported_network_is_wrong(
     tmp_path: Path, random_outdet: OutDet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "model.onnx"
+    path.write_bytes(b"an older model")
     spoilt = SpoiltFarAway(random_outdet.deployed(), offset=10)
     monkeypatch.setattr(random_outdet, "deployed", lambda: spoilt)
     with pytest.raises(InputError, match=r"differs: FAILED range 1e4 m.* 4 cases") as error:
         export(random_outdet, path)
     assert error.value.subject == path
     assert "intensity 0" not in error.value.reason
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.usefixtures("few_cases")
-def test_an_older_file_stays_as_it_was_when_the_proof_fails(
-    tmp_path: Path, random_outdet: OutDet, onnx_model: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "model.onnx"
-    path.write_bytes(b"an older model")
-    other = deepcopy(random_outdet)
-    other.network.head.bias.data += torch.tensor([0.0, 0.01])
-    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(onnx_model))
-    with pytest.raises(InputError, match="differs: FAILED intensity 0"):
-        export(other, path)
     assert [file.read_bytes() for file in tmp_path.iterdir()] == [b"an older model"]
 
 
-def test_a_model_that_has_not_been_trained_is_not_exported(tmp_path: Path) -> None:
+def test_what_cannot_be_exported_leaves_nothing(
+    tmp_path: Path, random_outdet: OutDet, onnx_model: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(InputError, match="outdet: has not been trained"):
         export(OutDet(), tmp_path / "model.onnx")
+    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(onnx_model))
+    with pytest.raises(InputError, match="no convolution to quantise"):
+        export(random_outdet, tmp_path / "model.onnx", [Scan.of(scene(99))])
+    with pytest.raises(InputError, match="is not a file that can be replaced"):
+        export(random_outdet, tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_output_that_cannot_be_written_is_reported(
-    tmp_path: Path, random_outdet: OutDet
-) -> None:
-    file = tmp_path / "file"
-    file.write_text("in the way")
-    with pytest.raises(InputError, match=r"model\.onnx: cannot be written"):
-        export(random_outdet, file / "model.onnx")
-    with pytest.raises(InputError, match="is not a file that can be replaced"):
-        export(random_outdet, tmp_path)
-    assert list(tmp_path.iterdir()) == [file]
-    assert file.read_text() == "in the way"
-
-
-@pytest.mark.usefixtures("one_block")
+@pytest.mark.usefixtures("few_cases", "one_block")
 def test_numbers_too_small_to_count_are_set_to_0_and_the_proof_holds(
-    tmp_path: Path, random_outdet: OutDet, few_cases: None
+    tmp_path: Path, random_outdet: OutDet
 ) -> None:
     model = deepcopy(random_outdet)
     subnormal, negligible, kept = 1e-40, -9e-21, 2e-20
@@ -272,8 +221,7 @@ def test_numbers_too_small_to_count_are_set_to_0_and_the_proof_holds(
         model.network.head.weight[:, 0] = subnormal
         model.network.head.weight[0, 1] = negligible
         model.network.head.weight[1, 1] = kept
-    proof = export(model, tmp_path / "model.onnx")
-    assert proof.holds
+    assert export(model, tmp_path / "model.onnx").holds
     stored = np.concatenate(
         [
             np.ravel(onnx.numpy_helper.to_array(tensor)).astype(np.float64)
@@ -283,25 +231,6 @@ def test_numbers_too_small_to_count_are_set_to_0_and_the_proof_holds(
     )
     assert np.abs(stored[stored != 0]).min() == pytest.approx(kept)
     assert Derainer(tmp_path / "model.onnx").metadata["flushed"] == 3
-
-
-def test_a_whole_number_of_0_is_left_alone() -> None:
-    graph = onnx.helper.make_graph([], "graph", [], [])
-    tensors = [np.array([0, 1]), np.array([True]), np.array([0.0, 1.0, 1e-30], np.float16)]
-    tensors += [np.array([[1e-30, -0.0], [1.0, np.nan]]), np.array(1e-30, np.float32)]
-    graph.initializer.extend(onnx.numpy_helper.from_array(t, str(i)) for i, t in enumerate(tensors))
-    proto = onnx.helper.make_model(graph)
-    assert onnx_file.flush_to_zero(proto) == 2
-    found = [onnx.numpy_helper.to_array(tensor) for tensor in proto.graph.initializer]
-    for before, after in zip(tensors, found, strict=True):
-        assert (after.dtype, after.shape) == (before.dtype, before.shape)
-        expected = np.where(before == 1e-30, 0, before) if before.dtype.kind == "f" else before
-        np.testing.assert_array_equal(after, np.where(np.abs(expected) < 1e-20, 0, expected))
-
-
-def _rows(model: OutDet) -> np.ndarray:
-    """For every row of the scene, the point of the network that answers for it."""
-    return model.spec.make_view()(SCENE[0][1]).inverse
 
 
 @pytest.mark.parametrize("succeeds", [True, False])
@@ -333,3 +262,45 @@ def test_a_model_is_taken_back_to_its_device(
     with evaluation_on_cpu(random_outdet):
         assert moved == []
     assert moved == [device]
+
+
+EXTRA = {"radar": (0.1, 0.3), "doppler": (-2.0, 3.0), DUAL_RETURN: (0.1, 0.5)}
+
+
+def recorded(seed: int) -> Scan:
+    """A scan of a sensor of two returns, with a radar's columns, of which some are not known."""
+    recording, generator = Recording(seed, share=0.2, step=3.0), np.random.default_rng(seed)
+    columns = {name: generator.normal(*EXTRA[name], len(recording.ray)) for name in EXTRA}
+    columns["doppler"][::3] = np.nan
+    del columns[DUAL_RETURN]  # follows from the places of the points
+    scan = Scan.of(np.column_stack([recording.xyz, recording.ray % 200]))
+    return replace(scan, fields=columns)
+
+
+@pytest.mark.usefixtures("one_block")
+def test_further_channels_are_seen_and_proved_and_missing_ones_are_their_mean(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("recorded", recorded(3))])
+    torch.manual_seed(0)
+    model = OutDet(channels=("x", "y", "z", "intensity", *EXTRA), neighbours=3).eval()
+    model.adopt(model.spec_for(replace(load_card("wads"), extra=EXTRA)))
+    export(model, tmp_path / "model.onnx")
+    derainer, scan = Derainer(tmp_path / "model.onnx", 1), recorded(7)
+    assert derainer.view.neighbours == 3
+    assert derainer.spec.units[-3:] == ("0 or 1", "m/s", "-1, 0 or 1")
+    seen = derainer.view(scan)
+    np.testing.assert_array_equal(seen.points[:, -1], channel_of(scan, DUAL_RETURN)[seen.first])
+    means = {name: np.full(len(scan), mean) for name, (mean, _) in EXTRA.items()}
+    absent, filled = (derainer.probability(replace(scan, fields=f)) for f in ({}, means))
+    dual = {DUAL_RETURN: channel_of(scan, DUAL_RETURN)}
+    with_mean = derainer.probability(replace(scan, fields={**means, **dual}))
+    np.testing.assert_array_equal(absent, with_mean)
+    assert (derainer.probability(scan) != absent).mean() > 0.1
+    assert (absent != filled).mean() > 0.1
+    # A proof looks at them as well.
+    graph = onnx.load(tmp_path / "model.onnx")
+    monkeypatch.setattr(onnx_file, "_traced", lambda *_: graph)
+    model.std[model.channels.index("doppler")] *= 2
+    with pytest.raises(InputError, match="the exported model differs"):
+        export(model, tmp_path / "other.onnx")

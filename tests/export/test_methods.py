@@ -1,9 +1,6 @@
-"""A method is found by its name, or what is wrong with the name is said in one line."""
+"""A method is found by its name or its file of parameters; what is wrong with it is one line."""
 
-import errno
 import json
-import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,35 +8,21 @@ import pytest
 import yaml
 
 from derain.errors import InputError
-from derain.export.methods import load_method, named_method
+from derain.export.methods import load_method, named_method, read_parameters, require_one_scan
 from derain.files.reading import is_file
-from derain.filters.parameters import CANDIDATES
+from derain.filters.derainer import CANDIDATES
+from derain.recordings.persistence import PersistenceDerainer
 from derain.views.candidates import Bound, Candidates
 
 KEPT = Path(__file__).parent / "kept"
-
-
-def test_a_checkpoint_is_to_be_exported_first() -> None:
-    with pytest.raises(
-        InputError, match=r"outdet\.ckpt: a checkpoint, .* Export it first: "
-    ) as error:
-        load_method(str(KEPT / "outdet.ckpt"), {})
-    assert f"`derain export {KEPT}/outdet.ckpt --out {KEPT}/outdet.onnx`" in str(error.value)
-
-
-def test_a_checkpoint_that_is_not_there_is_missing_first_of_all() -> None:
-    with pytest.raises(InputError, match=r"none\.ckpt: no such file"):
-        load_method("none.ckpt", {})
+BOUNDS = Candidates((Bound("range", most=30.0), Bound("z", least=-1.5)), 0.5)
 
 
 @pytest.mark.parametrize(
     ("name", "parameters"),
     [
         ("dror", {"neighbours": 3}),
-        (
-            "dsor",
-            {CANDIDATES: Candidates((Bound("range", most=30.0), Bound("z", least=-1.5)), 0.5)},
-        ),
+        ("dsor", {CANDIDATES: BOUNDS}),
         (str(KEPT / "outdet.onnx"), {"threshold": 0.25}),
     ],
 )
@@ -54,45 +37,56 @@ def test_what_a_method_says_of_itself_makes_the_same_again(
     assert load_method(same_name, same_parameters, 1).as_dict() == told
 
 
+@pytest.mark.parametrize(
+    ("name", "parameters", "reason"),
+    [
+        (str(KEPT / "outdet.ckpt"), {}, f"--out {KEPT}/outdet.onnx`"),
+        ("none.ckpt", {}, "none.ckpt: no such file"),
+        ("dro", {}, "dro: no such file. Did you mean dror? Give a model"),
+        (str(KEPT / "outdet.onnx"), {"neighbours": 3}, "it has no parameter neighbours"),
+        (str(KEPT / "outdet.onnx"), {"threshold": 1.5}, "threshold is 1.5"),
+        (str(KEPT / "outdet.onnx"), {"threshold": "high"}, "threshold is high"),
+    ],
+)
+def test_a_method_that_cannot_be_made_is_refused(
+    name: str, parameters: dict[str, Any], reason: str
+) -> None:
+    with pytest.raises(InputError) as refusal:
+        load_method(name, parameters)
+    assert reason in str(refusal.value)
+
+
+def test_a_method_of_several_scans_is_not_measured_on_single_ones() -> None:
+    with pytest.raises(InputError, match="persistence: sees the scans around the one"):
+        require_one_scan(PersistenceDerainer())
+
+
 def test_a_name_too_long_for_a_file_is_one_line() -> None:
     with pytest.raises(InputError, match=r"cannot be read .*too long"):
         is_file(Path("x" * 5000))
 
 
-@pytest.fixture
-def closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder that may not be searched, whoever runs the tests."""
-    folder = tmp_path / "closed"
-
-    def refusing(method: Callable[..., Any]) -> Callable[..., Any]:
-        def ask(path: Path, *arguments: Any, **options: Any) -> Any:
-            if folder in path.parents:
-                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
-            return method(path, *arguments, **options)
-
-        return ask
-
-    for name in ("stat", "open"):
-        monkeypatch.setattr(Path, name, refusing(getattr(Path, name)))
-    return folder
-
-
-@pytest.mark.parametrize("command", ["run", "bench", "export", "import-weights"])
-def test_a_model_in_a_folder_that_may_not_be_searched_is_one_line(
-    run_derain, closed: Path, tmp_path: Path, command: str
-) -> None:
-    scan = tmp_path / "scan.bin"
-    scan.write_bytes(bytes(16))
-    options: dict[str, list[object]] = {
-        "run": [closed / "a.onnx", scan],
-        "bench": ["--data", scan, "--card", "wads", "--methods", closed / "a.onnx"],
-        "export": [closed / "a.ckpt"],
-        "import-weights": ["outdet", closed / "a.pt", "--stats", "wads"],
-    }
-    out = tmp_path / ("out.ckpt" if command == "import-weights" else "out.onnx")
-    outcome = run_derain(command, *options[command], "--out", out)
-    assert (outcome.code, outcome.out) == (2, "")
-    (line,) = outcome.err.splitlines()
-    assert line.startswith(f"derain: {closed}/a.")
-    assert "cannot be read (Permission denied)" in line
-    assert not (tmp_path / "out.onnx").exists()
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "- dsor",
+        "neighbours: 3",
+        "method: 5",
+        "method: dsor\n2: 3",
+        "a: b: c",
+        'method: "dsor\\0"',
+        "method: dsor\nneighbours: [5]",
+        "method: dsor\nrange_multiplier: .inf",
+        "method: dsor\nrange_multiplier: null",
+        f"method: dsor\nneighbours: 0x{'f' * 5000}",
+    ],
+)
+def test_a_file_that_holds_no_parameters_is_refused(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "best.yaml"
+    path.write_text("# 100 trials\nmethod: dsor\nneighbours: 7\nrange_multiplier: 0.0812\n")
+    assert read_parameters(path) == ("dsor", {"neighbours": 7, "range_multiplier": 0.0812})
+    path.write_text(content)
+    with pytest.raises(InputError, match=r"best\.yaml: ") as refusal:
+        read_parameters(path)
+    assert len(str(refusal.value)) < len(str(path)) + 300

@@ -1,7 +1,13 @@
-"""The runtime gives PyTorch's answers, for any array and in its order, without torch."""
+"""The runtime gives PyTorch's answers, for any array and in its order, scan by scan or pushed.
+
+``kept/`` holds a 3D-OutDet of three neighbours, of random weights drawn with seed 0. The checkpoint
+was written by `save_model`, the model by ``derain export outdet.ckpt --out outdet.onnx`` of
+derain 0.1.0, before a Spec could lack a field and before a file had a checksum. ``probability.npy``
+is what that model answered for ``scene(300)``. None of the three is ever to be written again.
+"""
 
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,8 +23,20 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.export.runtime import Derainer
 from derain.filters import DROR
+from derain.models.base import DerainingModule
+from derain.models.checkpoint import load_model
 from derain.models.outdet import OutDet
 from derain.scan import Scan
+from derain.sources.frame import MemoryFrame
+from derain.sources.judgement import Judgement
+from derain.sources.source import Frames
+from derain.system.stopwatch import Stopwatch
+from derain.views.neighbours import NeighbourView
+from derain.views.probability import probability_of_rain
+from derain.views.window import Window, WindowOfScans
+
+KEPT = Path(__file__).parent / "kept"
+POINTS = 200
 
 Points = NDArray[np.float32]
 
@@ -28,16 +46,31 @@ def derainer(onnx_model: Path) -> Derainer:
     return Derainer(onnx_model, threads=1)
 
 
+def from_pytorch(model: DerainingModule, scan: Scan) -> NDArray[np.float32]:
+    view = model.spec.make_view()(scan)
+    inputs = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
+    with torch.inference_mode():
+        return view.back(probability_of_rain(model(**inputs).numpy()))
+
+
 def test_the_answers_are_those_of_pytorch(derainer: Derainer, random_outdet: OutDet) -> None:
     assert 0.4 < derainer(scene()).mean() < 0.6  # what the tests compare is worth comparing
     for name, scan in hard_cases(largest=3000):
-        view = random_outdet.spec.make_view()(scan)
-        inputs = {title: torch.from_numpy(array) for title, array in view.inputs().items()}
-        with torch.inference_mode():
-            expected = random_outdet(**inputs).softmax(dim=1)[:, 1].numpy()
         probability = derainer.probability(scan)
-        np.testing.assert_allclose(probability, view.back(expected), atol=2e-5, err_msg=name)
+        expected = from_pytorch(random_outdet, scan)
+        np.testing.assert_allclose(probability, expected, atol=2e-5, err_msg=name)
         np.testing.assert_array_equal(derainer(scan), probability > 0.5, err_msg=name)
+
+
+def test_files_of_an_early_derain_answer_as_they_did() -> None:
+    kept = np.load(KEPT / "probability.npy")
+    assert 0.2 < (kept > 0.5).mean() < 0.8
+    early, model = Derainer(KEPT / "outdet.onnx", threads=1), load_model(KEPT / "outdet.ckpt")
+    np.testing.assert_allclose(early.probability(scene(300)), kept, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(from_pytorch(model, Scan.of(scene(300))), kept, rtol=0, atol=1e-6)
+    assert model.spec == early.spec
+    assert (early.spec.data, early.spec.rain) == ("WADS", (110,))
+    assert len(early.metadata["proof"]["cases"]) == 48
 
 
 @pytest.mark.parametrize(
@@ -49,147 +82,71 @@ def test_the_answers_are_those_of_pytorch(derainer: Derainer, random_outdet: Out
         lambda points: np.repeat(points, 2, axis=0)[::2],
         lambda points: points.astype(">f4"),
         lambda points: Scan(points[:, :3].copy(), points[:, 3].copy()),
-        Scan.of,
     ],
-    ids=["5 columns", "float64", "Fortran order", "strided", "big-endian", "Scan", "Scan.of"],
+    ids=["5 columns", "float64", "Fortran order", "strided", "big-endian", "Scan"],
 )
 def test_points_come_in_any_form(derainer: Derainer, convert: Callable[[Points], Any]) -> None:
-    points = scene()
-    given_points = convert(points)
-    mask = derainer(given_points)
-    assert mask.dtype == bool
-    np.testing.assert_array_equal(mask, derainer(points))
-    probability = derainer.probability(given_points)
-    assert probability.dtype == np.float32
-    np.testing.assert_array_equal(probability, derainer.probability(points))
-    np.testing.assert_array_equal(points, scene())  # which are left as they were
+    points = scene(500)
+    np.testing.assert_array_equal(
+        derainer.probability(convert(points)), derainer.probability(points)
+    )
+    np.testing.assert_array_equal(points, scene(500))  # which are left as they were
 
 
 def test_points_without_intensity_get_the_mean_of_the_training_data(derainer: Derainer) -> None:
-    points = scene()
+    points = scene(500)
     points[:, 3] = derainer.spec.mean[3]
     np.testing.assert_array_equal(derainer.probability(points[:, :3]), derainer.probability(points))
 
 
-@pytest.mark.parametrize("shape", [(4,), (10, 2), (0,), (2, 5, 4)])
-def test_an_array_of_another_shape_is_refused(derainer: Derainer, shape: tuple[int, ...]) -> None:
-    with pytest.raises(InputError, match="Give an array of shape"):
-        derainer(np.zeros(shape))
-
-
-@pytest.mark.parametrize(
-    "row",
-    [
-        [np.nan, 1, 1, 1],
-        [1, np.inf, 1, 1],
-        [1, 1, -np.inf, 1],
-        [1, 1, 1, np.nan],
-        [0, 0, 0, 50],
-        [-1, -1, -1, -1],
-        [1e30, 1, 1, 1],
-    ],
-    ids=str,
-)
-def test_a_row_that_cannot_be_judged_is_not_rain_and_changes_no_other(
-    derainer: Derainer, row: list[float]
-) -> None:
+def test_rows_that_cannot_be_judged_are_not_rain_and_change_no_other(derainer: Derainer) -> None:
     points = scene(500)
-    places = [0, 250, 502]
-    mixed = np.insert(points, [0, 249, 500], np.array(row, np.float32), axis=0)
-    probability = derainer.probability(mixed)
-    np.testing.assert_array_equal(probability[places], 0)
-    assert not derainer(mixed)[places].any()
-    np.testing.assert_array_equal(np.delete(probability, places), derainer.probability(points))
+    rows = [
+        *([np.nan, 1, 1, 1], [1, np.inf, 1, 1], [1, 1, -np.inf, 1], [1, 1, 1, np.nan]),
+        *([0, 0, 0, 50], [-1, -1, -1, -1], [1e30, 1, 1, 1]),
+    ]
+    places = [0, 100, 200, 300, 400, 500, 500]
+    probability = derainer.probability(np.insert(points, places, np.float32(rows), axis=0))
+    inserted = np.array(places) + np.arange(len(places))
+    np.testing.assert_array_equal(probability[inserted], 0)
+    np.testing.assert_array_equal(np.delete(probability, inserted), derainer.probability(points))
 
 
 @settings(deadline=None, max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_permuted_points_get_the_permuted_answer(derainer: Derainer, seed: int) -> None:
-    points = scene(700)
-    order = np.random.default_rng(seed).permutation(len(points))
+def test_neither_order_nor_copies_nor_threads_matter(
+    derainer: Derainer, onnx_model: Path, seed: int
+) -> None:
+    points, generator = scene(700), np.random.default_rng(seed)
     answer = derainer.probability(points)
-    np.testing.assert_allclose(derainer.probability(points[order]), answer[order], atol=1e-6)
-
-
-def test_duplicates_get_one_answer_and_change_no_other(derainer: Derainer) -> None:
-    points = scene()
-    copies = np.random.default_rng(0).integers(0, len(points), 2000)
-    probability = derainer.probability(np.concatenate([points, points[copies]]))
-    np.testing.assert_array_equal(probability[len(points) :], probability[copies])
-    np.testing.assert_array_equal(probability[: len(points)], derainer.probability(points))
-
-
-def test_the_number_of_threads_does_not_change_the_mask(onnx_model: Path) -> None:
-    points = scene(20_000)
-    one, two = (Derainer(onnx_model, threads) for threads in (1, 2))
-    assert (one.threads, two.threads) == (1, 2)
-    np.testing.assert_array_equal(one(points), two(points))
-    np.testing.assert_allclose(one.probability(points), two.probability(points), atol=1e-6)
+    rows = generator.permutation(np.concatenate([np.arange(700), generator.integers(0, 700, 99)]))
+    np.testing.assert_allclose(derainer.probability(points[rows]), answer[rows], atol=1e-6)
+    of_two = Derainer(onnx_model, threads=2)
+    assert (derainer.threads, of_two.threads) == (1, 2)
+    np.testing.assert_allclose(of_two.probability(points), answer, atol=1e-6)
 
 
 def test_the_threshold_is_that_of_the_file(
-    onnx_model: Path, saying: Callable[[dict[str, Any]], Path]
+    derainer: Derainer, saying: Callable[[dict[str, Any]], Path]
 ) -> None:
-    spec = {**Derainer(onnx_model).metadata["spec"], "threshold": 0.75}
-    stricter = Derainer(saying({"spec": spec}))
+    stricter = Derainer(saying({"spec": {**derainer.metadata["spec"], "threshold": 0.75}}))
     np.testing.assert_array_equal(stricter(scene()), stricter.probability(scene()) > 0.75)
-    assert 0 < stricter(scene()).sum() < Derainer(onnx_model)(scene()).sum()
+    assert 0 < stricter(scene()).sum() < derainer(scene()).sum()
 
 
 @pytest.mark.parametrize(
-    ("change", "reason"),
+    ("given_", "reason"),
     [
-        (lambda spec: {"spec": {**spec, "schema": 2}}, "schema 2 is newer than this derain's 1"),
-        (lambda spec: {}, "it has no Spec"),
-        (lambda spec: {"spec": "none"}, "it has no Spec"),
-        (lambda spec: {"spec": {}}, "its Spec: network is missing"),
-        (lambda spec: {"spec": {**spec, "classes": {"rain": "rain"}}}, "its Spec: classes.rain: "),
-        (lambda spec: {"spec": {**spec, "view": {"kind": "hologram"}}}, "unknown view 'hologram'"),
-    ],
-)
-def test_a_spec_that_cannot_be_used_is_refused(
-    derainer: Derainer,
-    saying: Callable[[dict[str, Any]], Path],
-    change: Callable[[dict[str, Any]], dict[str, Any]],
-    reason: str,
-) -> None:
-    model = saying(change(derainer.metadata["spec"]))
-    with pytest.raises(InputError, match=reason):
-        Derainer(model)
-
-
-@pytest.mark.parametrize("kept", [0, 10, 1000, 20_000, None])
-def test_a_damaged_file_is_refused_in_one_line(
-    onnx_model: Path, tmp_path: Path, kept: int | None
-) -> None:
-    noise = np.random.default_rng(0).bytes(5000)
-    damaged = tmp_path / "damaged.onnx"
-    damaged.write_bytes(noise if kept is None else onnx_model.read_bytes()[:kept])
-    message = r"damaged\.onnx: (not an ONNX model|it has no Spec)"
-    with pytest.raises(InputError, match=message) as error:
-        Derainer(damaged)
-    assert "\n" not in str(error.value)
-
-
-def test_a_missing_model_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"none\.onnx: there is no such file"):
-        Derainer(tmp_path / "none.onnx")
-    with pytest.raises(InputError, match="is a folder"):
-        Derainer(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("given_", "hint"),
-    [
-        ("dror", r"derain\.FilterDerainer\(derain\.DROR\(\)\)"),
-        ("persistence", r"derain\.PersistenceDerainer\(\)"),
-        (DROR(), r"derain\.FilterDerainer"),
+        ("none.onnx", r"none\.onnx: there is no such file"),
+        (".", "is a folder"),
+        ("dror", "derain.FilterDerainer"),
+        (DROR(), "derain.FilterDerainer"),
         (np.zeros((5, 4)), "path of an ONNX file"),
     ],
-    ids=["filter", "method", "object", "array"],
+    ids=["missing", "folder", "filter", "object", "array"],
 )
-def test_what_is_no_model_is_refused_with_what_to_use_instead(given_: Any, hint: str) -> None:
-    with pytest.raises(InputError, match=hint):
+def test_what_is_no_model_is_refused(given_: Any, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
         Derainer(given_)
 
 
@@ -201,4 +158,90 @@ def test_a_derainer_can_be_pickled(onnx_model: Path) -> None:
     assert (again.spec, again.warns) == (derainer.spec, False)
     np.testing.assert_array_equal(again(scene()), derainer(scene()))
     assert pickle.loads(pickle.dumps(Derainer())).name == "default"
-    assert Derainer("default").path == Derainer().path
+
+
+def test_a_frame_is_answered_at_once_as_if_it_were_judged_alone(derainer: Derainer) -> None:
+    scan, stopwatch = Scan.of(scene(POINTS)), Stopwatch()
+    frame = MemoryFrame(key="0", scan=scan)
+    judgement = derainer.push(frame, stopwatch)
+    assert judgement is not None
+    assert judgement.frame is frame
+    assert list(stopwatch.milliseconds) == ["read", "view", "network", "back"]
+    assert (derainer.waiting, derainer.starts_new_recording(frame)) == (0, False)
+    for points in (scan, scene(POINTS)):
+        of_points = derainer.push(points)
+        assert of_points is not None
+        assert of_points.frame is None
+        np.testing.assert_array_equal(of_points.probability, judgement.probability)
+    assert list(derainer.flush()) == []
+
+
+def as_seen(scan: Scan, before: int, after: int) -> Scan:
+    """A scan as the view of the tests below shows it: what is around it shows in intensity."""
+    seen = np.full(len(scan), 20 * before + 60 * after, np.float32)
+    seen[0] += 1  # measured, as it seems
+    return replace(scan, intensity=seen)
+
+
+@pytest.fixture
+def windowed(onnx_model: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Derainer]:
+    """A model whose view asks for two scans before and one after."""
+
+    def of_window(view: NeighbourView, scans: WindowOfScans) -> object:
+        return view(as_seen(scans.scan, len(scans.before), len(scans.after)))
+
+    monkeypatch.setattr(NeighbourView, "window", Window(before=2, after=1))
+    monkeypatch.setattr(NeighbourView, "of_window", of_window)
+    return Derainer(onnx_model, 1)
+
+
+def assert_seen(judgement: Judgement | None, derainer: Derainer, before: int, after: int) -> None:
+    assert judgement is not None
+    expected = derainer.probability(as_seen(judgement.scan, before, after))
+    np.testing.assert_array_equal(judgement.probability, expected)
+    other = derainer.probability(as_seen(judgement.scan, before + 1, after))
+    assert (judgement.probability != other).any()
+
+
+def test_a_window_is_answered_when_it_is_whole_and_at_the_end(windowed: Derainer) -> None:
+    frames = [*Frames.of_scans([Scan.of(scene(POINTS, seed)) for seed in range(4)])]
+    answers = [windowed.push(frame) for frame in frames]
+    assert [answer and answer.frame for answer in answers] == [None, *frames[:3]]
+    assert windowed.waiting == 1
+    for before, answer in enumerate(answers[1:]):
+        assert_seen(answer, windowed, before, after=1)
+    (last,) = windowed.flush()
+    assert last.frame is frames[3]
+    assert_seen(last, windowed, before=2, after=0)
+    assert windowed.waiting == 0
+
+
+def test_points_without_a_frame_are_one_sequence_until_its_end(windowed: Derainer) -> None:
+    assert windowed.push(scene(POINTS, 0)) is None
+    assert_seen(windowed.push(Scan.of(scene(POINTS, 1))), windowed, before=0, after=1)
+    (frame,) = Frames.of_scans([Scan.of(scene(POINTS))], "another")
+    assert windowed.starts_new_recording(frame)
+    assert len(list(windowed.flush())) == 1
+    assert not windowed.starts_new_recording(frame)  # nothing would be lost
+    assert windowed.push(frame) is None
+    (answer,) = windowed.flush()
+    assert_seen(answer, windowed, before=0, after=0)
+
+
+def test_one_of_those_that_wait_does_not_take_the_others_with_it(
+    windowed: Derainer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(NeighbourView, "window", Window(before=0, after=3))
+    derainer = Derainer(windowed.path, 1)
+    for seed in range(3):
+        assert derainer.push(Scan.of(scene(POINTS, seed))) is None
+
+    def failing(_: object) -> object:
+        raise MemoryError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(derainer.session, "run", failing)
+        with pytest.raises(InputError, match="its network fails"):
+            list(derainer.flush())
+    assert derainer.waiting == 2
+    assert len(list(derainer.flush())) == 2

@@ -52,14 +52,12 @@ def test_percentiles_are_of_one_stage_or_of_each_run_as_a_whole() -> None:
     assert times.percentile(50, "read") == 3
     assert times.percentile(50) == 5  # not that of one stage and that of the other
     assert times.percentile(100, "back") == 4
+    assert np.isnan(RunTimes.of_no_runs().percentile(50))
 
 
-def test_times_of_no_runs_are_not_known() -> None:
-    times = RunTimes.of_no_runs()
-    assert np.isnan([times.percentile(50), *(times.percentile(95, s) for s in STAGES)]).all()
-
-
-def test_every_run_is_timed_by_stage_and_in_total(onnx_model: Path, tmp_path: Path) -> None:
+def test_a_model_is_timed_on_a_file_or_on_a_made_up_scan(
+    onnx_model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     wide = np.column_stack([scene(400), np.zeros(400, np.float32)])
     wide.tofile(tmp_path / "wide.bin")
     stated = ["x", "y", "z", "intensity", "ring"]
@@ -67,16 +65,11 @@ def test_every_run_is_timed_by_stage_and_in_total(onnx_model: Path, tmp_path: Pa
     times = np.array(list(report.times.stages.values()))
     assert times.shape == (len(STAGES), 4)
     assert (times > 0).all()
-    table = str(report).splitlines()[2:-1]
-    assert [line.split()[0] for line in table] == [*STAGES, "total"]
     assert (report.points, report.threads) == (400, 1)
-
-
-def test_without_a_scan_a_made_up_one_of_100_000_points_is_timed(
-    onnx_model: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setattr(timing, "WARM_UP", 0)
     assert measure_latency(onnx_model, repeats=1).points == 100_000
+    with pytest.raises(InputError, match=r"none\.bin: there is no such file"):
+        measure_latency(onnx_model, tmp_path / "none.bin")
 
 
 def test_the_report_is_a_table_of_percentiles() -> None:
@@ -90,10 +83,3 @@ def test_the_report_is_a_table_of_percentiles() -> None:
         "total        52.0     92.0    101.0",
         "a processor; versions",
     ]
-
-
-def test_what_cannot_be_read_is_reported(onnx_model: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"none\.bin: there is no such file"):
-        measure_latency(onnx_model, tmp_path / "none.bin")
-    with pytest.raises(InputError, match=r"none\.onnx: there is no such file"):
-        measure_latency(tmp_path / "none.onnx")

@@ -1,4 +1,4 @@
-"""Every filter against its definition, worked out from all pairs of points."""
+"""Every filter against its definition, worked out from all pairs of points; two against Open3D."""
 
 import numpy as np
 import pytest
@@ -7,9 +7,12 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
+from derain.errors import InputError
+from derain.evaluation.hard_cases import scene
 from derain.filters import DROR, DSOR, ROR, SOR, SSR, FilterDerainer, PointFilter, filter_view
 from derain.filters.radius_filters import RadiusFilter, has_few_neighbours
 from derain.scan import Scan
+from derain.system.open3d_import import import_open3d
 
 # Few values on a coarse grid: copies, equal distances, points at the origin, radii that are met
 # exactly. Few points: neighbourhoods larger than the scan.
@@ -179,3 +182,21 @@ def test_points_settled_along_the_curve_are_settled_right(filter_: RadiusFilter)
         xyz = view.points[rows, :3]
         few = has_few_neighbours(xyz, filter_.radius_at(xyz), filter_.neighbours, threads=2)
         np.testing.assert_array_equal(few, lonely[rows])
+
+
+def test_ror_and_sor_remove_what_open3d_removes() -> None:
+    try:
+        open3d = import_open3d()
+    except InputError as error:
+        pytest.skip(str(error))
+    points = scene(2000)
+    positions = open3d.utility.Vector3dVector(points[:, :3].astype(np.float64))
+    cloud = open3d.geometry.PointCloud(positions)
+    for filter_, (_, kept) in (
+        (ROR(neighbours=4, radius=0.6), cloud.remove_radius_outlier(3, 0.6)),
+        (SOR(5, 0.01), cloud.remove_statistical_outlier(5, 0.01)),
+        (SOR(20, 1.0), cloud.remove_statistical_outlier(20, 1.0)),
+    ):
+        expected = ~np.isin(np.arange(len(points)), kept)
+        assert 0.02 < expected.mean() < 0.95
+        np.testing.assert_array_equal(FilterDerainer(filter_)(points), expected)

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
 from derain.filters import CRF, FilterDerainer
-from derain.filters.airborne import RainBounds, fit_rain_bounds
+from derain.filters.airborne import fit_rain_bounds
 from derain.filters.ground import find_ground
+from derain.filters.random_field import decide_sequentially
 from derain.scan import Scan
 
 # Nearer than this to a limit, rounding may decide.
@@ -74,19 +75,70 @@ class Reference:
         self.is_clear &= len(np.unique(azimuth)) == len(azimuth)
         for value in feature.values():
             self.is_clear &= min(abs(value - 0.6), abs(value + 0.4)) > UNCLEAR
-        rain = np.zeros(len(self.xyz), bool)
-        decision: dict[int, float] = {}
-        for row in range(len(self.xyz)):
-            value = feature.get(row, -1.0)
-            if not -0.4 < value <= 0.6:
-                decision[row], rain[row] = (2.0, True) if value > 0.6 else (-2.0, False)
-        for row in sorted(set(feature) - set(decision), key=lambda row: azimuth[row]):
-            total = feature[row]
-            for other, apart in zip(self.near[row, 1:], self.apart[row, 1:], strict=True):
-                total += decision.get(int(other), feature.get(int(other), -1.0)) / (0.01 + apart)
-            self.is_clear &= abs(total) > UNCLEAR
-            rain[row], decision[row] = total > 0, 2.0 if total > 0 else -2.0
+        of_all = np.full(len(self.xyz), -1.0)
+        rows = np.array([*feature], int)
+        of_all[rows] = [*feature.values()]
+        place = np.argsort(np.argsort(azimuth[rows]))
+        rain, totals = by_loop(of_all, rows, place, self.near[rows], self.apart[rows], 2.0)
+        self.is_clear &= all(abs(total) > UNCLEAR for total in totals)
         return rain
+
+
+def by_loop(
+    feature: NDArray[np.float64],
+    rows: NDArray[np.int64],
+    place: NDArray[np.int64],
+    neighbours: NDArray[np.int64],
+    distances: NDArray[np.floating],
+    vote: float,
+) -> tuple[NDArray[np.bool_], list[float]]:
+    """Decides one point after the other; returns the rain, and the totals that decided."""
+    votes = [vote if f > 0.6 else -vote if f < -0.4 else f for f in feature.tolist()]
+    rain, totals = feature > 0.6, []
+    for number in np.argsort(place).tolist():
+        point = int(rows[number])
+        if not -0.4 < feature[point] <= 0.6:
+            continue
+        total = float(feature[point])
+        for other, apart in zip(neighbours[number, 1:], distances[number, 1:], strict=True):
+            total += votes[other] * (1 / (0.01 + float(apart)))
+        totals.append(total)
+        rain[point] = total > 0
+        votes[point] = vote if total > 0 else -vote
+    return rain, totals
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 8), st.sampled_from([0, 0.3, 2])
+)
+def test_waves_decide_as_a_loop_does(seed: int, points: int, size: int, vote: float) -> None:
+    generator = np.random.default_rng(seed)
+    feature = generator.choice([-1.0, -0.4, -0.39, -0.1, 0.05, 0.1, 0.6, 0.7], points)
+    rows = np.flatnonzero((feature > -1) | (generator.random(points) < 0.3))
+    neighbours = generator.integers(0, points, (len(rows), size))
+    neighbours[:, 0] = rows
+    distances = np.sort(generator.choice([0.0, 0.1, 0.5, 3.0], neighbours.shape), axis=1)
+    place = generator.permutation(len(rows))
+    field = (feature, rows, place, neighbours, distances.astype(np.float32), vote)
+    before = [np.copy(each) for each in field]
+    np.testing.assert_array_equal(decide_sequentially(*field), by_loop(*field)[0])
+    for one, other in zip(before, field, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("towards", [1, -1])
+def test_a_verdict_spreads_along_the_order_to_its_end(towards: int) -> None:
+    points = 5000
+    line = np.arange(points)
+    feature = np.full(points, 0.1)
+    feature[0] = -1
+    neighbours = np.stack([line, np.maximum(line - 1, 0), np.minimum(line + 1, points - 1)], axis=1)
+    distances = np.abs(neighbours - line[:, None]).astype(np.float32)
+    rain = decide_sequentially(feature, line, line[::towards], neighbours, distances, 2.0)
+    # From the one that is none, "no rain" goes on and on; against the order it stays where it is.
+    expected = 0 if towards > 0 else points - 2
+    assert np.count_nonzero(rain) == pytest.approx(expected, abs=1)
 
 
 @settings(deadline=None, max_examples=100)
@@ -182,19 +234,8 @@ def test_without_intensity_nothing_is_found_and_that_is_said(variant: str) -> No
 def test_only_the_published_bound_has_a_unit() -> None:
     scan = Scan.of(scene()).with_intensity_times(1 / 255)
     assert not list(CRF().issues(scan))
-    (odd,) = CRF(variant="published").issues(scan)
+    (odd,) = CRF(neighbours=2, variant="published").issues(scan)
     assert odd.kind == "intensity of a smaller unit"
-
-
-def test_the_published_variant_takes_fewer_neighbours() -> None:
-    assert CRF(neighbours=2, variant="published").neighbours == 2
-
-
-def test_bounds_hold_what_is_on_their_side_and_near() -> None:
-    intensity = np.array([0, 5, 9, 9], np.float32)
-    distance = np.array([3.0, 3.0, 3.0, 30.0])
-    assert RainBounds(5, False, 10).hold(intensity, distance).tolist() == [True, True, False, False]
-    assert RainBounds(5, True, 10).hold(intensity, distance).tolist() == [False, False, True, False]
 
 
 @pytest.mark.parametrize(("variant", "wanted"), [("published", 0.845), ("fitted", 0.84)])

@@ -1,8 +1,7 @@
 """What holds for every filter: hard scans, copies, stages, and parameters that make no sense."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import make_dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,9 +20,9 @@ from derain.filters import (
     FilterDerainer,
     PointFilter,
     filter_from,
-    read_parameters,
 )
 from derain.scan import Scan
+from derain.sources.frame import MemoryFrame
 from derain.system.stopwatch import Stopwatch
 from derain.views.candidates import Bound, Candidates
 
@@ -33,25 +32,20 @@ MIXED = [CRF(), PUBLISHED_CRF, ROR(radius=0.8), SOR(), DROR(), DSOR(), SSR(thres
 every_filter = pytest.mark.parametrize("filter_", MIXED, ids=str)
 
 
-@pytest.mark.parametrize("filter_", [CRF(), CRF(variant="published"), DSOR()], ids=str)
-@pytest.mark.parametrize("scan", [scan for _, scan in hard_cases(largest=5000)])
-def test_a_hard_scan_gets_an_answer_for_every_row(scan: Scan, filter_: PointFilter) -> None:
+@every_filter
+def test_a_hard_scan_gets_an_answer_for_every_row(filter_: PointFilter) -> None:
+    few = {f"{points} points": Scan.of(scene()[:points]) for points in (0, 1, 4)}
     with np.errstate(all="raise", under="ignore"):
-        rain = FilterDerainer(filter_, threads=2)(scan)
-    assert rain.dtype == bool
-    assert rain.shape == (len(scan),)
-    assert not rain[~scan.valid].any()
+        for name, scan in {**dict(hard_cases(largest=50)), **few}.items():
+            rain = FilterDerainer(filter_, threads=2)(scan)
+            assert (rain.dtype, rain.shape) == (bool, (len(scan),)), name
+            assert not rain[~scan.valid].any(), name
 
 
 @every_filter
-@pytest.mark.parametrize("points", [0, 1, 4])
-def test_few_points_are_judged_without_a_warning(filter_: PointFilter, points: int) -> None:
-    with np.errstate(all="raise", under="ignore"):
-        assert FilterDerainer(filter_)(scene()[:points]).shape == (points,)
-
-
-@every_filter
-def test_neither_order_nor_copies_nor_threads_matter(filter_: PointFilter) -> None:
+def test_neither_order_nor_copies_nor_threads_nor_the_way_of_asking_matter(
+    filter_: PointFilter,
+) -> None:
     derainer, points = FilterDerainer(filter_, threads=1), scene()
     rain = derainer(points)
     assert 0.01 < rain.mean() < 0.98
@@ -59,6 +53,16 @@ def test_neither_order_nor_copies_nor_threads_matter(filter_: PointFilter) -> No
     np.testing.assert_array_equal(derainer(points[shuffle]), rain[shuffle])
     np.testing.assert_array_equal(derainer(np.repeat(points, 3, axis=0)), np.repeat(rain, 3))
     np.testing.assert_array_equal(FilterDerainer(filter_, threads=2)(points), rain)
+    frame, stopwatch = MemoryFrame(key="0", scan=Scan.of(points)), Stopwatch()
+    judgement = derainer.push(frame, stopwatch)
+    assert list(stopwatch.milliseconds) == ["read", "view", "network", "back"]
+    assert judgement.frame is frame
+    np.testing.assert_array_equal(judgement.rain, rain)
+    np.testing.assert_array_equal(judgement.probability, rain.astype(np.float32))
+    np.testing.assert_array_equal(derainer.push(points).rain, rain)
+    assert derainer.weather(points).rays == judgement.weather.rays
+    assert (derainer.waiting, derainer.starts_new_recording(frame)) == (0, False)
+    assert list(derainer.flush()) == []
 
 
 @every_filter
@@ -72,13 +76,6 @@ def test_candidates_are_judged_as_without_bounds_and_nothing_else_is_rain(
     rain, of_candidates = (FilterDerainer(filter_, 0, each)(scan) for each in (None, candidates))
     np.testing.assert_array_equal(of_candidates, rain & candidates.among(scan))
     assert 0 < of_candidates.sum() < rain.sum()
-
-
-@every_filter
-def test_the_time_of_each_stage_is_taken_as_for_a_model(filter_: PointFilter) -> None:
-    stopwatch = Stopwatch()
-    FilterDerainer(filter_)(scene(50), stopwatch)
-    assert list(stopwatch.milliseconds) == ["view", "network", "back"]
 
 
 @pytest.mark.parametrize("filter_", [ROR(), DROR(), SOR(), DSOR()], ids=str)
@@ -114,33 +111,19 @@ def test_a_filter_is_found_by_its_name_and_takes_its_parameters() -> None:
         assert kind.HELP.splitlines() == [kind.HELP]
 
 
-@pytest.fixture
-def add_filter(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, type], None]:
-    """Registers filters for the length of a test."""
+def test_a_filter_is_called_what_it_is_registered_by_and_its_numbers_are_checked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(FILTERS, "_members", dict(FILTERS))
-    return lambda name, kind: FILTERS.add(name)(kind)
-
-
-def test_a_filter_is_called_what_it_is_registered_by(
-    add_filter: Callable[[str, type], None],
-) -> None:
-    fog = type("FogRemover", (ROR,), {})
+    # Its annotations are texts, as where a module puts them off.
+    fog = make_dataclass("FogRemover", [("reach", "float", 5.0)], bases=(ROR,), frozen=True)
     assert fog().name == "fogremover"
-    add_filter("fog", fog)
-    assert filter_from("fog", {}).name == fog().name == "fog"
-    assert ROR().name == "ror"
-    with pytest.raises(InputError, match="fog: radius is -1"):
-        filter_from("fog", {"radius": -1})
-
-
-def test_numbers_are_checked_where_annotations_are_texts_as_well(
-    add_filter: Callable[[str, type], None],
-) -> None:
-    fog = make_dataclass("Fog", [("reach", "float", 5.0)], bases=(ROR,), frozen=True)
-    add_filter("fog", fog)
+    FILTERS.add("fog")(fog)
     assert filter_from("fog", {"reach": 7}).as_dict()["reach"] == 7
-    with pytest.raises(InputError, match="fog: reach is 'far'"):
-        filter_from("fog", {"reach": "far"})
+    assert (fog().name, ROR().name) == ("fog", "ror")
+    for parameter, value in (("radius", -1), ("reach", "far")):
+        with pytest.raises(InputError, match=f"fog: {parameter} is "):
+            filter_from("fog", {parameter: value})
 
 
 @pytest.mark.parametrize(
@@ -153,20 +136,14 @@ def test_numbers_are_checked_where_annotations_are_texts_as_well(
             "ror: it has no parameter radios. Did you mean radius? It has neighbours, radius.",
         ),
         ("ror", {"radius": -1}, "ror: radius is -1. Give a finite number"),
-        ("ror", {"radius": "1e-3 m"}, "ror: radius is '1e-3 m'. Give a finite number"),
-        ("ror", {"radius": 10**400}, "ror: radius is 1000000"),
         ("ror", {"radius": 16**5000}, "ror: radius is a number of very many digits."),
         ("ror", {"radius": 1e200}, "ror: radius is 1e+200."),
-        ("ror", {"radius": ["long"] * 1000}, "ror: radius is ['long', 'long'"),
-        ("ror", {"neighbours": 16**5000}, "ror: neighbours is a number of very many digits."),
         ("sor", {"deviation_multiplier": float("nan")}, "sor: deviation_multiplier is nan."),
         ("dsor", {"range_multiplier": float("inf")}, "dsor: range_multiplier is inf."),
         ("ssr", {"threshold": True}, "ssr: threshold is True."),
-        ("ssr", {"threshold": None}, "ssr: threshold is None."),
         ("ssr", {"neighbours": 1}, "ssr: neighbours is 1. Give a whole number from 2"),
         ("dror", {"neighbours": 2.5}, "dror: neighbours is 2.5."),
         ("dror", {"neighbours": 10**9}, "dror: neighbours is 1000000000."),
-        ("dror", {"minimum_radius": -0.1}, "dror: minimum_radius is -0.1."),
         ("dror", {"variant": "book"}, "dror: variant is 'book'. Give one of code, paper."),
         ("crf", {"variant": "best"}, "crf: variant is 'best'. Give one of fitted, published."),
         (
@@ -183,42 +160,6 @@ def test_parameters_that_make_no_sense_are_refused(
         filter_from(name, parameters)
     assert str(refusal.value).startswith(message)
     assert len(str(refusal.value)) < 300
-
-
-def test_a_file_of_parameters_names_its_method(tmp_path: Path) -> None:
-    path = tmp_path / "best.yaml"
-    path.write_text("# 100 trials\nmethod: dsor\nneighbours: 7\nrange_multiplier: 0.0812\n")
-    assert read_parameters(path) == ("dsor", {"neighbours": 7, "range_multiplier": 0.0812})
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        "",
-        "3",
-        "- dsor",
-        "neighbours: 3",
-        "method: 5",
-        "method: dsor\n2: 3",
-        "a: b: c",
-        'method: "dsor\\0"',
-        "method: dsor\nneighbours: [5]",
-        "method: dsor\nrange_multiplier: .inf",
-        "method: dsor\nrange_multiplier: null",
-        f"method: dsor\nneighbours: 0x{'f' * 5000}",
-    ],
-)
-def test_a_file_that_holds_no_parameters_is_refused(tmp_path: Path, content: str) -> None:
-    path = tmp_path / "best.yaml"
-    path.write_text(content)
-    with pytest.raises(InputError, match=r"best\.yaml: ") as refusal:
-        read_parameters(path)
-    assert len(str(refusal.value)) < len(str(path)) + 300
-
-
-def test_a_missing_file_of_parameters_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"none.yaml: there is no such file"):
-        read_parameters(tmp_path / "none.yaml")
 
 
 @pytest.mark.parametrize(

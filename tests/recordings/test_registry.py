@@ -5,7 +5,7 @@ from window_method import Between, Dimmer
 
 from derain.errors import InputError
 from derain.export.methods import load_method, load_method_of_one_scan
-from derain.export.runtimes.registry import Runtime
+from derain.export.runtimes.session import Runtime
 from derain.recordings.registry import METHODS
 
 

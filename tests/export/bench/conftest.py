@@ -1,4 +1,4 @@
-"""Labelled scans that the tests of the bench share."""
+"""Labelled scans that the tests of the bench share, and a bench in this process."""
 
 from pathlib import Path
 
@@ -7,6 +7,8 @@ import pytest
 
 from derain.cards.card import DataCard
 from derain.evaluation.hard_cases import scene
+from derain.export.bench import bench
+from derain.export.bench.cost import measure_in_process
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.files.labels import write_labels
 from derain.sources.folders import named_frames
@@ -28,3 +30,9 @@ def labelled(tmp_path: Path) -> LabelledFrames:
     folders = sorted(tmp_path.glob("sequence */scans"))
     rates = {"sequence 0": 10.0, "sequence 1": 25.0, "sequence 2": 10.0}
     return LabelledFrames(CARD, named_frames(folders, labelled=True), rain_rates=rates)
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Times methods in this process; that each has its own is tested by itself."""
+    monkeypatch.setattr(bench, "measure_cost", measure_in_process)

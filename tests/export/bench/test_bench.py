@@ -1,6 +1,6 @@
 """A bench from Python: methods of every kind, on scans in memory and in files."""
 
-import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -8,27 +8,83 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from derain.errors import InputError
 from derain.evaluation.baselines import all_points
 from derain.evaluation.counts import Counts
 from derain.evaluation.scores import score
-from derain.export.bench import bench as module
 from derain.export.bench.bench import bench, scored_methods
-from derain.export.bench.bench_entries import bench_entries
-from derain.export.bench.cost import measure_in_process
+from derain.export.bench.bench_entries import FILE_SIZE, bench_entries
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.methods import load_method
+from derain.export.model_file import number_of_weights
 from derain.export.runtime import Derainer
+from derain.export.runtimes.session import Runtime
 from derain.filters import DSOR, FILTERS, FilterDerainer
 from derain.scan import Scan
 from derain.views.neighbours import NeighbourView
 
+KEPT = Path(__file__).parent.parent / "kept/outdet.onnx"
 
-@pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Times methods in this process; that each has its own is tested by itself."""
-    monkeypatch.setattr(module, "measure_cost", measure_in_process)
+
+def parameters(path: Path, **content: object) -> str:
+    path.write_text(yaml.safe_dump(content))
+    return str(path)
+
+
+def test_a_row_is_called_by_its_title_else_by_its_name(tmp_path: Path) -> None:
+    tuned = parameters(tmp_path / "best.yaml", method="dsor", range_multiplier=0.08)
+    odd = parameters(tmp_path / "r=0.1.yaml", method="dsor", range_multiplier=0.1)
+    names = {
+        str(KEPT): ("outdet", "outdet"),
+        f"fine={KEPT}": ("fine", "outdet"),
+        "dror": ("dror", "dror"),
+        tuned: ("best", "dsor"),
+        "none": ("none", "none"),
+        odd: ("r=0.1", "dsor"),
+        f"other={odd}": ("other", "dsor"),
+    }
+    rows = bench_entries([*names])
+    assert [(row.title, row.kind) for row in rows] == [*names.values()]
+    assert rows[3].filter == DSOR(range_multiplier=0.08)
+    assert rows[0].facts["weights"] == number_of_weights(KEPT.read_bytes())
+    assert rows[0].facts[FILE_SIZE] == len(KEPT.read_bytes())
+
+
+@pytest.mark.usefixtures("here")
+def test_methods_are_names_files_derainers_filters_and_functions(
+    labelled: LabelledFrames, tmp_path: Path
+) -> None:
+    derainer = Derainer(KEPT, 1)
+    derainer.spec = replace(derainer.spec, threshold=0.4)
+    methods = {
+        "name": "dsor",
+        "filter": DSOR(),
+        "filter, ready": FilterDerainer(DSOR(), 1),
+        "path": KEPT,
+        "model": derainer,
+        "file": parameters(tmp_path / "low.yaml", method=str(KEPT), threshold=0.4),
+        "function": all_points,
+        "call": FilterDerainer(DSOR(), 1).__call__,
+    }
+    found = bench(methods, labelled.frames, labelled.card, timed=1, repeats=1)
+    assert [row.title for row in found.rows] == list(methods)
+    pooled = {row.title: row.scores.pooled for row in found.rows}
+    assert pooled["name"] == pooled["filter"] == pooled["filter, ready"] == pooled["call"]
+    assert pooled["function"] == Counts(90, 790, 0, 0)
+    kinds = [found[title].kind for title in ("filter", "path", "function")]
+    assert kinds == ["dsor", "outdet", "function"]
+    thresholds = [found[title].as_dict()["threshold"] for title in ("path", "model", "file")]
+    assert thresholds == [0.5, 0.4, 0.4]
+    scans = [labelled.read(frame) for frame in labelled.frames]
+    expected = Counts()
+    for scan in scans:
+        known = scan.label != 9
+        expected += Counts.of(derainer(scan)[known], (scan.label == 3)[known])
+    assert pooled["model"] == pooled["file"] == expected != pooled["path"]
+    untitled = bench([DSOR(), derainer, all_points], scans, labelled.card, timed=1, repeats=1)
+    assert [row.title for row in untitled.rows] == ["dsor", "outdet", "all_points"]
 
 
 @pytest.mark.usefixtures("here")
@@ -44,70 +100,8 @@ def test_scans_in_memory_score_as_the_same_scans_in_files(labelled: LabelledFram
         assert in_memory.scores == replace(in_files.scores, by_rain_rate={})
         assert in_memory.iou_interval == in_files.iou_interval
     assert [file["scan"] for file in of_scans.facts["files"]] == [str(file) for file in files]
-
-
-@pytest.mark.usefixtures("here")
-def test_methods_are_names_derainers_filters_and_functions(
-    labelled: LabelledFrames, onnx_model: Path
-) -> None:
-    derainer = Derainer(onnx_model, 1)
-    derainer.spec = replace(derainer.spec, threshold=0.4)
-    methods = {
-        "name": "dsor",
-        "filter": DSOR(),
-        "filter, ready": FilterDerainer(DSOR(), 1),
-        "file": onnx_model,
-        "model": derainer,
-        "function": all_points,
-        "call": FilterDerainer(DSOR(), 1).__call__,
-    }
-    found = bench(methods, labelled.frames, labelled.card, timed=1, repeats=1)
-    assert [row.title for row in found.rows] == list(methods)
-    pooled = {row.title: row.scores.pooled for row in found.rows}
-    assert pooled["name"] == pooled["filter"] == pooled["filter, ready"] == pooled["call"]
-    assert pooled["function"] == Counts(90, 790, 0, 0)
-    assert [found[title].kind for title in ("filter", "file", "function")] == [
-        "dsor",
-        "outdet",
-        "function",
-    ]
-    assert found["model"].as_dict()["threshold"] == 0.4
-    scans = [labelled.read(frame) for frame in labelled.frames]
-    expected = Counts()
-    for scan in scans:
-        known = scan.label != 9
-        expected += Counts.of(derainer(scan)[known], (scan.label == 3)[known])
-    assert pooled["model"] == expected
-    untitled = bench([DSOR(), derainer, all_points], scans, labelled.card, timed=1, repeats=1)
-    assert [row.title for row in untitled.rows] == ["dsor", onnx_model.stem, "all_points"]
-
-
-def test_what_only_this_program_knows_is_timed_in_its_process_and_told(
-    labelled: LabelledFrames, tmp_path: Path
-) -> None:
-    found = bench(
-        {"mine": lambda scan: scan.intensity < 4, "all": "all"},
-        labelled.frames,
-        labelled.card,
-        timed=1,
-        repeats=1,
-    )
-    mine, everything = found.rows
-    assert (mine.cost.alone, everything.cost.alone) == (False, True)
-    assert mine.cost.peak_memory is None
-    assert mine.milliseconds > 0 < everything.milliseconds
-    found.write(tmp_path / "out")
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        *("bench.md", "bench.csv", "bench.json"),
-        "speed_error.png",
-    }
-    rows = json.loads((tmp_path / "out/bench.json").read_text())["rows"]
-    assert [row.get("timed_alone", True) for row in rows] == [False, True]
-    text = (tmp_path / "out/bench.md").read_text()
-    (line,) = [line for line in text.splitlines() if line.startswith("Timed in the process")]
-    assert line.endswith("of their own: mine.")
-    assert str(found) in text
-    assert "derain.bench(['mine', 'all'], ...)" in text
+    for learnt in ("position", "intensity"):
+        assert of_files[learnt].scores.pooled.iou > 0.5
 
 
 SCRIPT = """
@@ -128,7 +122,9 @@ for row in found.rows:
 """
 
 
-def test_a_script_that_guards_nothing_is_run_once(tmp_path: Path) -> None:
+def test_a_script_that_guards_nothing_is_run_once_and_times_its_own_functions(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "script.py").write_text(SCRIPT)
     finished = subprocess.run(
         [sys.executable, str(tmp_path / "script.py")], capture_output=True, text=True
@@ -137,46 +133,46 @@ def test_a_script_that_guards_nothing_is_run_once(tmp_path: Path) -> None:
     assert finished.stdout.splitlines() == ["begins", "dim True False None", "all False True None"]
 
 
+@pytest.mark.usefixtures("here")
 @pytest.mark.parametrize(
     "answer", [lambda n: np.ones(n + 1, bool), lambda n: np.ones(n), lambda n: None]
 )
-def test_a_function_that_gives_no_mask_is_told_in_its_row(labelled: LabelledFrames, answer) -> None:
-    found = bench({"odd": lambda scan: answer(len(scan))}, labelled.frames, labelled.card, timed=1)
-    (row,) = found.rows
-    assert len(row.scores.failures) == 3
-    assert "Let it return a bool array" in row.cost.failure
-    assert all("Let it return a bool array" in why for why in row.scores.failures.values())
+def test_a_function_that_gives_no_mask_fails_in_every_scan(
+    labelled: LabelledFrames, answer
+) -> None:
+    (entry,) = bench_entries({"odd": lambda scan: answer(len(scan))})
+    scans = map(labelled.read, labelled.frames)
+    (scores,) = score(scored_methods([entry], 1), scans, labelled.card)
+    assert len(scores.failures) == 3
+    assert all("Let it return a bool array" in why for why in scores.failures.values())
 
 
-def test_what_cannot_be_benched_is_refused(labelled: LabelledFrames, tmp_path: Path) -> None:
-    (scan, *_) = (labelled.read(frame) for frame in labelled.frames)
-    card = labelled.card
-    with pytest.raises(InputError, match="methods: there are none"):
-        bench([], [scan], card)
-    with pytest.raises(InputError, match="methods: the class DSOR is no method"):
-        bench([DSOR], [scan], card)  # type: ignore[list-item]
-    with pytest.raises(InputError, match="methods: int is no method"):
-        bench([3], [scan], card)  # type: ignore[list-item]
+@pytest.mark.parametrize(
+    ("methods", "reason"),
+    [
+        ([], "methods: there are none"),
+        ([DSOR], "methods: .*DSOR.* is no method"),
+        ([3], "methods: 3 is no method"),
+        (["nothing"], "nothing: no such file"),
+        (["absent.onnx"], "absent.onnx: no such file"),
+        (["position"], "position: it has no scans to learn from. Give --train"),
+        (["dror", "dror"], "dror: it is the title of two methods"),
+        (["x=dror", "x=none"], "x: it is the title of two methods"),
+    ],
+)
+def test_a_method_that_cannot_be_used_is_refused(methods: list[object], reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        bench_entries(methods)  # type: ignore[arg-type]
+
+
+def test_scans_that_cannot_be_benched_are_refused(labelled: LabelledFrames) -> None:
     with pytest.raises(InputError, match="scans: there are none"):
-        bench(["all"], [], card)
+        bench(["all"], [], labelled.card)
     with pytest.raises(InputError, match="scans: int is no scan"):
-        bench(["all"], [3], card)  # type: ignore[list-item]
-    with pytest.raises(InputError, match="it has no labels"):
-        bench(["all"], [Scan(scan.xyz)], card)
+        bench(["all"], [3], labelled.card)  # type: ignore[list-item]
     labelled.frames[0].label_path.unlink()
     with pytest.raises(InputError, match="its labels are not at"):
-        bench(["all"], labelled.frames, card)
-
-
-def test_a_loaded_model_of_another_threshold_is_made_anew_in_its_process(
-    labelled: LabelledFrames, onnx_model: Path
-) -> None:
-    derainer = load_method(str(onnx_model), {"threshold": 0.25}, 1)
-    found = bench([derainer], labelled.frames, labelled.card, timed=1, repeats=1)
-    (row,) = found.rows
-    assert row.cost.alone
-    assert row.cost.failure is None
-    assert row.as_dict()["threshold"] == 0.25
+        bench(["all"], labelled.frames, labelled.card)
 
 
 @pytest.mark.usefixtures("here")
@@ -188,10 +184,8 @@ def test_a_bench_without_rain_warns_unless_its_data_are_clean(
     warned: bool,
 ) -> None:
     frames, card = labelled.frames[1:], replace(labelled.card, rain=rain, unknown=())
-    found = bench(["none"], frames, card, timed=1, repeats=1)
-    name = labelled.card.classes[9]
-    assert (f"no point of these scans is {name}" in capsys.readouterr().err) == warned
-    assert found["none"].scores.pooled.false_positive == 0
+    bench(["none"], frames, card, timed=1, repeats=1)
+    assert ("no point of these scans is unknown" in capsys.readouterr().err) == warned
 
 
 def test_filters_share_one_search_and_score_as_they_would_alone(
@@ -212,3 +206,56 @@ def test_filters_share_one_search_and_score_as_they_would_alone(
     monkeypatch.undo()
     alone = [FilterDerainer(row.filter, threads=1) for row in rows]
     assert together == score(alone, scans, labelled.card)
+
+
+@pytest.mark.usefixtures("rainy")
+def test_every_model_is_followed_by_itself_by_the_other_runtime(tmp_path: Path) -> None:
+    low = parameters(tmp_path / "low.yaml", method=str(KEPT), threshold=0.25)
+    rows = bench_entries([f"a={KEPT}", "dror", low], runtime=Runtime("rainy", "bf16"))
+    titles = ["a", "a (rainy bf16)", "dror", "low", "low (rainy bf16)"]
+    assert [row.title for row in rows] == titles
+    assert ["runtime" in row.facts for row in rows] == ["rainy" in title for title in titles]
+    assert rows[4].facts["threshold"] == 0.25
+    assert rows[4].ready(1).runtime == Runtime("rainy", "bf16")
+    assert rows[4].usual(1).runtime == Runtime()
+    with pytest.raises(InputError, match="runtime rainy: none of the methods is a model"):
+        bench_entries(["dror", "all"], runtime=Runtime("rainy"))
+
+
+@pytest.mark.usefixtures("rainy", "here")
+def test_what_another_runtime_changes_is_counted(labelled: LabelledFrames, tmp_path: Path) -> None:
+    scans = [frame.path for frame in labelled.frames]
+    options = {"threads": 1, "timed": 2, "repeats": 1, "runtime": "rainy"}
+    found = bench([str(KEPT), "all"], scans, labelled.card, precision="int2", **options)
+    # All is rain to it, so that it flips what onnxruntime does not call rain.
+    assert found["outdet (rainy int2)"].scores.pooled == found["all"].scores.pooled
+    (change,) = found.facts["runtimes"]
+    usual = Derainer(KEPT, 1)
+    rain = np.concatenate([usual(labelled.read(labelled.frames[row])) for row in (0, 2)])
+    assert (change["method"], change["scans"]) == ("outdet (rainy int2)", 2)
+    assert (change["points"], change["flipped"]) == (len(rain), (~rain).sum())
+    assert change["rain_iou"] == pytest.approx(rain.mean())
+    found.write(tmp_path)
+    row = rf"outdet \(rainy int2\) +\| +2 scans, {len(rain)} points .*\| +{change['flipped']} \|"
+    assert re.search(row, (tmp_path / "bench.md").read_text())
+    assert re.search(row, str(found))
+
+
+@pytest.mark.usefixtures("rainy", "here")
+def test_a_model_that_has_its_runtime_is_compared_and_its_failure_is_stated(
+    labelled: LabelledFrames, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = load_method(str(KEPT), {}, 1, Runtime("rainy", "bf16"))
+    found = bench({"mine": model}, labelled.frames, labelled.card, threads=1, timed=1, repeats=1)
+    (change,) = found.facts["runtimes"]
+    assert (change["method"], change["runtime"]) == ("mine", "rainy bf16")
+    assert 0 < change["largest_difference"] <= 0.0101
+
+    def failing(*_: object) -> None:
+        raise MemoryError("no room")
+
+    monkeypatch.setattr("derain.export.proof.compare_runtimes", failing)
+    found = bench({"mine": model}, labelled.frames, labelled.card, threads=1, timed=1, repeats=1)
+    failure = {"method": "mine", "runtime": "rainy bf16", "failure": "no room"}
+    assert found.facts["runtimes"] == [failure]
+    assert "no room" in str(found)

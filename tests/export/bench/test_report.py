@@ -87,31 +87,30 @@ def test_json_and_csv_hold_the_same_figures(rows: list[Row], tmp_path: Path) -> 
     assert content["rows"][2]["by_range"]["80+ m"]["iou"] is None  # no point is as far
 
 
-def test_the_tables_name_every_method_and_what_failed(rows: list[Row]) -> None:
-    text = as_markdown(rows, FACTS)
-    for heading in ("Called rain, by class", "IoU by range", "IoU by rain rate", "Milliseconds"):
-        (section,) = [part for part in text.split("\n## ") if part.startswith(heading)]
-        assert all(f"| {row.title} " in section for row in rows)
-    assert "| broken (!) |" in text
+def test_the_tables_name_every_method_what_failed_and_what_was_not_timed_alone(
+    rows: list[Row],
+) -> None:
+    here = replace(rows[1], cost=replace(rows[1].cost, alone=False))
+    text = as_markdown([rows[0], here, rows[2]], FACTS)
+    parts = {part.splitlines()[0]: part for part in text.split("\n## ")}
+    for heading in ("Called rain, by class", "IoU by range", "IoU by rain rate"):
+        assert all(f"| {row.title} " in parts[heading] for row in rows)
     assert "broken: 3 of 3 scans, first" in text
     assert "broken could not be timed: no room" in text
-    assert "IoU by sensor" not in text
-
-
-def test_a_score_that_is_undefined_is_a_dash(rows: list[Row]) -> None:
-    text = as_markdown(rows, FACTS)
+    assert "of their own: all." in text
+    assert "IoU by sensor" not in parts
+    # A score that is undefined is a dash: the first finds nothing in the farthest band.
     (main,) = [line for line in text.splitlines() if line.startswith("| broken (!) |")]
     assert [cell.strip() for cell in main.split("|")[2:6]] == ["-", "0.000", "0.000", "0.000"]
-    (by_range,) = [part for part in text.split("\n## ") if part.startswith("IoU by range")]
-    assert all(line.split()[-2] == "-" for line in by_range.splitlines() if "dror" in line)
+    by_range = parts["IoU by range"].splitlines()
+    assert all(line.split()[-2] == "-" for line in by_range if "dror" in line)
 
 
-def test_simulated_data_are_called_so(rows: list[Row]) -> None:
+def test_simulated_data_are_called_so_and_one_scan_has_no_interval(
+    rows: list[Row], labelled: LabelledFrames
+) -> None:
     assert SIMULATED_IS_EASY not in as_markdown(rows, FACTS)
     assert SIMULATED_IS_EASY in as_markdown(rows, {**FACTS, "simulated": True})
-
-
-def test_one_scan_has_no_interval(labelled: LabelledFrames) -> None:
     one = replace(labelled, frames=labelled.frames[:1])
     methods = bench_entries(["all"])
     (row,) = bench_rows(methods, scored(methods, one), [cost(4)], np.random.default_rng(0))

@@ -17,13 +17,10 @@ from onnx import helper
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.export import onnx_file, proof
 from derain.export.model_file import METADATA_KEY
-from derain.export.onnx_file import export
-from derain.export.proof import BF16, FLOAT32, compare_runtimes, prove
+from derain.export.proof import BF16, FLOAT32, prove
 from derain.export.runtime import Derainer
-from derain.export.runtimes.registry import Runtime
-from derain.models.base import DerainingModule
+from derain.export.runtimes.session import Runtime
 from derain.models.checkpoint import load_model
 from derain.scan import Scan
 from derain.system.cores import usable_cores
@@ -67,22 +64,6 @@ def test_bfloat16_is_near_on_every_hard_case() -> None:
     assert str(found).startswith("openvino bf16: ")
 
 
-@pytest.mark.parametrize(("precision", "bounds"), [("float32", FLOAT32), ("bf16", BF16)])
-def test_networks_on_images_come_out_alike(
-    image_model: DerainingModule,
-    image_onnx: Path,
-    model_in_bfloat16: Derainer,
-    precision: str,
-    bounds: proof.Bounds,
-) -> None:
-    usual, other = Derainer(image_onnx, 1), Derainer(image_onnx, 1, "openvino", precision)
-    found = compare_runtimes(usual, other, HARD_CASES.items())
-    assert bounds.difference is not None
-    assert found.worst.difference < bounds.difference * image_model.LOGIT_GAIN
-    assert found.flipped <= len(found.cases) + (bounds.flipped or 0) * found.points
-    assert found.rain_iou > 0.95
-
-
 def test_scans_of_any_size_follow_each_other(model: Derainer, model_in_bfloat16: Derainer) -> None:
     sizes = [500, 0, 1, 2, 499, 1000, 500, 3, 0, 500]
     for derainer in (model, model_in_bfloat16):
@@ -90,14 +71,6 @@ def test_scans_of_any_size_follow_each_other(model: Derainer, model_in_bfloat16:
         for size, answer in zip(sizes, answers, strict=True):
             alone = Derainer(derainer.path, 2, "openvino", derainer.runtime.precision)
             np.testing.assert_array_equal(alone.probability(scene(size)), answer)
-
-
-def test_scores_stay_as_they_were_when_the_next_scan_is_judged(model: Derainer) -> None:
-    view = model.view(Scan.of(scene(300)))
-    first = model.logits(view)
-    kept = first.copy()
-    model.logits(model.view(Scan.of(scene(300, seed=1))))
-    np.testing.assert_array_equal(first, kept)
 
 
 def test_one_model_serves_several_threads_of_a_program(model: Derainer) -> None:
@@ -186,18 +159,3 @@ assert "openvino_telemetry" not in sys.modules
     assert finished.returncode == 0, finished.stderr
     assert int(finished.stdout) == Derainer(KEPT / "outdet.onnx", 1)(scene(300)).sum()
     assert not list(tmp_path.iterdir())
-
-
-def test_an_export_for_it_is_proved_by_both(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(1000)))])
-    # The graph need not be traced anew.
-    monkeypatch.setattr(onnx_file, "_traced", lambda *_: onnx.load(KEPT / "outdet.onnx"))
-    made = export(load_model(KEPT / "outdet.ckpt"), tmp_path / "made.onnx", runtime=OPENVINO)
-    assert made.holds
-    assert made.by_other is not None
-    assert [case.runtime for case in made.by_other.cases] == ["openvino"] * 2
-    assert "\nopenvino: 2 cases" in str(made)
-    written = Derainer(tmp_path / "made.onnx", 1, "openvino").metadata["proof"]
-    assert written["by_other"]["flipped"] == 0
