@@ -13,7 +13,7 @@ import yaml
 from benchmarks.fuzzing.mutations import as_json, changed
 from benchmarks.fuzzing.reader import Reader
 from derain.annotation.manifest import LABELS, TAUGHT_PARTS, Manifest
-from derain.annotation.scene_file import read_scene
+from derain.annotation.scene import read_scene
 from derain.cards.card import load_card, packaged_cards
 from derain.cards.layout import Layout
 from derain.evaluation.contents import find_sequences

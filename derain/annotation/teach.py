@@ -178,15 +178,9 @@ def refuse_to_overwrite(out: Path, source: Source) -> None:
 
 def _put_in_place(folder: Path, out: Path, manifest: Manifest, card: DataCard | None) -> None:
     """Replaces the folder's contents; if it is interrupted, the manifest is marked unfinished."""
-    former: set[str] = set()
-    with suppress(InputError):  # no former manifest, or one of an unfinished teaching
-        former = {scan.key for scan in Manifest.read(out).scans}
     Manifest(manifest.teacher, finished=False).write(out)
-    for key in (scan.key for scan in manifest.scans):
-        label_path(out, key).parent.mkdir(parents=True, exist_ok=True)
-        label_path(folder, key).replace(label_path(out, key))
-    for key in former - {scan.key for scan in manifest.scans}:
-        label_path(out, key).unlink(missing_ok=True)
+    shutil.rmtree(out / LABELS, ignore_errors=True)  # of an earlier teaching
+    (folder / LABELS).rename(out / LABELS)
     write_card(out / CARD, Path(manifest.teacher["method"]).stem, card)
     manifest.write(out)
 

@@ -94,7 +94,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    from derain.annotation.scene_file import read_scene
+    from derain.annotation.scene import read_scene
 
     require("annotate", OPEN3D, MATPLOTLIB)
     folders = map(_folder_of_scans, arguments.scans)

@@ -193,13 +193,12 @@ def _view_scan(
         scan, rain = scan.take(known), rain[known]
         predicted = {name: called_rain[known] for name, called_rain in predicted.items()}
     if out:
-        from derain.pictures.comparison import comparison_figure
-        from derain.pictures.scan_pictures import save
+        from derain.pictures.scan_pictures import comparison_figure, save
 
         save(comparison_figure(scan, predicted, rain, title), out)
         print_lines(str(out))
     if window:
-        from derain.pictures.comparison import show_comparison
+        from derain.pictures.scan_pictures import show_comparison
 
         show_comparison(scan, predicted, rain)
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torchmetrics import Metric
 
-from derain.errors import InputError
 from derain.evaluation.counts import Counts, intersection_over_union, ratio, table_of
 
 # Thresholds from 0 to 1 in equal steps; TensorBoard's curves take no more than 127.
@@ -110,10 +109,7 @@ class ThresholdCounts(Metric):
     Counts add up across processes. As :meth:`points` gathers them, each process must call it.
 
     Args:
-        chosen: Further thresholds, besides ``CURVE_THRESHOLDS`` and ``CLOSE``.
-
-    Raises:
-        InputError: One that is not between 0 and 1.
+        chosen: Further thresholds from 0 to 1, besides ``CURVE_THRESHOLDS`` and ``CLOSE``.
     """
 
     full_state_update = False
@@ -121,10 +117,6 @@ class ThresholdCounts(Metric):
 
     def __init__(self, chosen: Sequence[float] = ()) -> None:
         super().__init__()
-        if not all(0 <= threshold <= 1 for threshold in chosen):
-            raise InputError(
-                "threshold", f"{list(chosen)} is not within 0 and 1", "Give a probability."
-            )
         self.thresholds = np.unique([*CURVE_THRESHOLDS, *CLOSE, *(1 - CLOSE), *chosen])
         # Points by whether they are rain, and by how many thresholds their probability exceeds.
         bins = torch.zeros(2, len(self.thresholds) + 1, dtype=torch.int64)

@@ -2,8 +2,8 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, asdict, dataclass, fields
 from numbers import Integral, Real
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, get_args, get_origin
@@ -81,13 +81,10 @@ class PointFilter(ABC):
     neighbours: int
 
     def __post_init__(self) -> None:
-        _check_neighbours(self.name, self.neighbours)
         for parameter in fields(self):
             value = getattr(self, parameter.name)
-            if parameter.type in (float, "float"):  # the text, where annotations are put off
-                _check_number(self.name, parameter.name, value)
-            elif get_origin(parameter.type) is Literal:
-                _check_choice(self.name, parameter.name, value, get_args(parameter.type))
+            if remedy := _remedy(parameter, value):
+                raise InputError(self.name, f"{parameter.name} is {shown(value)}", remedy)
 
     @property
     def name(self) -> str:
@@ -205,29 +202,19 @@ def rows_of(points: NDArray[np.bool_], inverse: NDArray[np.int64]) -> NDArray[np
     return np.append(points, False).take(inverse)
 
 
-def _check_neighbours(filter_name: str, value: Any) -> None:
-    whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if not (whole and 2 <= value <= MOST_FILTER_NEIGHBOURS):
-        raise InputError(
-            filter_name,
-            f"neighbours is {shown(value)}",
-            "Give a whole number from 2 (the point itself and one more) to "
-            f"{MOST_FILTER_NEIGHBOURS}.",
-        )
-
-
-def _check_number(filter_name: str, parameter: str, value: Any) -> None:
-    number = isinstance(value, Real) and not isinstance(value, bool)
-    if not (number and 0 <= value <= LARGEST_NUMBER):
-        raise InputError(
-            filter_name,
-            f"{parameter} is {shown(value)}",
-            f"Give a finite number that is not negative, {LARGEST_NUMBER:g} at most.",
-        )
-
-
-def _check_choice(filter_name: str, parameter: str, value: Any, choices: Sequence[str]) -> None:
-    if value not in choices:
-        raise InputError(
-            filter_name, f"{parameter} is {shown(value)}", f"Give one of {', '.join(choices)}."
-        )
+def _remedy(parameter: Field[Any], value: Any) -> str | None:
+    """What to give in place of a value that a parameter cannot have; None where it can."""
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    if parameter.name == "neighbours":
+        is_whole = is_number and isinstance(value, Integral)
+        if not (is_whole and 2 <= value <= MOST_FILTER_NEIGHBOURS):
+            return (
+                "Give a whole number from 2 (the point itself and one more) to "
+                f"{MOST_FILTER_NEIGHBOURS}."
+            )
+    elif parameter.type in (float, "float"):  # the text, where annotations are put off
+        if not (is_number and 0 <= value <= LARGEST_NUMBER):
+            return f"Give a finite number that is not negative, {LARGEST_NUMBER:g} at most."
+    elif get_origin(parameter.type) is Literal and value not in get_args(parameter.type):
+        return f"Give one of {', '.join(get_args(parameter.type))}."
+    return None

@@ -16,7 +16,6 @@ from derain.sources.frame import Frame
 from derain.sources.method import Method
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
-from derain.system.notices import warn
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +67,11 @@ class Selection:
 
         Empty where a frame has no time, or where the times do not ascend, as with several
         recordings.
+
+        Raises:
+            InputError: Times that are damaged.
         """
-        try:
-            times = [frame.time for frame in self.frames]
-        except InputError as error:
-            warn(f"when the scans were taken is not shown: {error}")
-            return {}
+        times = [frame.time for frame in self.frames]
         known = [time for time in times if time is not None]
         if len(known) < len(times) or any(before >= after for before, after in pairwise(known)):
             return {}
@@ -86,15 +84,14 @@ class Selection:
         A pose takes the sensor's frame to that of the first scan shown of its sequence: the viewer
         computes in float32, in which points far from the origin would tremble. Empty where a frame
         has no pose.
+
+        Raises:
+            InputError: Poses that are damaged.
         """
-        try:
-            poses = [frame.pose for frame in self.frames]
-        except InputError as error:
-            warn(f"where the scans were taken is not shown: {error}")
-            return {}
         to_first: dict[str, NDArray[np.float64]] = {}
         placed = {}
-        for frame, pose in zip(self.frames, poses, strict=True):
+        for frame in self.frames:
+            pose = frame.pose
             if pose is None:
                 return {}
             back = to_first.setdefault(frame.sequence, np.linalg.inv(pose).astype(np.float64))

@@ -22,8 +22,7 @@ from derain.export.methods import load_method
 from derain.export.tuning import LabelledNeighbourhoods, Search, neighbours_to_find, tune_filter
 from derain.files import DEFAULT_COLUMNS
 from derain.files.atomic import replacing, require_writable
-from derain.pictures.comparison import comparison_figure
-from derain.pictures.scan_pictures import before_after_figure, save
+from derain.pictures.scan_pictures import before_after_figure, comparison_figure, save
 from derain.scan import Scan
 from derain.simulation.campaign import Campaign, partition
 from derain.simulation.dataset import simulate_track

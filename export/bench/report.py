@@ -103,31 +103,27 @@ def as_markdown(rows: Sequence[Row], facts: Mapping[str, Any]) -> str:
     return "\n\n".join([*parts, facts["versions"]])
 
 
-# Columns of the main table, and those of them that fit on a screen.
-COLUMNS = (
-    *("method", "P", "R", "F1", "IoU", "IoU 95 %", "behind best"),
-    *("F1 per scan", "IoU per scan", "ms", "p95", "weights", "MiB"),
-)
+# Columns of the main table that fit on a screen.
 SHORT = ("method", "P", "R", "F1", "IoU", "IoU 95 %", "ms")
 
 
-def main_table(rows: Sequence[Row], columns: Sequence[str] = COLUMNS) -> str:
+def main_table(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:
     """Error and cost of every method.
 
     Args:
-        rows: The methods.
-        columns: Some of COLUMNS.
+        rows: The methods, one or more.
+        columns: Titles of some of the columns; None for all.
     """
-    places = [COLUMNS.index(column) for column in columns]
-    cells = map(_main_cells, rows)
-    return markdown_table(columns, [[of_row[place] for place in places] for of_row in cells])
+    cells = [_main_cells(row) for row in rows]
+    titles = columns or [*cells[0]]
+    return markdown_table(titles, [[of_row[title] for title in titles] for of_row in cells])
 
 
 def runtimes_table(changed: Sequence[Mapping[str, Any]]) -> str:
     """Each model in another runtime, compared with the same model in onnxruntime.
 
     Args:
-        changed: One or more results of :func:`.other_runtime.changes`.
+        changed: One or more comparisons, as a bench has them under ``runtimes``.
     """
     head = ["method", "beside onnxruntime", "largest logit difference", "labels flipped"]
     return markdown_table([*head, "IoU of the rain"], [_changed_cells(row) for row in changed])
@@ -208,20 +204,25 @@ def _changed_cells(row: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _main_cells(row: Row) -> list[str]:
+def _main_cells(row: Row) -> dict[str, str]:
+    """Cells of the main table by the titles of their columns."""
     values = row.as_dict()
-    return [
-        row.title + (" (!)" if row.scores.failures or row.cost.failure else ""),
-        *(number_text(values[score]) for score in SCORES),
-        _interval(row.iou_interval),
-        _interval(row.behind_best),
-        number_text(values["f1_per_scan"]),
-        number_text(values["iou_per_scan"]),
-        number_text(values["ms"], ",.1f"),
-        number_text(values["ms_p95"], ",.1f"),
-        f"{values['weights']:,}" if "weights" in values else "-",
-        number_text(row.cost.peak_memory, ",.0f"),
-    ]
+    failed = row.scores.failures or row.cost.failure
+    return {
+        "method": f"{row.title} (!)" if failed else row.title,
+        "P": number_text(values["precision"]),
+        "R": number_text(values["recall"]),
+        "F1": number_text(values["f1"]),
+        "IoU": number_text(values["iou"]),
+        "IoU 95 %": _interval(row.iou_interval),
+        "behind best": _interval(row.behind_best),
+        "F1 per scan": number_text(values["f1_per_scan"]),
+        "IoU per scan": number_text(values["iou_per_scan"]),
+        "ms": number_text(values["ms"], ",.1f"),
+        "p95": number_text(values["ms_p95"], ",.1f"),
+        "weights": f"{values['weights']:,}" if "weights" in values else "-",
+        "MiB": number_text(row.cost.peak_memory, ",.0f"),
+    }
 
 
 def _by_class(rows: Sequence[Row]) -> str:

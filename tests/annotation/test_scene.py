@@ -7,9 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from derain.annotation import scene_file
-from derain.annotation.scene import Box, Correction, PlaneSearch, Rectangle, Scene, inside
-from derain.annotation.scene_file import read_scene
+from derain.annotation import scene as module
+from derain.annotation.scene import (
+    Box,
+    Correction,
+    PlaneSearch,
+    Rectangle,
+    Scene,
+    inside,
+    read_scene,
+)
 from derain.errors import InputError
 from derain.simulation.classes import TrackClass
 
@@ -98,8 +105,8 @@ def read(folder: Path, text: str) -> Scene:
 def test_every_key_of_a_scene_is_read_and_the_road_is_all_that_it_needs(tmp_path: Path) -> None:
     assert read(tmp_path, TEXT) == SCENE
     assert read(tmp_path, ROAD) == Scene(((0, 0), (1, 0), (0, 1)))
-    assert scene_file.__doc__ is not None
-    _, example, _ = scene_file.__doc__.split("\n\n")
+    assert module.__doc__ is not None
+    _, example, _ = module.__doc__.split("\n\n")
     assert [*read(tmp_path, example).boxes] == ["car_1", "mast_1"]
 
 

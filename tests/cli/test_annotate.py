@@ -7,7 +7,7 @@ from textwrap import dedent
 import numpy as np
 import pytest
 
-from derain.annotation.scene_file import read_scene
+from derain.annotation.scene import read_scene
 from derain.cli.annotate import DESCRIPTION
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan

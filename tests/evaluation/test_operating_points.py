@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from derain.errors import InputError
 from derain.evaluation.counts import Counts
 from derain.evaluation.operating_points import CURVE_THRESHOLDS, ThresholdCounts
 
@@ -72,9 +71,3 @@ def test_some_of_the_thresholds_alone_keep_their_counts() -> None:
     np.testing.assert_array_equal(even.thresholds, CURVE_THRESHOLDS)
     for number, threshold in enumerate(CURVE_THRESHOLDS):
         assert even.counts(number) == points.counts(points.at(threshold))
-
-
-@pytest.mark.parametrize("threshold", [-0.1, 1.5, float("nan")])
-def test_a_threshold_that_is_no_probability_is_refused(threshold: float) -> None:
-    with pytest.raises(InputError, match="not within 0 and 1"):
-        ThresholdCounts([threshold])

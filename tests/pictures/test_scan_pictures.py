@@ -14,9 +14,15 @@ from matplotlib.image import imread
 
 from derain.errors import InputError
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.pictures.comparison import MOST_PANELS_IN_A_ROW, comparison_figure, show_comparison
 from derain.pictures.palette import OUTCOMES
-from derain.pictures.scan_pictures import before_after_figure, judgement_figure, save
+from derain.pictures.scan_pictures import (
+    MOST_PANELS_IN_A_ROW,
+    before_after_figure,
+    comparison_figure,
+    judgement_figure,
+    save,
+    show_comparison,
+)
 from derain.scan import Scan
 
 
