@@ -83,38 +83,37 @@ def test_the_plane_is_that_of_the_road_of_all_scans_though_a_wall_has_more_point
         road_plane([elsewhere], SCENE)
 
 
+WIDER = Scene(SCENE.road, SCENE.boxes, rain_area=((0, -9), (25, -9), (25, 9), (0, 9)))
+
+
 def label_of(*point: float, scene: Scene = SCENE) -> int:
     return int(annotate(Scan.of(np.array([[*point, 50]], np.float32)), scene, PLANE)[0])
 
 
 @pytest.mark.parametrize(
-    ("point", "expected"),
+    ("scene", "point", "expected"),
     [
-        ((30, 0, 0), TrackClass.RAIN),
-        ((30, 0, -1.35), TrackClass.RAIN),
-        ((30, 0, -1.45), TrackClass.ROAD),
-        ((30, 0, -3), TrackClass.ROAD),
-        ((30, 5, -1.5), TrackClass.BACKGROUND),
-        ((21.8, 0, -1), TrackClass.CAR),
-        ((22.3, 0, -1), TrackClass.PEDESTRIAN),
-        ((10, 3, 1.5), TrackClass.SPRINKLER),
-        ((10, 2, 1.5), TrackClass.BACKGROUND),
-        ((10, 3, -1.6), UNKNOWN),
-        ((10, 3, -1.4), TrackClass.SPRINKLER),
-        ((np.nan, 0, 0), UNKNOWN),
+        (SCENE, (30, 0, 0), TrackClass.RAIN),
+        (SCENE, (30, 0, -1.35), TrackClass.RAIN),
+        (SCENE, (30, 0, -1.45), TrackClass.ROAD),
+        (SCENE, (30, 0, -3), TrackClass.ROAD),
+        (SCENE, (30, 5, -1.5), TrackClass.BACKGROUND),
+        (SCENE, (21.8, 0, -1), TrackClass.CAR),
+        (SCENE, (22.3, 0, -1), TrackClass.PEDESTRIAN),
+        (SCENE, (10, 3, 1.5), TrackClass.SPRINKLER),
+        (SCENE, (10, 2, 1.5), TrackClass.BACKGROUND),
+        (SCENE, (10, 3, -1.6), UNKNOWN),
+        (SCENE, (10, 3, -1.4), TrackClass.SPRINKLER),
+        (SCENE, (np.nan, 0, 0), UNKNOWN),
+        (WIDER, (15, 7, 0), TrackClass.RAIN),
+        (WIDER, (15, 7, -1.5), TrackClass.BACKGROUND),
+        (WIDER, (30, 0, 0), TrackClass.ROAD),
     ],
 )
 def test_a_point_gets_its_class_from_where_it_lies(
-    point: tuple[float, float, float], expected: int
+    scene: Scene, point: tuple[float, float, float], expected: int
 ) -> None:
-    assert label_of(*point) == expected
-
-
-def test_rain_beside_the_road_is_labelled_where_the_scene_has_an_area_for_it() -> None:
-    wider = Scene(SCENE.road, SCENE.boxes, rain_area=((0, -9), (25, -9), (25, 9), (0, 9)))
-    assert label_of(15, 7, 0, scene=wider) == TrackClass.RAIN
-    assert label_of(15, 7, -1.5, scene=wider) == TrackClass.BACKGROUND
-    assert label_of(30, 0, 0, scene=wider) == TrackClass.ROAD
+    assert label_of(*point, scene=scene) == expected
 
 
 def test_all_points_together_are_labelled_as_each_alone() -> None:

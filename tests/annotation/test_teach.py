@@ -162,15 +162,6 @@ def test_what_fails_half_way_leaves_what_was_there(
     assert out.exists() == there
 
 
-def test_a_broken_pipe_is_no_fault_of_the_folder(make_drive: MakeDrive, tmp_path: Path) -> None:
-    def watch(*_: object) -> None:
-        raise BrokenPipeError
-
-    with pytest.raises(BrokenPipeError):
-        teach(FilterDerainer(DROR(), 1), of(make_drive()), tmp_path / "out", watch=watch)
-    assert not (tmp_path / "out").exists()
-
-
 def test_what_is_interrupted_while_it_is_put_in_place_is_known(
     make_drive: MakeDrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

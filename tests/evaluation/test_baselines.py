@@ -88,22 +88,6 @@ def test_hard_scans_get_an_answer_and_points_that_cannot_be_judged_teach_nothing
         assert rule == IntensityRule.best(valid), name
 
 
-def test_on_real_snow_places_do_well_in_their_sequence_and_worse_elsewhere(shared: Path) -> None:
-    data = shared / "data/wads"
-    labels = sorted((data / "sequences/36/labels").glob("*.label"))
-
-    def read(scan: Path, label: Path) -> Truth:
-        snow = np.fromfile(label, np.uint32) & 0xFFFF == 110
-        return Scan.of(np.fromfile(scan, np.float32).reshape(-1, 4)), snow
-
-    *train, (scan, snow) = [
-        read(data / f"sequences/36/velodyne/{label.stem}.bin", label) for label in labels[:3]
-    ]
-    prior = PositionPrior.learn(train)
-    elsewhere, other_snow = read(data / "sample.bin", data / "sample.label")
-    assert iou(prior(elsewhere), other_snow) < 0.5 < iou(prior(scan), snow)
-
-
 def random_scan(seed: int, points: int, levels: int = 1000) -> tuple[Scan, NDArray[np.bool_]]:
     """Points of so many different ranges and intensities, and their rain: more of the near."""
     generator = np.random.default_rng(seed)

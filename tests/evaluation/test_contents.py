@@ -49,14 +49,12 @@ def test_sequences_are_found_from_the_root_to_the_sequence(
     assert sequences[0].rain_rate is None
 
 
-def test_a_folder_of_scans_is_one_sequence(tmp_path: Path) -> None:
+def test_a_folder_of_scans_is_one_sequence_and_other_folders_have_to_be_named(
+    tmp_path: Path,
+) -> None:
     write_scan(tmp_path / "scan.ply", Scan.of(scene(30)))
-    assert find_layout(tmp_path) is None
     (sequence,) = find_sequences(tmp_path, None)
     assert [frame.name for frame in sequence.frames] == [str(tmp_path / "scan.ply")]
-
-
-def test_other_folders_have_to_be_named(tmp_path: Path) -> None:
     add_scan(tmp_path / "drive", OTHERS, "0", [1, 2])
     assert find_layout(tmp_path) is None
     (sequence,) = find_sequences(tmp_path, OTHERS)
@@ -104,14 +102,10 @@ def test_points_are_counted_by_class_and_instances_are_not(tmp_path: Path) -> No
         "road": 0.2,
         "class 300": 0.2,
     }
-
-
-def test_a_scan_without_labels_gives_its_points(tmp_path: Path) -> None:
-    for suffix in ("bin", "pcd", "npz"):
-        write_scan(tmp_path / f"scan.{suffix}", Scan.of(scene(40)))
-        contents = count_frame(frame_of(tmp_path / f"scan.{suffix}"))
-        assert (contents.points, contents.labelled.total()) == (40, 0)
-        assert contents.as_dict({})["class_share"] == {}
+    path.unlink()
+    unlabelled = count_frame(frame_of(sequence.frames[0].path))
+    assert (unlabelled.points, unlabelled.labelled.total()) == (5, 0)
+    assert unlabelled.as_dict({})["class_share"] == {}
 
 
 def test_the_picture_has_a_bar_for_each_class_and_rate_and_a_slice_for_each_rate() -> None:

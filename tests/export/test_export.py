@@ -28,7 +28,7 @@ from ..two_returns import Recording
 SCENE = [("scene", Scan.of(scene()))]
 
 
-def test_the_file_holds_a_whole_network_for_any_number_of_points(
+def test_the_file_holds_a_whole_network_and_how_it_is_used(
     onnx_model: Path, random_outdet: OutDet
 ) -> None:
     beside = {file.name for file in onnx_model.parent.glob(f"{onnx_model.name}*")}
@@ -51,17 +51,12 @@ def test_the_file_holds_a_whole_network_for_any_number_of_points(
         "neighbours": ["points", 9],
         "logits": ["points", 2],
     }
-
-
-def test_the_metadata_says_how_the_model_is_used(onnx_model: Path, random_outdet: OutDet) -> None:
     derainer = Derainer(onnx_model)
     assert derainer.spec == random_outdet.spec
-    assert derainer.metadata["spec"] == random_outdet.spec.as_dict()
     assert derainer.metadata["versions"]["derain"] == derain.__version__
-    properties = {entry.key: entry.value for entry in onnx.load(onnx_model).metadata_props}
+    properties = {entry.key: entry.value for entry in proto.metadata_props}
     assert properties["license"] == "network: MIT; training data: CC BY-NC-SA 4.0"
     assert properties["version"] == derain.__version__
-    assert {"outdet", "WADS"} <= set(properties["description"].replace(":", "").split())
 
 
 def test_the_proof_in_the_file_is_that_of_every_hard_case(

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
@@ -189,28 +190,23 @@ def drops(points: int) -> NDArray[np.bool_]:
     return np.arange(points) >= points - points // 10
 
 
-def test_the_unit_of_intensity_does_not_matter() -> None:
+def test_neither_the_unit_of_intensity_nor_what_is_brighter_matters() -> None:
     points = scene(6000)
     rain = FilterDerainer(CRF())(points)
     assert iou(rain, drops(6000)) > 0.65
     for factor in (1 / 255, 257.0):
         scaled = points * np.array([1, 1, 1, factor], np.float32)
         np.testing.assert_array_equal(FilterDerainer(CRF())(scaled), rain)
-
-
-def test_rain_that_is_brighter_than_all_else_is_found_as_well() -> None:
-    points = scene(6000)
     points[:, 3] = 255 - points[:, 3]
     assert iou(FilterDerainer(CRF())(points), drops(6000)) > 0.65
     assert not FilterDerainer(CRF(variant="published"))(points).any()
 
 
-@pytest.mark.parametrize("degrees", [-15, 0, 8, 20])
-def test_a_sensor_may_be_tilted_and_mounted_anywhere(degrees: float) -> None:
+@pytest.mark.parametrize("degrees", [-15, 20])
+def test_a_sensor_may_be_tilted(degrees: float) -> None:
     points = scene(6000)
-    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    x, _, z = points[:, :3].T.copy()
-    points[:, 0], points[:, 2] = cosine * x + sine * z, cosine * z - sine * x
+    turn = Rotation.from_euler("y", degrees, degrees=True)
+    points[:, :3] = turn.apply(points[:, :3])
     assert iou(FilterDerainer(CRF())(points), drops(6000)) > 0.65
 
 

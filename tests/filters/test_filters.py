@@ -137,13 +137,10 @@ def test_a_filter_is_called_what_it_is_registered_by_and_its_numbers_are_checked
         ),
         ("ror", {"radius": -1}, "ror: radius is -1. Give a finite number"),
         ("ror", {"radius": 16**5000}, "ror: radius is a number of very many digits."),
-        ("ror", {"radius": 1e200}, "ror: radius is 1e+200."),
-        ("sor", {"deviation_multiplier": float("nan")}, "sor: deviation_multiplier is nan."),
         ("dsor", {"range_multiplier": float("inf")}, "dsor: range_multiplier is inf."),
         ("ssr", {"threshold": True}, "ssr: threshold is True."),
         ("ssr", {"neighbours": 1}, "ssr: neighbours is 1. Give a whole number from 2"),
         ("dror", {"neighbours": 2.5}, "dror: neighbours is 2.5."),
-        ("dror", {"neighbours": 10**9}, "dror: neighbours is 1000000000."),
         ("dror", {"variant": "book"}, "dror: variant is 'book'. Give one of code, paper."),
         ("crf", {"variant": "best"}, "crf: variant is 'best'. Give one of fitted, published."),
         (

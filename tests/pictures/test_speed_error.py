@@ -73,6 +73,12 @@ def test_labels_cover_neither_each_other_nor_a_marker(seed: int) -> None:
     assert not any(box.contains(*place) for box in boxes for place in places)
 
 
+def test_no_error_at_all_is_drawn_at_the_least() -> None:
+    figure = speed_error_figure([Standing("perfect", 0.0, 3.0, "network")], "one method")
+    (collection,) = figure.axes[0].collections
+    np.testing.assert_allclose(collection.get_offsets(), [[3.0, LEAST_ERROR]])
+
+
 def test_sizes_of_files_are_written_short_beside_the_titles() -> None:
     texts = {0: "1 kB", 1_499: "1 kB", 999_499: "999 kB", 999_500: "1.0 MB", 6_849_378: "6.8 MB"}
     assert {size: readable_size(size) for size in texts} == texts
@@ -90,12 +96,6 @@ def test_a_label_beside_a_marker_is_nearer_to_it_than_to_any_other() -> None:
     for number, (text, box) in enumerate(zip(figure.axes[0].texts, boxes, strict=True)):
         beyond = np.maximum(np.maximum(box.min - places, places - box.max), 0)
         assert text.arrow_patch or np.argmin(np.hypot(*beyond.T)) == number
-
-
-def test_no_error_at_all_is_drawn_at_the_least() -> None:
-    figure = speed_error_figure([Standing("perfect", 0.0, 3.0, "network")], "one method")
-    (collection,) = figure.axes[0].collections
-    np.testing.assert_allclose(collection.get_offsets(), [[3.0, LEAST_ERROR]])
 
 
 def test_labels_leave_the_front_in_sight_where_there_is_room_beside_it() -> None:

@@ -89,18 +89,6 @@ def test_an_interval_is_that_of_a_poisson_count() -> None:
         assert 1 - chance_up_to(count - 1, least) == pytest.approx(0.05, abs=0.015)
 
 
-def test_drops_where_few_rays_come_are_few_drops() -> None:
-    """As of a dry scan: 31 false drops, 26 of them where 187 of 70,000 rays come."""
-    other, rain = np.zeros((2, BINS), np.int64)
-    other[2:8], other[19] = 11_630, 161
-    rain[18], rain[4] = 26, 5
-    seen = visibility_of(other, rain)
-    assert seen.at_least > 200
-    assert seen.metres is not None
-    assert seen.at_most > 1.5 * seen.at_least
-    assert "[" in str(seen)
-
-
 def test_clear_air_is_as_far_as_so_many_rays_can_show() -> None:
     other = np.zeros(BINS, np.int64)
     other[30] = 100_000

@@ -7,30 +7,9 @@ import numpy as np
 import pytest
 
 from derain.export.bench.bench_entries import BenchEntry, bench_entries
-from derain.export.bench.cost import Timing, measure_cost, measure_in_process
+from derain.export.bench.cost import Timing, measure_cost
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.methods import load_method
-from derain.export.timing import STAGES, WARM_UP
-from derain.scan import Scan
-from derain.system.stopwatch import Stopwatch
-
-
-def test_each_run_is_timed_by_stage_on_scaled_intensities(labelled: LabelledFrames) -> None:
-    milliseconds = iter(range(100))
-
-    def method(scan: Scan, stopwatch: Stopwatch) -> np.ndarray:
-        assert scan.intensity.max() > 10_000
-        stopwatch.milliseconds["network"] = next(milliseconds)
-        return np.zeros(len(scan), bool)
-
-    row = BenchEntry("timed", "outdet", lambda threads: method)
-    cost = measure_in_process(row, Timing(labelled.frames, 1, repeats=2, intensity_scale=255))
-    stages = cost.times.stages
-    assert list(stages) == list(STAGES)
-    np.testing.assert_array_equal(stages["network"], range(WARM_UP, WARM_UP + 2 * 3))
-    assert (stages["view"] == 0).all()
-    total = stages["read"] + stages["network"]
-    assert cost.times.percentile(95) == np.percentile(total, 95)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is known on Linux alone")
