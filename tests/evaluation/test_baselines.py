@@ -58,14 +58,15 @@ def test_no_other_choice_by_share_is_better_on_the_training_scans(scans: list[Tr
 
 
 def test_a_few_points_prove_less_than_many() -> None:
-    # Calling the first voxel rain as well would be better only if its one point proved it.
-    many = in_voxels([1] * 50 + [2] * 50, [True] * 45 + [False] * 5 + [False] * 50)
-    one = in_voxels([0], [True])
-    prior = PositionPrior.learn([many, one])
-    seen = in_voxels([1, 0, 2, 3, 10**9], [False] * 5)[0]  # the last two by no training scan
-    assert prior(seen).tolist() == [True, True, False, False, False]
-    rival = in_voxels([0] + [3] * 9, [True] + [False] * 9)
-    assert PositionPrior.learn([many, rival])(in_voxels([3], [False])[0]).tolist() == [False]
+    # One of three points less than seven of twenty: the first voxel is called rain like the third.
+    voxels, rain = [3, 3, 20, 3, 5], [1, 2, 7, 3, 5]
+    scans = [
+        in_voxels([voxel] * points, [True] * wet + [False] * (points - wet))
+        for voxel, (points, wet) in enumerate(zip(voxels, rain, strict=True))
+    ]
+    prior = PositionPrior.learn(scans)
+    seen = in_voxels([0, 1, 2, 3, 4, 5, 10**9], [False] * 7)[0]  # the last two by no training scan
+    assert prior(seen).tolist() == [True] * 5 + [False] * 2
 
 
 def test_voxels_end_at_their_edges_on_either_side_of_the_sensor() -> None:

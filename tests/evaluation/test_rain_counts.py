@@ -114,9 +114,7 @@ def test_what_cannot_be_counted_is_refused() -> None:
             RainCounts(classes, rain)
 
 
-def test_a_metric_counts_the_same_after_a_copy_in_another_precision_and_forgets_when_reset() -> (
-    None
-):
+def test_a_metric_counts_alike_in_any_precision_and_forgets_when_reset() -> None:
     metrics, expected = RainMetrics(CLASSES, RAIN, [255]), RainCounts(CLASSES, RAIN, [255])
     for number in range(3):
         scan, called = labelled(number, 60)

@@ -223,9 +223,10 @@ def test_points_without_a_frame_are_one_sequence_until_its_end(windowed: Deraine
     assert windowed.starts_new_recording(frame)
     assert len(list(windowed.flush())) == 1
     assert not windowed.starts_new_recording(frame)  # nothing would be lost
-    assert windowed.push(frame) is None
-    (answer,) = windowed.flush()
-    assert_seen(answer, windowed, before=0, after=0)
+    for pushed in (frame, scene(POINTS, 2)):  # each of a recording of its own
+        assert windowed.push(pushed) is None
+        (answer,) = windowed.flush()
+        assert_seen(answer, windowed, before=0, after=0)
 
 
 def test_one_of_those_that_wait_does_not_take_the_others_with_it(

@@ -79,6 +79,11 @@ def test_ror_counts_the_points_within_its_radius(
     np.testing.assert_array_equal(FilterDerainer(ROR(neighbours, radius))(scan), expected)
 
 
+def test_a_point_at_exactly_the_radius_is_within() -> None:
+    line = np.column_stack([np.arange(1, 9), np.zeros((8, 3))])
+    assert FilterDerainer(ROR(3, 1.0))(line).tolist() == [True] + [False] * 6 + [True]
+
+
 @settings(deadline=None, max_examples=80)
 @given(
     cloud=clouds,

@@ -14,6 +14,7 @@ from derain.evaluation.hard_cases import scene
 from derain.files import read_scan
 from derain.filters import CRF, FilterDerainer
 from derain.filters.airborne import fit_rain_bounds
+from derain.filters.crf import _along_the_sweep
 from derain.filters.ground import find_ground
 from derain.filters.random_field import decide_sequentially
 from derain.scan import Scan
@@ -126,6 +127,11 @@ def test_waves_decide_as_a_loop_does(seed: int, points: int, size: int, vote: fl
     np.testing.assert_array_equal(decide_sequentially(*field), by_loop(*field)[0])
     for one, other in zip(before, field, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_the_sweep_goes_once_around_from_behind_where_y_is_any_zero() -> None:
+    xyz = np.array([[-1, 0.0, 0], [1, 0, 0], [-2, -0.0, 0], [0, -1, 0], [0, 1, 0]])
+    assert _along_the_sweep(xyz).tolist() == [3, 1, 4, 0, 2]
 
 
 @pytest.mark.parametrize("towards", [1, -1])

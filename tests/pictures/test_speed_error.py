@@ -71,6 +71,10 @@ def test_labels_cover_neither_each_other_nor_a_marker(seed: int) -> None:
     assert [text.get_text() for text in figure.axes[0].texts] == [each.label for each in methods]
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
     assert not any(box.contains(*place) for box in boxes for place in places)
+    for number, (text, box) in enumerate(zip(figure.axes[0].texts, boxes, strict=True)):
+        beyond = np.maximum(np.maximum(box.min - places, places - box.max), 0)
+        # A label without a line is nearer to its own marker than to any other.
+        assert text.arrow_patch or np.argmin(np.hypot(*beyond.T)) == number
 
 
 def test_no_error_at_all_is_drawn_at_the_least() -> None:
@@ -83,19 +87,6 @@ def test_sizes_of_files_are_written_short_beside_the_titles() -> None:
     texts = {0: "1 kB", 1_499: "1 kB", 999_499: "999 kB", 999_500: "1.0 MB", 6_849_378: "6.8 MB"}
     assert {size: readable_size(size) for size in texts} == texts
     assert Standing("outdet", 0.1, 60.0, "network", 67_535).label == "outdet · 68 kB"
-
-
-def test_a_label_beside_a_marker_is_nearer_to_it_than_to_any_other() -> None:
-    methods = [
-        Standing("right", 0.211, 239, "network"),
-        Standing("left", 0.209, 227, "network"),
-        Standing("far", 0.9, 5, "baseline"),
-        Standing("farther", 0.1, 9000, "baseline"),
-    ]
-    figure, places, boxes = drawn(methods)
-    for number, (text, box) in enumerate(zip(figure.axes[0].texts, boxes, strict=True)):
-        beyond = np.maximum(np.maximum(box.min - places, places - box.max), 0)
-        assert text.arrow_patch or np.argmin(np.hypot(*beyond.T)) == number
 
 
 def test_labels_leave_the_front_in_sight_where_there_is_room_beside_it() -> None:

@@ -78,9 +78,11 @@ def test_the_first_sector_is_ahead_and_the_next_ones_go_to_the_left() -> None:
     assert sectors == [0, 0, 0, 1, 3, 6, 6, 9, 11]
 
 
-def test_straight_behind_straight_up_and_straight_down_are_one_direction_each() -> None:
-    points = np.array([[-5, 0.0, 1], [-10, -0.0, 2], [-15, 0.0, 3]], np.float32)
-    assert ray_ends(Scan(points), np.zeros(3, bool)).sum() == 1
+def test_straight_behind_right_up_and_down_are_one_direction_each() -> None:
+    behind = np.array([[-5, 0.0, 1], [-10, -0.0, 2], [-15, 0.0, 3]], np.float32)
+    right = np.array([[1e-9, -5, 0], [-1e-9, -10, 0], [0, -15, 0]], np.float32)
+    for points in (behind, right):
+        assert ray_ends(Scan(points), np.zeros(3, bool)).sum() == 1
     points = np.array([[0, 0, 3], [-0.0, 0, 9], [0, 0, -2], [0, -0.0, -4]], np.float32)
     ends = ray_ends(Scan(points), np.zeros(4, bool))
     assert np.argwhere(ends.sum(axis=1)).tolist() == [[0, 8], [0, 18]]

@@ -40,8 +40,8 @@ def drawn(
 def test_drops_at_a_rate_have_the_visibility_of_that_rate_wherever_the_walls_are(
     rate: float, walls: tuple[float, float]
 ) -> None:
-    seen = visibility_of(*drawn(rate, 200_000, walls))
-    assert seen.metres == pytest.approx(-math.log(SHARE_THROUGH) / rate, rel=0.1)
+    seen = visibility_of(*drawn(rate, 1_000_000, walls))
+    assert seen.metres == pytest.approx(-math.log(SHARE_THROUGH) / rate, rel=0.03)
     assert seen.at_least <= seen.metres <= seen.at_most
 
 
