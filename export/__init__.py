@@ -2,6 +2,6 @@
 
 import os
 
-# From 1.29 on, onnxruntime tells its makers of every model that it opens, unless this is set before
-# it is imported. What runs on a robot tells nobody; whoever wants it to sets the variable to 0.
+# From 1.29 on, onnxruntime reports every model that it opens to its makers, unless this is set
+# before it is imported. A robot reports nothing; whoever wants the reports sets the variable to 0.
 os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")

@@ -56,7 +56,7 @@ def fit_network_candidates(
 
     Rain that it does not find is not lost to it by bounds: so they may be narrower than those of
     all rain, of which a label's last thousandth may lie anywhere. Where a network was trained with
-    candidates, they stay within those: what it says outside them, it was never taught.
+    candidates, they stay within those: it was never taught what is outside them.
 
     Args:
         model: A trained model.
@@ -65,7 +65,7 @@ def fit_network_candidates(
         inside: Share of the rain it finds that is to be within the bounds.
 
     Raises:
-        InputError: Scans without rain, or in which it finds none, or none that bounds would tell
+        InputError: Scans without rain, or in which it finds none, or none that bounds separate
             from the rest; a model that sees several scans at a time, or takes no candidates.
     """
     _require_candidates(model)
@@ -89,7 +89,7 @@ def fit_network_candidates(
         before += Counts.of(called, rain)
         after += Counts.of(called & among, rain)
         bounded += Counts.of(among[rows], rain[rows])
-    # So far their shares are of the rain that it finds, which nobody who reads them knows.
+    # So far their shares are of the rain that it finds; whoever reads them expects those of all.
     of_all_rain = replace(
         candidates,
         points=(bounded.true_positive + bounded.false_positive) / sum(astuple(bounded)),

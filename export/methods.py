@@ -83,7 +83,7 @@ def method_names() -> list[str]:
 
 
 def method_hint(name: str) -> str:
-    """What a user is told to give in place of what is no method; no sentence's end.
+    """What a user should give in place of what is no method; without the full stop.
 
     Args:
         name: What the user gave.

@@ -1,4 +1,4 @@
-"""What an ONNX file says of itself, read from its bytes without the onnx package.
+"""The metadata of an ONNX file, read from its bytes without the onnx package.
 
 The file is not trusted: all that derain asks of it is looked at before a network is made of it.
 """
@@ -64,7 +64,7 @@ class ModelFile:
     Attributes:
         path: The file.
         content: Its bytes.
-        metadata: What it says of itself: its Spec, proof, versions and licence.
+        metadata: Its Spec, proof, versions and licence.
         spec: How the model is used.
     """
 

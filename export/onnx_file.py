@@ -182,7 +182,7 @@ def _traced(model: DerainingModule, spec: Spec) -> onnx.ModelProto:
             },
             verbose=False,
         )
-    assert program is not None  # only None when it was told to write a file itself
+    assert program is not None  # only None where it writes a file itself
     proto: onnx.ModelProto = program.model_proto
     if scored := list(example.varying.values()):
         # Where a network computes in blocks, as 3D-OutDet does, the exporter writes the number of

@@ -48,7 +48,7 @@ class Derainer(Method):
 
     Args:
         model: ONNX file written by ``derain export``; None, or ``default``, takes the model that
-            comes with derain, of which ``derain info default`` says what it is.
+            comes with derain, which ``derain info default`` describes.
         threads: Threads for view and network; 0 takes every core this process may use.
         runtime: What runs the network: ``onnxruntime``, or ``openvino``, which has to be installed
             (``pip install 'derain[openvino]'``).
@@ -61,7 +61,7 @@ class Derainer(Method):
         threads: How many it uses.
         runtime: What runs the network, and its precision.
         spec: How the model sees a scan and what it was trained on.
-        metadata: Everything else the file says of itself: proof, versions, licence.
+        metadata: Everything else in the file's metadata: proof, versions, licence.
 
     Raises:
         InputError: A missing file, one that is not ONNX, one that derain did not export or that
@@ -92,7 +92,7 @@ class Derainer(Method):
     def __call__(
         self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
     ) -> NDArray[np.bool_]:
-        """Says which points are rain.
+        """Returns which points are rain.
 
         Args:
             points: A Scan, or (N, ≥ 4) numbers: x, y, z in metres and intensity in the unit of
@@ -125,7 +125,7 @@ class Derainer(Method):
         return self.judge(points, stopwatch).probability
 
     def judge(self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None) -> Judgement:
-        """Says all that the model has to say of a scan.
+        """Judges a scan: which points are rain, and how probably.
 
         Args:
             points: As for calling the model.
@@ -138,7 +138,7 @@ class Derainer(Method):
         return self._judged(scan, lambda: self.view(scan), stopwatch or Stopwatch())
 
     def weather(self, points: Scan | NDArray[Any]) -> ScanWeather:
-        """Says how bad the weather is that a scan shows: shares of rain, and visibility.
+        """Returns the weather that a scan shows: shares of rain, and visibility.
 
         What was judged already has it as :attr:`Judgement.weather`.
 
@@ -192,8 +192,7 @@ class Derainer(Method):
             stopwatch: Takes the times of the stages read, view, network and back.
 
         Returns:
-            What the model says of the frame that has all of its window by now; None until there is
-            one.
+            The judgement of the frame that has all of its window by now; None until there is one.
 
         Raises:
             InputError: A frame that cannot be read, a network that fails, or whose scores are not
@@ -264,7 +263,7 @@ class Derainer(Method):
         return replace(judgement, frame=ready.frame)
 
     def _judged(self, scan: Scan, see: Callable[[], ViewedScan], stopwatch: Stopwatch) -> Judgement:
-        """What the model says of a scan, once it sees it."""
+        """Judges a scan by what ``see`` gives."""
         with stopwatch.stage("view"):
             view = see()
         with stopwatch.stage("network"):

@@ -49,7 +49,7 @@ class LabelledNeighbourhoods:
 
         Args:
             scan: The scan.
-            card: Says which of its labels are rain.
+            card: Data card of its labels.
             neighbours: How many of each point, the point itself included; see
                 :func:`neighbours_to_find`.
             threads: Threads of the search; 0 takes every core this process may use.
@@ -141,7 +141,7 @@ def tune_filter(name: str, scans: Sequence[LabelledNeighbourhoods], search: Sear
 
     Args:
         name: One of ``FILTERS``.
-        scans: Scans with rain in them, with as many neighbours as :func:`neighbours_to_find` says.
+        scans: Scans with rain in them, with as many neighbours as :func:`neighbours_to_find`.
         search: How to search.
 
     Raises:
@@ -178,7 +178,7 @@ def tune_filter(name: str, scans: Sequence[LabelledNeighbourhoods], search: Sear
                 stored.add_trial(study.trials[-1])
                 search.done()
     except (optuna.exceptions.OptunaError, SQLAlchemyError) as error:
-        # What SQLAlchemy says goes on for lines, with the statement and a link.
+        # SQLAlchemy's message goes on for lines, with the statement and a link.
         reason = str(error).splitlines()[0]
         raise InputError(
             str(search.storage),

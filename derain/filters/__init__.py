@@ -9,7 +9,7 @@ every one of them would have a neighbour at distance 0, which no drop has. Rows 
 judged are not rain.
 
 A file of this folder enters by ``@FILTERS.add("its name")``, and needs to be named nowhere else:
-:class:`PointFilter` says what it brings with it.
+:class:`PointFilter` describes what it brings with it.
 """
 
 from derain.filters.crf import CRF as CRF

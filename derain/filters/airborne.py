@@ -28,12 +28,12 @@ OFF_SURFACES = 0.1
 LEAST_AIRBORNE = 0.01
 FEWEST_AIRBORNE = 10
 
-# What is in the air has to differ in intensity from what is not, or intensity tells nothing: the
+# What is in the air has to differ in intensity from what is not, or intensity shows nothing: the
 # shares of both that are beyond some value have to differ by at least this (the distance of
 # Kolmogorov and Smirnov). In rain that derain simulates on dry scans it is .49 to .87.
 LEAST_DIFFERENCE = 0.4
 
-# Share of what is in the air that tells how far the rain is seen; others may be stray.
+# Share of what is in the air by which the reach of the rain is set; others may be stray.
 SEEN = 0.95
 
 
@@ -129,7 +129,7 @@ def _is_airborne(
 def _greatest_difference(
     intensity: NDArray[np.float32], airborne: NDArray[np.bool_]
 ) -> tuple[float, bool, float]:
-    """The bound that tells best what is in the air.
+    """The bound that separates best what is in the air.
 
     Args:
         intensity: Intensities, float32 (Q,).

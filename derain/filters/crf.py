@@ -55,7 +55,7 @@ class CRF(PointFilter):
     a plane and 1/3 where they are scattered alike in all directions
     (:func:`derain.views.scatter.scatter_through_space`). F is scaled to -1..1; above 0.6 the
     point is rain, up to -0.4 it is not, and between them
-    :func:`derain.filters.random_field.decide_sequentially` says, in the order of azimuth from
+    :func:`derain.filters.random_field.decide_sequentially` decides, in the order of azimuth from
     behind the sensor once around it. That is the order of files which a spinning sensor wrote, by
     which the authors' program goes; but it does not depend on the file, save that of equally near
     neighbours the one of the lower row comes first.
@@ -67,7 +67,7 @@ class CRF(PointFilter):
     Variant ``fitted`` takes all bounds from the scan itself, whatever the unit or the mounting, and
     whether rain is darker or brighter than the rest: what is above the plane of the road
     (:func:`derain.filters.ground.find_ground`), and within the intensities and ranges of what is in
-    the air (:func:`derain.filters.airborne.fit_rain_bounds`). Within these bounds intensity tells
+    the air (:func:`derain.filters.airborne.fit_rain_bounds`). Within these bounds intensity shows
     nothing more: F is that of intensity 0, and is scaled by constants. Where it does not rain,
     there are no such bounds, and nothing is called rain.
 
@@ -83,7 +83,7 @@ class CRF(PointFilter):
         neighbours: Size of a neighbourhood, the point itself included; of variant ``fitted`` at
             least 4.
         variant: ``fitted`` or ``published``.
-        vote: What a neighbour that is judged says, beside features from -1 to 1.
+        vote: Weight of a neighbour that is judged, beside features from -1 to 1.
         sparseness: Of variant ``fitted``: how many times as far as usual, for its range, the
             neighbours of a point are that is in the air.
         reach: Of variant ``fitted``: how many times as far as 95 % of what is in the air rain may
@@ -130,7 +130,7 @@ class CRF(PointFilter):
             )
 
     def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
-        """Says which points are rain; see :class:`PointFilter`."""
+        """Returns which points are rain; see :class:`PointFilter`."""
         size = min(self.neighbours, view.size)  # where there are fewer, the rest are stand-ins
         neighbours, distances = view.neighbours[:, :size], view.distances[:, :size]
         return self._rain(

@@ -58,7 +58,7 @@ class FilterDerainer(Method):
     def __call__(
         self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None
     ) -> NDArray[np.bool_]:
-        """Says which points are rain.
+        """Returns which points are rain.
 
         Args:
             points: A Scan, or (N, ≥ 3) numbers: x, y, z in metres, then intensity.
@@ -71,7 +71,7 @@ class FilterDerainer(Method):
         return self.judge(points, stopwatch).rain
 
     def judge(self, points: Scan | NDArray[Any], stopwatch: Stopwatch | None = None) -> Judgement:
-        """Says all that the filter has to say of a scan.
+        """Judges a scan.
 
         Args:
             points: As for calling the filter.
@@ -84,7 +84,7 @@ class FilterDerainer(Method):
         return self.with_warnings(Judgement(rain.astype(np.float32), rain, judged, scan))
 
     def weather(self, points: Scan | NDArray[Any]) -> ScanWeather:
-        """Says how bad the weather is that a scan shows.
+        """Returns the weather that a scan shows.
 
         What was judged already has it as :attr:`Judgement.weather`.
 
@@ -95,7 +95,7 @@ class FilterDerainer(Method):
 
     @property
     def gives_probabilities(self) -> bool:
-        """No: a filter says which points are rain, and no more."""
+        """No: a filter returns which points are rain, and no more."""
         return False
 
     @property
@@ -115,7 +115,7 @@ class FilterDerainer(Method):
     def push(
         self, frame: Frame | Scan | NDArray[Any], stopwatch: Stopwatch | None = None
     ) -> Judgement:
-        """Says what it has to say of the next frame of a recording, at once.
+        """Judges the next frame of a recording, at once.
 
         Args:
             frame: A frame, which is read; or points, as for calling the filter.

@@ -18,7 +18,7 @@ class SOR(PointFilter):
 
     With m the mean distance of a point to the others of its neighbourhood: rain where
     m > mean(m) + ``deviation_multiplier`` · std(m), over all points of the scan, the standard
-    deviation being that of n - 1. A scan of a single point says nothing of what is usual: not rain.
+    deviation being that of n - 1. In a scan of a single point nothing is usual: not rain.
 
     PCL's StatisticalOutlierRemoval decides so with a mean_k of ``neighbours`` - 1. Open3D's
     remove_statistical_outlier with an nb_neighbors of ``neighbours`` takes the point itself into
@@ -50,7 +50,7 @@ class SOR(PointFilter):
     deviation_multiplier: float = 0.01
 
     def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
-        """Says which points are rain; see :class:`PointFilter`."""
+        """Returns which points are rain; see :class:`PointFilter`."""
         if view.size < 2:
             return np.zeros(view.size, bool)
         distance = mean_distance(view, self.neighbours)
@@ -65,8 +65,8 @@ class DSOR(PointFilter):
     With m the mean distance of a point to the others of its neighbourhood: rain where
     m ≥ (mean(m) + ``deviation_multiplier`` · std(m)) · ``range_multiplier`` · range, over all
     points of the scan, the standard deviation being that of n - 1 and the range that in space.
-    What is very near the sensor is rain by this definition. A scan of a single point says nothing
-    of what is usual: not rain.
+    What is very near the sensor is rain by this definition. In a scan of a single point nothing is
+    usual: not rain.
 
     Example:
         >>> scan = derain.read_scan("scan.bin")  # a wall of 800 points and 20 drops before it
@@ -95,7 +95,7 @@ class DSOR(PointFilter):
     range_multiplier: float = 0.05
 
     def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
-        """Says which points are rain; see :class:`PointFilter`."""
+        """Returns which points are rain; see :class:`PointFilter`."""
         if view.size < 2:
             return np.zeros(view.size, bool)
         distance = mean_distance(view, self.neighbours)

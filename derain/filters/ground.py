@@ -31,7 +31,7 @@ BELOW_IT = 0.2
 # Fewer squares show no plane.
 FEWEST_LOW_POINTS = 30
 
-# Distances beyond which points have no say, metres, from the first guess to the last: the rough
+# Distances beyond which points have no weight, metres, from the first guess to the last: the rough
 # plane is a quarter of a metre off, and curbs, snow and bumpers are above this last one.
 SCALES = (0.5, 0.4, 0.3, 0.2, 0.2, 0.2, 0.2)
 

@@ -27,7 +27,7 @@ FILTERS: Registry[type["PointFilter"]] = Registry("derain.filters")
 # thousands would fill the memory.
 MOST_FILTER_NEIGHBOURS = 200
 
-# Beyond any limit that a filter may know, and a square of it is still a number.
+# Beyond any limit of a filter, and a square of it is still a number.
 LARGEST_NUMBER = 1e100
 
 # Smallest and largest value of a parameter, whole numbers or not.
@@ -38,7 +38,7 @@ Span = tuple[int, int] | tuple[float, float]
 RainAndPoints = tuple[NDArray[np.bool_], NDArray[np.int64]]
 
 # Where derain's own filters look for the best number of neighbours. Tuning finds as many of every
-# point as the largest says, and keeps them in memory for all trials.
+# point as the largest asks for, and keeps them in memory for all trials.
 TUNED_NEIGHBOURS: Span = (2, 12)
 
 
@@ -48,7 +48,7 @@ class PointFilter(ABC):
 
     A subclass is a frozen dataclass; its parameters besides ``neighbours`` are numbers, or names.
     It is found by the name that it is registered by, in which there is no dot, for what has a
-    suffix is a file. It brings with it all that there is to know of it::
+    suffix is a file. It brings all that derain needs of it::
 
         @FILTERS.add("near")
         @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class PointFilter(ABC):
 
     @abstractmethod
     def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
-        """Says which points are rain.
+        """Returns which points are rain.
 
         Args:
             view: One scan with at least ``neighbours`` neighbours a point; more are not looked at,
@@ -175,8 +175,8 @@ def rain_among(
 ) -> NDArray[np.bool_]:
     """What a filter calls rain among candidates.
 
-    A filter looks at all points to say what is usual, whether or not they are candidates. So what
-    it says of a candidate is what it says without bounds.
+    A filter looks at all points to find what is usual, whether or not they are candidates. So its
+    verdict on a candidate is that without bounds.
 
     Args:
         filter: The filter.

@@ -55,7 +55,7 @@ class RadiusFilter(PointFilter):
         """
 
     def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
-        """Says which points are rain; see :class:`PointFilter`.
+        """Returns which points are rain; see :class:`PointFilter`.
 
         No radius is searched: at least k points lie within it exactly where the k-th nearest is
         no farther than it.
@@ -126,7 +126,7 @@ class DROR(RadiusFilter):
 
     - variant ``code``, what the authors' program computes:
       ``radius_multiplier`` · 2 · ρ · sin(``azimuth_resolution``);
-    - variant ``paper``, what their paper says:
+    - variant ``paper``, what their paper states:
       ``radius_multiplier`` · ρ · ``azimuth_resolution`` in radians.
 
     The resolution is 0.16° by default, as in the authors' launch file. The 0.04° of their class is
@@ -209,7 +209,7 @@ def has_few_neighbours(
     if not len(unsettled):
         return few
     _, squared = NeighbourSearch(xyz, threads=threads).nearest(unsettled, count)
-    # Rounded to float32 as the distances of the neighbour view are, so that a filter says the same
+    # Rounded to float32 as the distances of the neighbour view are, so that a filter decides alike
     # whether it judges alone or shares a view with others.
     distance = np.sqrt(squared[:, count - 1].astype(np.float32))
     few[unsettled] = distance > radius[unsettled]

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Features from -1 to 1 above the first are rain, and those up to the second are not, whatever the
-# neighbours say.
+# neighbours are.
 # Source: CRFOR.
 CERTAIN, RULED_OUT = 0.6, -0.4
 
-# What a neighbour says is divided by its distance and this, metres.
+# The vote of a neighbour is divided by its distance and this, metres.
 # Source: CRFOR.
 DISTANCE_FLOOR = 0.01
 
@@ -25,12 +25,11 @@ def decide_sequentially(
 
     A point of an uncertain feature F is rain where F + Σ v / (0.01 m + d) > 0, over its neighbours
     at distances d. A neighbour's v is ``vote`` where it is rain and -``vote`` where it is not, as
-    far as its feature or an earlier decision says; else it is its feature.
+    far as its feature or an earlier decision shows; else it is its feature.
 
     All that may be rain is taken for it first. Then what must turn is turned, wave by wave. A turn
     bears on later points alone, and makes none of them rain; so the waves end where a loop over
-    the points in their order would. Most points say the same whatever is said to them, and are
-    asked but once.
+    the points in their order would. Most points are decided once, whatever their neighbours are.
 
     Args:
         feature: Feature of all points, float64 (M,), from -1 to 1.
@@ -78,9 +77,9 @@ def _turn_in_waves(
         is_rain: What the U uncertain points are taken for, bool (U,); decided in place.
         open_: Numbers of the H points whose verdicts are open, int64 (H,).
         own: Their features, float64 (H,).
-        votes: What is said to them while all before them are rain, float64 (k - 1, H); changed in
+        votes: The votes for them while all before them are rain, float64 (k - 1, H); changed in
             place.
-        at_least: What is said to them where none before them is, float64 (k - 1, H).
+        at_least: The votes for them where none before them is, float64 (k - 1, H).
         dependents: Which of them hear of whose decision.
     """
     turned = np.flatnonzero(~is_rain)
@@ -100,10 +99,10 @@ def _by_point(points: int, rows: NDArray[np.int64], values: NDArray[np.int64]) -
 
 
 def _total(own: NDArray[np.float64], votes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What points have of themselves and what is said to each, from the nearest neighbour on.
+    """The features of points and the votes for each, from the nearest neighbour on.
 
-    Sums that are rounded in one order keep the order of their terms: where less is said, the total
-    is no more.
+    Sums that are rounded in one order keep the order of their terms: where votes are less, the
+    total is no more.
 
     Args:
         own: float64 (U,).

@@ -50,7 +50,7 @@ class SSR(PointFilter):
     threshold: float = 2.5
 
     def judge(self, view: Neighbourhoods) -> NDArray[np.bool_]:
-        """Says which points are rain; see :class:`PointFilter`.
+        """Returns which points are rain; see :class:`PointFilter`.
 
         Args:
             view: One scan; its intensities are not numbers where it has none.

@@ -50,7 +50,7 @@ def seem_distinct(numbers: NDArray[np.uint32]) -> bool:
     """Whether a sample shows that next to none of the numbers repeats another.
 
     The sample is of values, not of places, so that it has all that equal one of it. Of few numbers
-    nothing is said.
+    the answer is no.
 
     Args:
         numbers: uint32 (N,).

@@ -1,8 +1,8 @@
 """Where each ray of a scan ends, and whether at rain.
 
 Returns in one direction are of one ray: the copies of a return that dual-return sensors write, and
-what stands behind a drop. They are told by direction alone, which takes a small part of the time of
-:func:`derain.views.returns.pair_returns`, which says which return is which.
+what stands behind a drop. They are found by direction alone, in a small part of the time of
+:func:`derain.views.returns.pair_returns`, which also finds which return is which.
 """
 
 import numpy as np

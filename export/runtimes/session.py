@@ -50,7 +50,7 @@ class Session(ABC):
 
     Attributes:
         NAME: The runtime's name; the decorator sets it.
-        PACKAGE: What is installed to have it, whose version a report of times says.
+        PACKAGE: The package that it is installed by, whose version a report of times states.
         PRECISIONS: What it can compute in, on some processors at least.
         DROPS_UNUSED_INPUTS: Whether ``inputs`` leaves out what the network has no use for.
 
@@ -82,7 +82,7 @@ class Session(ABC):
         """The network's first output, an array of its own.
 
         Args:
-            inputs: Arrays by name, of the types that ``inputs`` says, and any that were dropped.
+            inputs: Arrays by name, of the types of ``inputs``, and any that were dropped.
 
         Raises:
             Exception: Whatever the runtime raises where the network fails.
@@ -92,7 +92,7 @@ class Session(ABC):
     def cannot_run(cls, file: ModelFile, error: Exception) -> InputError:
         """What to raise of a graph that the runtime does not take."""
         lines = [line for line in str(error).splitlines() if line.strip()]
-        # OpenVINO begins with lines that say where in its own sources it stopped.
+        # OpenVINO begins with lines on the place in its own sources where it stopped.
         reason = next((line for line in lines if not line.startswith("Exception from")), "")
         return InputError(
             file.path,
