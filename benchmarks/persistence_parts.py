@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading
-from derain.datamodules.labelled import NamedScans
+from derain.datamodules.labelled import named_scans
 from derain.evaluation.counts import Counts
 from derain.recordings.evidence import (
     RayEvidence,
@@ -47,7 +47,7 @@ def main() -> None:
     parser.add_argument("data", nargs="+", type=Path, help="a recording or more")
     arguments = parser.parse_args()
     card = load_card(arguments.card)
-    data = NamedScans(arguments.data, card, Loading())
+    data = named_scans(arguments.data, card, Loading())
     counts: dict[str, list[Counts]] = defaultdict(list)
     for recording in recordings_of(with_poses(data.source("test"))):
         for frame, points, windows in _seen(recording):

@@ -23,7 +23,7 @@ from sklearn.linear_model import LogisticRegression
 
 from derain.cards.card import load_card
 from derain.datamodules.base import Loading
-from derain.datamodules.labelled import NamedScans
+from derain.datamodules.labelled import named_scans
 from derain.recordings.evidence import mean_evidence, ray_evidence, surroundings_features
 from derain.recordings.known_points import ScanPoints
 from derain.sources.frame import Frame
@@ -54,7 +54,7 @@ def main() -> None:
 def _described(roots: list[Path]) -> Iterator[Described]:
     """What is known of each scan that has others before and after it."""
     card = load_card("simulated")
-    data = NamedScans(roots, card, Loading())
+    data = named_scans(roots, card, Loading())
     for recording in recordings_of(data.source("test")):
         scans = [data.read(frame) for frame in recording]
         points = [ScanPoints.of(scan, usable_cores()) for scan in scans]

@@ -17,6 +17,7 @@ from derain.scan import Scan
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
 from derain.sources.spread import evenly_spaced
+from derain.sources.training_record import record_of_scans
 
 __all__ = ["Loading", "Part", "ScanDataModule"]
 
@@ -89,6 +90,10 @@ class ScanDataModule(ScanData, lightning.LightningDataModule):
         frames = with_needed_labels(self.source("train"), "train", labelled)
         reader = FrameReader(self.card, self.loading.intensity_scale, columns)
         return map(reader.read, evenly_spaced(frames, most))
+
+    def training_record(self) -> dict[str, tuple[str, ...]]:
+        """The training scans, as the Spec of a model that is trained on them records them."""
+        return record_of_scans(self.source("train"))
 
     def train_dataloader(self) -> DataLoader[Sample | InputError]:
         """Training scans, in a new order and newly augmented every epoch."""

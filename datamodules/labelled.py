@@ -4,15 +4,16 @@ Nothing here loads torch.
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from derain.annotation.manifest import CARD, is_taught
+from derain.annotation.manifest import CARD, Manifest, is_taught
 from derain.cards.card import DataCard, load_card, packaged_cards
 from derain.cards.known import card_by_folders, layouts_for
 from derain.cards.layout import Layout
-from derain.datamodules.scan_data import Loading, Part, ScanData, SequenceData, TaughtData
+from derain.datamodules.scan_data import Loading, Part, ScanData, split_source, taught_source
 from derain.errors import InputError
 from derain.files.documents import Entry
 from derain.simulation.manifest import RAIN_RATE, manifest_of, rates_of_sequences, read_manifest
@@ -20,33 +21,37 @@ from derain.sources.folders import find_layout, named_frames
 from derain.sources.source import Source
 
 
-class NamedScans(ScanData):
-    """Scans named one by one or by their folders, the same ones for every part.
-
-    A scan's labels are ``<stem>.label`` beside it or in the sibling folder of labels.
+class LabelledScans(ScanData):
+    """Labelled scans that a user names.
 
     Args:
-        paths: Scans, folders with scans directly in them, and sequences.
-        card: Data card of the scans. Its layout is the first to be searched for sequences and
-            labels.
+        card: Data card of the scans.
         loading: How the scans are read.
+        source_of: Returns the scans of a part.
+        has_parts: Whether the parts differ; where not, every part is all scans.
     """
 
-    def __init__(self, paths: Sequence[Path], card: DataCard, loading: Loading) -> None:
+    def __init__(
+        self,
+        card: DataCard,
+        loading: Loading,
+        source_of: Callable[[Part], Source],
+        has_parts: bool = True,
+    ) -> None:
         super().__init__(card, loading)
-        self.paths = paths
+        self.has_parts = has_parts
+        self._source_of = source_of
 
     def source(self, part: Part) -> Source:
-        """The scans, in the order of their names on the command line; a folder's sorted by name.
+        """The scans of a part, in order, and where their labels should be.
 
         Raises:
-            InputError: A path that does not exist, or a folder without scans.
+            InputError: Missing folders or scans.
         """
-        layouts = layouts_for(self.card)
-        return named_frames(self.paths, self.loading.columns, labelled=True, layouts=layouts)
+        return self._source_of(part)
 
 
-def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> ScanData:
+def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> LabelledScans:
     """The scans that a command's ``--data`` names.
 
     Args:
@@ -63,7 +68,7 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> S
     taught = [path for path in paths if is_taught(path)]
     roots = taught or [path for path in paths if os.path.isdir(path / card.layout.sequences)]
     if not roots:
-        return NamedScans(paths, card, loading)
+        return named_scans(paths, card, loading)
     root = roots[0]
     if len(paths) > 1:
         raise InputError(
@@ -72,9 +77,29 @@ def labelled_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> S
             "Name it alone, or its sequences one by one.",
         )
     if taught:
-        return TaughtData(str(root), loading)
-    split = read_manifest(root).get("split")
-    return SequenceData(str(root), card, _layout_of(root, card), split, loading)
+        source_of = partial(taught_source, root, Manifest.read(root))
+        return LabelledScans(load_card(root / CARD), loading, source_of)
+    split = read_manifest(root).get("split") or card.split
+    source_of = partial(split_source, root, _layout_of(root, card), split, loading.columns)
+    return LabelledScans(card, loading, source_of)
+
+
+def named_scans(paths: Sequence[Path], card: DataCard, loading: Loading) -> LabelledScans:
+    """Scans named one by one or by their folders, the same ones for every part.
+
+    A scan's labels are ``<stem>.label`` beside it or in the sibling folder of labels.
+
+    Args:
+        paths: Scans, folders with scans directly in them, and sequences.
+        card: Data card of the scans. Its layout is the first to be searched for sequences and
+            labels.
+        loading: How the scans are read.
+    """
+
+    def source_of(part: Part) -> Source:
+        return named_frames(paths, loading.columns, labelled=True, layouts=layouts_for(card))
+
+    return LabelledScans(card, loading, source_of, has_parts=False)
 
 
 def card_of(paths: Sequence[Path], name: str | None) -> DataCard:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from torch.utils.data import DataLoader
@@ -68,19 +68,29 @@ class Mixture(ScanDataModule):
         loading: Loading = Loading(),
     ) -> None:
         _check_parts(parts)
+        weights = weights or {}
+        measured = list(parts) if measured is None else measured
+        for name in (*weights, *measured):
+            if name not in parts:
+                raise InputError(f"part '{name}'", "there is none", f"Parts: {', '.join(parts)}.")
+        for name, weight in weights.items():
+            if not (math.isfinite(weight) and weight > 0):
+                raise InputError(
+                    f"part '{name}'",
+                    f"its weight is {weight:g}",
+                    "Give a number greater than 0, or leave the part out.",
+                )
+        if scans_per_epoch is not None and scans_per_epoch < 1:
+            raise InputError("scans_per_epoch", f"is {scans_per_epoch}", "Give 1 or more.")
         if loading.intensity_scale != 1:
             raise InputError(
                 "loading.intensity_scale", "would be that of all parts", "Give it to each part."
             )
         super().__init__(mixed_card(_cards(parts)), loading)
         self.parts = parts
-        _check_weights(parts, weights or {})
-        self.weights = {name: float((weights or {}).get(name, 1)) for name in parts}
-        if scans_per_epoch is not None and scans_per_epoch < 1:
-            raise InputError("scans_per_epoch", f"is {scans_per_epoch}", "Give 1 or more.")
+        self.weights = {name: float(weights.get(name, 1)) for name in parts}
         self.scans_per_epoch = scans_per_epoch
-        self.measured = list(parts) if measured is None else measured
-        _refuse_strangers("measured", self.measured, parts)
+        self.measured = measured
 
     @property
     def shares(self) -> list[float]:
@@ -214,27 +224,4 @@ def _check_parts(parts: Mapping[str, ScanDataModule]) -> None:
         names = ", ".join(dict.fromkeys(part.card.name for part in parts.values()))
         raise InputError(
             "parts", f"no class of {names} is rain", "Give a part with rain, or another card."
-        )
-
-
-def _check_weights(parts: Mapping[str, ScanDataModule], weights: Mapping[str, float]) -> None:
-    _refuse_strangers("weights", weights, parts)
-    for name, weight in weights.items():
-        if not (math.isfinite(weight) and weight > 0):
-            raise InputError(
-                f"part '{name}'",
-                f"its weight is {weight:g}",
-                "Give a number greater than 0, or leave the part out.",
-            )
-
-
-def _refuse_strangers(
-    subject: str, names: Collection[str], parts: Mapping[str, ScanDataModule]
-) -> None:
-    strangers = [name for name in names if name not in parts]
-    if strangers or (subject == "measured" and not names):
-        raise InputError(
-            subject,
-            f"{strangers[0]!r} is no part" if strangers else "names no part",
-            f"Parts are {', '.join(parts)}.",
         )

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from derain.annotation.manifest import CARD, FEWEST_SCANS, HELD_OUT_PART, TRAINING_PART, Manifest
-from derain.cards.card import DataCard, load_card
+from derain.annotation.manifest import FEWEST_SCANS, HELD_OUT_PART, TRAINING_PART, Manifest
+from derain.cards.card import DataCard
 from derain.cards.layout import Layout
 from derain.datamodules.augmentation import Augmentation
 from derain.errors import InputError
@@ -20,7 +20,6 @@ from derain.sources.folders import sequence_frames
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.source import Source
-from derain.sources.training_record import record_of_scans, record_of_sequences
 
 Part = Literal["train", "validation", "test", "predict"]
 
@@ -53,12 +52,10 @@ class Loading:
     cache_mb: int = 512
 
     def __post_init__(self) -> None:
-        least = {"batch_size": 1, "workers": 0, "cache_mb": 0}
-        for name, fewest in least.items():
-            if getattr(self, name) < fewest:
-                raise InputError(
-                    name, f"{getattr(self, name)} is too few", f"Give {fewest} or more."
-                )
+        for name, fewest in {"batch_size": 1, "workers": 0, "cache_mb": 0}.items():
+            value = getattr(self, name)
+            if value < fewest:
+                raise InputError(name, f"{value} is too few", f"Give {fewest} or more.")
 
     def counts_once(self, card: DataCard) -> bool:
         """Whether points at one position are measured once."""
@@ -114,10 +111,6 @@ class ScanData(ABC):
         """
         return (self._reader.read_distinct if self.distinct else self._reader.read)(frame)
 
-    def training_record(self) -> dict[str, tuple[str, ...]]:
-        """The training scans, as the Spec of a model that is trained on them records them."""
-        return record_of_scans(self.source("train"))
-
     @property
     def _reads_labels(self) -> bool:
         """Whether training and validation need labels."""
@@ -126,99 +119,6 @@ class ScanData(ABC):
     @property
     def _reader(self) -> FrameReader:
         return FrameReader(self.card, self.loading.intensity_scale)
-
-
-class SequenceData(ScanData):
-    """Scans and labels in sequences, which a split assigns to train, validation and test.
-
-    Args:
-        root: Folder of the data set.
-        card: Data card of the scans.
-        layout: Names of its folders.
-        split: Sequences of ``train``, ``validation`` and ``test``; by default the data card's.
-        loading: How the scans are read and batched.
-    """
-
-    def __init__(
-        self,
-        root: str,
-        card: DataCard,
-        layout: Layout,
-        split: Mapping[str, Sequence[str]] | None,
-        loading: Loading,
-    ) -> None:
-        super().__init__(card, loading)
-        self.root = Path(root)
-        self.layout = layout
-        self.split = split or card.split
-
-    def source(self, part: Part) -> Source:
-        """The scans of a part's sequences, in order; for prediction those of the test part.
-
-        Raises:
-            InputError: A missing sequence or scan folder.
-        """
-        sequences = self.split.get("test" if part == "predict" else part, ())
-        if not sequences:
-            raise InputError(self.root, f"no sequences are named for {part}", "Give a split.")
-        return sequence_frames(
-            [self._folder(name) for name in sequences], self.layout, self.loading.columns
-        )
-
-    def training_record(self) -> dict[str, tuple[str, ...]]:
-        """The training scans, recorded by the names of their sequences.
-
-        Simulated sequences have the same names in every data set: their scans are recorded instead.
-        """
-        if self.card.simulated:
-            return super().training_record()
-        return record_of_sequences(self.split.get("train", ()))
-
-    def _folder(self, name: str) -> Path:
-        folder = self.root / self.layout.sequences / name
-        if not (folder / self.layout.scans).is_dir():
-            raise InputError(
-                folder / self.layout.scans,
-                f"no such folder, though the split names sequence {name}",
-                "Check the root. If only some sequences are there, give `derain fit` a "
-                "--data.split, and other commands the folders of scans.",
-            )
-        return folder
-
-
-class TaughtData(ScanData):
-    """Recordings that ``derain teach`` labelled; the held-out scans are the validation part.
-
-    Args:
-        root: The folder that ``derain teach`` wrote.
-        loading: How the scans are read; their columns and the unit of their intensities are those
-            that the teacher read.
-
-    Raises:
-        InputError: No such folder, or one that is damaged or not complete.
-    """
-
-    def __init__(self, root: str, loading: Loading = Loading()) -> None:
-        self.root = Path(root)
-        self.manifest = Manifest.read(self.root)
-        super().__init__(load_card(self.root / CARD), loading)
-
-    def source(self, part: Part) -> Source:
-        """The scans of a part, in order: the held-out ones for every part but ``train``.
-
-        Raises:
-            InputError: No scan was held out.
-        """
-        wanted = TRAINING_PART if part == "train" else HELD_OUT_PART
-        frames = self.manifest.frames(self.root, wanted)
-        if not len(frames):
-            raise InputError(
-                self.root,
-                f"none of its labelled scans is for {part}",
-                f"Of a sequence with {FEWEST_SCANS} or more labelled scans the last ones are held "
-                "out: see what `derain teach` warned of.",
-            )
-        return frames
 
 
 def with_needed_labels(source: Source, part: Part, reads_labels: bool) -> Source:
@@ -242,3 +142,61 @@ def with_needed_labels(source: Source, part: Part, reads_labels: bool) -> Source
     for frame in source:
         frame.require_labels()
     return source
+
+
+def split_source(
+    root: Path,
+    layout: Layout,
+    split: Mapping[str, Sequence[str]],
+    columns: Sequence[str],
+    part: Part,
+) -> Source:
+    """The scans of the sequences that a split assigns to a part; prediction has those of the test.
+
+    Args:
+        root: Folder of the data set.
+        layout: Names of its folders.
+        split: Sequences of ``train``, ``validation`` and ``test``.
+        columns: Names of the columns of files that do not name them.
+        part: The part.
+
+    Raises:
+        InputError: A part without sequences, or a missing sequence or scan folder.
+    """
+    sequences = split.get("test" if part == "predict" else part, ())
+    if not sequences:
+        raise InputError(
+            root, f"no sequences are named for {part}", "Give a split, or simulate more sequences."
+        )
+    folders = [root / layout.sequences / name for name in sequences]
+    for folder in folders:
+        if not (folder / layout.scans).is_dir():
+            raise InputError(
+                folder / layout.scans,
+                f"no such folder, though the split names sequence {folder.name}",
+                "Check the root. If only some sequences are there, give `derain fit` a "
+                "--data.split, and other commands the folders of scans.",
+            )
+    return sequence_frames(folders, layout, columns)
+
+
+def taught_source(root: Path, manifest: Manifest, part: Part) -> Source:
+    """The scans of a part that a teacher labelled: the held-out ones for every part but ``train``.
+
+    Args:
+        root: The folder that ``derain teach`` wrote.
+        manifest: Its manifest.
+        part: The part.
+
+    Raises:
+        InputError: No scan was held out.
+    """
+    frames = manifest.frames(root, TRAINING_PART if part == "train" else HELD_OUT_PART)
+    if not len(frames):
+        raise InputError(
+            root,
+            f"none of its labelled scans is for {part}",
+            f"Of a sequence with {FEWEST_SCANS} or more labelled scans the last ones are held "
+            "out: see what `derain teach` warned of.",
+        )
+    return frames

@@ -1,11 +1,17 @@
 """Data modules of scans in sequences."""
 
-from derain.cards.card import load_card
-from derain.datamodules.base import Loading, ScanDataModule
-from derain.datamodules.scan_data import SequenceData
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from derain.cards.card import DataCard, load_card
+from derain.cards.layout import Layout
+from derain.datamodules.base import Loading, Part, ScanDataModule
+from derain.datamodules.scan_data import split_source
+from derain.sources.source import Source
+from derain.sources.training_record import record_of_sequences
 
 
-class SequenceDataModule(SequenceData, ScanDataModule):
+class SequenceDataModule(ScanDataModule):
     """Scans and labels in sequences, which a split assigns to train, validation and test.
 
     Args:
@@ -15,6 +21,36 @@ class SequenceDataModule(SequenceData, ScanDataModule):
         split: Sequences of ``train``, ``validation`` and ``test``; by default the data card's.
         loading: How the scans are read and batched.
     """
+
+    def __init__(
+        self,
+        root: str,
+        card: DataCard,
+        layout: Layout,
+        split: Mapping[str, Sequence[str]] | None,
+        loading: Loading,
+    ) -> None:
+        super().__init__(card, loading)
+        self.root = Path(root)
+        self.layout = layout
+        self.split = split or card.split
+
+    def source(self, part: Part) -> Source:
+        """The scans of a part's sequences, in order; for prediction those of the test part.
+
+        Raises:
+            InputError: A missing sequence or scan folder.
+        """
+        return split_source(self.root, self.layout, self.split, self.loading.columns, part)
+
+    def training_record(self) -> dict[str, tuple[str, ...]]:
+        """The training scans, recorded by the names of their sequences.
+
+        Simulated sequences have the same names in every data set: their scans are recorded instead.
+        """
+        if self.card.simulated:
+            return super().training_record()
+        return record_of_sequences(self.split.get("train", ()))
 
 
 class Sequences(SequenceDataModule):

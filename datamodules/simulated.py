@@ -3,14 +3,13 @@
 from pathlib import Path
 
 from derain.cards.card import load_card
-from derain.datamodules.base import Loading, Part
+from derain.datamodules.base import Loading
 from derain.datamodules.sequences import SequenceDataModule
 from derain.errors import InputError
 from derain.simulation.campaign import Campaign
 from derain.simulation.dataset import ensure_track
 from derain.simulation.manifest import read_manifest
 from derain.simulation.world import WorldCampaign
-from derain.sources.source import Source
 from derain.system.cores import usable_cores
 
 
@@ -36,8 +35,16 @@ class SimulatedDataModule(SequenceDataModule):
         loading: Loading,
         workers: int = 1,
     ) -> None:
-        split = campaign.split if make else _split_of(Path(root))
-        card = load_card("simulated")
+        card, split = load_card("simulated"), campaign.split
+        if not make:
+            manifest = read_manifest(Path(root))
+            if not {"files", "split"} <= manifest.keys():
+                raise InputError(
+                    root,
+                    "holds no complete simulated data set",
+                    "Make it with `derain simulate --out`.",
+                )
+            split = manifest["split"]
         super().__init__(root, card, card.layout, split, loading)
         self.campaign = campaign
         self.make = make
@@ -51,20 +58,6 @@ class SimulatedDataModule(SequenceDataModule):
         """
         if self.make:
             ensure_track(self.root, self.campaign, self.workers)
-
-    def source(self, part: Part) -> Source:
-        """The scans of a part's sequences, in order; for prediction those of the test part.
-
-        Raises:
-            InputError: A missing sequence or scan folder, or too few sequences for such a part.
-        """
-        if not self.split["test" if part == "predict" else part]:
-            raise InputError(
-                self.root,
-                f"no sequence is for {part}",
-                "Simulate three sequences or more, or ask for some for it.",
-            )
-        return super().source(part)
 
 
 class Simulated(SimulatedDataModule):
@@ -95,15 +88,3 @@ class Simulated(SimulatedDataModule):
         loading: Loading = Loading(),
     ) -> None:
         super().__init__(root, campaign, make, loading)
-
-
-def _split_of(root: Path) -> dict[str, list[str]]:
-    manifest = read_manifest(root)
-    if not {"files", "split"} <= manifest.keys():
-        raise InputError(
-            root,
-            "holds no complete simulated data set",
-            "Make it with `derain simulate --out`.",
-        )
-    split: dict[str, list[str]] = manifest["split"]
-    return split

@@ -1,14 +1,18 @@
 """The data module of recordings that a teacher labelled."""
 
-from derain.datamodules.base import Part, ScanDataModule
-from derain.datamodules.scan_data import TaughtData
+from pathlib import Path
+
+from derain.annotation.manifest import CARD, Manifest
+from derain.cards.card import load_card
+from derain.datamodules.base import Loading, Part, ScanDataModule
+from derain.datamodules.scan_data import taught_source
 from derain.sources.source import Frames, Source
 
 # Scans of a training epoch, at least: the learning rates are chosen for so many steps.
 FEWEST_SHOWN = 16
 
 
-class Taught(TaughtData, ScanDataModule):
+class Taught(ScanDataModule):
     """Scans with a teacher's labels; the held-out scans are the validation part.
 
     Points of which the teacher is not sure are left out, in training and in measuring. Scores are
@@ -33,6 +37,19 @@ class Taught(TaughtData, ScanDataModule):
     Raises:
         InputError: No such folder, or one that is damaged or not complete.
     """
+
+    def __init__(self, root: str, loading: Loading = Loading()) -> None:
+        self.root = Path(root)
+        self.manifest = Manifest.read(self.root)
+        super().__init__(load_card(self.root / CARD), loading)
+
+    def source(self, part: Part) -> Source:
+        """The scans of a part, in order: the held-out ones for every part but ``train``.
+
+        Raises:
+            InputError: No scan was held out.
+        """
+        return taught_source(self.root, self.manifest, part)
 
     def epoch_source(self, part: Part) -> Source:
         """The scans of a part; those of a short training recording several times an epoch.

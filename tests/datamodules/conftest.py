@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from derain.datamodules.base import ScanDataModule
+from derain.datamodules.base import Loading, ScanDataModule
+from derain.datamodules.folder import Folder
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
 from derain.files.labels import write_labels
@@ -15,6 +17,8 @@ from derain.learning.task import agree_on_task
 from derain.models.base import DerainingModule
 from derain.models.outdet import OutDet
 from derain.scan import Scan
+
+Connect = Callable[..., ScanDataModule]
 
 
 @pytest.fixture
@@ -36,7 +40,7 @@ def write() -> Callable[..., None]:
 
 
 @pytest.fixture
-def connect() -> Callable[..., ScanDataModule]:
+def connect() -> Connect:
     """Has a data module agree with a model, by default 3D-OutDet, as a trainer would."""
 
     def connect(
@@ -46,3 +50,17 @@ def connect() -> Callable[..., ScanDataModule]:
         return data
 
     return connect
+
+
+@pytest.fixture
+def folder(tmp_path: Path, write: Callable[..., None]) -> Callable[..., Folder]:
+    """Makes a data module of six scans of 40, 41, ... points, a third of them snow of WADS."""
+    for number in range(6):
+        file = tmp_path / f"{number}.bin"
+        write(file, file.with_suffix(".label"), [0, 110, 111], scene(40 + number, seed=number))
+
+    def make(**loading: Any) -> Folder:
+        everything = {part: ["*.bin"] for part in ("train", "validation", "test")}
+        return Folder(str(tmp_path), "wads", **everything, loading=Loading(**loading))
+
+    return make

@@ -1,7 +1,6 @@
 """Augmentation turns, jitters, mirrors and thins a scan, and changes nothing else about it."""
 
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,11 +9,8 @@ from hypothesis import strategies as st
 
 from derain.datamodules.augmentation import Augmentation
 from derain.evaluation.hard_cases import hard_cases, scene
-from derain.files import read_scan
 from derain.scan import Scan
 from derain.views.channels import INTENSITY_RANK, channel_of, with_columns
-from derain.views.grid_fit import fit_grid
-from derain.views.range_image import RangeView
 
 HARD_CASES = dict(hard_cases(largest=5000))
 TURN = Augmentation(rotation_probability=1, jitter_probability=0)
@@ -109,38 +105,21 @@ def test_what_is_seen_stays_where_a_network_looks_that_does_not_see_all_around(
     np.testing.assert_allclose(within, expected[::-1] if mirrored else expected, atol=1e-2)
 
 
-@pytest.mark.parametrize("front", ["kitti_front.bin", "hesai_at128_front.pcd"])
-def test_a_front_view_stays_in_the_image_that_is_fitted_to_it(shared: Path, front: str) -> None:
-    scan = read_scan(shared / "data/clean" / front)
-    view = RangeView(fit_grid([scan]).grid)
-    default, rng = Augmentation(mirror_probability=0.5), np.random.default_rng(0)
-    points = scan.valid.sum()
-    for _ in range(10):
-        inside = view(default(scan, rng, view.azimuth)).pixel >= 0
-        assert inside.sum() > 0.99 * points  # the jitter may take the outermost across the border
-
-
-def test_everything_else_stays() -> None:
-    scan = street()
-    before = scan.xyz.copy()
-    changed = BOTH(scan, np.random.default_rng(0))
-    np.testing.assert_array_equal(changed.intensity, scan.intensity)
-    np.testing.assert_array_equal(changed.label, scan.label)
-    assert changed.xyz.dtype == np.float32
-    np.testing.assert_array_equal(scan.xyz, before)
-
-
 @pytest.mark.parametrize("scan", HARD_CASES.values(), ids=HARD_CASES)
 def test_points_that_cannot_be_judged_stay_as_they_are(scan: Scan) -> None:
+    before = scan.xyz.copy()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        changed, mirrored, dropped = (
-            each(scan, np.random.default_rng(0)) for each in (BOTH, MIRROR, DROP)
+        changed, mirrored, dropped, _ = (
+            each(scan, np.random.default_rng(0)) for each in (BOTH, MIRROR, DROP, SECTOR)
         )
+    assert changed.xyz.dtype == np.float32
+    np.testing.assert_array_equal(scan.xyz, before)
     np.testing.assert_array_equal(mirrored.valid, scan.valid)
     assert dropped.valid.sum() <= scan.valid.sum()
     np.testing.assert_array_equal(changed.valid, scan.valid)
     np.testing.assert_array_equal(changed.xyz[~scan.valid], scan.xyz[~scan.valid])
+    np.testing.assert_array_equal(changed.intensity, scan.intensity)
     assert (changed.xyz[scan.valid] != scan.xyz[scan.valid]).any() or not scan.valid.any()
 
 
@@ -158,11 +137,6 @@ def test_a_sector_is_all_that_there_is_between_two_azimuths(seed: int) -> None:
     off = np.abs((azimuth[:, None] - middles + 180) % 360 - 180)
     inside, outside = off[rows].max(axis=0) <= 35.3, off[left].min(axis=0, initial=180) >= 34.7
     assert (inside & outside).any()
-
-
-def test_a_sector_of_nothing_is_nothing() -> None:
-    nothing = Scan.of(np.full((3, 4), np.nan))
-    assert len(SECTOR(nothing, np.random.default_rng(0))) == 3
 
 
 def test_other_intensities_are_alike_inverted_or_of_few_levels_and_all_else_stays() -> None:

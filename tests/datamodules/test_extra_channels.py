@@ -1,16 +1,12 @@
 """Columns of fused scans reach the models that name them, and no other."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from derain.datamodules.augmentation import Augmentation
 from derain.datamodules.base import Loading
 from derain.datamodules.folder import Folder
-from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.files import write_scan
 from derain.files.labels import write_labels
@@ -21,14 +17,11 @@ from derain.scan import Scan
 COLUMNS = ("x", "y", "z", "intensity", "radar", "doppler", "rcs")
 CARD = "name: fused\nclasses: {0: other, 3: rain}\nrain: [3]\n"
 
-MakeFolder = Callable[..., Folder]
-
 
 def fused(seed: int, points: int = 60) -> Scan:
     """A scan whose last ten points are a radar's."""
     rng = np.random.default_rng(seed)
-    columns = dict(zip("xyz", scene(points, seed).T[:3], strict=True))
-    columns["intensity"] = scene(points, seed)[:, 3]
+    columns = dict(zip(COLUMNS[:4], scene(points, seed).T, strict=True))
     is_radar = np.arange(points) >= points - 10
     columns["radar"] = np.float32(is_radar)
     for name in ("doppler", "rcs"):
@@ -37,29 +30,20 @@ def fused(seed: int, points: int = 60) -> Scan:
 
 
 @pytest.fixture(params=["bin", "npz"])
-def folder(request: pytest.FixtureRequest, tmp_path: Path) -> MakeFolder:
-    """Makes a data module of three fused scans in a format."""
+def data(request: pytest.FixtureRequest, tmp_path: Path) -> Folder:
+    """A data module of three fused scans in a format."""
     for number in range(3):
         path = tmp_path / f"{number}.{request.param}"
         write_scan(path, fused(number))
         write_labels(path.with_suffix(".label"), np.arange(60) % 2 * 3)
     (tmp_path / "card.yaml").write_text(CARD)
-
-    def make(**loading: Any) -> Folder:
-        parts = {part: [f"*.{request.param}"] for part in ("train", "validation", "test")}
-        loading = {"columns": COLUMNS, **loading}
-        return Folder(
-            str(tmp_path), str(tmp_path / "card.yaml"), **parts, loading=Loading(**loading)
-        )
-
-    return make
+    parts = {part: [f"*.{request.param}"] for part in ("train", "validation", "test")}
+    loading = Loading(columns=COLUMNS)
+    return Folder(str(tmp_path), str(tmp_path / "card.yaml"), **parts, loading=loading)
 
 
-def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(
-    folder: MakeFolder,
-) -> None:
+def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(data: Folder) -> None:
     model = OutDet(channels=("x", "y", "z", "intensity", "rcs", "radar", "doppler"))
-    data = folder()
     agree_on_task(model, data)
     scans = [fused(number) for number in range(3)]
     for name in ("radar", "doppler", "rcs"):
@@ -79,43 +63,14 @@ def test_extra_channels_are_measured_and_batched_for_a_model_that_names_them(
             np.testing.assert_array_equal(points[~known, place], np.float32(model.spec.mean[place]))
 
 
-def test_a_model_that_names_none_is_given_none(folder: MakeFolder) -> None:
-    data = folder()
+def test_a_model_that_names_none_is_given_none(data: Folder) -> None:
     assert set(data.read(data.frames("train")[0]).fields) == set(COLUMNS)  # without a model: all
     agree_on_task(OutDet(), data)
     assert data.card.extra == {}
     assert data.read(data.frames("train")[0]).fields == {}
 
 
-def test_columns_stay_with_their_points_where_training_drops_and_turns_points(
-    folder: MakeFolder,
-) -> None:
-    model = OutDet(channels=("x", "y", "z", "intensity", "rcs"))
-    data = folder(augmentation=Augmentation(dropping_probability=1, dropping=0.5))
-    agree_on_task(model, data)
-    lost = 0
-    loader = data.train_dataloader()
-    for pick in loader.sampler:
-        scan = loader.dataset[pick].scan
-        lost += 60 - len(scan)
-        by_intensity = {
-            original.intensity[row]: original.fields["rcs"][row]
-            for original in map(fused, range(3))
-            for row in range(60)
-        }
-        expected = [by_intensity[intensity] for intensity in scan.intensity]
-        np.testing.assert_array_equal(scan.channel("rcs"), expected)
-    assert lost > 0
-
-
-def test_a_channel_that_the_scans_have_not_is_one_error_before_training(folder: MakeFolder) -> None:
-    model = OutDet(channels=("x", "y", "z", "dopler"))
-    with pytest.raises(InputError, match="channel 'dopler': no training scan holds a number"):
-        agree_on_task(model, folder())
-
-
-def test_what_the_card_says_of_a_channel_is_not_measured(folder: MakeFolder) -> None:
-    data = folder()
+def test_what_the_card_says_of_a_channel_is_not_measured(data: Folder) -> None:
     data.card = data.card.completed(extra={"rcs": (1.0, 2.0)})
     agree_on_task(OutDet(channels=("x", "y", "z", "rcs", "doppler")), data)
     assert set(data.card.extra) == {"rcs", "doppler"}

@@ -17,7 +17,7 @@ from derain.evaluation.hard_cases import scene
 from derain.learning.task import agree_on_task
 from derain.models.outdet import OutDet
 from derain.scan import Scan
-from derain.sources.frame import Frame, MemoryFrame
+from derain.sources.frame import MemoryFrame
 from derain.sources.source import Frames
 from derain.views.neighbours import NeighbourView
 from derain.views.window import Window, WindowOfScans
@@ -76,16 +76,6 @@ def test_a_window_reaches_over_no_gap() -> None:
         view_in_window(view, gap[number].read(), gap, number, lambda frame: frame.read())
     around = [[which(placed.scan) for placed in (*w.before, w.judged, *w.after)] for w in told]
     assert around == [[0, 1], [0, 1], [3, 4], [3, 4]]
-
-
-def test_a_view_of_one_scan_pays_for_no_other() -> None:
-    def read(frame: Frame) -> Scan:
-        raise AssertionError(frame)
-
-    frames = drives(3)
-    expected = NeighbourView(5)(frames[1].read())
-    found = view_in_window(NeighbourView(5), frames[1].read(), frames, 1, read)
-    np.testing.assert_array_equal(found.inputs()["points"], expected.inputs()["points"])
 
 
 def test_a_loader_gives_a_network_its_windows(monkeypatch: pytest.MonkeyPatch) -> None:
