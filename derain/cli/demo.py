@@ -1,16 +1,6 @@
-"""``derain demo``: every step from scans to a deployed model, on simulated rain."""
+"""Shows every step from scans to a deployed model, on simulated rain.
 
-import argparse
-from pathlib import Path
-
-from derain.cli.arguments import count
-from derain.cli.outputs import print_lines
-from derain.cli.scan_options import add_columns
-from derain.sources.folders import named_frames
-from derain.system.extras import EXPORT_LIBRARIES, OPEN3D, OPTUNA, TRAINING_LIBRARIES, require
-
-DESCRIPTION = """\
-Simulates rain in streets and draws a scan of it; trains 3D-OutDet, SalsaNext and LiSnowNet-L1 on
+It simulates rain in streets and draws a scan of it; trains 3D-OutDet, SalsaNext and LiSnowNet-L1 on
 the scans, the last without labels; exports and proves each; cleans scans; and compares the
 networks with filters, with the model that comes with derain, and with baselines that every method
 has to beat. With --scan, the model that comes with derain then cleans scans of your own.
@@ -19,6 +9,14 @@ has to beat. With --scan, the model that comes with derain then cleans scans of 
   derain demo --out somewhere
   derain demo --scan scan.pcd
 """
+
+import argparse
+from pathlib import Path
+
+from derain.cli.options import add_columns, count
+from derain.cli.outputs import print_lines
+from derain.sources.folders import named_frames
+from derain.system.extras import EXPORT_LIBRARIES, OPEN3D, OPTUNA, TRAINING_LIBRARIES, require
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

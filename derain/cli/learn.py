@@ -1,23 +1,8 @@
-"""``derain learn``: a derainer for a sensor, from an unlabelled recording of it."""
+"""Trains a network to take the rain out of a sensor's scans, from an unlabelled recording.
 
-import argparse
-from pathlib import Path
-
-from derain.bags.names import within
-from derain.cli.arguments import count, file_named
-from derain.cli.outputs import print_lines
-from derain.cli.scan_options import add_columns, add_poses, add_topic
-from derain.cli.view_recording import refuse_unusable, write_and_report
-from derain.sources.method import Method
-from derain.system.extras import EXPORT_LIBRARIES, TRAINING_LIBRARIES, require
-from derain.workflows.learn_config import PERSISTENCE, STUDENTS, LearnConfig
-from derain.workflows.start import START_HELP
-
-DESCRIPTION = """\
-Trains a network to take the rain out of a sensor's scans, from an unlabelled recording: consecutive
-scans in a folder. A teacher labels each point rain, not rain or not known; a network is trained on
-these labels, exported as one ONNX file and proved; a report describes how far to trust it, with the
-commands that repeat each step.
+The recording is consecutive scans in a folder. A teacher labels each point rain, not rain or not
+known; a network is trained on these labels, exported as one ONNX file and proved; a report
+describes how far to trust it, with the commands that repeat each step.
 
   derain learn recording/ --out model.onnx
   derain learn recording/ --out model.onnx --poses standing    the sensor stood still
@@ -33,6 +18,18 @@ stay in their place, drops do not. Labels beside the scans are not read; with --
 the finished model, for the record. Labels, runs and report go to a folder beside the model, which a
 second run clears.
 """
+
+import argparse
+from pathlib import Path
+
+from derain.bags.names import within
+from derain.cli.options import add_columns, add_poses, add_topic, count, file_named
+from derain.cli.outputs import print_lines
+from derain.cli.playback import refuse_unusable, write_and_report
+from derain.sources.method import Method
+from derain.system.extras import EXPORT_LIBRARIES, TRAINING_LIBRARIES, require
+from derain.workflows.learn_config import PERSISTENCE, STUDENTS, LearnConfig
+from derain.workflows.start import START_HELP
 
 # The Rerun file shows so many scans of a long recording, spread over all of it.
 MOST_SHOWN = 100
@@ -63,9 +60,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--work", type=Path, help="folder for all else (default: beside the model)")
     parser.add_argument(
-        "--card", help="data card of labels beside the scans, which measure the finished model "
-        "for the record",
-    )  # fmt: skip
+        "--card",
+        help="data card of labels beside the scans, which measure the finished model for the "
+        "record",
+    )
     parser.add_argument(
         "--rerun",
         type=Path,

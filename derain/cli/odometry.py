@@ -1,29 +1,6 @@
-"""``derain odometry``: finds where a sensor was, scan by scan, and writes its poses."""
+"""Registers each scan to the scan before it, and writes the poses of the sensor.
 
-import argparse
-import math
-import sys
-from dataclasses import dataclass
-from pathlib import Path
-
-from tqdm import tqdm
-
-from derain.bags.names import within
-from derain.cli.arguments import add_threads
-from derain.cli.outputs import ScanByScan, exit_code, print_facts, print_lines
-from derain.cli.scan_options import add_columns, add_topic
-from derain.errors import printable
-from derain.recordings.registration import Registration
-from derain.sources.folders import named_frames
-from derain.sources.frame import Frame
-from derain.sources.records import POSES
-from derain.system.memory import keep_freed_memory
-from derain.system.stopwatch import Stopwatch
-from derain.workflows.odometry import find_poses
-
-DESCRIPTION = """\
-Registers each scan to the scan before it, and writes the poses of the sensor: one line per scan,
-the transform of its points into the frame of the first scan.
+A line per scan holds the transform of its points into the frame of the first scan.
 
   derain odometry drive --out poses.txt
   derain odometry drive --out drive/poses.txt               later commands read them there
@@ -37,38 +14,22 @@ that it cannot register, with the reason. Its pose is then extrapolated at const
 the exit code is 2.
 """
 
+import argparse
+import math
+import sys
+from pathlib import Path
 
-@dataclass(frozen=True)
-class Registered:
-    """What was found of one scan.
-
-    Attributes:
-        scan: Its file.
-        metres: How far the sensor moved since the scan before.
-        degrees: By how much it turned.
-        residual: Median distance from the surfaces of the scan before, metres; None if unknown.
-        matched: Share of its surfaces that the scan before has too.
-        trusted: Whether that is to be believed.
-        reason: Why not.
-        milliseconds: By stage.
-    """
-
-    scan: str
-    metres: float
-    degrees: float
-    residual: float | None
-    matched: float
-    trusted: bool
-    reason: str
-    milliseconds: dict[str, float]
-
-    def __str__(self) -> str:
-        apart = "none" if self.residual is None else f"{self.residual:.3f} m"
-        told = "" if self.trusted else ", NOT TRUSTED"
-        return (
-            f"{printable(self.scan)}: {self.metres:.2f} m, {self.degrees:.2f} deg, residual "
-            f"{apart}, {self.matched:.0%} matched, {sum(self.milliseconds.values()):.0f} ms{told}"
-        )
+from derain.bags.names import within
+from derain.cli.options import add_columns, add_json, add_threads, add_topic
+from derain.cli.outputs import exit_code, print_error, print_facts, print_lines
+from derain.recordings.registration import Registration
+from derain.sources.folders import named_frames
+from derain.sources.frame import Frame
+from derain.sources.judging import Failures
+from derain.sources.records import POSES
+from derain.system.memory import keep_freed_memory
+from derain.system.stopwatch import Stopwatch
+from derain.workflows.odometry import find_poses
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -92,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--replace", action="store_true", help=f"replace a {POSES} that belongs to the scans"
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object per scan")
+    add_json(parser)
     add_threads(parser)
     add_columns(parser)
     add_topic(parser)
@@ -102,10 +63,9 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
     source = named_frames(within(arguments.sequences, arguments.topic), arguments.columns)
-    scans = ScanByScan(source)
 
     def show(frame: Frame, registration: Registration, stopwatch: Stopwatch) -> None:
-        print_facts(_registered(frame, registration, stopwatch), arguments.json)
+        _print_registration(frame, registration, stopwatch, arguments.json)
 
     recordings = find_poses(
         source,
@@ -113,26 +73,35 @@ def main(arguments: argparse.Namespace) -> int:
         form=arguments.format,
         replace=arguments.replace,
         threads=arguments.threads,
-        guard=scans.skipping_failures,
+        guard=Failures(print_error).skipping_failures,
         watch=show,
     )
     for found in recordings:
         if found.fault is None:
             print_lines(str(found), sys.stderr if arguments.json else None)
         else:
-            tqdm.write(f"derain: {found.fault}", sys.stderr)
+            print_error(found.fault)
     untrusted = sum(found.untrusted for found in recordings)
     return exit_code(untrusted, len(source), "{scans} could not be registered")
 
 
-def _registered(frame: Frame, registration: Registration, stopwatch: Stopwatch) -> Registered:
-    return Registered(
-        frame.name,
-        registration.distance,
-        registration.turn,
-        None if math.isnan(registration.residual) else registration.residual,
-        registration.matched,
-        registration.trusted,
-        registration.reason,
-        dict(stopwatch.milliseconds),
+def _print_registration(
+    frame: Frame, found: Registration, stopwatch: Stopwatch, as_json: bool
+) -> None:
+    unknown = math.isnan(found.residual)
+    facts = {
+        "scan": frame.name,
+        "metres": found.distance,
+        "degrees": found.turn,
+        "residual": None if unknown else found.residual,
+        "matched": found.matched,
+        "trusted": found.trusted,
+        "reason": found.reason,
+        "milliseconds": dict(stopwatch.milliseconds),
+    }
+    residual = "none" if unknown else f"{found.residual:.3f} m"
+    text = (
+        f"{frame.name}: {found.distance:.2f} m, {found.turn:.2f} deg, residual {residual}, "
+        f"{found.matched:.0%} matched, {sum(stopwatch.milliseconds.values()):.0f} ms"
     )
+    print_facts(facts, text if found.trusted else f"{text}, NOT TRUSTED", as_json)

@@ -7,15 +7,17 @@ then on neither asks the other anything.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from derain.cards.card import DataCard
-from derain.learning.start import Start
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.spec import Spec
 from derain.views.channels import extra_channels
 from derain.views.view import View
+
+if TYPE_CHECKING:
+    from derain.models.base import DerainingModule
 
 # Scans that a view or a rule is fitted to; more change its grid by nothing.
 EXAMPLE_SCANS = 20
@@ -43,32 +45,6 @@ class Task:
     def make_view(self, threads: int = 0) -> View:
         """The view that the network sees a scan through, on so many threads; 0 takes all cores."""
         return self.spec.make_view(threads)
-
-
-class Learner(Protocol):
-    """What an agreement asks of a model."""
-
-    LEARNS_FROM_LABELS: ClassVar[bool]
-    channels: tuple[str, ...]
-    start: Start | None
-
-    @property
-    def has_spec(self) -> bool:
-        """Whether it knows already how it is used, from a training or a checkpoint."""
-
-    @property
-    def spec(self) -> Spec:
-        """How it is used.
-
-        Raises:
-            InputError: Nobody has said so yet.
-        """
-
-    def spec_for(self, card: DataCard, scans: Sequence[Scan]) -> Spec:
-        """How it is used on a data set, fitted to some training scans."""
-
-    def adopt_task(self, task: Task) -> None:
-        """Takes over what was agreed."""
 
 
 @runtime_checkable
@@ -100,7 +76,7 @@ class ReadableScans(Protocol):
         """Some of them, spread over all."""
 
 
-def agree_on_task(model: Learner, data: TrainingData, training: bool = True) -> Task:
+def agree_on_task(model: "DerainingModule", data: TrainingData, training: bool = True) -> Task:
     """Settles how a model and its data work together, and gives it to both.
 
     Lightning's trainer has it done by the model's ``setup`` wherever there is a data module. It is

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from derain.errors import InputError
+from derain.files.documents import Entry
 from derain.files.packaged import packaged
 
 CONFIG_OPTIONS = ("--config", "-c")
@@ -23,21 +24,16 @@ def with_packaged_configs(arguments: Sequence[str]) -> list[str]:
     """Replaces the name of a packaged configuration by its file.
 
     Raises:
-        InputError: A name that is neither a file nor packaged.
+        InputError: A name that is neither a file nor packaged, or a file that is no mapping.
     """
-    return [
-        prefix + str(_file(name)) if name else prefix for prefix, name in _with_names(arguments)
-    ]
-
-
-def own_configurations(arguments: Sequence[str]) -> list[Path]:
-    """The configurations on a command line that do not come with derain.
-
-    Raises:
-        InputError: A name that is neither a file nor packaged.
-    """
-    files = [_file(name) for _, name in _with_names(arguments) if name]
-    return [file for file in files if file not in packaged_configs().values()]
+    words: list[str] = []
+    for argument in arguments:
+        if words and words[-1] in CONFIG_OPTIONS:
+            argument = str(_file(argument))
+        elif argument.startswith("--config="):
+            argument = f"--config={_file(argument.removeprefix('--config='))}"
+        words.append(argument)
+    return words
 
 
 def require_configuration(arguments: Sequence[str]) -> None:
@@ -54,21 +50,10 @@ def require_configuration(arguments: Sequence[str]) -> None:
         )
 
 
-def _with_names(arguments: Sequence[str]) -> list[tuple[str, str]]:
-    """Every argument as what stands before the name of a configuration, and the name, if any."""
-    return [
-        ("--config=", argument.removeprefix("--config="))
-        if argument.startswith("--config=")
-        else ("", argument)
-        if previous in CONFIG_OPTIONS
-        else (argument, "")
-        for previous, argument in zip(["", *arguments], arguments, strict=False)
-    ]
-
-
 def _file(name: str) -> Path:
     configs = packaged_configs()
     if Path(name).is_file():
+        Entry.of_yaml(Path(name)).members()  # the parser would not name the file at fault
         return Path(name)
     if name in configs:
         return configs[name]

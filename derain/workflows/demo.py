@@ -2,28 +2,25 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
-from numpy.typing import NDArray
 
 from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
 from derain.datamodules.scan_data import Loading, ScanData
 from derain.default import DEFAULT
 from derain.errors import InputError
+from derain.evaluation.counts import table_of
+from derain.evaluation.range_bands import RANGE_EDGES, band_names, band_of
 from derain.export.bench.bench import Bench, Effort, run_bench
 from derain.export.bench.bench_entries import bench_entries
 from derain.export.bench.labelled_frames import LabelledFrames
 from derain.export.bench.report import SHORT, main_table
 from derain.export.methods import load_method
-from derain.export.tuning import LabelledNeighbourhoods, Search, neighbours_to_find, tune_filter
 from derain.files import DEFAULT_COLUMNS
-from derain.files.atomic import replacing, require_writable
+from derain.files.atomic import require_writable
 from derain.pictures.scan_pictures import before_after_figure, comparison_figure, save
-from derain.scan import Scan
 from derain.simulation.campaign import Campaign, partition
 from derain.simulation.dataset import simulate_track
 from derain.sources.cleaning import CleanedScan, CleaningObserver, CleanReport, clean
@@ -38,6 +35,7 @@ from derain.views.scan_issues import ScanIssue
 from derain.workflows.fit import fit
 from derain.workflows.learn import export_checkpoint
 from derain.workflows.steps import Show, Steps, show_nothing
+from derain.workflows.tuning import tune_filter_on, write_parameters
 
 # Titles of the networks, and the beginning of their configurations' names.
 DEMO_NETWORKS = {"3D-OutDet": "outdet", "SalsaNext": "salsanext", "LiSnowNet-L1": "lisnownet"}
@@ -51,9 +49,6 @@ STREETS = Campaign(*partition(26), sensor="mems_64")
 
 # Trials of the filter's tuning.
 TRIALS = 100
-
-# Starts of the bands of range of what is removed from your own scans, metres; the last is open.
-BANDS = (0, 10, 20, 40, 80)
 
 
 @dataclass(frozen=True)
@@ -140,17 +135,9 @@ def run_demo(config: DemoConfig, show: Show = show_nothing) -> Bench:
 def _tune(config: DemoConfig, data: ScanData, steps: Steps) -> None:
     steps.begin(f"Tuning: {TRIALS} trials of the filter dsor")
     frames = data.frames("validation")
-    neighbours = neighbours_to_find("dsor")
-    scans = [
-        LabelledNeighbourhoods.of(data.read_measured(frame), data.card, neighbours, 0, None)
-        for frame in frames
-    ]
-    names = [frame.name for frame in frames]
-    tuned = tune_filter("dsor", scans, Search(TRIALS, 0, None, names, lambda: None))
-    with replacing(config.tuned) as temporary:
-        text = yaml.safe_dump({"method": "dsor", **tuned.parameters}, sort_keys=False)
-        command = f"derain tune dsor --data {config.data} --out {config.tuned}"
-        temporary.write_text(f"# {command}\n{text}", "utf-8")
+    tuned = tune_filter_on("dsor", data, frames, TRIALS)
+    command = f"derain tune dsor --data {config.data} --out {config.tuned}"
+    write_parameters(config.tuned, "dsor", tuned.parameters, command)
     steps.end(f"IoU {tuned.iou:.4f} on {len(frames)} scans, {tuned.default_iou:.4f} by default")
 
 
@@ -233,12 +220,12 @@ class Drawing(CleaningObserver):
         heading: Title of the picture.
 
     Attributes:
-        by_range: Valid points and removed points by band of BANDS, int64 (bands, 2).
+        by_range: Valid points by band of range and by whether they are removed, int64 (bands, 2).
     """
 
     def __init__(self, file: Path, scan: str, heading: str) -> None:
         self.file = file
-        self.by_range = np.zeros((len(BANDS), 2), np.int64)
+        self.by_range = np.zeros((len(RANGE_EDGES), 2), np.int64)
         self._scan, self._heading = scan, heading
         self._notices = Notices()
 
@@ -251,7 +238,9 @@ class Drawing(CleaningObserver):
 
     def cleaned(self, judgement: Judgement, scan: CleanedScan) -> None:
         """Counts a scan that is written."""
-        self.by_range += removed_by_range(judgement.scan, judgement.rain)
+        valid = judgement.scan.valid
+        band, removed = band_of(judgement.scan.range[valid]), judgement.rain[valid]
+        self.by_range += table_of((band, removed.astype(np.int64)), self.by_range.shape)
 
     def failed(self, error: InputError) -> None:
         """Warns of a scan that is left whole or cannot be read."""
@@ -260,11 +249,11 @@ class Drawing(CleaningObserver):
     @property
     def shares(self) -> str:
         """Share removed in each band of range that holds points."""
-        names = [f"{start}-{end} m" for start, end in pairwise(BANDS)] + [f"{BANDS[-1]}+ m"]
+        bands = zip(band_names(), self.by_range.tolist(), strict=True)
         return ", ".join(
-            f"{name} {removed / points:.2%}"
-            for name, (points, removed) in zip(names, self.by_range.tolist(), strict=True)
-            if points
+            f"{name} {removed / (kept + removed):.2%}"
+            for name, (kept, removed) in bands
+            if kept + removed
         )
 
 
@@ -288,16 +277,3 @@ def clean_own_scans(scans: Path, columns: Sequence[str], out: Path, steps: Steps
     steps.end(f"{report}; before and after: {drawing.file}")
     steps.show(f"        removed by range: {drawing.shares}")
     return report
-
-
-def removed_by_range(scan: Scan, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Valid points and those of them that are removed, by band of BANDS, int64 (bands, 2).
-
-    Args:
-        scan: The scan, of N points.
-        rain: Which points are removed, bool (N,).
-    """
-    band = np.searchsorted(BANDS, scan.range[scan.valid], side="right") - 1
-    points = np.bincount(band, minlength=len(BANDS))
-    removed = np.bincount(band[rain[scan.valid]], minlength=len(BANDS))
-    return np.stack([points, removed], axis=1)

@@ -1,6 +1,6 @@
 """Measures a student on held-out scans: beside its teacher, and by labels where asked to."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,6 @@ from derain.datamodules.taught import Taught
 from derain.errors import InputError
 from derain.evaluation.answers import NOT_KNOWN, RAIN, Answers, AnswersOfScan, answer_of
 from derain.evaluation.counts import SCORES
-from derain.evaluation.rain_counts import RainCounts
 from derain.evaluation.text_tables import markdown_table, number_text
 from derain.pictures.answers import answers_figure
 from derain.pictures.scan_pictures import before_after_figure, save
@@ -23,8 +22,8 @@ from derain.sources.file_frame import FileFrame
 from derain.sources.frame import Frame
 from derain.sources.reader import FrameReader
 from derain.sources.spread import evenly_spaced
-from derain.views.morton import first_rows
 from derain.workflows.learn_report import LearnResults
+from derain.workflows.teaching import TruthRecord
 
 # Returns which points of a scan of N points are rain, bool (N,).
 Student = Callable[[Scan], NDArray[np.bool_]]
@@ -115,58 +114,40 @@ def scores_by_labels(frames: Sequence[Frame], taught: DataCard, name: str, stude
         Tables in Markdown; where the labels cannot be used, the reason.
     """
     try:
-        card = load_card(name)
-        return _tables(card, _counted(frames, taught, card, student))
+        record = TruthRecord(load_card(name), ("teacher", SURE, "student"))
+        for frame in frames:
+            _measure(record, frame, taught, student)
     except InputError as error:
         return f"Nothing could be measured: {error}"
+    return _tables(record)
 
 
-def _counted(
-    frames: Sequence[Frame], taught: DataCard, card: DataCard, student: Student
-) -> dict[str, RainCounts]:
-    """Teacher and student beside the labels, over all points and where the teacher is sure."""
-    titles = ("teacher", SURE, "student")
-    counts = {t: RainCounts(card.classes, card.rain, unknown=card.unknown) for t in titles}
-    reader, layouts = FrameReader(taught), layouts_for(card)
-    for frame in frames:
-        assert isinstance(frame, FileFrame)  # taught scans lie in files
-        scan = reader.read(frame)
-        answer, rain = answer_of(scan, taught), student(scan)
-        own = (
-            frame.label_beside_bag if isinstance(frame, BagFrame) else label_of(frame.path, layouts)
-        )
-        labelled = replace(frame, label_path=own).read_label(len(scan))
-        rows = first_rows(scan) if card.deduplicate else np.flatnonzero(scan.valid)
-        sure = rows[answer[rows] != NOT_KNOWN]
-        truth = scan.with_label(labelled)
-        counts["teacher"].add(truth.take(rows), answer[rows] == RAIN)
-        counts[SURE].add(truth.take(sure), answer[sure] == RAIN)
-        counts["student"].add(truth.take(rows), rain[rows])
-    return counts
+def _measure(record: TruthRecord, frame: Frame, taught: DataCard, student: Student) -> None:
+    """Measures teacher and student by the labels that lie beside a scan."""
+    assert isinstance(frame, FileFrame)  # taught scans lie in files
+    scan = FrameReader(taught).read(frame)
+    own = label_of(frame.path, layouts_for(record.card))
+    if isinstance(frame, BagFrame):
+        own = frame.label_beside_bag
+    answer, every = answer_of(scan, taught), np.ones(len(scan), bool)
+    found = answer == RAIN
+    answers = (found, every), (found, answer != NOT_KNOWN), (student(scan), every)
+    record.add(replace(frame, label_path=own), scan, *answers)
 
 
-def _tables(card: DataCard, counts: Mapping[str, RainCounts]) -> str:
+def _tables(record: TruthRecord) -> str:
     """Scores over the points of all scans, and the share of each class that is called rain."""
     scores = [
         [title, *(number_text(getattr(counted.pooled(), score)) for score in SCORES)]
-        for title, counted in counts.items()
+        for title, counted in record.counts.items()
     ]
-    of_classes = {title: counted.by_class() for title, counted in counts.items()}
-    called = [
-        [
-            name + " (rain)" * of_class.rain,
-            f"{of_class.points:,}",
-            *(f"{of_classes[title][name].share_lost:.2%}" for title in ("teacher", "student")),
-        ]
-        for name, of_class in of_classes["student"].items()
-        if of_class.points
-    ]
+    classes = record.rows_by_class("teacher", "student")
     return "\n\n".join(
         (
-            f"Labels of {card.title} on the held-out scans, pooled over their points. They were "
-            "read when the model was finished, and chose nothing.",
+            f"Labels of {record.card.title} on the held-out scans, pooled over their points. They "
+            "were read when the model was finished, and chose nothing.",
             markdown_table(("", "P", "R", "F1", "IoU"), scores),
             "Called rain, by class:",
-            markdown_table(("class", "points", "teacher", "student"), called),
+            markdown_table(("class", "points", "teacher", "student"), classes),
         )
     )

@@ -25,17 +25,11 @@ from derain.system.memory import keep_freed_memory
 from derain.system.notices import recorded_warnings, warn
 from derain.workflows.evaluation import evaluate_student, teacher_answers
 from derain.workflows.fit import fit, fit_options
-from derain.workflows.learn_config import (
-    LearnConfig,
-    epochs_of,
-    network_settings,
-    with_network,
-    without_intensity,
-)
+from derain.workflows.learn_config import LearnConfig, Student, student_of
 from derain.workflows.learn_report import LEAST_RAIN, LearnResults, write_report
 from derain.workflows.odometry import find_poses, placed
 from derain.workflows.steps import Show, Steps, show_nothing
-from derain.workflows.teaching import TeachResults, teach_recordings
+from derain.workflows.teaching import teach_recordings
 
 # A folder with this file may be cleared by a second run.
 MARK = "learning.txt"
@@ -67,15 +61,14 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         InputError: Too few scans, or too few that can be labelled; a folder that holds something
             else; nothing to be learnt; or what a step raises. No model is left then.
     """
-    config = with_network(config)
     source = named_frames(config.recordings, config.columns)
     _refuse_too_few(config, source)
+    student = student_of(config, source)
     require_writable(config.out)
     _clear(config.work)
     keep_freed_memory()
     show(f"{len(source):,} scans to learn from. Everything but the model goes to {config.work}/")
-    if not config.blind and source[0].read().intensity is None:
-        config = without_intensity(config)
+    if student.blind and not config.blind and student.start is None:
         show("The scans have no intensities: the network learns without.")
     steps = Steps(show, LEARN_STEPS + config.needs_odometry(source))
     with recorded_warnings() as warnings:
@@ -85,18 +78,21 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
         results = LearnResults(
             title=", ".join(map(str, config.recordings)),
             teacher=config.teacher,
-            student=config.student,
+            student=str(student),
             model=config.out,
             path=config.work / "report.md",
             scans=teacher_answers(data),
             stood=config.poses == STANDING,
-            sees_intensity=not config.blind,
+            sees_intensity=not student.blind,
             warnings=warnings,
-            commands=commands(config, source, poses),
+            commands=commands(config, student, source, poses),
         )
         write_report(results)  # the teacher's labels are worth a look, whatever follows
         _refuse_clean(results)
-        _fit(config, steps)
+        steps.begin(f"Training: {student}, {student.epochs} epochs")
+        trained = fit(student.config, _settings(config, student), quiet=True)
+        scored = trained.iou is not None
+        steps.end(f"IoU {trained.iou:.3f} on held-out scans, last epoch" if scored else "trained")
         export_checkpoint(config.checkpoint, config.out, steps)
     evaluate_student(results, data, Derainer(config.out), config.card)
     write_report(results)
@@ -104,11 +100,12 @@ def learn(config: LearnConfig, show: Show = show_nothing) -> LearnResults:
     return results
 
 
-def commands(config: LearnConfig, source: Source, poses: str | None) -> list[str]:
+def commands(config: LearnConfig, student: Student, source: Source, poses: str | None) -> list[str]:
     """Commands that repeat the steps of :func:`learn`.
 
     Args:
-        config: What is learnt, with its network.
+        config: What is learnt.
+        student: The network that learns.
         source: The scans.
         poses: Poses that the teacher is given; None for those beside the scans.
     """
@@ -120,10 +117,22 @@ def commands(config: LearnConfig, source: Source, poses: str | None) -> list[str
     given = () if poses is None else ("--poses", poses)
     steps += [
         ("teach", config.teacher, *scans, "--out", taught, *given, *columns),
-        ("fit", *fit_options(*_training(config))),
+        ("fit", *fit_options(student.config, _settings(config, student))),
         ("export", str(config.checkpoint), "--out", str(config.out)),
     ]
     return [f"derain {shlex.join(words)}" for words in steps]
+
+
+def _settings(config: LearnConfig, student: Student) -> dict[str, object]:
+    """Settings of the training, which keeps the epoch that agrees best with the teacher."""
+    return {
+        **student.settings,
+        "data.root": config.taught,
+        "trainer.logger.save_dir": config.work / "runs",
+        "checkpoint.dirpath": config.work,
+        "checkpoint.filename": config.checkpoint.stem,
+        "trainer.max_epochs": student.epochs,
+    }
 
 
 def _refuse_too_few(config: LearnConfig, source: Source) -> None:
@@ -181,7 +190,7 @@ def _find_poses(config: LearnConfig, source: Source, steps: Steps) -> str | None
 
 def _teach(
     config: LearnConfig, poses: str | None, scans: int, steps: Steps, warnings: Sequence[str]
-) -> TeachResults:
+) -> None:
     """Has the teacher label the scans.
 
     Raises:
@@ -201,7 +210,6 @@ def _teach(
             "Record scans that overlap.",
         )
     steps.end(f"{labelled:,} scans labelled")
-    return results
 
 
 @contextmanager
@@ -234,27 +242,6 @@ def _refuse_clean(results: LearnResults) -> None:
             f"{results.teacher} is sure of): it seems to be clean",
             f"Record in rain. What was found: {results.path}.",
         )
-
-
-def _training(config: LearnConfig) -> tuple[str, dict[str, object]]:
-    """Configuration and settings of the training, for :func:`derain.workflows.fit.fit`."""
-    file, network = network_settings(config)
-    return file, {
-        **network,
-        "data.root": config.taught,
-        "trainer.logger.save_dir": config.work / "runs",
-        "checkpoint.dirpath": config.work,
-        "checkpoint.filename": config.checkpoint.stem,
-        "trainer.max_epochs": epochs_of(config),
-    }
-
-
-def _fit(config: LearnConfig, steps: Steps) -> None:
-    """Trains the student, and keeps the epoch that agrees best with the teacher."""
-    steps.begin(f"Training: {config.student}, {epochs_of(config)} epochs")
-    trained = fit(*_training(config), quiet=True)
-    scored = trained.iou is not None
-    steps.end(f"IoU {trained.iou:.3f} on held-out scans, last epoch" if scored else "trained")
 
 
 def export_checkpoint(checkpoint: Path, out: Path, steps: Steps) -> None:

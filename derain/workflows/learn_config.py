@@ -1,7 +1,7 @@
 """What is learnt from which recording, and by which network."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
@@ -10,6 +10,7 @@ from derain.errors import InputError
 from derain.files import DEFAULT_COLUMNS
 from derain.recordings.posed import ODOMETRY
 from derain.sources.source import Source
+from derain.spec import Spec
 from derain.views.channels import INTENSITY_RANK
 from derain.workflows.configurations import packaged_configs
 from derain.workflows.start import checkpoint_of
@@ -18,6 +19,9 @@ PERSISTENCE = "persistence"
 
 # Networks that learn from labels, and the beginning of their configurations' names.
 STUDENTS = ("outdet", "salsanext", "salsanext_lite")
+
+# Channels by which a network sees intensity.
+SEE_INTENSITY = {"intensity", INTENSITY_RANK}
 
 # Channels of a network that is blind to intensity, as the option `--model.channels` takes them.
 BLIND = {"outdet": "[x,y,z]", "salsanext": "[range,x,y,z]", "salsanext_lite": "[range,x,y,z]"}
@@ -67,13 +71,6 @@ class LearnConfig:
         return self.folder or self.out.with_name(f"{self.out.stem}_learning")
 
     @property
-    def student(self) -> str:
-        """Title of the student in a report."""
-        blind = ", blind to intensity" if self.blind else ""
-        start = "" if self.start is None else f", started from {self.start}"
-        return f"{self.model}{blind}{start}"
-
-    @property
     def taught(self) -> Path:
         """Folder of the teacher's labels."""
         return self.work / "taught"
@@ -96,21 +93,74 @@ class LearnConfig:
         return self.teacher == PERSISTENCE and (self.poses == ODOMETRY or not known)
 
 
-def with_network(config: LearnConfig) -> LearnConfig:
-    """The same configuration with the network: a student has the channels of its start.
+@dataclass(frozen=True)
+class Student:
+    """The network that learns; as text, its title in a report.
+
+    Attributes:
+        network: Its name.
+        blind: Whether it sees no intensity.
+        start: The trained model that it begins with; None where its weights are drawn at random.
+        config: The packaged configuration of its training.
+        settings: Settings of the network over that configuration, as
+            :func:`derain.workflows.fit.fit` takes them.
+        epochs: Epochs of the training.
+    """
+
+    network: str
+    blind: bool
+    start: str | None
+    config: str
+    settings: Mapping[str, str]
+    epochs: int
+
+    def __str__(self) -> str:
+        blind = ", blind to intensity" if self.blind else ""
+        start = "" if self.start is None else f", started from {self.start}"
+        return f"{self.network}{blind}{start}"
+
+
+def student_of(config: LearnConfig, source: Source) -> Student:
+    """The network that learns from a recording: one with a start sees what that sees.
+
+    Args:
+        config: What is learnt.
+        source: The scans; without intensities, the student is blind to them.
 
     Raises:
-        InputError: A start that cannot be read, that lies in the folder to be cleared, that is of
-            another network, or that sees intensity where the student is to be blind.
+        InputError: A first scan that cannot be read; a start that cannot be read, that lies in the
+            folder to be cleared, that is of another network, or that sees intensity where the
+            student is to be blind or the scans have none.
     """
+    blind = config.blind or source[0].read().intensity is None
     if config.start is None:
-        return replace(config, model=config.model or STUDENTS[0])
+        network = config.model or STUDENTS[0]
+        file, settings = _configuration(network)
+        if blind:
+            settings["model.channels"] = BLIND[network]
+    else:
+        spec = _spec_of_start(config, config.start)
+        if "intensity" in spec.channels and blind and not config.blind:
+            raise InputError(
+                config.recordings[0],
+                f"has no intensities, which {config.start} sees",
+                "Give a start that is blind to intensity, or none.",
+            )
+        network, blind = spec.network, SEE_INTENSITY.isdisjoint(spec.channels)
+        file, settings = _configuration(network)
+        settings["start"] = config.start
+    usual = yaml.safe_load(packaged_configs()[file].read_text("utf-8"))["trainer"]["max_epochs"]
+    return Student(network, blind, config.start, file, settings, config.epochs or int(usual))
+
+
+def _spec_of_start(config: LearnConfig, start: str) -> Spec:
+    """How the model of the start is used."""
     from derain.models.checkpoint import load_model
 
-    checkpoint = checkpoint_of(config.start)
+    checkpoint = checkpoint_of(start)
     if config.work.resolve() in checkpoint.resolve().parents:
         raise InputError(
-            config.start,
+            start,
             f"lies in {config.work}, which this run clears first",
             "Give another --work, or copy it elsewhere.",
         )
@@ -118,60 +168,16 @@ def with_network(config: LearnConfig) -> LearnConfig:
     if config.model not in (None, spec.network):
         raise InputError(
             "--model",
-            f"{config.start} is of {spec.network}, from which {config.model} cannot start",
+            f"{start} is of {spec.network}, from which {config.model} cannot start",
             f"Leave --model out, or give a start of {config.model}.",
         )
-    sees_intensity = bool({"intensity", INTENSITY_RANK} & set(spec.channels))
-    if config.blind and sees_intensity:
+    if config.blind and not SEE_INTENSITY.isdisjoint(spec.channels):
         raise InputError(
             "--blind",
-            f"{config.start} sees intensity, and so does a student that starts from it",
+            f"{start} sees intensity, and so does a student that starts from it",
             "Leave one of the two out, or give a start that is blind to intensity.",
         )
-    return replace(config, model=spec.network, blind=not sees_intensity)
-
-
-def without_intensity(config: LearnConfig) -> LearnConfig:
-    """The same configuration for a recording without intensities.
-
-    Raises:
-        InputError: A start that sees intensity, other than by ranks, which may all be alike.
-    """
-    if config.start is not None:
-        from derain.models.checkpoint import load_model
-
-        if "intensity" not in load_model(checkpoint_of(config.start)).spec.channels:
-            return config
-        raise InputError(
-            config.recordings[0],
-            f"has no intensities, which {config.start} sees",
-            "Give a start that is blind to intensity, or none.",
-        )
-    return replace(config, blind=True)
-
-
-def network_settings(config: LearnConfig) -> tuple[str, dict[str, str]]:
-    """The configuration of the student's training, and settings of its network.
-
-    Args:
-        config: What is learnt, with its network.
-
-    Returns:
-        The two as :func:`derain.workflows.fit.fit` takes them.
-    """
-    file, settings = _configuration(str(config.model))
-    if config.start is not None:
-        settings["start"] = config.start
-    elif config.blind:
-        settings["model.channels"] = BLIND[str(config.model)]
-    return file, settings
-
-
-def epochs_of(config: LearnConfig) -> int:
-    """Epochs of the training: those of the configuration, or those that are usual."""
-    file, _ = _configuration(str(config.model))
-    usual = yaml.safe_load(packaged_configs()[file].read_text("utf-8"))["trainer"]["max_epochs"]
-    return config.epochs or int(usual)
+    return spec
 
 
 def _configuration(network: str) -> tuple[str, dict[str, str]]:

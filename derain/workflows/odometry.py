@@ -26,7 +26,7 @@ from derain.sources.judging import Guard, unguarded
 from derain.sources.recordings import recordings_of
 from derain.sources.records import POSES
 from derain.sources.source import Source
-from derain.sources.trajectory import CALIBRATION, Trajectory, write_trajectory
+from derain.sources.trajectory import Trajectory, write_trajectory
 from derain.system.notices import Notices, warn
 from derain.system.stopwatch import Stopwatch
 
@@ -113,23 +113,20 @@ def find_poses(
     recordings = recordings_of(source)
     files = _files_of(recordings, out, replace)
     times = [_times(recording, form) for recording in recordings]
-    if form == "kitti":
-        _warn_of_calibrations(files, recordings)
     odometry = FrameOdometry(threads)
-    registrations = iter(
-        [
-            _register(frame, odometry, guard, watch)
-            for frame in tqdm(source, "odometry", unit="scan", disable=None)
-        ]
-    )
     found = []
-    for file, recording, seconds in zip(files, recordings, times, strict=True):
-        poses = FoundPoses(file, recording, [next(registrations) for _ in recording], seconds)
-        try:
-            _write(poses, form)
-        except InputError as error:  # the other recordings go on
-            poses = replaced(poses, fault=error)
-        found.append(poses)
+    with tqdm(total=len(source), desc=ODOMETRY, unit="scan", disable=None) as bar:
+        for file, recording, seconds in zip(files, recordings, times, strict=True):
+            registrations = []
+            for frame in recording:
+                registrations.append(_register(frame, odometry, guard, watch))
+                bar.update()
+            poses = FoundPoses(file, recording, registrations, seconds)
+            try:
+                _write(poses, form)
+            except InputError as error:  # the other recordings go on
+                poses = replaced(poses, fault=error)
+            found.append(poses)
     return found
 
 
@@ -213,23 +210,6 @@ def _files_of(recordings: Sequence[Sequence[Frame]], out: Path, replace: bool) -
         _refuse_to_overwrite(file, recording, replace)
         require_writable(file)
     return files
-
-
-def _warn_of_calibrations(files: Sequence[Path], recordings: Sequence[Sequence[Frame]]) -> None:
-    """Warns of poses that would be taken for a camera's if they were put beside the scans.
-
-    Args:
-        files: The file of each recording's poses, of KITTI's form.
-        recordings: The recordings.
-    """
-    for file, recording in zip(files, recordings, strict=True):
-        for folder in _folders(recording):
-            here = folder / CALIBRATION
-            if is_file(here) and not is_file(file.with_name(CALIBRATION)):
-                warn(
-                    f"{file}: holds poses of the LiDAR; beside {here} they would be read as those "
-                    f"of its camera: to use them there, write them there, with --out {folder}/..."
-                )
 
 
 def _refuse_to_overwrite(file: Path, recording: Sequence[Frame], replace: bool) -> None:

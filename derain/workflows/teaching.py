@@ -1,6 +1,6 @@
 """Labels recordings by a method, and counts what it labels."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
@@ -12,11 +12,10 @@ from derain.annotation.teach import TAUGHT_CARD, teach
 from derain.cards.card import DataCard
 from derain.errors import InputError
 from derain.evaluation.answers import Answers
-from derain.evaluation.counts import Counts
 from derain.evaluation.rain_counts import RainCounts
 from derain.evaluation.text_tables import number_text, plain_table
+from derain.scan import Scan
 from derain.sources.frame import Frame
-from derain.sources.judgement import Judgement
 from derain.sources.judging import Answer, Guard, unguarded
 from derain.sources.method import Method
 from derain.sources.reader import FrameReader
@@ -25,6 +24,12 @@ from derain.sources.source import Source
 from derain.system.notices import Notices, warn
 from derain.views.morton import first_rows
 from derain.views.scan_issues import much_removed
+
+# Which points of a scan of N points, bool (N,).
+Mask = NDArray[np.bool_]
+
+# What a teacher's answers are measured on.
+OF_TEACHER = ("all points", "points it is sure of")
 
 
 @dataclass(frozen=True)
@@ -106,9 +111,11 @@ def teach_recordings(
         answers = Answers.of(judgement.scan.with_label(labels), TAUGHT_CARD)
         counts += answers
         watch(LabelledScan(frame.name, answers, dict(stopwatch.milliseconds)))
-        if record is not None:
+        if record is not None and frames[frame.key].has_labels:
+            of_all = judgement.rain, np.ones_like(judgement.rain)
+            of_sure = judgement.rain, judgement.answered
             try:
-                record.add(frames[frame.key], judgement)
+                record.add(frames[frame.key], judgement.scan, of_all, of_sure)
             except InputError as error:
                 warn(f"not measured: {error}")
 
@@ -129,55 +136,59 @@ def _warn_of_little(results: TeachResults) -> None:
 
 
 class TruthRecord:
-    """Measures a teacher's answers by the scans' own labels, where there are any.
+    """Measures answers by the labels that came with the scans; as text, two tables.
 
     Args:
         card: Data card of the scans.
+        titles: What each answer is called.
 
     Attributes:
-        scans: Number of scans with labels.
+        scans: Number of scans that were measured.
+        counts: The points of all scans, by the title of the answer.
     """
 
-    def __init__(self, card: DataCard) -> None:
+    def __init__(self, card: DataCard, titles: Sequence[str] = OF_TEACHER) -> None:
         self.card = card
         self.scans = 0
-        self._all, self._sure = (
-            RainCounts(card.classes, card.rain, unknown=card.unknown) for _ in range(2)
-        )
+        self.counts = {
+            title: RainCounts(card.classes, card.rain, unknown=card.unknown) for title in titles
+        }
 
-    def add(self, frame: Frame, judgement: Judgement) -> None:
-        """Measures one scan; one without labels is skipped.
+    def add(self, frame: Frame, scan: Scan, *answers: tuple[Mask, Mask]) -> None:
+        """Measures the answers to one scan.
 
         Args:
             frame: The scan's frame, with its own labels.
-            judgement: What the teacher returned for it.
+            scan: All N points of it.
+            answers: For each title, which points are called rain and which are counted, bool (N,).
 
         Raises:
             InputError: Labels that cannot be read, or that the data card does not name.
         """
-        if not frame.has_labels:
-            return
-        scan = FrameReader(self.card).with_labels(judgement.scan, frame)
-        rows = first_rows(scan) if self.card.deduplicate else scan.valid.nonzero()[0]
-        self._all.add(scan.take(rows), judgement.rain[rows])
-        sure = rows[judgement.answered[rows]]
-        self._sure.add(scan.take(sure), judgement.rain[sure])
+        truth = FrameReader(self.card).with_labels(scan, frame)
+        rows = first_rows(truth) if self.card.deduplicate else truth.valid.nonzero()[0]
+        for counts, (rain, counted) in zip(self.counts.values(), answers, strict=True):
+            of_answer = rows[counted[rows]]
+            counts.add(truth.take(of_answer), rain[of_answer])
         self.scans += 1
+
+    def rows_by_class(self, first: str, second: str) -> list[list[str]]:
+        """Each class that has points: its name, its points, and what two answers call rain."""
+        others, rows = self.counts[second].by_class(), []
+        for name, counts in self.counts[first].by_class().items():
+            if counts.points:
+                title = f"{name} (rain)" if counts.rain else name
+                shares = (counts.share_lost, others[name].share_lost)
+                called = (number_text(share, ".2%") for share in shares)
+                rows.append([title, f"{counts.points:,}", *called])
+        return rows
 
     def __str__(self) -> str:
         scores = [["", "points", "precision", "recall", "IoU"]]
-        for name, measured in (("all points", self._all), ("points it is sure of", self._sure)):
-            scores.append([name, *_scores(measured.pooled())])
+        for title, counted in self.counts.items():
+            pooled = counted.pooled()
+            numbers = map(number_text, (pooled.precision, pooled.recall, pooled.iou))
+            scores.append([title, f"{sum(astuple(pooled)):,}", *numbers])
         classes = [["class", "points", "called rain", "of those it is sure of"]]
-        sure = self._sure.by_class()
-        for name, counts in self._all.by_class().items():
-            if counts.points:
-                of_sure = number_text(sure[name].share_lost, ".2%")
-                title = f"{name} (rain)" if counts.rain else name
-                classes.append([title, f"{counts.points:,}", f"{counts.share_lost:.2%}", of_sure])
+        classes += self.rows_by_class(*self.counts)
         return f"{plain_table(scores)}\n{plain_table(classes)}"
-
-
-def _scores(counts: Counts) -> list[str]:
-    points = sum(astuple(counts))
-    return [f"{points:,}", *map(number_text, (counts.precision, counts.recall, counts.iou))]

@@ -48,14 +48,14 @@ from derain.system.cores import usable_cores
 from derain.system.memory import KEPT_IN_TRAINING, keep_freed_memory
 from derain.system.open3d_import import warn_where_tensorboard_cannot_start
 from derain.system.workers import exit_with_launcher
-from derain.workflows.configurations import own_configurations, with_packaged_configs
+from derain.workflows.configurations import with_packaged_configs
 from derain.workflows.run_folder import (
     WholeConfig,
     folder_of_run,
     logging_to_run_folder,
 )
 from derain.workflows.start import START_HELP, checkpoint_of
-from derain.workflows.training_errors import as_input_error, known_options, read_configuration
+from derain.workflows.training_errors import as_input_error, known_options
 
 # What `--ckpt_path` may be besides a file: checkpoints that Lightning looks for itself.
 FOUND_BY_LIGHTNING = ("last", "hpc")
@@ -123,12 +123,11 @@ class DerainCLI(LightningCLI):
         """Refuses what cannot be used: options, and checkpoints before Lightning reads them."""
         known = known_options(self.parser_of_a_subcommand, choices())
         arguments = args if isinstance(args, list) else []
-        files = [read_configuration(path, known) for path in own_configurations(arguments)]
         parser.set_defaults({"test.verbose": False})  # the table is in our report
         try:
             super().parse_arguments(parser, args)
         except argparse.ArgumentError as error:
-            raise as_input_error(error.message, known, files) from error
+            raise as_input_error(error.message, known) from error
         self._check_options()
         path = self.config[self.config.subcommand].get("ckpt_path")
         if path in (None, *FOUND_BY_LIGHTNING):

@@ -2,14 +2,11 @@
 
 import difflib
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from collections.abc import Collection, Iterable, Mapping
 
 from jsonargparse import ArgumentParser
 
 from derain.errors import InputError
-from derain.files.documents import Entry
 from derain.models.former_names import FORMER_OPTIONS
 
 # Steps of a key in a file that an option on the command line leaves out.
@@ -23,7 +20,7 @@ _UNKNOWN = (
     re.compile(r"Option '(?P<key>[^']+)' is not accepted"),
 )
 _SECTION = re.compile(r'Parser key "([^"]+)"')
-_ARGUMENT = re.compile(r"argument (?P<options>\S+): (?P<fault>.*)")
+_ARGUMENT = re.compile(r"argument (?:--)?(?P<option>\S+): (?P<fault>.*)")
 _EXPECTED = re.compile(r"Expected an? <class '(?P<kind>[^']+)'>")
 _GIVEN = re.compile(r"(?:Got|Given) value: (?P<value>.*)$", re.MULTILINE)
 
@@ -53,53 +50,31 @@ def known_options(parser: ArgumentParser, classes: Mapping[str, Iterable[type]])
     }
 
 
-def read_configuration(path: Path, known: Collection[str]) -> Entry:
-    """Reads a configuration within bounds, before a library that trusts it does.
+def as_input_error(message: str, known: Collection[str]) -> InputError:
+    """One line for what the parser prints in a page.
 
-    Args:
-        path: A YAML file.
-        known: All options, without their dashes.
-
-    Raises:
-        InputError: A file that :meth:`Entry.of_yaml` refuses, or whose sections are no mappings.
-    """
-    document = Entry.of_yaml(path)
-    sections = {option.split(".")[0] for option in known if "." in option}
-    for name, entry in document.members().items():
-        if name in sections and not isinstance(entry.value, str | None):
-            entry.members()
-    return document
-
-
-def as_input_error(
-    message: str, known: Collection[str], configurations: Sequence[Entry]
-) -> InputError:
-    """Says in a line what the parser says in a page.
+    An option is named without its dashes: it may stand in a configuration.
 
     Args:
         message: The parser's.
         known: All options, without their dashes.
-        configurations: The user's own files, where the key may stand.
     """
     section = ".".join(_SECTION.findall(message))
     for pattern in _UNKNOWN:
         if found := pattern.search(message):
             groups = found.groupdict()
             key = ".".join(filter(None, (section, groups.get("group"), groups["key"])))
-            return _unknown(key, known, configurations)
+            return _unknown(key, known)
     if found := _ARGUMENT.match(message):
-        return InputError(found["options"], found["fault"], HINT)
-    subject = _place(section, configurations)[0] if section else "command line"
-    return _unusable(subject, message)
+        return InputError(found["option"], found["fault"], HINT)
+    return _unusable(section or "command line", message)
 
 
-def _unknown(key: str, known: Collection[str], configurations: Sequence[Entry]) -> InputError:
-    subject, dashes = _place(key, configurations)
+def _unknown(key: str, known: Collection[str]) -> InputError:
     section, dot, name = key.rpartition(".")
     renamed = f"{section}{dot}{FORMER_OPTIONS.get(name, name)}"
     near = [renamed] if renamed in known else difflib.get_close_matches(key, known, n=1)
-    remedy = f"Did you mean {dashes}{near[0]}?" if near else HINT
-    return InputError(subject, "no such option", remedy)
+    return InputError(key, "no such option", f"Did you mean {near[0]}?" if near else HINT)
 
 
 def _unusable(subject: str, message: str) -> InputError:
@@ -112,22 +87,3 @@ def _unusable(subject: str, message: str) -> InputError:
     if others or not (kinds and given):
         return InputError(subject, "; ".join(others or faults), HINT)
     return InputError(subject, f"cannot be {given['value']}", f"Give: {' or '.join(kinds)}.")
-
-
-def _place(key: str, configurations: Sequence[Entry]) -> tuple[str, str]:
-    """Where a key stands: in one of the files, or else on the command line; and its dashes."""
-    for document in configurations:
-        if _holds(document.value, key.split(".")):
-            return f"{document.source}: {key}", ""
-    return f"--{key}", "--"
-
-
-def _holds(value: Any, steps: Sequence[str]) -> bool:
-    if not steps:
-        return True
-    if not isinstance(value, Mapping):
-        return False
-    below = [value.get(step) for step in IMPLIED]
-    return (steps[0] in value and _holds(value[steps[0]], steps[1:])) or any(
-        _holds(inner, steps) for inner in below
-    )

@@ -44,7 +44,7 @@ def test_a_training_returns_its_best_checkpoint_and_score(
     assert results.folder == tmp_path / "runs/outdet_wads/version_0"
     assert results.iou == pytest.approx(results.metrics["val/iou"])
     assert capsys.readouterr().out == ""
-    with pytest.raises(InputError, match=r"--data.rot: no such option"):
+    with pytest.raises(InputError, match=r"data\.rot: no such option"):
         fit("outdet_wads.yaml", {"data.rot": "WADS"})
 
 

@@ -5,47 +5,108 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from derain.cards.card import load_card
+from derain.errors import InputError
 from derain.models import registry
+from derain.models.checkpoint import save_model
 from derain.models.outdet import OutDet
 from derain.models.salsanext import SalsaNext
 from derain.sources.folders import named_frames
-from derain.workflows.learn_config import LearnConfig, epochs_of, network_settings
-
-CONFIG = LearnConfig([Path("drive")], Path("out.onnx"), model="outdet")
-BLIND = LearnConfig([Path("drive")], Path("out.onnx"), model="salsanext", blind=True)
+from derain.sources.source import Source
+from derain.workflows.learn_config import LearnConfig, Student, student_of
 
 
-def test_a_network_is_trained_by_its_configuration_without_intensity_if_blind() -> None:
-    assert network_settings(CONFIG) == ("outdet_taught.yaml", {})
-    blind = {"model.channels": "[range,x,y,z]"}
-    assert network_settings(BLIND) == ("salsanext_taught.yaml", blind)
-    assert epochs_of(CONFIG) == 20
+def write_scans(folder: Path, columns: int = 4) -> Source:
+    folder.mkdir(parents=True)
+    for number in range(3):
+        np.ones((2, columns), np.float32).tofile(folder / f"{number}.bin")
+    return named_frames([folder], ("x", "y", "z", "intensity")[:columns])
+
+
+def config(scans: Path, **options: object) -> LearnConfig:
+    return LearnConfig([scans], scans.parent / "out.onnx", **options)
+
+
+def save_start(path: Path, channels: tuple[str, ...]) -> str:
+    model = OutDet(neighbours=4, channels=channels)
+    model.adopt(model.spec_for(load_card("wads")))
+    save_model(model, path)
+    return str(path)
+
+
+def test_a_network_is_trained_by_its_configuration_without_intensity_where_it_is_blind(
+    tmp_path: Path,
+) -> None:
+    scans, dark = write_scans(tmp_path / "scans"), write_scans(tmp_path / "dark", columns=3)
+    plain = Student("outdet", False, None, "outdet_taught.yaml", {}, 20)
+    assert student_of(config(tmp_path / "scans"), scans) == plain
+    asked = student_of(config(tmp_path / "scans", model="salsanext", blind=True), scans)
+    assert (asked.config, asked.settings) == (
+        "salsanext_taught.yaml",
+        {"model.channels": "[range,x,y,z]"},
+    )
+    forced = student_of(config(tmp_path / "dark", epochs=3), dark)
+    assert (forced.blind, forced.settings, forced.epochs) == (
+        True,
+        {"model.channels": "[x,y,z]"},
+        3,
+    )
+    assert str(forced) == "outdet, blind to intensity"
+
+
+def test_a_student_sees_what_its_start_sees(tmp_path: Path) -> None:
+    scans = write_scans(tmp_path / "scans")
+    start = save_start(tmp_path / "mine.ckpt", ("range",))
+    student = student_of(config(tmp_path / "scans", start=start), scans)
+    assert (student.network, student.blind, student.settings) == ("outdet", True, {"start": start})
+    assert str(student) == f"outdet, blind to intensity, started from {start}"
 
 
 def test_a_network_without_a_configuration_has_that_of_a_network_of_the_same_view(
-    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    others = {"on_points": OutDet, "on_images": SalsaNext}
-    monkeypatch.setattr(registry, "NETWORKS", others)
+    scans = write_scans(tmp_path / "scans")
+    monkeypatch.setattr(registry, "NETWORKS", {"on_points": OutDet, "on_images": SalsaNext})
+    points, images = (
+        student_of(config(tmp_path / "scans", model=name), scans)
+        for name in ("on_points", "on_images")
+    )
+    model = {"model": "derain.models.outdet.module.OutDet"}
+    assert (points.config, points.settings) == ("outdet_taught.yaml", model)
+    assert images.config == "salsanext_taught.yaml"
 
-    def settings(network: str) -> tuple[str, dict[str, str]]:
-        start = "mine.ckpt"
-        return network_settings(LearnConfig([], Path("out.onnx"), model=network, start=start))
 
-    model = "derain.models.outdet.module.OutDet"
-    assert settings("on_points") == ("outdet_taught.yaml", {"model": model, "start": "mine.ckpt"})
-    assert settings("on_images")[0] == "salsanext_taught.yaml"
+@pytest.mark.parametrize(
+    ("channels", "columns", "options", "reason"),
+    [
+        (("x", "intensity"), 3, {}, "has no intensities, which"),
+        (("x", "intensity"), 4, {"blind": True}, "sees intensity"),
+        (("range",), 4, {"model": "salsanext"}, "is of outdet, from which salsanext"),
+        (("range",), 4, {"folder": Path(".")}, "which this run clears first"),
+    ],
+)
+def test_what_does_not_go_with_a_start_is_refused(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    channels: tuple[str, ...],
+    columns: int,
+    options: dict[str, object],
+    reason: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    scans = write_scans(tmp_path / "scans", columns)
+    start = save_start(tmp_path / "mine.ckpt", channels)
+    with pytest.raises(InputError, match=reason):
+        student_of(config(tmp_path / "scans", start=start, **options), scans)
 
 
 def test_odometry_is_needed_where_there_are_no_poses(tmp_path: Path) -> None:
     folder = tmp_path / "drive/velodyne"
-    folder.mkdir(parents=True)
-    for number in range(3):
-        np.zeros((2, 4), np.float32).tofile(folder / f"{number}.bin")
+    write_scans(folder)
 
     def needed(teacher: str, poses: str | None) -> bool:
-        config = LearnConfig([folder], Path("out.onnx"), teacher=teacher, poses=poses)
-        return config.needs_odometry(named_frames([folder]))
+        asked = config(folder, teacher=teacher, poses=poses)
+        return asked.needs_odometry(named_frames([folder]))
 
     given = [("persistence", poses) for poses in (None, "standing", "poses.txt", "odometry")]
     assert [needed(*each) for each in [*given, ("dror", None)]] == [True, False, False, True, False]

@@ -11,7 +11,6 @@ from derain.errors import InputError
 from derain.evaluation.hard_cases import scene
 from derain.scan import Scan
 from derain.sources.frame import MemoryFrame
-from derain.sources.judgement import Judgement
 from derain.workflows.teaching import TruthRecord
 
 CARD = DataCard("yard", {0: "wall", 1: "drop", 2: "car", 9: "nobody knows"}, (1,), (9,))
@@ -22,17 +21,21 @@ CALLED = np.array([1, 1, 0, 1, 0, 0, 1, 1, 0, 1], bool)
 SURE = np.array([1, 0, 1, 1, 1, 1, 0, 1, 1, 1], bool)
 
 
-def frame_and_judgement(known: NDArray[np.bool_] | None = SURE) -> tuple[MemoryFrame, Judgement]:
-    scan = Scan.of(scene(len(TRUTH)))
-    every = np.ones(len(TRUTH), bool)
-    judgement = Judgement(CALLED.astype(np.float32), CALLED, every, scan, known=known)
-    return MemoryFrame(key="0", scan=scan.with_label(TRUTH)), judgement
+EVERY = np.ones(len(TRUTH), bool)
+FRAME = MemoryFrame(key="0", scan=Scan.of(scene(len(TRUTH))).with_label(TRUTH))
+
+
+def record_of(card: DataCard, rows: NDArray[np.int64], sure: NDArray[np.bool_]) -> TruthRecord:
+    """A record of one scan that has these rows of the points above."""
+    record, scan = TruthRecord(card), FRAME.scan.take(rows)
+    answers = (CALLED[rows], EVERY[rows]), (CALLED[rows], sure[rows])
+    record.add(MemoryFrame(key="0", scan=scan), scan, *answers)
+    return record
 
 
 def test_all_points_and_sure_ones_are_counted_apart() -> None:
-    record = TruthRecord(CARD)
-    record.add(*frame_and_judgement())
-    lines = str(record).splitlines()
+    rows = np.arange(len(TRUTH))
+    lines = str(record_of(CARD, rows, SURE)).splitlines()
     # All: 4 drops, 3 found, 2 others called so. Sure: 3 drops, 2 found, 1 other.
     assert lines[1].split() == ["all", "points", "9", "0.600", "0.750", "0.500"]
     assert lines[2].split()[-4:] == ["7", "0.667", "0.667", "0.500"]
@@ -41,34 +44,18 @@ def test_all_points_and_sure_ones_are_counted_apart() -> None:
         ["drop", "(rain)", "4", "75.00%", "66.67%"],
         ["car", "2", "50.00%", "50.00%"],
     ]
-    without_doubt = TruthRecord(CARD)
-    without_doubt.add(*frame_and_judgement(known=None))
-    first, second = str(without_doubt).splitlines()[1:3]
-    assert first.split()[-4:] == second.split()[-4:] == lines[1].split()[-4:]
+    without_doubt = str(record_of(CARD, rows, EVERY)).splitlines()
+    assert without_doubt[2].split()[-4:] == lines[1].split()[-4:]
 
 
 def test_points_at_one_position_count_once_where_the_card_says_so() -> None:
-    frame, judgement = frame_and_judgement()
     twice = np.tile(np.arange(len(TRUTH)), 2)
-    doubled = Judgement(
-        *(part[twice] for part in (judgement.probability, CALLED, judgement.judged)),
-        scan=judgement.scan.take(twice),
-        known=SURE[twice],
-    )
-    again = MemoryFrame(key="0", scan=frame.scan.take(twice))
-    once, both = TruthRecord(replace(CARD, deduplicate=True)), TruthRecord(CARD)
-    once.add(again, doubled)
-    both.add(again, doubled)
-    assert "all points" in str(once)
-    assert str(once).splitlines()[1].split()[2] == "9"
-    assert str(both).splitlines()[1].split()[2] == "18"
+    for card, points in ((CARD, "18"), (replace(CARD, deduplicate=True), "9")):
+        assert str(record_of(card, twice, SURE)).splitlines()[1].split()[2] == points
 
 
-def test_scans_without_labels_are_left_out_and_strange_ones_refused() -> None:
-    record = TruthRecord(CARD)
-    frame, judgement = frame_and_judgement()
-    record.add(frame.without_labels(), judgement)
-    assert record.scans == 0
+def test_strange_labels_are_refused() -> None:
+    record, strange = TruthRecord(CARD), FRAME.scan.with_label(TRUTH * 0 + 7)
     with pytest.raises(InputError, match=r"ids \[7\] are no classes of yard"):
-        record.add(replace(frame, scan=frame.scan.with_label(TRUTH * 0 + 7)), judgement)
+        record.add(MemoryFrame(key="0", scan=strange), strange, (CALLED, EVERY), (CALLED, SURE))
     assert record.scans == 0

@@ -1,0 +1,152 @@
+"""Tunes filters and thresholds of models on labelled scans."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+from tqdm import tqdm
+
+from derain.cards.rain_found import require_rain
+from derain.datamodules.scan_data import ScanData
+from derain.export.methods import load_method_of_one_scan
+from derain.export.runtime import Derainer
+from derain.export.tuning import (
+    LabelledNeighbourhoods,
+    Search,
+    Tuned,
+    neighbours_to_find,
+    tune_filter,
+    tune_threshold,
+)
+from derain.files.atomic import replacing
+from derain.filters import filter_from
+from derain.filters.parameters import CANDIDATES
+from derain.scan import Scan
+from derain.sources.frame import Frame
+from derain.sources.training_record import training_overlap
+from derain.system.notices import Notices, warn
+from derain.views.candidate_fit import fit_candidates
+from derain.views.candidates import Candidates
+from derain.views.scan_issues import ScanChecker, outside_view
+
+
+def bounds_of_rain(data: ScanData, frames: Sequence[Frame], inside: float) -> Candidates | None:
+    """Bounds that hold a share of the scans' rain; None if no bounds tell rain from the rest.
+
+    Args:
+        data: How the scans are read.
+        frames: The scans.
+        inside: The share, 0 to 1.
+
+    Raises:
+        InputError: A scan that cannot be read.
+    """
+
+    def known() -> Iterator[tuple[Any, Any]]:
+        for frame in tqdm(frames, desc="bounding rain", unit="scan", disable=None):
+            yield data.card.known_points(data.read_measured(frame))
+
+    return fit_candidates(known(), ("intensity",), inside)
+
+
+def tune_filter_on(
+    name: str,
+    data: ScanData,
+    frames: Sequence[Frame],
+    trials: int,
+    *,
+    seed: int = 0,
+    storage: Path | None = None,
+    candidates: Candidates | None = None,
+    threads: int = 0,
+) -> Tuned:
+    """Searches the parameters of a filter, and warns of scans that do not suit it.
+
+    Args:
+        name: The filter.
+        data: How the scans are read.
+        frames: The scans.
+        trials: Trials in all.
+        seed: Of the sampler.
+        storage: SQLite file that keeps the trials; None keeps nothing.
+        candidates: Bounds outside which nothing is called rain; None where anything may be.
+        threads: Threads of the search for neighbours; 0 takes every core.
+
+    Returns:
+        The parameters, those of the candidates included.
+
+    Raises:
+        InputError: A scan that cannot be read, scans without rain, or as for
+            :func:`derain.export.tuning.tune_filter`.
+    """
+    notices, default, neighbours = Notices(), filter_from(name, {}), neighbours_to_find(name)
+    scans = []
+    for frame in tqdm(frames, desc="finding neighbours", unit="scan", disable=None):
+        scan = _read(data, default, notices, frame)
+        scans.append(LabelledNeighbourhoods.of(scan, data.card, neighbours, threads, candidates))
+    require_rain(any(scan.rain.any() for scan in scans), data.card, "--data")
+    with tqdm(desc="tuning", unit="trial", total=trials, disable=None) as progress:
+        names = [frame.name for frame in frames]
+        search = Search(trials, seed, storage, names, progress.update)
+        tuned = tune_filter(name, scans, search)
+    notices.warn_of_repeats()
+    if candidates is None:
+        return tuned
+    return replace(tuned, parameters={**tuned.parameters, CANDIDATES: candidates.as_dict()})
+
+
+def tune_model_on(name: str, data: ScanData, frames: Sequence[Frame], threads: int = 0) -> Tuned:
+    """Finds the best threshold of a model, and warns of scans that do not suit it.
+
+    Args:
+        name: ``default``, or the model's file.
+        data: How the scans are read.
+        frames: The scans.
+        threads: Threads to use; 0 takes every core.
+
+    Raises:
+        InputError: No such model, a scan that cannot be read, or scans without rain.
+    """
+    derainer, notices = load_method_of_one_scan(name, {}, threads), Notices()
+    assert isinstance(derainer, Derainer)  # filters have no threshold
+    if note := training_overlap(name, derainer.spec, data.card, frames):
+        warn(note)
+    scans = []
+    for frame in tqdm(frames, desc="judging", unit="scan", disable=None):
+        scan = _read(data, derainer.spec, notices, frame)
+        known = scan.valid & ~data.card.unknown_of(scan)
+        judgement = derainer.judge(scan)
+        outside = outside_view(scan, judgement.judged, derainer.spec.data)
+        notices.warn(frame.name, outside)
+        scans.append((judgement.probability[known], data.card.rain_of(scan)[known]))
+    require_rain(any(rain.any() for _, rain in scans), data.card, "--data")
+    notices.warn_of_repeats()
+    return tune_threshold(scans, derainer.spec.threshold)
+
+
+def write_parameters(
+    path: Path, method: str, parameters: Mapping[str, Any], *comments: str
+) -> None:
+    """Writes parameters as :func:`derain.filters.read_parameters` reads them.
+
+    Args:
+        path: The YAML file.
+        method: Name of the method, or the way from the file to a model.
+        parameters: Its parameters by name.
+        comments: Lines above them.
+
+    Raises:
+        InputError: It cannot be written.
+    """
+    text = yaml.safe_dump({"method": method, **parameters}, sort_keys=False)
+    with replacing(path) as temporary:
+        temporary.write_text("".join(f"# {line}\n" for line in comments) + text, "utf-8")
+
+
+def _read(data: ScanData, checker: ScanChecker, notices: Notices, frame: Frame) -> Scan:
+    """Reads a scan, and warns of what is odd about it for the method."""
+    scan = data.read_measured(frame)
+    notices.warn(frame.name, checker.issues(scan))
+    return scan
