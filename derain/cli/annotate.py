@@ -1,40 +1,8 @@
-"""``derain annotate``: labels the scans of a static scene by its geometry."""
+"""Labels the scans of one sequence as REHEARSE-3D is labelled, by the geometry of its scene.
 
-import argparse
-import json
-import os
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from tqdm import tqdm
-
-from derain.cards.known import lidar_folders
-from derain.cli.arguments import factor
-from derain.cli.outputs import folder_sink, print_lines
-from derain.cli.scan_options import add_columns
-from derain.errors import InputError
-from derain.fusion import LABEL_WITHIN, UNKNOWN, transfer_labels
-from derain.simulation.classes import TrackClass
-from derain.sources.folders import named_frames
-from derain.sources.frame import Frame
-from derain.sources.sink import FolderSink
-from derain.sources.source import Source
-from derain.sources.spread import evenly_spaced
-from derain.system.extras import MATPLOTLIB, OPEN3D, require
-
-if TYPE_CHECKING:
-    from derain.annotation.scene import Scene
-    from derain.annotation.steps import Plane
-    from derain.scan import Scan
-
-DESCRIPTION = """\
-Labels the scans of one sequence as REHEARSE-3D is labelled. It fits a plane to the road. Points in
-a box get the class of the box; other points over the road are rain or road, by their height above
-the plane; everything else is background. It writes <stem>.label with the class ids of REHEARSE-3D
-(255: unknown), and a picture of the sequence.
+It fits a plane to the road. Points in a box get the class of the box; other points over the road
+are rain or road, by their height above the plane; everything else is background. It writes
+<stem>.label with the class ids of REHEARSE-3D (255: unknown), and a picture of the sequence.
 
   derain annotate sequences/003 --scene scene.yaml --out labels/003
   derain annotate scans/*.bin --scene scene.yaml --out labels --sequence 003 --json
@@ -59,6 +27,30 @@ Each radar frame, in the LiDAR's frame, belongs to the scan of the same name. It
 label of the nearest LiDAR point, in the folder radar. `derain fuse` pairs frames by time and
 transforms them into the LiDAR's frame.
 """
+
+import argparse
+import json
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from derain.cards.known import lidar_folders
+from derain.cli.options import add_columns, factor
+from derain.cli.outputs import folder_sink, print_lines
+from derain.errors import InputError
+from derain.fusion import LABEL_WITHIN, UNKNOWN, transfer_labels
+from derain.simulation.classes import TrackClass
+from derain.sources.folders import named_frames
+from derain.sources.frame import Frame
+from derain.sources.sink import FolderSink
+from derain.sources.source import Source
+from derain.sources.spread import evenly_spaced
+from derain.system.extras import MATPLOTLIB, OPEN3D, require
 
 CLASS_NAMES = {kind.value: kind.name.lower() for kind in TrackClass} | {UNKNOWN: "unknown"}
 
@@ -94,28 +86,44 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    from derain.annotation.scene import read_scene
-
     require("annotate", OPEN3D, MATPLOTLIB)
+    from derain.annotation.picture import annotation_figure
+    from derain.annotation.scene import read_scene
+    from derain.annotation.steps import annotate, road_plane
+    from derain.pictures.scan_pictures import save
+
     folders = map(_folder_of_scans, arguments.scans)
     source = named_frames(folders, arguments.columns, layouts=())  # one sequence, no data set
     sequence = arguments.sequence or _sequence_of(Path(source[0].name))
     sink = folder_sink(arguments.out, source)
     radar = _radar_frames(arguments.radar, arguments.radar_columns, source)
+    radar_sink = FolderSink(sink.folder / "radar")
     scene = read_scene(arguments.scene).in_sequence(sequence)
+    plane = road_plane([frame.read() for frame in evenly_spaced(source, scene.plane.scans)], scene)
 
-    plane = _road_plane(source, scene)
-    points = _label_all(source, radar, scene, plane, sink, arguments.within)
+    points: Counter[int] = Counter()
+    for frame in tqdm(source, unit="scan", disable=None):
+        scan = frame.read()
+        label = annotate(scan, scene, plane)
+        sink.write(frame, None, label)
+        points.update(label.tolist())
+        if frame.key in radar:
+            detections = radar[frame.key].read()
+            labelled = scan.with_label(label)
+            transferred = transfer_labels(labelled, detections.xyz, arguments.within)
+            radar_sink.write(radar[frame.key], None, transferred)
     report: dict[str, Any] = {
         "sequence": sequence,
         "scans": len(source),
-        "points": sum(points.values()),
+        "points": points.total(),
         "points_by_class": {name: points[id_] for id_, name in CLASS_NAMES.items()},
         "plane": {**asdict(plane), "slope": plane.slope},
     }
     if arguments.picture:
         picture = arguments.out / f"{sequence}.png"
-        _draw(source[len(source) // 2].read(), scene, plane, sequence, picture)
+        scan = source[len(source) // 2].read()
+        title = f"sequence {sequence}, {Path(scan.name).name}: {len(scan):,} points"
+        save(annotation_figure(scan, annotate(scan, scene, plane), scene, title), picture)
         report["picture"] = str(picture)
     print_lines(json.dumps(report) if arguments.json else _as_text(report))
     return 0
@@ -135,55 +143,12 @@ def _radar_frames(folder: Path | None, columns: Sequence[str], source: Source) -
     """Radar frames by the key of the scan that each belongs to."""
     if folder is None:
         return {}
-    frames = named_frames([folder], columns, layouts=())
-    keys = {frame.key for frame in source}
-    for frame in frames:
-        if frame.key not in keys:
-            raise InputError(
-                frame.name, "no scan has its name", "Pair the frames in time with `derain fuse`."
-            )
-    return {frame.key: frame for frame in frames}
-
-
-def _road_plane(source: Source, scene: "Scene") -> "Plane":
-    from derain.annotation.steps import road_plane
-
-    chosen = evenly_spaced(source, scene.plane.scans)
-    return road_plane([frame.read() for frame in chosen], scene)
-
-
-def _label_all(
-    source: Source,
-    radar: Mapping[str, Frame],
-    scene: "Scene",
-    plane: "Plane",
-    sink: FolderSink,
-    within: float,
-) -> Counter[int]:
-    """Writes the labels of all scans and radar frames; counts the scans' points by class."""
-    from derain.annotation.steps import annotate
-
-    of_radar = FolderSink(sink.folder / "radar")
-    points: Counter[int] = Counter()
-    for frame in tqdm(source, unit="scan", disable=None):
-        scan = frame.read()
-        label = annotate(scan, scene, plane)
-        sink.write(frame, None, label)
-        points.update(label.tolist())
-        if frame.key in radar:
-            detections = radar[frame.key].read()
-            transferred = transfer_labels(scan.with_label(label), detections.xyz, within)
-            of_radar.write(radar[frame.key], None, transferred)
-    return points
-
-
-def _draw(scan: "Scan", scene: "Scene", plane: "Plane", sequence: str, picture: Path) -> None:
-    from derain.annotation.picture import annotation_figure
-    from derain.annotation.steps import annotate
-    from derain.pictures.scan_pictures import save
-
-    title = f"sequence {sequence}, {Path(scan.name).name}: {len(scan):,} points"
-    save(annotation_figure(scan, annotate(scan, scene, plane), scene, title), picture)
+    frames = {frame.key: frame for frame in named_frames([folder], columns, layouts=())}
+    for key in frames.keys() - {frame.key for frame in source}:
+        raise InputError(
+            frames[key].name, "no scan has its name", "Pair the frames in time with `derain fuse`."
+        )
+    return frames
 
 
 def _as_text(report: dict[str, Any]) -> str:
@@ -191,9 +156,9 @@ def _as_text(report: dict[str, Any]) -> str:
     lines = [
         f"sequence {report['sequence']}: {report['scans']:,} scans, {points:,} points",
         f"road: {plane['offset']:.3f} m under the sensor, inclined by {plane['slope']:.2f} degrees",
-        *(
-            f"  {name:<11}{count:>14,} {count / max(points, 1):>8.2%}"
-            for name, count in report["points_by_class"].items()
-        ),
     ]
-    return "\n".join([*lines, *([report["picture"]] if "picture" in report else [])])
+    for name, count in report["points_by_class"].items():
+        lines.append(f"  {name:<11}{count:>14,} {count / max(points, 1):>8.2%}")
+    if "picture" in report:
+        lines.append(report["picture"])
+    return "\n".join(lines)

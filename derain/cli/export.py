@@ -1,31 +1,4 @@
-"""``derain export``: an ONNX file from a checkpoint, proved and timed."""
-
-import argparse
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from derain.cli.arguments import count, file_named, share, threads
-from derain.cli.labelled_data import labelled
-from derain.cli.method_options import add_runtime, runtime_of
-from derain.cli.outputs import print_lines
-from derain.cli.scan_options import add_columns, add_intensity_scale
-from derain.errors import InputError
-from derain.system.extras import EXPORT_LIBRARIES, require
-from derain.system.notices import Notices
-from derain.views.candidate_fit import RAIN_INSIDE
-from derain.views.channels import extra_channels, with_columns
-
-if TYPE_CHECKING:
-    from derain.datamodules.scan_data import ScanData
-    from derain.models.base import DerainingModule
-    from derain.scan import Scan
-    from derain.sources.frame import Frame
-    from derain.spec import Spec
-
-DESCRIPTION = """\
-Exports a checkpoint as one ONNX file, proves it against PyTorch, and times it.
+"""Exports a checkpoint as one ONNX file, proves it against PyTorch, and times it.
 
   derain export outdet.ckpt --out outdet.onnx
   derain export outdet.ckpt --out outdet.onnx --scan scans/000000.bin --threads 2
@@ -43,6 +16,38 @@ their intensities must have the unit of the training data.
 The file is the same for every runtime. If you name another, it has to pass the proof too.
 """
 
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from derain.bags.names import split
+from derain.cli.method_options import add_runtime, runtime_of
+from derain.cli.options import (
+    add_columns,
+    add_intensity_scale,
+    add_threads,
+    count,
+    file_named,
+    labelled,
+    share,
+)
+from derain.cli.outputs import print_lines
+from derain.errors import InputError
+from derain.files.reading import is_file
+from derain.sources.folders import named_frames
+from derain.sources.frame import Frame
+from derain.sources.spread import evenly_spaced
+from derain.system.extras import EXPORT_LIBRARIES, require
+from derain.system.notices import Notices
+from derain.views.candidate_fit import RAIN_INSIDE
+from derain.views.channels import extra_channels, with_columns
+
+if TYPE_CHECKING:
+    from derain.datamodules.labelled import LabelledScans
+    from derain.models.base import DerainingModule
+    from derain.scan import Scan
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the command's arguments."""
@@ -54,7 +59,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--int8", action="store_true", help="compute in eight bits (networks with convolutions)"
     )
     parser.add_argument(
-        "--calibration", type=Path, nargs="+", help="scans, or folders of scans, for --int8"
+        "--calibration",
+        type=Path,
+        nargs="+",
+        default=[],
+        help="scans, or folders of scans, for --int8",
     )
     parser.add_argument(
         "--candidates",
@@ -76,9 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_columns(parser)
     add_intensity_scale(parser, of="calibration and labelled ")
-    parser.add_argument(
-        "--threads", type=threads, default=0, help="threads for the timing (default: all cores)"
-    )
+    add_threads(parser)
     add_runtime(parser, help="prove and time the file by this runtime too")
     parser.add_argument(
         "--repeats", type=count, default=30, help="timed runs (default: %(default)s)"
@@ -88,69 +95,50 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     require("export", *EXPORT_LIBRARIES)
-    from derain.bags.names import split
     from derain.export.onnx_file import export
+    from derain.export.quantisation import CALIBRATION_SCANS, CalibrationScans
     from derain.export.timing import measure_latency
-    from derain.files.reading import is_file
     from derain.models.checkpoint import load_model
 
-    if arguments.scan is not None and not (is_file(arguments.scan) or split(arguments.scan)):
-        raise InputError(arguments.scan, "there is no such file", "Check --scan.")
+    out, scan, scale = arguments.out, arguments.scan, arguments.intensity_scale
+    if scan is not None and not (is_file(scan) or split(scan)):
+        raise InputError(scan, "there is no such file", "Check --scan.")
     if arguments.inside is not None and not arguments.candidates:
         raise InputError("--inside", "bounds candidates, and there are none", "Give --candidates.")
-    runtime = runtime_of(arguments.runtime, arguments.precision)
-    model = load_model(arguments.checkpoint)
     if arguments.int8 != bool(arguments.calibration):
         raise InputError(
             "--int8", "needs --calibration, and that needs it", "Give both or neither."
         )
-    calibration = _calibration(
-        arguments.calibration or [], arguments.columns, arguments.intensity_scale
+    runtime = runtime_of(arguments)
+    model = load_model(arguments.checkpoint)
+    frames = named_frames(arguments.calibration, arguments.columns).map(
+        lambda frame: frame.with_intensity_times(scale)
     )
-    _warn_of_issues(calibration, model.spec)
+    calibration = CalibrationScans(evenly_spaced(frames, CALIBRATION_SCANS))
+    # The proof does not show scans of another unit: both models judge the same ones.
+    notices = Notices()
+    for frame in calibration.frames:
+        notices.warn(frame.name, model.spec.issues(frame.read()))
+    notices.warn_of_repeats()
     if arguments.candidates:
-        data = labelled(
-            arguments.candidates, arguments.card, arguments.columns, arguments.intensity_scale
-        )
+        data = labelled(arguments.candidates, arguments.card, arguments.columns, scale)
         inside = RAIN_INSIDE if arguments.inside is None else arguments.inside
         _fit_candidates(model, data, inside)
-    proof = export(model, arguments.out, calibration, runtime)
-    print(proof)
-    print_lines(f"Wrote {arguments.out} ({arguments.out.stat().st_size:,} bytes)\n")
-    print(
-        measure_latency(
-            arguments.out,
-            arguments.scan,
-            arguments.columns,
-            arguments.threads,
-            arguments.repeats,
-            runtime,
-        )
-    )
+    print(export(model, out, calibration, runtime))
+    print_lines(f"Wrote {out} ({out.stat().st_size:,} bytes)\n")
+    threads, repeats = arguments.threads, arguments.repeats
+    print(measure_latency(out, scan, arguments.columns, threads, repeats, runtime))
     return 0
 
 
-def _calibration(
-    paths: Sequence[Path], columns: Sequence[str], intensity_scale: float
-) -> Collection["Scan"]:
-    """Scans that an eight-bit model is scaled by; none for one in float32."""
-    from derain.export.quantisation import CALIBRATION_SCANS, CalibrationScans
-    from derain.sources.folders import named_frames
-    from derain.sources.spread import evenly_spaced
-
-    frames = evenly_spaced(named_frames(paths, columns), CALIBRATION_SCANS)
-    return CalibrationScans([frame.with_intensity_times(intensity_scale) for frame in frames])
-
-
-def _fit_candidates(model: "DerainingModule", data: "ScanData", inside: float) -> None:
+def _fit_candidates(model: "DerainingModule", data: "LabelledScans", inside: float) -> None:
     """Fits a model's candidates to labelled scans, and prints their bounds and what they cost."""
     from derain.export.candidates import fit_network_candidates
     from derain.learning.task import EXAMPLE_SCANS
-    from derain.sources.spread import evenly_spaced
 
     notices = Notices()
 
-    def read(frame: "Frame") -> "Scan":
+    def read(frame: Frame) -> "Scan":
         scan = data.read_measured(frame)
         notices.warn(frame.name, model.spec.issues(scan))
         return with_columns(scan, extra_channels(model.channels))
@@ -160,15 +148,3 @@ def _fit_candidates(model: "DerainingModule", data: "ScanData", inside: float) -
     notices.warn_of_repeats()
     model.adopt(replace(model.spec, candidates=fitted.candidates))
     print(fitted)
-
-
-def _warn_of_issues(scans: Iterable["Scan"], spec: "Spec") -> None:
-    """Warns of scans that do not suit the model.
-
-    The proof would not tell: it has both models judge the same scans, in whatever unit.
-    """
-    notices = Notices()
-    for scan in scans:
-        notices.warn(scan.name, spec.issues(scan))
-        del scan  # or it would be in memory while the next is read
-    notices.warn_of_repeats()

@@ -1,9 +1,28 @@
-"""``derain fuse``: merges the frames of a LiDAR and of a 4D radar."""
+r"""Merges each LiDAR scan with the radar frame nearest in time, in the layout of REHEARSE-3D.
+
+Each file in lidar_radar_pcd holds the LiDAR's points, then the radar's points in the LiDAR's frame.
+With --labels it also writes lidar_radar_labels.
+
+  derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused
+  derain fuse --lidar innoviz --radar ext_radar --extrinsics radar_to_lidar.yaml \
+    --out fused --extra velocity,cross_section
+  derain fuse --lidar innoviz --radar radar --extrinsics radar_to_lidar.yaml --out fused \
+    --radar-columns x,y,z,doppler,rcs --extra doppler,rcs
+  derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused \
+    --labels innoviz_labels --label-within 0.5
+
+The extrinsics are the pose of the radar in the LiDAR's frame (x forward, y left, z up):
+
+  {x: 0.5, y: 0.0, z: -0.7, roll: 0, pitch: 0, yaw: 1.5}     metres and degrees
+
+or a 4 x 4 matrix. metadata.csv in each folder has one line per scan: frame (its name),
+timestamp (in seconds). A radar point gets the label of the nearest LiDAR point, or 255 (unknown) if
+none is near. A LiDAR scan without a radar frame is written alone.
+"""
 
 import argparse
 import csv
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,61 +30,21 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from derain.cards.card import load_card
-from derain.cli.arguments import factor
+from derain.cli.options import add_columns, factor
 from derain.cli.outputs import folder_sink, print_lines
-from derain.cli.scan_options import add_columns
 from derain.errors import InputError
 from derain.files import write_scan
 from derain.files.atomic import replacing
 from derain.files.extrinsics import Extrinsics, read_extrinsics
 from derain.files.frame_times import FRAME_COLUMNS, METADATA, read_frame_times
 from derain.files.labels import LABEL, instance, read_labels, semantic, write_labels
-from derain.fusion import LABEL_WITHIN, NO_DETECTIONS, UNKNOWN, fuse, nearest_in_time
+from derain.fusion import LABEL_WITHIN, NO_DETECTIONS, fuse, nearest_in_time
 from derain.scan import Scan
 from derain.sources.folders import named_frames
 from derain.sources.frame import Frame
 from derain.sources.source import Source
 
-DESCRIPTION = f"""\
-Merges each LiDAR scan with the radar frame nearest in time, in the layout of REHEARSE-3D. Each file
-in lidar_radar_pcd holds the LiDAR's points, then the radar's points in the LiDAR's frame. With
---labels it also writes lidar_radar_labels.
-
-  derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused
-  derain fuse --lidar innoviz --radar ext_radar --extrinsics radar_to_lidar.yaml \\
-    --out fused --extra velocity,cross_section
-  derain fuse --lidar innoviz --radar radar --extrinsics radar_to_lidar.yaml --out fused \\
-    --radar-columns x,y,z,doppler,rcs --extra doppler,rcs
-  derain fuse --lidar innoviz --radar radar_pcd --extrinsics radar_to_lidar.yaml --out fused \\
-    --labels innoviz_labels --label-within 0.5
-
-The extrinsics are the pose of the radar in the LiDAR's frame (x forward, y left, z up):
-
-  {{x: 0.5, y: 0.0, z: -0.7, roll: 0, pitch: 0, yaw: 1.5}}     metres and degrees
-
-or a 4 x 4 matrix. {METADATA} in each folder has one line per scan: frame (its name),
-timestamp (in seconds). A radar point gets the label of the nearest LiDAR point, or {UNKNOWN}
-(unknown) if none is near. A LiDAR scan without a radar frame is written alone.
-"""
-
 LAYOUT = load_card("rehearse3d").layout
-
-
-@dataclass(frozen=True)
-class Fusing:
-    """How scans and radar frames are merged.
-
-    Attributes:
-        extrinsics: Pose of the radar in the LiDAR's frame.
-        labels: Folder of the LiDAR scans' labels; None where there are none.
-        label_within: Largest distance in metres from which a radar point takes a label.
-        extra: Columns of the radar to keep.
-    """
-
-    extrinsics: Extrinsics
-    labels: Path | None
-    label_within: float
-    extra: Sequence[str]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -111,13 +90,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _two_names(text: str) -> list[str]:
+    names = text.split(",")
+    if len(names) != 2:
+        raise argparse.ArgumentTypeError(f"{text} is not two names with a comma between")
+    return names
+
+
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
-    _refuse_overwriting(arguments.out, (arguments.lidar, arguments.radar, arguments.labels))
+    out = arguments.out
+    _refuse_overwriting(out, (arguments.lidar, arguments.radar, arguments.labels))
     extrinsics = read_extrinsics(arguments.extrinsics)
     lidar = named_frames([arguments.lidar], arguments.lidar_columns, layouts=())
     radar = named_frames([arguments.radar], arguments.radar_columns, layouts=())
-    folder_sink(arguments.out / LAYOUT.scans, lidar)
+    folder_sink(out / LAYOUT.scans, lidar)
     times = _times(lidar, arguments.metadata_columns)
     nearest = nearest_in_time(times, _times(radar, arguments.metadata_columns), arguments.within)
     if (nearest < 0).all():
@@ -127,47 +114,17 @@ def main(arguments: argparse.Namespace) -> int:
             "Check that the timestamps are seconds of one clock, or widen --within.",
         )
     partners = [radar[number] if number >= 0 else None for number in nearest.tolist()]
-    fusing = Fusing(
-        extrinsics,
-        arguments.labels,
-        arguments.label_within,
-        list(filter(None, arguments.extra.split(","))),
-    )
+    extra = [name for name in arguments.extra.split(",") if name]
     for frame, partner in tqdm(zip(lidar, partners, strict=True), total=len(lidar), disable=None):
-        _fuse(frame, partner, fusing, arguments.out)
-    _write_metadata(arguments.out / LAYOUT.scans / METADATA, lidar, times, partners)
+        _fuse(frame, partner, extrinsics, arguments.labels, arguments.label_within, extra, out)
+    folder = out / LAYOUT.scans
+    _write_metadata(folder / METADATA, lidar, times, partners)
     alone = partners.count(None)
-    folder = arguments.out / LAYOUT.scans
     print_lines(f"{len(lidar)} scans in {folder}, {alone} of them without a radar frame")
     return 0
 
 
-def _fuse(frame: Frame, partner: Frame | None, fusing: Fusing, out: Path) -> None:
-    lidar = _read(frame, "--lidar-columns")
-    raw = None
-    if fusing.labels is not None:
-        raw = read_labels(fusing.labels / f"{frame.key}{LABEL}", len(lidar))
-        lidar = lidar.with_label(semantic(raw))
-    radar = NO_DETECTIONS if partner is None else _read(partner, "--radar-columns")
-    fused = fuse(lidar, radar, fusing.extrinsics, fusing.label_within, fusing.extra)
-    suffix = ".npz" if fusing.extra else ".bin"
-    write_scan(out / LAYOUT.scans / f"{frame.key}{suffix}", fused)
-    if fused.label is not None and raw is not None:
-        instances = np.pad(instance(raw), (0, len(radar)))  # the radar's points are of none
-        labels = out / LAYOUT.labels / f"{frame.key}{LABEL}"
-        write_labels(labels, fused.label, instances)
-
-
-def _read(frame: Frame, option: str) -> Scan:
-    """Reads a frame; an error that names --columns names the option of the sensor instead."""
-    try:
-        return frame.read()
-    except InputError as error:
-        texts = str(error.subject), error.reason, error.remedy
-        raise InputError(*(text.replace("--columns", option) for text in texts)) from error
-
-
-def _refuse_overwriting(out: Path, read: Iterable[Path | None]) -> None:
+def _refuse_overwriting(out: Path, read: Sequence[Path | None]) -> None:
     written = {(out / name).resolve() for name in (LAYOUT.scans, LAYOUT.labels)}
     for folder in read:
         if folder is not None and folder.resolve() in written:
@@ -179,6 +136,39 @@ def _times(frames: Source, columns: Sequence[str]) -> NDArray[np.float64]:
     return read_frame_times([Path(frame.name) for frame in frames], columns)
 
 
+def _fuse(
+    frame: Frame,
+    partner: Frame | None,
+    extrinsics: Extrinsics,
+    labels: Path | None,
+    label_within: float,
+    extra: Sequence[str],
+    out: Path,
+) -> None:
+    """Writes a scan with the radar frame that belongs to it, and their labels if there are any."""
+    lidar = _read(frame, "--lidar-columns")
+    radar = NO_DETECTIONS if partner is None else _read(partner, "--radar-columns")
+    path = out / LAYOUT.scans / f"{frame.key}{'.npz' if extra else '.bin'}"
+    if labels is None:
+        write_scan(path, fuse(lidar, radar, extrinsics, label_within, extra))
+        return
+    raw = read_labels(labels / f"{frame.key}{LABEL}", len(lidar))
+    fused = fuse(lidar.with_label(semantic(raw)), radar, extrinsics, label_within, extra)
+    assert fused.label is not None  # as the LiDAR's scan has some
+    write_scan(path, fused)
+    instances = np.pad(instance(raw), (0, len(radar)))  # the radar's points are of none
+    write_labels(out / LAYOUT.labels / f"{frame.key}{LABEL}", fused.label, instances)
+
+
+def _read(frame: Frame, option: str) -> Scan:
+    """Reads a frame; an error that names --columns names the option of the sensor instead."""
+    try:
+        return frame.read()
+    except InputError as error:
+        texts = str(error.subject), error.reason, error.remedy
+        raise InputError(*(text.replace("--columns", option) for text in texts)) from error
+
+
 def _write_metadata(
     path: Path, frames: Source, times: NDArray[np.float64], partners: Sequence[Frame | None]
 ) -> None:
@@ -188,10 +178,3 @@ def _write_metadata(
         writer.writerow([*FRAME_COLUMNS, "radar_frame"])
         for frame, time, partner in zip(frames, times.tolist(), partners, strict=True):
             writer.writerow([frame.key, time, partner.key if partner else ""])
-
-
-def _two_names(text: str) -> list[str]:
-    names = text.split(",")
-    if len(names) != 2:
-        raise argparse.ArgumentTypeError(f"{text} is not two names with a comma between")
-    return names

@@ -1,20 +1,8 @@
-"""``derain import-weights``: a checkpoint of derain from weights that others published."""
-
-import argparse
-from dataclasses import replace
-from pathlib import Path
-
-from derain.cli.arguments import file_named
-from derain.cli.outputs import print_lines
-from derain.errors import InputError, did_you_mean
-from derain.system.extras import CHECKPOINT_LIBRARIES, require
-
-DESCRIPTION = """\
-Makes a checkpoint of derain from published weights.
+r"""Makes a checkpoint of derain from published weights.
 
   derain import-weights outdet saved_models/bin_desnow_wads/outdet.pt --stats wads --out outdet.ckpt
   derain import-weights outdet rehearse3d_outdet.pt --stats wads --data rehearse3d --out outdet.ckpt
-  derain import-weights salsanext SalsaNext_valid_best --stats semantickitti --data rehearse3d \\
+  derain import-weights salsanext SalsaNext_valid_best --stats semantickitti --data rehearse3d \
       --grid rehearse3d --out salsanext.ckpt
 
 --data names the data card of what the weights were trained on, which says their classes, rain and
@@ -23,6 +11,15 @@ packaged card or a YAML file. The published REHEARSE-3D weights of 3D-OutDet fit
 WADS best (inferred); those of SalsaNext were trained with SemanticKITTI's. --grid names the grid of
 the range images that the weights were trained on.
 """
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from derain.cli.options import file_named
+from derain.cli.outputs import print_lines
+from derain.errors import InputError, did_you_mean
+from derain.system.extras import CHECKPOINT_LIBRARIES, require
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,16 +51,19 @@ def main(arguments: argparse.Namespace) -> int:
     from derain.models.registry import NETWORKS
     from derain.sources.training_record import record_of_sequences
 
-    network = NETWORKS.get(arguments.network)
-    if network is None or not issubclass(network, Published):
-        raise _not_published(arguments.network)
+    name = arguments.network
+    published = {known: kind for known, kind in NETWORKS.items() if issubclass(kind, Published)}
+    if name not in published:
+        reason = "no weights of it were published" if name in NETWORKS else "no such network"
+        known = f"{did_you_mean(name, published)}Known are {', '.join(published)}."
+        raise InputError(name, reason, known)
     stats = load_card(arguments.stats)
     data = stats if arguments.data is None else load_card(arguments.data)
     if not data.rain:
         raise InputError(
             "--data", f"{data.name} has no rain that weights could know", "Say what theirs had."
         )
-    model = network.from_published(
+    model = published[name].from_published(
         read_state_dict(arguments.weights), data.normalised_as(stats), arguments.grid
     )
     model.adopt(replace(model.spec, training=record_of_sequences(data.split.get("train", ()))))
@@ -73,13 +73,3 @@ def main(arguments: argparse.Namespace) -> int:
         f"with the statistics of {stats.name}"
     )
     return 0
-
-
-def _not_published(name: str) -> InputError:
-    """The error for a network that does not exist or has no published weights."""
-    from derain.models.published import Published
-    from derain.models.registry import NETWORKS
-
-    known = [name for name, network in NETWORKS.items() if issubclass(network, Published)]
-    reason = "no weights of it were published" if name in NETWORKS else "no such network"
-    return InputError(name, reason, f"{did_you_mean(name, known)}Known are {', '.join(known)}.")

@@ -1,47 +1,11 @@
-"""``derain info``: what is in a scan, a label file, a model or a data set."""
+"""Describes scans, label files, bags, exported models, checkpoints and data sets.
 
-import argparse
-import json
-import os
-import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from textwrap import wrap
-from typing import Any
-
-import numpy as np
-import yaml
-
-from derain.bags.names import is_bag, split, within
-from derain.cards.card import load_card
-from derain.cards.known import layouts_for
-from derain.cli.info_bag import facts_of_bag
-from derain.cli.info_folder import draw, facts_of_folder
-from derain.cli.info_scan import facts_of_scan
-from derain.cli.outputs import print_lines
-from derain.cli.scan_options import ListFormats, add_columns, add_topic
-from derain.default import DEFAULT, ModelCard, ModelScore, default_model, model_card
-from derain.errors import InputError, printable
-from derain.evaluation.text_tables import number_text
-from derain.files.documents import Entry
-from derain.files.labels import read_labels, semantic
-from derain.files.reading import reading
-from derain.sources.folders import frame_of, named_frames
-from derain.system.extras import CHECKPOINT_LIBRARIES, MATPLOTLIB, require
-from derain.system.notices import warn
-from derain.views.candidates import candidates_at
-from derain.views.grid_fit import fit_grid
-from derain.views.scan_issues import no_points
-
-DESCRIPTION = """\
-Describes scans, label files, bags, exported models and checkpoints. For a scan it also prints the
-range image that fits, and how many rays have two returns; with --card, how often the second return
-of a labelled scan is the surface behind rain. For a data set (a folder of sequences as of
-REHEARSE-3D, SemanticKITTI or WADS, or simulated; one sequence; or a folder of scans) it counts
-scans and points by class and rain rate. With --grid it fits one grid to all scans, for a
-configuration. `derain info default` prints the card of the model that comes with derain: what it
-is, how good it is, and when not to use it.
+For a scan it also prints the range image that fits, and how many rays have two returns; with
+--card, how often the second return of a labelled scan is the surface behind rain. For a data set (a
+folder of sequences as of REHEARSE-3D, SemanticKITTI or WADS, or simulated; one sequence; or a
+folder of scans) it counts scans and points by class and rain rate. With --grid it fits one grid to
+all scans, for a configuration. `derain info default` prints the card of the model that comes with
+derain: what it is, how good it is, and when not to use it.
 
   derain info default
   derain info scan.bin
@@ -57,26 +21,35 @@ is, how good it is, and when not to use it.
   derain info my_data --layout lidar,classes --card my_card.yaml
 """
 
+import argparse
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from textwrap import indent, wrap
+from typing import Any
 
-@dataclass(frozen=True)
-class Options:
-    """How files and folders are described.
+import yaml
 
-    Attributes:
-        card: Name or file of their data card; None finds that of a folder.
-        layout: Names of a sequence's folders of scans and labels; None finds them.
-        columns: Names of the columns of files that do not name them.
-        topic: Topic of point clouds, in bags.
-        picture: File for a picture of a folder's statistics.
-        as_json: Whether each line is a JSON object.
-    """
+from derain.bags.names import is_bag, within
+from derain.cli.info_file import facts_of_file
+from derain.cli.info_folder import draw, facts_of_folder
+from derain.cli.options import add_columns, add_topic
+from derain.cli.outputs import print_lines
+from derain.default import DEFAULT, ModelCard, ModelScore, default_model, model_card
+from derain.errors import InputError, printable
+from derain.evaluation.text_tables import number_text, plain_table
+from derain.files.documents import Entry
+from derain.files.format import FORMATS
+from derain.sources.folders import named_frames
+from derain.system.extras import MATPLOTLIB, require
+from derain.system.notices import warn
+from derain.views.candidates import candidates_at
+from derain.views.grid_fit import fit_grid
 
-    card: str | None
-    layout: str | None
-    columns: tuple[str, ...]
-    topic: str | None
-    picture: Path | None
-    as_json: bool
+# Letters of a line, as in every document of derain.
+LINE_LENGTH = 100
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -100,10 +73,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--picture", type=Path, help="draw a folder's statistics to this PNG file")
     parser.add_argument(
-        "--formats", action=ListFormats, nargs=0, help="list the formats of scans, and exit"
+        "--formats", action=_ListFormats, nargs=0, help="list the formats of scans, and exit"
     )
     add_columns(parser)
     add_topic(parser)
+
+
+class _ListFormats(argparse.Action):
+    """Prints the formats of scan files that there are, a line each, and ends the command."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        suffixes: dict[str, list[str]] = {}
+        for suffix, format_ in FORMATS.items():
+            needs = f" (needs derain[{format_.EXTRA.name}])" if format_.EXTRA else ""
+            suffixes.setdefault(format_.HELP + needs, []).append(suffix)
+        print("formats of scans, each of them also compressed as .gz:")
+        for what, names in suffixes.items():
+            print(f"  {', '.join(names):<24}{what}")
+        parser.exit()
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -118,39 +105,30 @@ def main(arguments: argparse.Namespace) -> int:
         fit = fit_grid([frame.read() for frame in frames]).as_dict()
         print(json.dumps(fit) if arguments.json else yaml.safe_dump(fit, sort_keys=False).rstrip())
         return 0
-    options = Options(
-        arguments.card,
-        arguments.layout,
-        arguments.columns,
-        arguments.topic,
-        arguments.picture,
-        arguments.json,
-    )
     code = 0
     for name in arguments.files:
         try:
-            _describe(name, options)
+            _describe(name, arguments)
         except InputError as error:  # the other files are none the worse for it
             print(f"derain: {error}", file=sys.stderr)
             code = 2
     return code
 
 
-def _describe(name: str, options: Options) -> None:
+def _describe(name: str, arguments: argparse.Namespace) -> None:
     """Prints what is in one file or folder."""
     if name == DEFAULT:  # not ./default, which is a file or folder; a Path would make both the same
-        _describe_default(options.as_json)
+        _describe_default(arguments.json)
         return
-    path = within([Path(name)], options.topic)[0]
+    path = within([Path(name)], arguments.topic)[0]
     if os.path.isdir(path) and not is_bag(path):
-        _describe_folder(path, options)
+        _describe_folder(path, arguments)
         return
-    facts = _facts(path, options.card, options.columns)
-    if options.as_json:
+    facts = facts_of_file(path, arguments.card, arguments.columns)
+    if arguments.json:
         print(json.dumps({"file": str(path), **facts}))
     else:
-        print(printable(str(path)))
-        print_lines(_indented(_in_brief(facts)))
+        print_lines(f"{printable(str(path))}\n{_indented(_in_brief(facts))}")
 
 
 def _describe_default(as_json: bool) -> None:
@@ -168,64 +146,16 @@ def _describe_default(as_json: bool) -> None:
         print_lines(card_as_text(card, model.stat().st_size))
 
 
-def _describe_folder(folder: Path, options: Options) -> None:
-    facts = facts_of_folder(folder, options.card, options.layout, options.columns)
-    print_lines(json.dumps(facts.as_dict()) if options.as_json else facts.as_text())
-    if options.card is not None and not facts.total.labelled:
+def _describe_folder(folder: Path, arguments: argparse.Namespace) -> None:
+    facts = facts_of_folder(folder, arguments.card, arguments.layout, arguments.columns)
+    print_lines(json.dumps(facts.as_dict()) if arguments.json else facts.as_text())
+    if arguments.card is not None and not facts.total.labelled:
         warn(
             f"{folder}: no labels are beside its scans or in a folder that the card names. Name "
             f"the folders of scans and labels, as in --layout {folder.absolute().name},labels"
         )
-    if options.picture:
-        draw(facts, options.picture)
-
-
-def _facts(path: Path, card_name: str | None, columns: Sequence[str]) -> dict[str, Any]:
-    if is_bag(path):
-        return facts_of_bag(path)
-    with reading(path):
-        exists = path.exists() or split(path) is not None
-    if not exists:
-        raise InputError(path, "there is no such file or folder", "Check the path.")
-    match path.suffix.lower():
-        case ".label":
-            return _of_labels(path)
-        case ".onnx":
-            from derain.export.runtime import Derainer
-
-            return Derainer(path, threads=1).metadata
-        case ".ckpt":
-            require(path, *CHECKPOINT_LIBRARIES)
-            from derain.models.checkpoint import load_model
-
-            model = load_model(path)
-            weights = sum(parameter.numel() for parameter in model.parameters())
-            return {"spec": dict(model.hparams["spec"]), "parameters": weights}
-        case ".pt" | ".pth":
-            raise InputError(
-                path,
-                "weights alone do not say how they are used",
-                "Make a checkpoint of them with `derain import-weights`.",
-            )
-        case _:
-            card = None if card_name is None else load_card(card_name)
-            frame = frame_of(path, columns, layouts_for(card))
-            scan = frame.read()
-            for issue in no_points(scan):
-                warn(f"{path}: {issue.detail}")
-            return facts_of_scan(scan, frame, card)
-
-
-def _of_labels(path: Path) -> dict[str, Any]:
-    labels, rest = divmod(path.stat().st_size, 4)
-    if rest:
-        raise InputError(path, "is not whole labels of 4 bytes", "Make the file again.")
-    label = semantic(read_labels(path, labels))
-    ids, counts = np.unique(label, return_counts=True)
-    return {
-        "points": len(label),
-        "points by class id": dict(zip(map(str, ids), counts.tolist(), strict=True)),
-    }
+    if arguments.picture:
+        draw(facts, arguments.picture)
 
 
 def _in_brief(facts: dict[str, Any]) -> dict[str, Any]:
@@ -244,25 +174,20 @@ def _in_brief(facts: dict[str, Any]) -> dict[str, Any]:
     return facts
 
 
-def _indented(facts: Any, depth: int = 1) -> str:
+def _indented(facts: dict[str, Any], depth: int = 1) -> str:
     lines = []
     for name, fact in facts.items():
-        if isinstance(fact, dict) and any(
-            isinstance(value, dict | list) for value in fact.values()
-        ):
-            lines.append(f"{'  ' * depth}{name}:\n{_indented(fact, depth + 1)}")
-        elif isinstance(fact, dict):
-            inline = ", ".join(f"{key} {value}" for key, value in fact.items())
-            lines.append(f"{'  ' * depth}{name}: {inline}")
-        elif isinstance(fact, list) and fact and isinstance(fact[0], dict):
-            lines.append(f"{'  ' * depth}{name}: {len(fact)}")
+        title = f"{'  ' * depth}{name}:"
+        if isinstance(fact, list) and fact and isinstance(fact[0], dict):
+            fact = len(fact)
+        if not isinstance(fact, dict):
+            lines.append(f"{title} {fact}")
+        elif any(isinstance(value, dict | list) for value in fact.values()):
+            lines.append(f"{title}\n{_indented(fact, depth + 1)}")
         else:
-            lines.append(f"{'  ' * depth}{name}: {fact}")
+            inline = ", ".join(f"{key} {value}" for key, value in fact.items())
+            lines.append(f"{title} {inline}")
     return "\n".join(lines)
-
-
-# Letters of a line, as in every document of derain.
-LINE_LENGTH = 100
 
 
 def card_as_text(card: ModelCard, size: int) -> str:
@@ -272,46 +197,39 @@ def card_as_text(card: ModelCard, size: int) -> str:
         card: The card.
         size: Bytes of the model's file.
     """
-    return "\n".join(
-        [
-            f"{card.title}, {size:,} bytes",
-            *_part("what it is", card.what),
-            *_part("when not to use it", *card.not_for),
-            *_part("how good it is", *_scores(card.scores)),
-            *_part("measured by", card.measured),
-            *_part("threshold", f"{card.threshold:g}: {card.threshold_chosen}"),
-            *_part("learnt from", card.data),
-            *_part("made by", *card.training),
-            *_part("seed", str(card.seed)),
-            *_part("licence", card.licence),
-            *_part("sha256", card.sha256),
-        ]
-    )
+    parts: dict[str, Sequence[str]] = {
+        "what it is": [card.what],
+        "when not to use it": card.not_for,
+        "how good it is": [],
+        "measured by": [card.measured],
+        "threshold": [f"{card.threshold:g}: {card.threshold_chosen}"],
+        "learnt from": [card.data],
+        "made by": card.training,
+        "seed": [str(card.seed)],
+        "licence": [card.licence],
+        "sha256": [card.sha256],
+    }
+    lines = [f"{card.title}, {size:,} bytes"]
+    for heading, paragraphs in parts.items():
+        lines.append(f"  {heading}:")
+        lines += [line for paragraph in paragraphs for line in _wrapped(paragraph)]
+        if heading == "how good it is":
+            lines.append(_scores(card.scores))
+    return "\n".join(lines)
 
 
-def _part(heading: str, *paragraphs: str) -> Iterator[str]:
-    """A heading and what stands below it; of several paragraphs, further lines are set in."""
-    yield f"  {heading}:"
-    hanging = "    " if len(paragraphs) == 1 else "      "
-    for paragraph in paragraphs:
-        # As it is where it fits, for tables have columns.
-        fits = len(paragraph) <= LINE_LENGTH - 4
-        lines = [paragraph] if fits else wrap(paragraph, LINE_LENGTH - 6, break_long_words=False)
-        yield f"    {lines[0]}"
-        yield from (f"{hanging}{line}" for line in lines[1:])
+def _wrapped(paragraph: str) -> list[str]:
+    """Lines of a paragraph, those after the first set in."""
+    start, hanging = "    ", "      "
+    return wrap(paragraph, LINE_LENGTH, initial_indent=start, subsequent_indent=hanging)
 
 
-def _scores(scores: Sequence[ModelScore]) -> list[str]:
+def _scores(scores: Sequence[ModelScore]) -> str:
     """A table of scores: a line of headings, and a line for each data set."""
     if not scores:
-        return ["not measured"]
-    width = max(len(score.data) for score in scores)
-    return [
-        f"{'':{width}}      P      R    IoU    taken",
-        *(
-            f"{score.data:{width}}  {number_text(score.precision):>5}"
-            f"  {number_text(score.recall):>5}  {number_text(score.iou):>5}"
-            f"  {number_text(score.taken, '.3%'):>7}"
-            for score in scores
-        ),
-    ]
+        return "    not measured"
+    rows = [["", "P", "R", "IoU", "taken"]]
+    for score in scores:
+        figures = map(number_text, (score.precision, score.recall, score.iou))
+        rows.append([score.data, *figures, number_text(score.taken, ".3%")])
+    return indent(plain_table(rows), "  ")

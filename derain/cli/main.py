@@ -69,7 +69,6 @@ def main(arguments: list[str] | None = None) -> int:
         number of the signal that ended it.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
-    _replace_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names may hold what is no text
@@ -109,13 +108,6 @@ def main(arguments: list[str] | None = None) -> int:
         return _refused(InputError("memory", "it is full", "Give it less at once."))
 
 
-def _replace_closed_streams() -> None:
-    """Lets a command print to nowhere where it was started with closed streams, as by ``>&-``."""
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
-
-
 def _cut_off(error: BrokenPipeError) -> int:
     """Prints what the command had written when the reader of its output closed the pipe."""
     with suppress(BrokenPipeError):  # the same reader may have read the errors
@@ -143,7 +135,7 @@ def _refused(error: InputError) -> int:
 
 
 def module_of(command: str) -> ModuleType:
-    """The module of a command, with its ``DESCRIPTION``, ``add_arguments`` and ``main``.
+    """The module of a command, with its help as docstring, ``add_arguments`` and ``main``.
 
     Args:
         command: One of COMMANDS.
@@ -185,6 +177,6 @@ def _parser(command: str | None) -> Parser:
         )
         if name == command:
             module = module_of(name)
-            of_command.description = module.DESCRIPTION
+            of_command.description = module.__doc__
             module.add_arguments(of_command)
     return parser

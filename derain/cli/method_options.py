@@ -1,35 +1,66 @@
-"""Arguments that name a method, its parameters and what runs it, the same in every command."""
+"""Options that name a method, its parameters and what runs it, the same in every command."""
 
 import argparse
+import os
+from functools import partial
 from pathlib import Path
-from typing import Any
 
+from derain.bags.names import split
+from derain.cli.options import add_threads
+from derain.cli.parser import Parser
 from derain.default import DEFAULT
 from derain.errors import InputError
-from derain.export.methods import load_method, named_method, read_parameters
+from derain.export.methods import (
+    CHECKPOINT_SUFFIX,
+    PARAMETER_SUFFIXES,
+    is_method_name,
+    load_method,
+    method_hint,
+    named_method,
+    read_parameters,
+)
 from derain.export.runtimes.session import DEFAULT_RUNTIME, FLOAT32_PRECISION, Runtime
+from derain.files.format import FORMATS
+from derain.files.names import scan_suffix
+from derain.files.reading import is_file
 from derain.filters import FILTERS
 from derain.recordings.registry import METHODS
 from derain.sources.method import Method
 
-_MODEL = f"the model that comes with derain:\n  {DEFAULT}  see `derain info {DEFAULT}`"
-_FILTERS_HERE, _METHODS_HERE = "{filters}", "{methods}"
+# Suffixes of files that name a method, or, as a checkpoint does, are refused as one.
+METHOD_SUFFIXES = (".onnx", CHECKPOINT_SUFFIX, *PARAMETER_SUFFIXES)
 
 
-def list_filters(parser: argparse.ArgumentParser) -> None:
-    """Ends the help of a command with the default model and the filters, one a line."""
-    parser.formatter_class = _FilterHelp
-    parser.epilog = f"{_MODEL}\nfilters:\n{_FILTERS_HERE}"
+def list_methods(parser: Parser, of_recordings: bool = True) -> None:
+    """Ends the help of a command with the default model and the filters, one a line.
+
+    Args:
+        parser: The command's parser.
+        of_recordings: Whether methods that see several scans are listed too.
+    """
+    # Listed when help is asked for: most starts need not look for what other packages bring.
+    parser.late_epilog = partial(_listed_methods, of_recordings)
 
 
-def list_methods(parser: argparse.ArgumentParser) -> None:
-    """Ends the help of a command with these, and the methods that see several scans."""
-    list_filters(parser)
-    parser.epilog = f"{parser.epilog}\n{_METHODS_HERE}"
+def _listed_methods(of_recordings: bool) -> str:
+    model = {DEFAULT: f"see `derain info {DEFAULT}`"}
+    parts = [
+        ("the model that comes with derain", model),
+        ("filters", {name: filter_.HELP for name, filter_ in FILTERS.items()}),
+    ]
+    if of_recordings and METHODS:
+        several = {name: method.HELP for name, method in METHODS.items()}
+        parts.append(("methods that see several scans of a recording", several))
+    lines = []
+    for heading, helps in parts:
+        width = max(map(len, helps))
+        lines.append(f"{heading}:")
+        lines += [f"  {name:{width}}  {text}".rstrip() for name, text in helps.items()]
+    return "\n".join(lines)
 
 
-def add_method(parser: argparse.ArgumentParser, metavar: str = "METHOD") -> None:
-    """Declares the method, and lists in the help which there are.
+def add_method(parser: Parser, metavar: str = "METHOD") -> None:
+    """Declares the method, its parameters and what runs it, as :func:`method_of` reads them.
 
     Args:
         parser: The command's parser.
@@ -39,10 +70,8 @@ def add_method(parser: argparse.ArgumentParser, metavar: str = "METHOD") -> None
         "method", metavar=metavar, help="ONNX file, YAML file of parameters, or name of a method"
     )
     list_methods(parser)
-
-
-def add_parameters(parser: argparse.ArgumentParser) -> None:
-    """Declares the method's parameters."""
+    add_threads(parser)
+    add_runtime(parser, help="what runs the model")
     parser.add_argument(
         "--parameters", type=Path, metavar="YAML", help="parameters of the method, from derain tune"
     )
@@ -76,35 +105,28 @@ def add_runtime(parser: argparse.ArgumentParser, help: str) -> None:
     )
 
 
-def runtime_of(name: str | None, precision: str | None) -> Runtime:
+def runtime_of(arguments: argparse.Namespace) -> Runtime:
     """The runtime and the precision that a command line names.
-
-    Args:
-        name: What ``--runtime`` names; None is the default.
-        precision: What ``--precision`` names; None is the default.
 
     Raises:
         InputError: No such runtime, or a precision that it does not have.
     """
-    return Runtime(name or DEFAULT_RUNTIME, precision or FLOAT32_PRECISION)
+    return Runtime(arguments.runtime or DEFAULT_RUNTIME, arguments.precision or FLOAT32_PRECISION)
 
 
-def method_of(
-    method: str, file: Path | None, settings: dict[str, Any], threads: int, runtime: Runtime
-) -> Method:
+def method_of(method: str, arguments: argparse.Namespace) -> Method:
     """The method that a command line names, ready to judge scans.
 
     Args:
         method: Its name or file.
-        file: File of parameters, over those of the method's own file; None where there is none.
-        settings: Single parameters, over those of the files.
-        threads: Threads to use; 0 takes all cores.
-        runtime: What runs a model's network.
+        arguments: The options that :func:`add_method` declares.
 
     Raises:
         InputError: No such method, parameters of another, or some that it cannot have.
     """
+    runtime = runtime_of(arguments)
     name, parameters = named_method(method)
+    file = arguments.parameters
     if file is not None:
         of_method, tuned = read_parameters(file)
         # Models are files, which have more than one name.
@@ -113,7 +135,7 @@ def method_of(
                 file, f"holds parameters of {of_method}, not of {name}", f"Run {of_method} with it."
             )
         parameters |= tuned
-    return load_method(name, parameters | settings, threads, runtime)
+    return load_method(name, parameters | dict(arguments.set), arguments.threads, runtime)
 
 
 def _assignment(text: str) -> tuple[str, int | float | str]:
@@ -129,25 +151,51 @@ def _assignment(text: str) -> tuple[str, int | float | str]:
     return name, value
 
 
-class _FilterHelp(argparse.RawDescriptionHelpFormatter):
-    """Makes the list when help is asked for.
+def add_method_and_scans(parser: Parser, help: str) -> None:
+    """Declares a method, which need not be named, and the scans.
 
-    Every start of derain makes every parser, and most starts need not look for what other packages
-    bring.
+    Args:
+        parser: The command's parser.
+        help: What the scans are.
     """
-
-    def add_text(self, text: str | None) -> None:
-        """Adds a text to the help, with the lists in place of their marks."""
-        if text and _FILTERS_HERE in text:
-            text = text.replace(_FILTERS_HERE, _listed({n: f.HELP for n, f in FILTERS.items()}))
-        if text and _METHODS_HERE in text:
-            listed = _listed({name: method.HELP for name, method in METHODS.items()})
-            heading = "methods that see several scans of a recording:\n" if listed else ""
-            text = text.replace(_METHODS_HERE, heading + listed)
-        super().add_text(text)
+    add_method(parser, metavar="[METHOD]")
+    scans = parser.add_argument("scans", nargs="+", type=Path, metavar="SCAN", help=help)
+    # Where only one word is given it goes to the method, and the words are sorted afterwards. Were
+    # it the method that is not required, `run dror --out cleaned scans/` would be misread.
+    scans.required = False
 
 
-def _listed(helps: dict[str, str]) -> str:
-    """Names, a line each, and what stands for each."""
-    width = max(map(len, helps), default=0)
-    return "\n".join(f"  {name:{width}}  {help_}".rstrip() for name, help_ in helps.items())
+def method_and_scans(first: str, others: list[Path]) -> tuple[str, list[Path]]:
+    """The method and the scans that the words of ``derain run`` mean.
+
+    Args:
+        first: The first word, a method or a scan.
+        others: The words after it, scans.
+
+    Raises:
+        InputError: A first word that is neither, or could be both where that matters; a method
+            without scans.
+    """
+    path = Path(first)
+    folder, in_bag = os.path.isdir(first), split(path) is not None
+    there = folder or in_bag or is_file(path)
+    of_method = path.suffix in METHOD_SUFFIXES and not folder
+    named = of_method or (not path.suffix and is_method_name(first))
+    if not (named or there):
+        raise InputError(
+            first, "no such file", f"{method_hint(first)}, and scans after it; or scans alone."
+        )
+    may_be_scans = folder or in_bag or scan_suffix(path) in FORMATS
+    if not named and (not others or may_be_scans):
+        return DEFAULT, [path, *others]
+    if others:
+        return first, others
+    beside = f"`derain run {first} SCANS --out cleaned`"
+    if there and not of_method:
+        raise InputError(
+            first,
+            "it is a method's name, and a file or folder here has it, too",
+            f"Write ./{first} to have that cleaned by the model that comes with derain, or "
+            f"{beside} to clean others by the method.",
+        )
+    raise InputError(first, "it is a method, and no scans are named", f"Write {beside}.")

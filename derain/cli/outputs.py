@@ -1,45 +1,43 @@
-"""What commands print, and the files and folders that they may write."""
+"""What commands print, and the folders that they may write to."""
 
 import json
-import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import Any, TextIO
 
 from tqdm import tqdm
 
 from derain.errors import InputError, printable
-from derain.sources.frame import Frame
-from derain.sources.judging import Failures
 from derain.sources.sink import FolderSink
 from derain.sources.source import Source
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
 
-
-def folder_sink(out: Path, source: Source, removed: Path | None = None) -> FolderSink:
+def folder_sink(out: Path, source: Source) -> FolderSink:
     """The folder that a command writes to, once it is known to overwrite nothing of the source.
 
     Args:
         out: What ``--out`` names.
         source: What is read.
-        removed: Folder for what is taken away of the scans; None where nobody asks for it.
 
     Raises:
         InputError: It holds a scan or labels that would be overwritten, or two scans have one name.
     """
-    sink = FolderSink(out, again=False, removed=removed)
+    sink = FolderSink(out, again=False)
     sink.refuse_clashes(source)
     return sink
 
 
-def print_facts(facts: "DataclassInstance", as_json: bool) -> None:
-    """Prints what was done to a scan, above a progress bar: a line of text, or an object."""
-    tqdm.write(json.dumps(asdict(facts)) if as_json else str(facts), sys.stdout)
+def print_facts(facts: Mapping[str, Any], text: str, as_json: bool) -> None:
+    """Prints what was done to a scan, above a progress bar.
+
+    Args:
+        facts: As an object.
+        text: As a line of text; a name in it may hold anything.
+        as_json: Which of the two.
+    """
+    tqdm.write(json.dumps(facts) if as_json else printable(text), sys.stdout)
     sys.stdout.flush()  # so that the reader of a pipe gets each line at once
 
 
@@ -51,6 +49,11 @@ def print_lines(text: str, stream: TextIO | None = None) -> None:
         stream: Where to; None is the standard output.
     """
     tqdm.write("\n".join(map(printable, text.split("\n"))), stream or sys.stdout)
+
+
+def print_error(error: InputError) -> None:
+    """Prints an error on stderr, above a progress bar."""
+    tqdm.write(f"derain: {error}", sys.stderr)
 
 
 @contextmanager
@@ -67,46 +70,6 @@ def noting_progress(so_far: Callable[[], str]) -> Iterator[None]:
         raise
 
 
-def require_free_path(option: str, path: Path, written: Iterable[Path]) -> None:
-    """Refuses a file that would be in the way of what else a command writes.
-
-    Args:
-        option: The option that names it.
-        path: The file.
-        written: What else is written.
-
-    Raises:
-        InputError: It is one of these, or a folder of one, or lies in one.
-    """
-    place = os.path.realpath(path)
-    for other in written:
-        result = os.path.realpath(other)
-        if place == result or result.startswith(f"{place}{os.sep}"):
-            reason = f"{other} is written there"
-        elif place.startswith(f"{result}{os.sep}"):
-            reason = f"{other} is written in place of what is there"
-        else:
-            continue
-        raise InputError(path, reason, f"Give {option} another file.")
-
-
-class ScanByScan(Failures):
-    """The frames of a source, one after the other, with a progress bar.
-
-    It prints what is wrong with single scans, and goes on with the others.
-
-    Args:
-        source: The source.
-    """
-
-    def __init__(self, source: Source) -> None:
-        super().__init__(print_error)
-        self._source = source
-
-    def __iter__(self) -> Iterator[Frame]:
-        return iter(tqdm(self._source, unit="scan", disable=None))
-
-
 def exit_code(failed: int, scans: int, outcome: str) -> int:
     """The command's exit code: 2 where scans failed, which it prints, else 0.
 
@@ -119,8 +82,3 @@ def exit_code(failed: int, scans: int, outcome: str) -> int:
         return 0
     print(f"derain: {outcome.format(scans=f'{failed} of {scans} scans')}", file=sys.stderr)
     return 2
-
-
-def print_error(error: InputError) -> None:
-    """Prints an error on stderr, above a progress bar."""
-    tqdm.write(f"derain: {error}", sys.stderr)

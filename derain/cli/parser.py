@@ -1,25 +1,56 @@
 """The parser of the command line: what it cannot understand is one line with a remedy."""
 
 import argparse
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
-from derain.cli.arguments import number, whole
 from derain.errors import InputError, did_you_mean
 
 # Options of other programs that choose a GPU.
 GPU_OPTIONS = {"--gpu", "--gpus", "--device", "--cuda", "--accelerator"}
 
 
+def whole(text: str) -> int:
+    """A whole number."""
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number") from None
+
+
+def number(text: str) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text} is not a number")
+    return value
+
+
 class Parser(argparse.ArgumentParser):
-    """Raises InputError for a command line that it cannot understand."""
+    """Raises InputError for a command line that it cannot understand.
+
+    Attributes:
+        late_epilog: Makes the end of the help when help is asked for; None where it has none.
+    """
+
+    late_epilog: Callable[[], str] | None = None
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         # Instead of int and float, whose names would appear in the messages.
         self.register("type", int, whole)
         self.register("type", float, number)
+
+    def format_help(self) -> str:
+        """The help, with its end."""
+        if self.late_epilog is not None:
+            self.epilog = self.late_epilog()
+        return super().format_help()
 
     def error(self, message: str) -> NoReturn:
         """Refuses a command line, with an example of a right one where something is missing."""

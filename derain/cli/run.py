@@ -1,45 +1,8 @@
-"""``derain run``: cleans scans with an exported model or a filter."""
+r"""Cleans scans with an exported model or a filter.
 
-import argparse
-import sys
-from pathlib import Path
-
-from derain.bags.names import within
-from derain.cli.arguments import add_threads, share
-from derain.cli.method_options import add_parameters, add_runtime, method_of, runtime_of
-from derain.cli.method_or_scans import RULE, add_method_and_scans, method_and_scans
-from derain.cli.outputs import (
-    exit_code,
-    noting_progress,
-    print_error,
-    print_facts,
-    print_lines,
-    require_free_path,
-)
-from derain.cli.scan_options import add_columns, add_intensity_scale, add_poses, add_topic
-from derain.cli.weather_options import (
-    WeatherTable,
-    add_weather,
-    warn_of_bad_weather,
-    weather_options,
-)
-from derain.default import DEFAULT, model_card
-from derain.errors import InputError
-from derain.sources.clean_sink import CleanSink, require_probabilities
-from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
-from derain.sources.cleaning import CleanedScan, CleaningObserver, CleanReport, clean
-from derain.sources.folders import named_frames
-from derain.sources.judgement import Judgement
-from derain.sources.recordings import irregularities
-from derain.system.memory import keep_freed_memory
-from derain.system.notices import Notices, warn
-from derain.views.scan_issues import MOST_RAIN, ScanIssue
-from derain.workflows.odometry import placed
-
-DESCRIPTION = f"""\
-Cleans scans: writes <stem>.label (1 = rain, one per row of the input) and the scan without its
-rain, in the format of the input with all its fields. With --weather, --fail-at, --dry or --json it
-measures the weather of every scan; otherwise of five scans, for the last line.
+Writes <stem>.label (1 = rain, one per row of the input) and the scan without its rain, in the
+format of the input with all its fields. With --weather, --fail-at, --dry or --json it measures the
+weather of every scan; otherwise of five scans, for the last line.
 
   derain run scans/ --out cleaned
   derain run model.onnx scan.bin --out cleaned
@@ -58,7 +21,8 @@ measures the weather of every scan; otherwise of five scans, for the last line.
 
 METHOD is a model from `derain export` (.onnx), parameters from `derain tune` (.yaml), or a name
 (below).
-{RULE}
+METHOD is optional: if the first word is a folder or a scan, the model that comes with derain cleans
+all scans. Write ./crf for a folder called crf.
 Methods that see several scans need the scans of a recording in time order. Where a method is not
 sure of a point, its best guess decides. Results of a data set are named by their paths in it.
 A bag (.bag of ROS 1; .mcap, .db3 or a folder of ROS 2) becomes a bag of the same name: the clouds
@@ -72,14 +36,51 @@ returns shows only in comparison with dry scans of the sensor (--dry).
 The exit code is 3 if derain cleaned every scan and one was at the level of --fail-at or worse.
 """
 
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+from derain.bags.names import within
+from derain.cli.method_options import add_method_and_scans, method_and_scans, method_of
+from derain.cli.options import (
+    add_columns,
+    add_intensity_scale,
+    add_json,
+    add_poses,
+    add_topic,
+    share,
+)
+from derain.cli.outputs import exit_code, noting_progress, print_error, print_facts, print_lines
+from derain.cli.parser import Parser
+from derain.cli.weather_options import (
+    add_weather,
+    warn_of_bad_weather,
+    weather_options,
+    weather_table,
+)
+from derain.default import DEFAULT, model_card
+from derain.errors import InputError
+from derain.sources.clean_sink import CleanSink, require_probabilities
+from derain.sources.cleaned_bags import RAIN_PROBABILITY, BagOptions
+from derain.sources.cleaning import CleanedScan, CleaningObserver, CleanReport, clean
+from derain.sources.folders import named_frames
+from derain.sources.frame import time_of
+from derain.sources.judgement import Judgement
+from derain.sources.recordings import irregularities
+from derain.system.memory import keep_freed_memory
+from derain.system.notices import Notices, warn
+from derain.views.scan_issues import MOST_RAIN, ScanIssue
+from derain.weather.record import weather_row
+from derain.workflows.odometry import placed
+
+
+def add_arguments(parser: Parser) -> None:
     """Declares the command's arguments."""
     add_method_and_scans(parser, help="scans, folders of scans, or a data set's folder")
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
-    add_threads(parser)
-    add_runtime(parser, help="what runs the model")
-    parser.add_argument("--json", action="store_true", help="print one JSON object per scan")
+    add_json(parser)
     add_columns(parser)
     add_intensity_scale(parser)
     parser.add_argument(
@@ -96,15 +97,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--probability", action="store_true", help=f"add the column {RAIN_PROBABILITY} to the scans"
     )
-    add_parameters(parser)
     add_poses(parser)
     add_topic(parser)
-    _add_cleaned_bags(parser)
-    add_weather(parser)
-
-
-def _add_cleaned_bags(parser: argparse.ArgumentParser) -> None:
-    """Declares what is written of bags."""
     parser.add_argument(
         "--cleaned-topic",
         metavar="NAME",
@@ -118,52 +112,53 @@ def _add_cleaned_bags(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="bags: keep rows and columns of organised clouds; removed points become NaN",
     )
+    add_weather(parser)
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     keep_freed_memory()
-    name, scans = method_and_scans(arguments.method, arguments.scans or [], arguments.command)
-    runtime = runtime_of(arguments.runtime, arguments.precision)
-    settings = dict(arguments.set)
-    method = method_of(name, arguments.parameters, settings, arguments.threads, runtime)
+    name, scans = method_and_scans(arguments.method, arguments.scans or [])
+    method = method_of(name, arguments)
     frames = named_frames(within(scans, arguments.topic), arguments.columns)
     source = placed(frames, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
     if arguments.probability:
         require_probabilities(method, source)
-    weather, table = weather_options(arguments), WeatherTable(arguments.weather)
-    printer = _Printer(table, arguments.json)
-    with CleanSink(
+    weather = weather_options(arguments)
+    sink = CleanSink(
         arguments.out,
         source,
         removed=arguments.removed,
         probability=arguments.probability,
         bags=BagOptions(arguments.cleaned_topic, arguments.removed_topic, arguments.keep_shape),
-    ) as sink:
-        if arguments.weather is not None:
-            require_free_path("--weather", arguments.weather, sink.targets())
+    )
+    with sink, weather_table(arguments.weather) as rows, noting_progress(sink.so_far):
+        printer = _Printer(rows, arguments.json)
         if name == DEFAULT:
             printer.introduce_default()
         for sentence in irregularities(source, method.window):
             warn(sentence)
-        with table.open(), noting_progress(sink.so_far):
-            most_removed = arguments.most_removed
-            report = clean(
-                source, method, sink, most_removed=most_removed, weather=weather, observer=printer
-            )
-            printer.summarise(report)
-        failed = exit_code(len(report.failures), len(source), "{scans} could not be cleaned")
-        return failed or warn_of_bad_weather(report.weather, arguments.fail_at)
+        report = clean(
+            source,
+            method,
+            sink,
+            most_removed=arguments.most_removed,
+            weather=weather,
+            observer=printer,
+        )
+        printer.summarise(report)
+    failed = exit_code(len(report.failures), len(source), "{scans} could not be cleaned")
+    return failed or warn_of_bad_weather(report.weather, arguments.fail_at)
 
 
 class _Printer(CleaningObserver):
-    """Prints what is done to the scans, and writes their weather into a table."""
+    """Prints what is done to the scans, and makes a row of a table of the weather of each."""
 
-    def __init__(self, table: WeatherTable, as_json: bool) -> None:
+    def __init__(self, rows: list[Sequence[object]], as_json: bool) -> None:
         self._notices = Notices()
-        self._table = table
+        self._rows = rows
         self._as_json = as_json
         self._stream = sys.stderr if as_json else sys.stdout
 
@@ -187,9 +182,12 @@ class _Printer(CleaningObserver):
         self._notices.warn(judgement.frame.name, odd)
 
     def cleaned(self, judgement: Judgement, scan: CleanedScan) -> None:
-        """Prints a line, and adds one to the table."""
-        self._table.add(judgement, scan)
-        print_facts(scan, self._as_json)
+        """Prints a line, and adds a row to the table."""
+        assert judgement.frame is not None
+        if scan.weather is not None:
+            row = weather_row(scan.weather, judgement.weather)
+            self._rows.append([scan.scan, time_of(judgement.frame), *row])
+        print_facts(asdict(scan), str(scan), self._as_json)
 
     def failed(self, error: InputError) -> None:
         """Prints why a scan is not cleaned."""

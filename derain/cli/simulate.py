@@ -1,27 +1,8 @@
-"""``derain simulate``: a data set of simulated rain, or rain on scans of one's own."""
+"""Simulates a data set of rain, or lets it rain on clean scans.
 
-import argparse
-from collections.abc import Iterable, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from derain.cli.arguments import count
-from derain.cli.outputs import folder_sink, print_lines
-from derain.cli.scan_options import add_columns
-from derain.errors import InputError
-from derain.files import DEFAULT_COLUMNS
-from derain.sources.folders import named_frames
-from derain.system.cores import usable_cores
-from derain.system.extras import MATPLOTLIB, OPEN3D, require
-
-if TYPE_CHECKING:
-    from derain.simulation.campaign import Campaign
-    from derain.simulation.world import WorldCampaign
-
-DESCRIPTION = """\
-Simulates a rain facility in the layout of REHEARSE-3D: LiDAR, radar, both merged, labels, weather.
-Every sequence is another track: 60 % for training, 20 % each for validation and test. Training
-needs three or more sequences; one is enough to look at.
+By default it simulates a rain facility in the layout of REHEARSE-3D: LiDAR, radar, both merged,
+labels, weather. Every sequence is another track: 60 % for training, 20 % each for validation and
+test. Training needs three or more sequences; one is enough to look at.
 
   derain simulate --out facility
   derain simulate --out look --sequences 1 --scans 1 --rain 50
@@ -58,6 +39,36 @@ and writes <stem>.label (1 = rain).
 
 Simulated rain is easy: a score on it does not predict the score on real rain.
 """
+
+import argparse
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from tqdm import tqdm
+
+from derain.cli.options import add_columns, count
+from derain.cli.outputs import (
+    exit_code,
+    folder_sink,
+    noting_progress,
+    print_error,
+    print_facts,
+    print_lines,
+)
+from derain.errors import InputError
+from derain.files import DEFAULT_COLUMNS
+from derain.simulation.classes import TrackClass
+from derain.sources.folders import named_frames
+from derain.sources.judging import Failures
+from derain.system.cores import usable_cores
+from derain.system.extras import MATPLOTLIB, OPEN3D, require
+
+if TYPE_CHECKING:
+    from derain.scan import Scan
+    from derain.simulation.campaign import Campaign
+    from derain.simulation.world import WorldCampaign
 
 # The names of derain.simulation.layouts, which takes too long to import where it is not used.
 LAYOUT_NAMES = (
@@ -153,49 +164,35 @@ def main(arguments: argparse.Namespace) -> int:
     """Runs the command."""
     if arguments.seed < 0:
         raise InputError("--seed", f"{arguments.seed} is negative", "Give 0 or more.")
-    given = {name: value for name, value in vars(arguments).items() if value is not None}
     if arguments.on is not None:
-        _refuse((*DATA_SET_DEFAULTS, "world"), given, needs="without --on")
-        if arguments.picture:
-            require("--picture", MATPLOTLIB)
-        from derain.cli.rain_on_scans import rain_on_scans
-        from derain.simulation.rain_field import UniformRain
-        from derain.simulation.sensor_file import load_sensor
-
-        if not arguments.rain or len(arguments.rain) > 1:
-            raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")
-        rain, sensor = UniformRain(*arguments.rain), load_sensor(arguments.sensor or "spinning_64")
-        source = named_frames(arguments.on, arguments.columns or DEFAULT_COLUMNS)
-        sink = folder_sink(arguments.out, source)
-        output = bool(arguments.picture), bool(arguments.json)
-        return rain_on_scans(source, rain, sensor, sink, arguments.seed, *output)
+        _refuse((*DATA_SET_DEFAULTS, "world"), arguments, needs="without --on")
+        return _rain_on_scans(arguments)
     require("simulate", OPEN3D)
     from derain.simulation.dataset import simulate_track
 
-    workers = arguments.workers or DATA_SET_DEFAULTS["workers"]
-    campaign: WorldCampaign | Campaign
-    if arguments.world is not None:
-        _refuse((*OF_NO_WORLD, *SCAN_OPTIONS, "rain", "sensor"), given, needs="without --world")
-        campaign, scans = _world_campaign(arguments), 1
-    else:
-        _refuse(SCAN_OPTIONS, given, needs="with --on")
-        campaign = _campaign(
-            argparse.Namespace(**{**vars(arguments), **DATA_SET_DEFAULTS, **given})
-        )
-        scans = campaign.scans
-    simulate_track(arguments.out, campaign, workers)
+    in_world = arguments.world is not None
+    if in_world:
+        foreign = (*OF_NO_WORLD, *SCAN_OPTIONS, "rain", "sensor")
+        _refuse(foreign, arguments, needs="without --world")
+    _refuse(SCAN_OPTIONS, arguments, needs="with --on")
+    for name, value in DATA_SET_DEFAULTS.items():
+        if getattr(arguments, name) is None:
+            setattr(arguments, name, value)
+    campaign = _world_campaign(arguments) if in_world else _campaign(arguments)
+    simulate_track(arguments.out, campaign, arguments.workers)
     sequences = len(campaign.names)
+    scans = sequences * (1 if in_world else arguments.scans)
     print_lines(
-        f"{arguments.out}: {sequences} sequences, {sequences * scans:,} scans. "
+        f"{arguments.out}: {sequences} sequences, {scans:,} scans. "
         f"What is in them: derain info {arguments.out}"
     )
     return 0
 
 
-def _refuse(foreign: Iterable[str], given: Mapping[str, object], needs: str) -> None:
+def _refuse(foreign: Iterable[str], arguments: argparse.Namespace, needs: str) -> None:
     """Refuses the options of other uses."""
     for name in foreign:
-        if name in given:
+        if getattr(arguments, name) is not None:
             raise InputError(f"--{name}", f"has a meaning only {needs}", "Leave it out.")
 
 
@@ -218,9 +215,50 @@ def _campaign(options: argparse.Namespace) -> "Campaign":
     )
 
 
-def _world_campaign(arguments: argparse.Namespace) -> "WorldCampaign":
+def _world_campaign(options: argparse.Namespace) -> "WorldCampaign":
     from derain.simulation.campaign import partition
     from derain.simulation.world import WorldCampaign
 
-    parts = partition(arguments.sequences or DATA_SET_DEFAULTS["sequences"])
-    return WorldCampaign(*parts, seed=arguments.seed, world=arguments.world)
+    return WorldCampaign(*partition(options.sequences), seed=options.seed, world=options.world)
+
+
+def _rain_on_scans(arguments: argparse.Namespace) -> int:
+    """Writes clean scans in the rain, and prints what it did to each."""
+    if arguments.picture:
+        require("--picture", MATPLOTLIB)
+        from derain.pictures.scan_pictures import before_after_figure, save
+    from derain.simulation.rain_field import UniformRain
+    from derain.simulation.recorded import rain_on_scan
+    from derain.simulation.sensor_file import load_sensor
+
+    if not arguments.rain or len(arguments.rain) > 1:
+        raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")
+    rain, sensor = UniformRain(*arguments.rain), load_sensor(arguments.sensor or "spinning_64")
+    source = named_frames(arguments.on, arguments.columns or DEFAULT_COLUMNS)
+    sink = folder_sink(arguments.out, source)
+    failures, written = Failures(print_error), 0
+    with noting_progress(lambda: f"{written:,} of {len(source):,} scans are written"):
+        for number, frame in enumerate(tqdm(source, unit="scan", disable=None)):
+            seed = np.random.SeedSequence(arguments.seed, spawn_key=(number,))
+            with failures.skipping_failures(frame):
+                clean = frame.read()
+                rainy = rain_on_scan(clean, rain, sensor, np.random.default_rng(seed))
+                assert rainy.label is not None  # rain comes with labels
+                drops = rainy.label == TrackClass.RAIN
+                sink.write(frame, rainy, drops)
+                if arguments.picture:
+                    title = f"{Path(frame.key).name} in {rain.heaviest:g} mm/h of simulated rain"
+                    figure = before_after_figure(rainy, drops, f"{title}, and without its drops")
+                    save(figure, sink.path(frame, ".png"))
+                written += 1
+                _print_rain(frame.name, clean, rainy, int(drops.sum()), arguments.json)
+    return exit_code(len(failures.errors), len(source), "it could not rain on {scans}")
+
+
+def _print_rain(name: str, clean: "Scan", rainy: "Scan", drops: int, as_json: bool) -> None:
+    """Prints the valid points of a scan before and after, how many are drops, and how many lost."""
+    before, after = int(clean.valid.sum()), int(rainy.valid.sum())
+    lost = before - (after - drops)
+    text = f"{name}: {before:,} points, in the rain {after:,}: {drops:,} of drops, {lost:,} lost"
+    facts = {"scan": name, "clean": before, "points": after, "rain": drops, "lost": lost}
+    print_facts(facts, text, as_json)

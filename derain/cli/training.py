@@ -1,7 +1,6 @@
 """``derain fit``, ``validate``, ``test`` and ``predict``, which Lightning runs, and their help."""
 
 import shlex
-from collections.abc import Iterable
 
 from derain.workflows.configurations import packaged_configs
 
@@ -38,21 +37,20 @@ Writes the labels that a checkpoint gives the test scans, which need none of the
 }
 
 # The options that most runs need; `ALL` lists those that any run can have.
-OPTIONS = {
-    "--config FILE": "configuration: a YAML file, or the name of a packaged one",
-    "--data.root FOLDER": "root folder of the data set",
-    "--ckpt_path FILE": "checkpoint to continue, to measure or to use",
-    "--start MODEL": "start with the weights of a trained model: a checkpoint, or default",
-    "--trainer.max_epochs N": "passes over the training scans",
-    "--trainer.devices N": "devices, or processes on a CPU",
-    "--trainer.accelerator NAME": "cpu, gpu, ...",
-    "--trainer.logger.name NAME": "name of the run's folder",
-    "--trainer.logger.save_dir FOLDER": "folder of the logs (default: runs)",
-    "--data.loading.batch_size N": "scans in a batch",
-    "--data.loading.workers N": "processes that read scans",
-    "--predictions.folder FOLDER": "folder for the labels of `predict`",
-    "--seed_everything N": "random seed (default: 0)",
-}
+OPTIONS = """\
+  --config FILE                     configuration: a YAML file, or the name of a packaged one
+  --data.root FOLDER                root folder of the data set
+  --ckpt_path FILE                  checkpoint to continue, to measure or to use
+  --start MODEL                     start with the weights of a trained model: a file, or default
+  --trainer.max_epochs N            passes over the training scans
+  --trainer.devices N               devices, or processes on a CPU
+  --trainer.accelerator NAME        cpu, gpu, ...
+  --trainer.logger.name NAME        name of the run's folder
+  --trainer.logger.save_dir FOLDER  folder of the logs (default: runs)
+  --data.loading.batch_size N       scans in a batch
+  --data.loading.workers N          processes that read scans
+  --predictions.folder FOLDER       folder for the labels of `predict`
+  --seed_everything N               random seed (default: 0)"""
 
 
 def short_help(command: str) -> str:
@@ -61,10 +59,13 @@ def short_help(command: str) -> str:
     Args:
         command: ``fit``, ``validate``, ``test`` or ``predict``.
     """
-    options = "\n".join(f"  {option:<34}{meaning}" for option, meaning in OPTIONS.items())
+    networks: dict[str, list[str]] = {}
+    for name in packaged_configs():
+        networks.setdefault(name.split("_")[0], []).append(name)
+    configurations = "\n".join(f"  {'  '.join(of_one)}" for of_one in networks.values())
     return (
         f"usage: derain {command} --config FILE [--OPTION VALUE ...]\n\n{EXAMPLES[command]}\n"
-        f"packaged configurations:\n{_by_network(packaged_configs())}\n\noptions:\n{options}\n\n"
+        f"packaged configurations:\n{configurations}\n\noptions:\n{OPTIONS}\n\n"
         "Any option can stand in a configuration, and any key of one be given as an option.\n"
         f"All options: derain {command} {ALL}. All values, as they would be used: --print_config."
     )
@@ -88,10 +89,3 @@ def train(arguments: list[str]) -> None:
     if arguments[0] == "fit" and best and trainer.is_global_zero:
         print_lines(f"Best checkpoint: {best}")
         print_lines(f"derain export {shlex.quote(best)} --out model.onnx")
-
-
-def _by_network(names: Iterable[str]) -> str:
-    networks: dict[str, list[str]] = {}
-    for name in names:
-        networks.setdefault(name.split("_")[0], []).append(name)
-    return "\n".join(f"  {'  '.join(of_one)}" for of_one in networks.values())

@@ -1,37 +1,5 @@
-"""``derain view``: shows scans as several methods clean them."""
+"""Shows scans as several methods clean them.
 
-import argparse
-from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from derain.bags.names import is_bag, within
-from derain.cards.card import DataCard, load_card
-from derain.cards.known import layouts_for
-from derain.cli.arguments import add_threads, count, whole
-from derain.cli.method_options import list_methods
-from derain.cli.outputs import print_lines
-from derain.cli.scan_options import add_columns, add_intensity_scale, add_poses, add_topic
-from derain.default import DEFAULT
-from derain.errors import InputError
-from derain.sources.bag_frame import NUMBER, BagFrame
-from derain.sources.folders import frame_of, named_frames
-from derain.sources.source import Source
-from derain.system.extras import MATPLOTLIB, OPEN3D, require
-from derain.system.memory import keep_freed_memory
-from derain.system.notices import Notices
-from derain.views.scan_issues import outside_view
-from derain.workflows.odometry import placed
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from derain.export.bench.bench_entries import BenchEntry
-    from derain.scan import Scan
-    from derain.sources.frame import Frame
-
-DESCRIPTION = """\
 Draws a scan, its labels if there are any, and the result of each method, from above and from the
 sensor; or writes a recording for Rerun's viewer.
 
@@ -56,8 +24,50 @@ poses, from files beside the scans or by --poses, the scans are placed in the wo
 cannot be read or judged are reported and shown empty; the exit code is then 2.
 """
 
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+from derain.bags.names import is_bag, within
+from derain.cards.card import load_card
+from derain.cards.known import layouts_for
+from derain.cli.method_options import list_methods
+from derain.cli.options import (
+    add_columns,
+    add_intensity_scale,
+    add_poses,
+    add_threads,
+    add_topic,
+    count,
+)
+from derain.cli.outputs import print_lines
+from derain.cli.parser import Parser, whole
+from derain.cli.playback import refuse_unusable, write_and_report
+from derain.default import DEFAULT
+from derain.errors import InputError
+from derain.export.methods import load_method, named_method, split_title
+from derain.sources.bag_frame import NUMBER, BagFrame
+from derain.sources.folders import frame_of, named_frames
+from derain.sources.frame import Frame
+from derain.sources.method import Method
+from derain.sources.recordings import irregularities
+from derain.system.extras import MATPLOTLIB, OPEN3D, require
+from derain.system.memory import keep_freed_memory
+from derain.system.notices import Notices, warn
+from derain.system.stopwatch import Stopwatch
+from derain.views.scan_issues import outside_view
+from derain.workflows.odometry import placed
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from derain.export.bench.bench_entries import BenchEntry
+    from derain.scan import Scan
+
+
+def add_arguments(parser: Parser) -> None:
     """Declares the command's arguments."""
     parser.add_argument(
         "scans", nargs="+", type=Path, metavar="SCAN", help="scan; with --rerun, recordings"
@@ -99,40 +109,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_topic(parser)
 
 
-def main(arguments: argparse.Namespace) -> int:
-    """Runs the command."""
-    if arguments.rerun is not None:
-        from derain.cli.view_recording import load_methods, refuse_unusable, view_recording
-
-        if arguments.out or arguments.window:
-            raise InputError("--rerun", "excludes --out and --window", "Leave them out.")
-        refuse_unusable(arguments.rerun)
-        keep_freed_memory()
-        methods = load_methods(arguments.methods, arguments.threads)
-        card = None if arguments.card is None else load_card(arguments.card)
-        source = _recordings(arguments, card)
-        shown = range(len(source))[arguments.frames][:: arguments.every]
-        return view_recording(arguments.rerun, methods, source, shown, card)
-    path = arguments.scans[0]
-    if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):
-        raise InputError(
-            path,
-            "is more than one scan; a picture shows one",
-            "Name one, or give --rerun out.rrd to see all of them.",
-        )
-    _view_scan(
-        within(arguments.scans, arguments.topic)[0],
-        arguments.methods,
-        columns=arguments.columns,
-        card_name=arguments.card,
-        intensity_scale=arguments.intensity_scale,
-        threads=arguments.threads,
-        out=arguments.out,
-        window=arguments.window,
-    )
-    return 0
-
-
 def _numbers(text: str) -> slice:
     """Places of scans, such as ``10:20``, ``10:`` or ``:20``."""
     first, colon, end = text.partition(":")
@@ -141,8 +117,32 @@ def _numbers(text: str) -> slice:
     return slice(*(whole(part) if part else None for part in (first, end)))
 
 
-def _recordings(arguments: argparse.Namespace, card: DataCard | None) -> Source:
-    """The scans that the arguments name, each with its pose."""
+def main(arguments: argparse.Namespace) -> int:
+    """Runs the command."""
+    if arguments.rerun is not None:
+        if arguments.out or arguments.window:
+            raise InputError("--rerun", "excludes --out and --window", "Leave them out.")
+        return _view_recording(arguments)
+    path = arguments.scans[0]
+    if len(arguments.scans) > 1 or (path.is_dir() and not is_bag(path)):
+        raise InputError(
+            path,
+            "is more than one scan; a picture shows one",
+            "Name one, or give --rerun out.rrd to see all of them.",
+        )
+    if not (arguments.out or arguments.window):
+        raise InputError(path, "no output is named", "Give --out, --window or --rerun.")
+    require("view", MATPLOTLIB, *((OPEN3D,) if arguments.window else ()))
+    _view_scan(within([path], arguments.topic)[0], arguments)
+    return 0
+
+
+def _view_recording(arguments: argparse.Namespace) -> int:
+    """Writes a recording as several methods clean it, for Rerun's viewer."""
+    refuse_unusable(arguments.rerun)
+    keep_freed_memory()
+    methods = _load_methods(arguments.methods, arguments.threads)
+    card = None if arguments.card is None else load_card(arguments.card)
     found = named_frames(
         within(arguments.scans, arguments.topic),
         arguments.columns,
@@ -150,60 +150,71 @@ def _recordings(arguments: argparse.Namespace, card: DataCard | None) -> Source:
         layouts=layouts_for(card),
         recordings=True,
     )
-    return placed(found, arguments.poses, arguments.threads).map(
+    source = placed(found, arguments.poses, arguments.threads).map(
         lambda frame: frame.with_intensity_times(arguments.intensity_scale)
     )
+    from derain.pictures.selection import Labels, Selection
+
+    selection = Selection(source, range(len(source))[arguments.frames][:: arguments.every])
+    if card is not None and not any(frame.has_labels for frame in selection.frames):
+        warn(f"{selection.frames[0].name}: no scan has labels, so no truth is shown")
+        card = None
+    for method in methods.values():
+        for sentence in irregularities(source, method.window):
+            warn(sentence)
+    labels = None if card is None else Labels(card)
+    return write_and_report(arguments.rerun, selection, methods, labels)
 
 
-def _view_scan(
-    path: Path,
-    names: Sequence[str],
-    *,
-    columns: Sequence[str],
-    card_name: str | None,
-    intensity_scale: float,
-    threads: int,
-    out: Path | None,
-    window: bool,
-) -> None:
-    """Draws a scan as several methods clean it, or shows it in a window.
+def _load_methods(names: Sequence[str], threads: int) -> dict[str, Method]:
+    """The methods by their titles, in order.
 
     Raises:
-        InputError: A scan or labels that cannot be read, an unknown method, or an output that
-            cannot be written.
+        InputError: No such method, or two of one title.
     """
+    methods: dict[str, Method] = {}
+    for text in names:
+        title, name = split_title(text)
+        if title in methods:
+            raise InputError(
+                title, "is the title of two methods", "Give titles: `first=a.onnx second=dror`."
+            )
+        methods[title] = load_method(*named_method(name), threads)
+    return methods
+
+
+def _view_scan(path: Path, arguments: argparse.Namespace) -> None:
+    """Draws a scan as several methods clean it, or shows it in a window."""
     from derain.export.bench.bench_entries import bench_entries
 
-    if not (out or window):
-        raise InputError(path, "no output is named", "Give --out, --window or --rerun.")
-    require("view", MATPLOTLIB, *((OPEN3D,) if window else ()))
-    methods = bench_entries(names)
-    card = None if card_name is None else load_card(card_name)
-    frame = frame_of(path, columns, layouts_for(card))
-    scan = frame.with_intensity_times(intensity_scale).read()
+    methods = bench_entries(arguments.methods)
+    card = None if arguments.card is None else load_card(arguments.card)
+    frame = frame_of(path, arguments.columns, layouts_for(card))
+    scan = frame.with_intensity_times(arguments.intensity_scale).read()
     notices = Notices()
     for method in methods:
         if method.spec_or_filter is not None:
             notices.warn(frame.name, method.spec_or_filter.issues(scan), method.title)
-    truth = None if card is None else _truth(scan, frame, card)
-    predicted = {method.title: _rain(scan, method, threads, notices) for method in methods}
-    title, rain = f"{_shown(frame, path)}: {len(scan):,} points", None
-    if truth is not None:
-        rain, known = truth
-        scan, rain = scan.take(known), rain[known]
+    labelled = None if card is None else scan.with_label(frame.read_label(len(scan)))
+    predicted = {
+        method.title: _rain(scan, method, arguments.threads, notices) for method in methods
+    }
+    title, rain = f"{_name_in_title(frame, path)}: {len(scan):,} points", None
+    if card is not None and labelled is not None:
+        known = ~card.unknown_of(labelled)
+        rain = card.rain_of(labelled)[known]
+        scan = scan.take(known)
         predicted = {name: called_rain[known] for name, called_rain in predicted.items()}
-    if out:
-        from derain.pictures.scan_pictures import comparison_figure, save
+    from derain.pictures.scan_pictures import comparison_figure, save, show_comparison
 
-        save(comparison_figure(scan, predicted, rain, title), out)
-        print_lines(str(out))
-    if window:
-        from derain.pictures.scan_pictures import show_comparison
-
+    if arguments.out:
+        save(comparison_figure(scan, predicted, rain, title), arguments.out)
+        print_lines(str(arguments.out))
+    if arguments.window:
         show_comparison(scan, predicted, rain)
 
 
-def _shown(frame: "Frame", path: Path) -> str:
+def _name_in_title(frame: Frame, path: Path) -> str:
     """Name of a scan in the title; prints which cloud of a bag is drawn."""
     if not isinstance(frame, BagFrame):
         return path.name
@@ -217,7 +228,6 @@ def _rain(
 ) -> "NDArray[np.bool_]":
     """Points that a method calls rain, bool (N,); warns of many points outside a model's view."""
     from derain.export.runtime import Derainer
-    from derain.system.stopwatch import Stopwatch
 
     judge = method.ready(threads)
     if not isinstance(judge, Derainer):
@@ -226,11 +236,3 @@ def _rain(
     outside = outside_view(scan, judgement.judged, judge.spec.data)
     notices.warn(scan.name, outside, method.title)
     return judgement.rain
-
-
-def _truth(
-    scan: "Scan", frame: "Frame", card: DataCard
-) -> "tuple[NDArray[np.bool_], NDArray[np.bool_]]":
-    """Points that are rain, and points whose label is known, each bool (N,)."""
-    labelled = scan.with_label(frame.read_label(len(scan)))
-    return card.rain_of(labelled), ~card.unknown_of(labelled)

@@ -1,4 +1,4 @@
-"""Arguments of the weather that a recording shows, and the table of it."""
+"""Options of the weather that a recording shows, and the table of it."""
 
 import argparse
 import csv
@@ -10,19 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from derain.cli.arguments import count
+from derain.cli.options import count
 from derain.errors import InputError
 from derain.files.atomic import replacing, require_writable
 from derain.files.reading import is_file, reading
-from derain.sources.cleaning import CleanedScan
 from derain.sources.folders import named_frames
-from derain.sources.frame import time_of
-from derain.sources.judgement import Judgement
 from derain.sources.spread import evenly_spaced
 from derain.sources.weather_monitor import WeatherMonitor, WeatherOptions
 from derain.system.notices import warn
 from derain.weather.alarm import ERROR, HOLD, WARNING, Level, Threshold
-from derain.weather.record import WEATHER_COLUMNS, weather_row
+from derain.weather.record import WEATHER_COLUMNS
 from derain.weather.scan_weather import ScanWeather, dry_reach
 from derain.weather.visibility import Visibility
 
@@ -116,44 +113,29 @@ def warn_of_bad_weather(weather: WeatherMonitor, fail_at: str | None) -> int:
     return BAD_WEATHER
 
 
-class WeatherTable:
-    """A table of the weather, a line a scan.
+@contextmanager
+def weather_table(path: Path | None) -> Iterator[list[Sequence[object]]]:
+    """Lends a list of rows, and writes them as a table when the block ends.
 
     Args:
-        path: The file; None writes no table.
+        path: The file; None writes none.
 
     Raises:
-        InputError: Some other file is there.
+        InputError: Some other file is there, or the file cannot be written.
     """
-
-    def __init__(self, path: Path | None) -> None:
-        self.path = path
-        self._text = io.StringIO()
-        self._add = csv.writer(self._text, lineterminator="\n").writerow
-        if path is not None:
-            _refuse_other_file(path)
-
-    @contextmanager
-    def open(self) -> Iterator[None]:
-        """Writes the table when the block ends, with the scans so far."""
-        if self.path is None:
-            yield
-            return
-        require_writable(self.path)
-        self._add(TABLE_HEAD)
-        try:
-            yield
-        finally:  # scans cleaned before an error or the end of a pipe have their lines
-            with replacing(self.path) as temporary:
-                temporary.write_text(self._text.getvalue(), "utf-8", newline="")
-
-    def add(self, judgement: Judgement, scan: CleanedScan) -> None:
-        """Adds the line of a scan."""
-        if self.path is None or scan.weather is None:
-            return
-        assert judgement.frame is not None
-        row = weather_row(scan.weather, judgement.weather)
-        self._add([scan.scan, time_of(judgement.frame), *row])
+    rows: list[Sequence[object]] = []
+    if path is None:
+        yield rows
+        return
+    _refuse_other_file(path)
+    require_writable(path)
+    try:
+        yield rows
+    finally:  # scans cleaned before an error or the end of a pipe have their lines
+        table = io.StringIO()
+        csv.writer(table, lineterminator="\n").writerows([TABLE_HEAD, *rows])
+        with replacing(path) as temporary:
+            temporary.write_text(table.getvalue(), "utf-8", newline="")
 
 
 def _refuse_other_file(path: Path) -> None:

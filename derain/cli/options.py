@@ -1,0 +1,234 @@
+"""Options that several commands have, each declared and read in one way.
+
+Types refuse impossible values before any work.
+"""
+
+import argparse
+import shlex
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from derain.bags.names import within
+from derain.cards.card import packaged_cards
+from derain.cli.parser import number, whole
+from derain.errors import printable
+from derain.files import DEFAULT_COLUMNS
+from derain.files.format import FORMATS
+from derain.recordings.posed import ODOMETRY, STANDING
+
+if TYPE_CHECKING:
+    from derain.datamodules.labelled import LabelledScans
+
+# Flags that can be given as --no-..., by the name that argparse gives their values.
+DENIABLE = ("distinct",)
+
+
+def count(text: str, least: int = 1) -> int:
+    """A whole number of 1 or more."""
+    value = whole(text)
+    if value < least:
+        raise argparse.ArgumentTypeError(f"{text} is less than {least}")
+    return value
+
+
+def threads(text: str) -> int:
+    """A number of threads; 0 stands for every core."""
+    return count(text, least=0)
+
+
+def factor(text: str) -> float:
+    """A finite number above 0."""
+    value = number(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+    return value
+
+
+def share(text: str) -> float:
+    """A number from 0 to 1."""
+    value = number(text)
+    if not 0 <= value <= 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 to 1")
+    return value
+
+
+def column_names(text: str) -> tuple[str, ...]:
+    """Names of columns, between commas."""
+    return tuple(text.split(","))
+
+
+def file_named(*suffixes: str) -> Callable[[str], Path]:
+    """A file to write, with a suffix by which other commands know its kind.
+
+    Args:
+        suffixes: The suffixes that it may have.
+    """
+
+    def path(text: str) -> Path:
+        if Path(text).suffix not in suffixes:
+            raise argparse.ArgumentTypeError(f"{text} does not end in {' or '.join(suffixes)}")
+        return Path(text)
+
+    return path
+
+
+def add_threads(parser: argparse.ArgumentParser) -> None:
+    """Declares how many threads a command may use."""
+    parser.add_argument("--threads", type=threads, default=0, help="threads (default: all cores)")
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Declares that what is printed of each scan is an object."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object per scan")
+
+
+def add_columns(
+    parser: argparse._ActionsContainer,
+    option: str = "--columns",
+    of: str = "",
+    default: tuple[str, ...] | None = DEFAULT_COLUMNS,
+) -> None:
+    """Declares the names of the columns of files that do not name them.
+
+    Args:
+        parser: The command's parser, or a group of its arguments.
+        option: What the option is called.
+        of: Whose files they are, where a command reads several kinds.
+        default: What it is where it is not given; None leaves that to the command.
+    """
+    action = parser.add_argument(
+        option,
+        type=column_names,
+        metavar="NAMES",
+        default=default,
+        help=f"column names for {of}files without them: %(unnamed)s "
+        f"(default: {','.join(DEFAULT_COLUMNS)})",
+    )
+    vars(action)["unnamed"] = _UnnamedFormats()
+
+
+class _UnnamedFormats:
+    """Which files do not name their columns, format by format.
+
+    A text that is made when help shows it, for other packages are asked what formats they bring.
+    """
+
+    def __str__(self) -> str:
+        return ", ".join(sorted({format_.UNNAMED for format_ in FORMATS.values()} - {""}))
+
+
+def add_intensity_scale(parser: argparse.ArgumentParser, of: str = "") -> None:
+    """Declares the factor from the scans' intensities to the unit of the methods.
+
+    Args:
+        parser: The command's parser.
+        of: Which scans they are, where a command reads several kinds.
+    """
+    parser.add_argument(
+        "--intensity-scale",
+        type=factor,
+        default=1.0,
+        metavar="FACTOR",
+        help=f"multiply the {of}scans' intensities by FACTOR, e.g. 255 (default: 1)",
+    )
+
+
+def add_topic(parser: argparse.ArgumentParser) -> None:
+    """Declares the topic to read of a bag."""
+    parser.add_argument(
+        "--topic", metavar="NAME", help="topic of point clouds, for bags with several"
+    )
+
+
+def add_poses(parser: argparse.ArgumentParser) -> None:
+    """Declares where poses come from, as :func:`derain.recordings.posed.with_poses` takes it."""
+    parser.add_argument(
+        "--poses",
+        metavar="POSES",
+        help=f"poses of the scans: a file in the format of KITTI or TUM, a folder with one "
+        f"<sequence>.txt per sequence, {STANDING}, or {ODOMETRY} (default: poses.txt beside the "
+        f"scans, otherwise {ODOMETRY})",
+    )
+
+
+def add_data(parser: argparse.ArgumentParser, part: str) -> None:
+    """Declares the labelled scans that a command measures on, as :func:`labelled` reads them.
+
+    Args:
+        parser: The command's parser.
+        part: Part of a data set that the command takes by default.
+    """
+    parser.add_argument(
+        "--data",
+        type=Path,
+        nargs="+",
+        required=True,
+        help="labelled scans and folders of them (labels beside them or in ../labels), "
+        "or the root of one data set",
+    )
+    parser.add_argument(
+        "--part",
+        choices=("train", "validation", "test"),
+        default=part,
+        help="part of a data set (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--card",
+        help=f"data card with the meaning of the labels: {', '.join(packaged_cards())} (derain: "
+        "from simulate --on), or a YAML file (default: found by the data set's folders)",
+    )
+    add_columns(parser)
+    add_intensity_scale(parser)
+    add_topic(parser)
+
+
+def labelled(
+    paths: Sequence[Path],
+    card: str | None,
+    columns: tuple[str, ...],
+    intensity_scale: float,
+    topic: str | None = None,
+    distinct: bool | None = None,
+) -> "LabelledScans":
+    """The labelled scans that a command line names.
+
+    Args:
+        paths: Scans and folders of them, or the root of one data set.
+        card: Name or file of their data card; None finds it by their folders.
+        columns: Names of the columns of files that do not name them.
+        intensity_scale: Factor from the scans' intensities to the unit of the data card.
+        topic: Topic of point clouds in bags; None where the paths name it.
+        distinct: Whether points at one position count once; None follows the data card.
+
+    Raises:
+        InputError: Data whose labels nothing explains, or a root without sequences.
+    """
+    from derain.datamodules.labelled import card_of, labelled_scans
+    from derain.datamodules.scan_data import Loading
+
+    loading = Loading(columns=columns, intensity_scale=intensity_scale, deduplicate=distinct)
+    paths = within(paths, topic)
+    return labelled_scans(paths, card_of(paths, card), loading)
+
+
+def command_line(arguments: argparse.Namespace, positional: str | None = None) -> str:
+    """The command line of some parsed arguments, defaults included.
+
+    Args:
+        arguments: The parsed arguments, with the name of the command.
+        positional: Name of the positional argument, if there is one.
+    """
+    words = ["derain", arguments.command]
+    for name, value in vars(arguments).items():
+        if name == "command" or value is None or (value is False and name not in DENIABLE):
+            continue
+        if name != positional:
+            words.append(f"--{'no-' if value is False else ''}{name.replace('_', '-')}")
+        if isinstance(value, tuple):  # names between commas
+            words.append(",".join(value))
+        elif isinstance(value, list):
+            words += map(str, value)
+        elif not isinstance(value, bool):
+            words.append(str(value))
+    return printable(shlex.join(words))
