@@ -1,5 +1,6 @@
 """Small made-up data sets in the layouts of the real ones."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -69,3 +70,17 @@ def succeed(run_derain: Callable[..., Any]) -> Callable[..., Any]:
         return outcome
 
     return run
+
+
+@pytest.fixture
+def facts_of(succeed: Callable[..., Any]) -> Callable[..., dict[str, Any]]:
+    """What `derain info` prints as JSON of the standard: without NaN and infinity."""
+
+    def refuse(constant: str) -> None:
+        raise ValueError(constant)
+
+    def facts(*arguments: str | Path) -> dict[str, Any]:
+        text = succeed("info", *arguments, "--json").out
+        return json.loads(text, parse_constant=refuse)
+
+    return facts

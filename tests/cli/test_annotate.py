@@ -1,14 +1,16 @@
 """``derain annotate`` labels the scans of one sequence."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from textwrap import dedent
+from typing import Any
 
 import numpy as np
 import pytest
 
 from derain.annotation.scene import read_scene
-from derain.cli.annotate import DESCRIPTION
+from derain.cli.main import module_of
 from derain.evaluation.hard_cases import scene
 from derain.files import read_scan, write_scan
 from derain.files.labels import read_labels, semantic
@@ -35,15 +37,24 @@ def sequence(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.fixture
+def annotate(succeed, tmp_path: Path, sequence: Path) -> Callable[..., Any]:
+    """Labels the sequence."""
+
+    def run(out: Path, *options: str | Path) -> Any:
+        command = ["annotate", sequence, "--scene", tmp_path / "scene.yaml", "--out", out]
+        return succeed(*command, *options)
+
+    return run
+
+
 def labels(out: Path, points: int = 2000) -> list[np.ndarray]:
     return [semantic(read_labels(path, points)) for path in sorted(out.glob("*.label"))]
 
 
-def test_a_sequence_is_labelled_counted_and_drawn(succeed, tmp_path: Path, sequence: Path) -> None:
+def test_a_sequence_is_labelled_counted_and_drawn(annotate, tmp_path: Path, sequence: Path) -> None:
     out = tmp_path / "out"
-    outcome = succeed(
-        "annotate", sequence, "--scene", tmp_path / "scene.yaml", "--out", out, "--json"
-    )
+    outcome = annotate(out, "--json")
     report = json.loads(outcome.out)
     found = labels(out)
     assert (report["sequence"], report["scans"], report["points"]) == ("003", 3, 6000)
@@ -62,15 +73,8 @@ def test_a_sequence_is_labelled_counted_and_drawn(succeed, tmp_path: Path, seque
         assert (label[low] == TrackClass.ROAD).mean() > 0.99
 
 
-def test_the_text_says_the_plane_and_the_points_by_class(
-    run_derain, tmp_path: Path, sequence: Path
-) -> None:
-    scans = sorted((sequence / "lidar_radar_pcd").iterdir())
-    outcome = run_derain(
-        *("annotate", *scans, "--scene", tmp_path / "scene.yaml"),
-        *("--out", tmp_path / "out", "--no-picture"),
-    )
-    lines = outcome.out.splitlines()
+def test_the_text_says_the_plane_and_the_points_by_class(annotate, tmp_path: Path) -> None:
+    lines = annotate(tmp_path / "out", "--no-picture").out.splitlines()
     assert lines[0] == "sequence 003: 3 scans, 6,000 points"
     assert lines[1].startswith("road: 1.")
     counts = {line.split()[0]: line.split()[1] for line in lines[2:]}
@@ -79,34 +83,27 @@ def test_the_text_says_the_plane_and_the_points_by_class(
     assert not list((tmp_path / "out").glob("*.png"))
 
 
-def test_corrections_are_those_of_the_sequence_named(
-    run_derain, tmp_path: Path, sequence: Path
-) -> None:
+def test_corrections_are_those_of_the_sequence_named(annotate, tmp_path: Path) -> None:
     rain = {}
     for name in ("003", "007"):
-        out = tmp_path / name
-        arguments = ["--scene", tmp_path / "scene.yaml", "--out", out, "--no-picture"]
-        assert run_derain("annotate", sequence, *arguments, "--sequence", name).code == 0
-        rain[name] = np.sum(np.array(labels(out)) == TrackClass.RAIN)
+        annotate(tmp_path / name, "--no-picture", "--sequence", name)
+        rain[name] = np.sum(np.array(labels(tmp_path / name)) == TrackClass.RAIN)
     assert rain["007"] > rain["003"] + 1000  # nothing keeps the wall from being rain
 
 
-def test_radar_points_take_the_label_of_the_nearest_point(
-    succeed, tmp_path: Path, sequence: Path
-) -> None:
+def test_radar_points_take_the_label_of_the_nearest_point(annotate, tmp_path: Path) -> None:
     points = scene(2000, 1)[::100]
     points[-1] = (500, 0, 0, 0)
     write_scan(tmp_path / "radar/000001.bin", Scan.of(points))
     out = tmp_path / "out"
-    arguments = ["--scene", tmp_path / "scene.yaml", "--out", out, "--no-picture"]
-    succeed("annotate", sequence, *arguments, "--radar", tmp_path / "radar")
+    annotate(out, "--no-picture", "--radar", tmp_path / "radar")
     (radar,) = labels(out / "radar", 20)
     assert radar[:-1].tolist() == labels(out)[1][::100][:-1].tolist()
     assert radar[-1] == UNKNOWN
 
 
 def test_the_scene_file_of_the_help_can_be_read(tmp_path: Path) -> None:
-    _, text = DESCRIPTION.split("up):\n")
+    _, text = (module_of("annotate").__doc__ or "").split("up):\n")
     example, _ = text.split("The classes are")
     (tmp_path / "scene.yaml").write_text(dedent(example))
     scene = read_scene(tmp_path / "scene.yaml")

@@ -33,15 +33,7 @@ def judged(folder: Path) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    "words",
-    [
-        ["scans"],
-        ["scans/"],
-        ["scans/0.bin", "scans/1.bin"],
-        ["default", "scans"],
-        ["./crf"],
-        ["./crf/0.bin", "scans/1.bin"],
-    ],
+    "words", [["scans/"], ["scans/0.bin", "scans/1.bin"], ["default", "scans"], ["./crf"]]
 )
 def test_scans_alone_are_cleaned_by_the_model_that_comes_with_derain(
     run_derain, here: Path, words: list[str]
@@ -67,7 +59,6 @@ def test_with_json_it_says_so_beside_the_objects(succeed, here: Path) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        ["dror", "scans", "--out", "cleaned"],
         ["crf", "scans", "--out", "cleaned"],  # though a folder is called so
         ["dror", "--out", "cleaned", "scans"],
         ["--out", "cleaned", "dror", "scans/0.bin", "scans/1.bin"],
@@ -86,15 +77,11 @@ def test_a_method_that_is_named_is_the_one_that_cleans(
     [
         (["crf"], "crf: it is a method's name, and a file or folder here has it, too. Write ./crf"),
         (["dror"], "dror: it is a method, and no scans are named. Write `derain run dror SCANS"),
-        (["default"], "default: it is a method, and no scans are named"),
-        (["m.onnx"], "m.onnx: it is a method, and no scans are named"),
         (["best.yaml"], "best.yaml: it is a method, and no scans are named"),
-        (["scnas"], "scnas: no such file. Give a model written by `derain export`, or one of def"),
         (["scnas/", "scans"], "scnas/: no such file. Give a model written by `derain export`"),
         (["scans", "scnas"], "scnas: there is no such file or folder"),
         (["notes"], "notes: '' is not the suffix of a scan"),
         (["notes", "scans"], "notes: not an ONNX model"),
-        ([], "the following arguments are required"),
     ],
 )
 def test_words_that_can_be_read_in_no_way_or_in_two_are_refused(
@@ -106,15 +93,6 @@ def test_words_that_can_be_read_in_no_way_or_in_two_are_refused(
     assert outcome.code == 2
     assert reason in outcome.err
     assert not judged(here / "cleaned")
-
-
-def test_parameters_are_its_own(run_derain, succeed, here: Path) -> None:
-    outcome = succeed("run", "scans", "--out", "all", "--set", "threshold=0")
-    probability = [Derainer(threads=1).probability(scene(200, number)) for number in range(2)]
-    np.testing.assert_array_equal(judged(here / "all"), np.array(probability) > 0)
-    Path("other.yaml").write_text("method: dsor\n")
-    outcome = run_derain("run", "scans", "--out", "none", "--parameters", "other.yaml")
-    assert "holds parameters of dsor, not of default" in outcome.err
 
 
 def test_the_card_is_printed(run_derain, here: Path) -> None:
@@ -133,8 +111,9 @@ def test_the_card_is_printed(run_derain, here: Path) -> None:
 def test_scores_of_a_card_are_a_table() -> None:
     scores = (ModelScore("WADS sample", 0.9, 1.0, 0.9, 0.1), ModelScore("clean", taken=0.0005))
     text = card_as_text(replace(model_card(), scores=scores), 10)
-    assert "WADS sample  0.900  1.000  0.900  10.000%" in text
-    assert "clean            -      -      -   0.050%" in text
+    rows = [line.split() for line in text.splitlines()]
+    assert ["WADS", "sample", "0.900", "1.000", "0.900", "10.000%"] in rows
+    assert ["clean", "-", "-", "-", "0.050%"] in rows
 
 
 def test_a_folder_of_its_name_makes_it_unclear_what_is_asked(
@@ -148,35 +127,15 @@ def test_a_folder_of_its_name_makes_it_unclear_what_is_asked(
     assert run_derain("info", "./default").code == 0
 
 
-@pytest.mark.parametrize("command", ["run", "teach", "bench", "view", "tune"])
-def test_help_names_it(run_derain, command: str) -> None:
-    assert "see `derain info default`" in run_derain(command, "--help").out
-
-
-def test_the_first_help_names_it(run_derain) -> None:
-    told = run_derain("--help").out
-    assert "derain run scans/ --out cleaned" in told
-    assert "derain info default" in told
-
-
 def test_other_commands_know_it(
     run_derain, succeed, here: Path, write_labelled: Callable[..., None]
 ) -> None:
+    assert "see `derain info default`" in run_derain("bench", "--help").out
     for number in range(3):
         write_labelled(here / f"data/{number}.bin", here / f"data/{number}.label", rain=110)
-    labelled = ["--data", "data", "--card", "wads"]
-    out = ["--out", "bench", "--timed", "1", "--repeats", "1"]
-    succeed("bench", *labelled, "--methods", "default", "all", *out)
-    first, _ = json.loads(Path("bench/bench.json").read_text())["rows"]
-    assert first["method"] == "default"
-
-    assert run_derain("tune", "default", *labelled, "--out", "tuned/best.yaml").code == 0
+    succeed("tune", "default", "--data", "data", "--card", "wads", "--out", "tuned/best.yaml")
     assert yaml.safe_load(Path("tuned/best.yaml").read_text())["method"] == "default"
-    assert run_derain("run", "tuned/best.yaml", "scans", "--out", "by_tuned").code == 0
-
-    assert run_derain("teach", "default", "data", "--out", "taught").code == 0
+    succeed("run", "tuned/best.yaml", "scans", "--out", "by_tuned")
+    succeed("teach", "default", "data", "--out", "taught")
     taught = yaml.safe_load(Path("taught/taught.yaml").read_text())
     assert taught["teacher"]["method"] == "default"
-
-    assert run_derain("view", "scans/0.bin", "--out", "view.png").code == 0
-    assert Path("view.png").stat().st_size > 1000

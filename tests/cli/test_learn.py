@@ -1,15 +1,16 @@
 """From an unlabelled recording to a model and a report, in one command."""
 
 import hashlib
-from collections.abc import Callable
 from pathlib import Path
 
+import lightning
 import numpy as np
 import pytest
 from matplotlib.image import imread
 from recording_read_back import ReadBack
 
 from derain.annotation.manifest import Manifest
+from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.evaluation.answers import Answers
 from derain.evaluation.hard_cases import scene
@@ -17,6 +18,9 @@ from derain.export import onnx_file
 from derain.export.runtime import Derainer
 from derain.files import read_scan
 from derain.files.labels import read_labels, write_labels
+from derain.learning.start import STARTED_FROM
+from derain.models.checkpoint import save_model
+from derain.models.outdet import OutDet
 from derain.scan import Scan
 from derain.system.notices import warn
 from derain.workflows import learn, learn_report
@@ -32,20 +36,14 @@ def _quickly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
 
 
-WriteRecording = Callable[..., Path]
-
-
 @pytest.fixture
-def write() -> WriteRecording:
-    """Writes a recording of some scans of 600 points, a tenth of them drops."""
-
-    def write(folder: str = "drive", scans: int = 5, points: int = 600) -> Path:
-        Path(folder, "velodyne").mkdir(parents=True)
-        for number in range(scans):
-            scene(points, seed=number).tofile(Path(folder, "velodyne", f"{number:06d}.bin"))
-        return Path(folder, "velodyne")
-
-    return write
+def recording() -> Path:
+    """Five scans of 600 points, a tenth of them drops."""
+    folder = Path("drive/velodyne")
+    folder.mkdir(parents=True)
+    for number in range(5):
+        scene(600, seed=number).tofile(folder / f"{number:06d}.bin")
+    return folder
 
 
 def weights(model: Path) -> str:
@@ -59,20 +57,28 @@ def weights(model: Path) -> str:
 
 @pytest.mark.usefixtures("one_block")
 def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
-    succeed, write: WriteRecording
+    succeed, recording: Path
 ) -> None:
-    recording, work = write(), Path("model_learning")
-    command = ("learn", recording, "--out", "model.onnx", *QUICK)
+    lightning.seed_everything(0)
+    start = OutDet(neighbours=4, channels=("range",))
+    start.adopt(start.spec_for(load_card("wads")))
+    save_model(start, Path("mine.ckpt"))
+    work = Path("model_learning")
+    command = ("learn", recording, "--out", "model.onnx", *QUICK, "--start", "mine.ckpt")
     outcome = succeed(*command)
     steps = [line.partition(":")[0] for line in outcome.out.splitlines()]
     assert [step for step in steps if step.istitle()][:3] == ["Teaching", "Training", "Export"]
     assert "(step 3 of 3)" in outcome.out
     derainer = Derainer("model.onnx")
-    assert derainer.spec.network == "outdet"
-    assert "taught by dror" in derainer.spec.data
+    spec = derainer.spec
+    # The student sees what its start saw.
+    assert (spec.network, spec.channels, spec.view["neighbours"]) == ("outdet", ("range",), 4)
+    assert spec.training[STARTED_FROM][0].startswith("mine.ckpt (")
+    assert "taught by dror" in spec.data
 
     report = (work / "report.md").read_text()
-    for heading in ("What could not be learnt", "The teacher: dror", "The student: outdet"):
+    student = "The student: outdet, blind to intensity, started from mine.ckpt"
+    for heading in ("What could not be learnt", "The teacher: dror", student):
         assert f"## {heading}" in report
     assert "4 scans to learn from, 1 held out" in report
     for name in ("teacher", "removed", "held_out_1", "held_out_1_beside"):
@@ -84,6 +90,7 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
     assert f"removes {removed:.1%} of the points" in report
     for step in ("teach dror", "fit --config outdet_taught.yaml", "export"):
         assert f"\n    derain {step} " in report
+    assert "--start mine.ckpt" in report
 
     # Again, with labels beside the scans that are all wrong, and asked to measure by them.
     without_labels = weights(Path("model.onnx"))
@@ -91,7 +98,7 @@ def test_a_recording_becomes_a_model_and_a_report_whatever_its_labels_say(
         label = recording.parent / "labels" / f"{number:06d}.label"
         write_labels(label, np.where(np.arange(600) < 540, 110, 65535))
     (work / "left.txt").touch()
-    outcome = succeed(*command, "--card", "wads", "--rerun", "report.rrd")
+    succeed(*command, "--card", "wads", "--rerun", "report.rrd")
     assert weights(Path("model.onnx")) == without_labels
     assert "Nothing could be measured" in (work / "report.md").read_text()
     assert not (work / "left.txt").exists()
@@ -123,11 +130,11 @@ def shows_teacher_and_student(found: ReadBack, recording: Path, work: Path) -> N
     assert [number for number, text in captions.items() if ", held out" in text[0]] == [4]
 
 
-def test_a_folder_of_something_else_is_not_cleared(refused, write: WriteRecording) -> None:
+def test_a_folder_of_something_else_is_not_cleared(refused, recording: Path) -> None:
     mine = Path("mine/notes.txt")
     mine.parent.mkdir()
     mine.touch()
-    line = refused("learn", write(), "--out", "model.onnx", "--work", "mine")
+    line = refused("learn", recording, "--out", "model.onnx", "--work", "mine")
     assert "mine: holds something other than what an earlier run left" in line
     assert mine.exists()
 
@@ -135,16 +142,16 @@ def test_a_folder_of_something_else_is_not_cleared(refused, write: WriteRecordin
 @pytest.mark.parametrize(
     ("scans", "options", "names"),
     [
-        (1, (), "1 scan: too few to learn from some and choose by others"),
-        (2, (), "2 scans: too few"),
+        (2, (), "2 scans: too few to learn from some and choose by others"),
         (3, ("--teacher", "nobody"), "derain: nobody: no such file"),
         (3, ("--poses", "none.txt", "--teacher", "dror"), "none.txt"),
     ],
 )
 def test_what_cannot_be_learnt_from_is_refused_and_leaves_no_model(
-    run_derain, write: WriteRecording, scans: int, options: tuple[str, ...], names: str
+    run_derain, recording: Path, scans: int, options: tuple[str, ...], names: str
 ) -> None:
-    outcome = run_derain("learn", write(scans=scans), "--out", "model.onnx", *options)
+    paths = sorted(recording.iterdir())[:scans]
+    outcome = run_derain("learn", *paths, "--out", "model.onnx", *options)
     assert outcome.code == 2
     assert names in outcome.err
     assert not Path("model.onnx").exists()
@@ -163,26 +170,26 @@ def test_scans_that_nothing_connects_are_refused_with_the_reason(run_derain) -> 
 
 
 def test_a_recording_of_which_too_few_scans_can_be_labelled_is_refused_with_the_reason(
-    write: WriteRecording, monkeypatch: pytest.MonkeyPatch, run_derain
+    recording: Path, monkeypatch: pytest.MonkeyPatch, run_derain
 ) -> None:
     def teach(*_: object, **options: object) -> TeachResults:
         warn("2.bin: not to be trusted: it is of another place")
         return TeachResults(Manifest({"method": "dror"}), 5, Answers.none(), None)
 
     monkeypatch.setattr(learn, "teach_recordings", teach)
-    outcome = run_derain("learn", write(scans=5), "--out", "model.onnx", "--teacher", "dror")
+    outcome = run_derain("learn", recording, "--out", "model.onnx", "--teacher", "dror")
     assert outcome.code == 2
     assert "only 0 of 5 scans could be labelled" in outcome.err
     assert outcome.err.count("2.bin: not to be trusted: it is of another place") == 2
 
 
 def test_a_clean_recording_is_refused_with_a_report_of_it(
-    run_derain, write: WriteRecording, monkeypatch: pytest.MonkeyPatch
+    run_derain, recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A recording of which a filter finds nothing to be rain is hard to make up.
     monkeypatch.setattr(learn, "LEAST_RAIN", 1.0)
     monkeypatch.setattr(learn_report, "LEAST_RAIN", 1.0)
-    outcome = run_derain("learn", write(), "--out", "model.onnx", *QUICK)
+    outcome = run_derain("learn", recording, "--out", "model.onnx", *QUICK)
     assert outcome.code == 2
     assert "hardly any rain was found" in outcome.err
     assert "seems to be clean" in Path("model_learning/report.md").read_text()
@@ -190,9 +197,8 @@ def test_a_clean_recording_is_refused_with_a_report_of_it(
 
 
 def test_a_recording_without_intensities_is_learnt_without(
-    run_derain, write: WriteRecording, monkeypatch: pytest.MonkeyPatch
+    run_derain, recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    recording = write(scans=3)
     for scan in recording.iterdir():
         np.fromfile(scan, np.float32).reshape(-1, 4)[:, :3].copy().tofile(scan)
     trained: list[dict[str, object]] = []
@@ -206,4 +212,3 @@ def test_a_recording_without_intensities_is_learnt_without(
     assert outcome.code == 2
     assert [settings["model.channels"] for settings in trained] == ["[x,y,z]"]
     assert "no intensities" in outcome.out
-    assert not Path("model.onnx").exists()

@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 
 from derain.cli.main import COMMANDS, module_of
+from derain.cli.options import column_names
 from derain.cli.parser import Parser
-from derain.cli.scan_options import column_names
 from derain.errors import InputError
 
 
 def parser_of(command: str) -> Parser:
-    parser = Parser(f"derain {command}", description=module_of(command).DESCRIPTION)
+    parser = Parser(f"derain {command}", description=module_of(command).__doc__)
     module_of(command).add_arguments(parser)
     return parser
 

@@ -15,233 +15,177 @@ from derain.files import read_scan
 from derain.files.labels import read_labels
 from derain.filters import FilterDerainer, filter_from
 
+RAIN = np.tile(np.arange(300) >= 270, 3)  # of the three scans
 
-@pytest.fixture
-def data(tmp_path: Path, write_labelled) -> list[str | Path]:
-    """Options for three labelled scans."""
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write_labelled) -> Path:
+    """The folder in which the commands run, with three labelled scans."""
+    monkeypatch.chdir(tmp_path)
     for number in range(3):
-        write_labelled(
-            tmp_path / f"velodyne/{number}.bin", tmp_path / f"labels/{number}.label", rain=110
-        )
-    return ["--data", tmp_path / "velodyne", "--card", "wads"]
+        write_labelled(Path(f"velodyne/{number}.bin"), Path(f"labels/{number}.label"), rain=110)
+    return tmp_path
 
 
-def test_run_takes_what_tune_wrote(
-    run_derain, succeed, data: list[str | Path], tmp_path: Path
-) -> None:
-    best = tmp_path / "best.yaml"
-    outcome = succeed("tune", "dsor", *data, "--trials", "5", "--out", best)
+DATA = ["--data", "velodyne", "--card", "wads"]
+BEST = Path("best.yaml")
+
+
+def files() -> list[Path]:
+    return sorted(Path("velodyne").iterdir())
+
+
+def iou_of(called: np.ndarray) -> float:
+    return np.count_nonzero(called & RAIN) / np.count_nonzero(called | RAIN)
+
+
+def test_run_takes_what_tune_wrote(run_derain, succeed) -> None:
+    outcome = succeed("tune", "dsor", *DATA, "--trials", "5", "--out", BEST)
     assert outcome.out.startswith("dsor: IoU 0.")
-    command = best.read_text().splitlines()[0].partition(": derain ")[2]
-    assert f"tune dsor --data {tmp_path / 'velodyne'} --part validation --card wads" in command
-    again = run_derain(*shlex.split(command), "--out", tmp_path / "again.yaml")
+    command = BEST.read_text().splitlines()[0].partition(": derain ")[2]
+    assert "tune dsor --data velodyne --part validation --card wads" in command
+    again = run_derain(*shlex.split(command), "--out", "again.yaml")
     assert again.out == outcome.out
-    method, parameters = read_parameters(best)
+    method, parameters = read_parameters(BEST)
     assert method == "dsor"
     filter_from(method, parameters)
-    scans = tmp_path / "velodyne"
-    succeed("run", "dsor", scans, "--out", tmp_path / "o", "--parameters", best)
+    succeed("run", "dsor", "velodyne", "--out", "o", "--parameters", BEST)
 
 
-def test_run_and_bench_keep_to_the_candidates_that_tune_fitted(
-    run_derain, succeed, data: list[str | Path], tmp_path: Path
-) -> None:
-    best = tmp_path / "best.yaml"
-    options = ["--trials", "3", "--candidates", "0.9", "--out", best]
-    outcome = succeed("tune", "dror", *data, *options)
-    method, parameters = read_parameters(best)
+def test_run_and_bench_keep_to_the_candidates_that_tune_fitted(succeed) -> None:
+    outcome = succeed("tune", "dror", *DATA, "--trials", "3", "--candidates", "0.9", "--out", BEST)
+    method, parameters = read_parameters(BEST)
     candidates = parameters.pop("candidates")
     assert f"candidates: {candidates}" in outcome.out.splitlines()
-    scans = [read_scan(path) for path in sorted((tmp_path / "velodyne").iterdir())]
-    drops = [candidates.among(scan)[270:].mean() for scan in scans]
-    assert np.mean(drops) >= 0.9
-    assert run_derain("run", best, tmp_path / "velodyne", "--out", tmp_path / "o").code == 0
+    scans = [read_scan(path) for path in files()]
+    inside = np.concatenate([candidates.among(scan) for scan in scans])
+    assert inside[RAIN].mean() >= 0.9
+    succeed("run", BEST, "velodyne", "--out", "o")
     unbounded = FilterDerainer(filter_from(method, parameters))
-    called = []
-    for number, scan in enumerate(scans):
-        expected = unbounded(scan) & candidates.among(scan)
-        np.testing.assert_array_equal(read_labels(tmp_path / f"o/{number}.label", 300), expected)
-        called.append(expected)
-    rain = np.tile(np.arange(300) >= 270, 3)
-    iou = np.count_nonzero(np.concatenate(called) & rain) / np.count_nonzero(
-        np.concatenate(called) | rain
-    )
-    assert f"dror: IoU {iou:.4f} " in outcome.out
-    benched = succeed(
-        *("bench", *data, "--part", "validation", "--methods", best, "--out", tmp_path / "bench"),
-        *("--repeats", "1"),
-    )
-    assert f" {iou:.3f} |" in benched.out
+    called = np.concatenate([unbounded(scan) for scan in scans]) & inside
+    written = [read_labels(Path(f"o/{number}.label"), 300) for number in range(3)]
+    np.testing.assert_array_equal(np.concatenate(written), called)
+    assert f"dror: IoU {iou_of(called):.4f} " in outcome.out
+    validation = ["--part", "validation", "--repeats", "1"]
+    benched = succeed("bench", *DATA, *validation, "--methods", BEST, "--out", "bench")
+    assert f" {iou_of(called):.3f} |" in benched.out
 
 
-def test_a_model_has_candidates_of_its_own(
-    refused, data: list[str | Path], tmp_path: Path, onnx_model: Path
-) -> None:
-    line = refused("tune", onnx_model, *data, "--candidates", "--out", tmp_path / "b.yaml")
-    assert line == ("derain: --candidates: a model has its own. Give it to `derain export`.")
+def test_a_model_has_candidates_of_its_own(refused, onnx_model: Path) -> None:
+    line = refused("tune", onnx_model, *DATA, "--candidates", "--out", BEST)
+    assert line == "derain: --candidates: a model has its own. Give it to `derain export`."
 
 
-def test_the_threshold_of_a_model_is_tuned(
-    run_derain, data: list[str | Path], tmp_path: Path, onnx_model: Path
-) -> None:
-    best = tmp_path / "best.yaml"
-    assert run_derain("tune", onnx_model, *data, "--out", best).code == 0
-    method, parameters = read_parameters(best)
+def test_the_threshold_of_a_model_is_tuned(succeed, onnx_model: Path) -> None:
+    succeed("tune", onnx_model, *DATA, "--out", BEST)
+    method, parameters = read_parameters(BEST)
     assert Path(method).samefile(onnx_model)
     derainer = Derainer(onnx_model, 1)
-    scans = [read_scan(path) for path in sorted((tmp_path / "velodyne").iterdir())]
-    probability = np.concatenate([derainer.probability(scan) for scan in scans])
-    rain = np.tile(np.arange(300) >= 270, 3)
-
-    def iou(threshold: float) -> float:
-        called = probability > threshold
-        return np.count_nonzero(called & rain) / np.count_nonzero(called | rain)
-
-    assert iou(parameters["threshold"]) == max(map(iou, [0, *probability]))
+    probability = np.concatenate([derainer.probability(read_scan(path)) for path in files()])
+    found = iou_of(probability > parameters["threshold"])
+    assert found == max(iou_of(probability > threshold) for threshold in (0, *probability))
 
 
-def test_points_outside_the_grid_of_a_model_are_warned_of(
-    run_derain, data: list[str | Path], tmp_path: Path, salsanext_onnx: Path
-) -> None:
-    outsides = []
-    for path in sorted((tmp_path / "velodyne").iterdir()):
+def test_points_outside_the_grid_of_a_model_are_warned_of(run_derain, salsanext_onnx: Path) -> None:
+    for path in files():
         points = np.fromfile(path, np.float32).reshape(-1, 4)
         points[:100, 2] = 80.0
         points.tofile(path)
-        outsides.append((Derainer(salsanext_onnx).view.grid.pixel(points[:, :3]) < 0).mean())
-    outcome = run_derain("tune", salsanext_onnx, *data, "--out", tmp_path / "best.yaml")
-    assert outcome.said == [
-        f"derain: warning: {tmp_path / 'velodyne/0.bin'}: {outsides[0]:.0%} of the points lie "
-        "outside the grid of WADS, and stay",
-        "derain: warning: 2 more scans: points outside the grid",
-    ]
+    first, others = run_derain("tune", salsanext_onnx, *DATA, "--out", BEST).said
+    assert first.startswith("derain: warning: velodyne/0.bin: ")
+    assert "of the points lie outside the grid of WADS" in first
+    assert others == "derain: warning: 2 more scans: points outside the grid"
 
 
 def test_a_tuned_model_is_found_from_any_folder(
-    run_derain,
-    data: list[str | Path],
-    tmp_path: Path,
-    onnx_model: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    succeed, here: Path, onnx_model: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "models/tuned").mkdir(parents=True)
-    shutil.copy(onnx_model, tmp_path / "models/outdet.onnx")
-    monkeypatch.chdir(tmp_path)
-    best = "models/tuned/best.yaml"
-    assert run_derain("tune", "models/outdet.onnx", *data, "--out", best).code == 0
-    assert yaml.safe_load(Path(best).read_text())["method"] == "../outdet.onnx"
+    Path("models/tuned").mkdir(parents=True)
+    shutil.copy(onnx_model, "models/outdet.onnx")
+    succeed("tune", "models/outdet.onnx", *DATA, "--out", "models/tuned/best.yaml")
     # With its model it may go wherever it likes.
     Path("models").rename("elsewhere")
-    (tmp_path / "here").mkdir()
-    monkeypatch.chdir("here")
+    Path("sub").mkdir()
+    monkeypatch.chdir("sub")
     best = "../elsewhere/tuned/best.yaml"
-    scan = tmp_path / "velodyne/0.bin"
-    assert run_derain("run", best, scan, "--out", "out").code == 0
+    assert yaml.safe_load(Path(best).read_text())["method"] == "../outdet.onnx"
+    scan = here / "velodyne/0.bin"
+    succeed("run", best, scan, "--out", "out")
     _, parameters = read_parameters(best)
     probability = Derainer(onnx_model).probability(read_scan(scan))
     rain = np.fromfile("out/0.label", "<u4") == 1
     np.testing.assert_array_equal(rain, probability > parameters["threshold"])
     model = "../elsewhere/outdet.onnx"
-    assert not run_derain("run", model, scan, "--out", "too", "--parameters", best).code
+    succeed("run", model, scan, "--out", "too", "--parameters", best)
     (bench_entry,) = bench_entries([best])
     assert bench_entry.facts["threshold"] == parameters["threshold"]
 
 
-def test_a_model_that_is_not_beside_its_parameters_is_sought_as_written(
-    tmp_path: Path, onnx_model: Path
-) -> None:
-    parameters = tmp_path / "best.yaml"
-    parameters.write_text(f"method: {onnx_model}\nthreshold: 0.5\n")
-    assert read_parameters(parameters)[0] == str(onnx_model)
-    (tmp_path / "dsor").touch()  # no model, though it lies there
-    parameters.write_text("method: dsor\n")
-    assert read_parameters(parameters)[0] == "dsor"
+def test_a_model_that_is_not_beside_its_parameters_is_sought_as_written(onnx_model: Path) -> None:
+    BEST.write_text(f"method: {onnx_model}\nthreshold: 0.5\n")
+    assert read_parameters(BEST)[0] == str(onnx_model)
+    Path("dsor").touch()  # no model, though it lies there
+    BEST.write_text("method: dsor\n")
+    assert read_parameters(BEST)[0] == "dsor"
 
 
-def test_intensities_of_another_unit_are_warned_of_and_scaled(
-    run_derain, data: list[str | Path], tmp_path: Path
-) -> None:
-    options = ["--trials", "12", "--out", tmp_path / "best.yaml"]
-    whole = run_derain("tune", "ssr", *data, *options)
+def test_intensities_of_another_unit_are_warned_of_and_scaled(run_derain) -> None:
+    options = ["tune", "ssr", *DATA, "--trials", "12", "--out", BEST]
+    whole = run_derain(*options)
     assert whole.said == []
-    for path in (tmp_path / "velodyne").iterdir():
+    for path in files():
         points = np.fromfile(path, np.float32).reshape(-1, 4)
         (points / np.array([1, 1, 1, 256], np.float32)).tofile(path)
-    outcome = run_derain("tune", "ssr", *data, *options)
-    assert outcome.said == [
-        f"derain: warning: {tmp_path / 'velodyne/0.bin'}: intensities of 0..1, but 0..255 for "
-        "ssr: see --intensity-scale or Scan.with_intensity_times",
-        "derain: warning: 2 more scans: intensity of a smaller unit",
-    ]
-    scaled = run_derain("tune", "ssr", *data, *options, "--intensity-scale", "256")
+    small = run_derain(*options)
+    first, others = small.said
+    assert first.startswith("derain: warning: velodyne/0.bin: intensities of 0..1, but 0..255 for")
+    assert others == "derain: warning: 2 more scans: intensity of a smaller unit"
+    scaled = run_derain(*options, "--intensity-scale", "256")
     assert scaled.said == []
-    assert scaled.out == whole.out != outcome.out
+    assert scaled.out == whole.out != small.out
 
 
-def test_a_second_call_goes_on_and_comes_to_the_same(
-    run_derain, data: list[str | Path], tmp_path: Path
-) -> None:
-    options = [*data, "--storage", tmp_path / "study.db"]
+def test_a_second_call_goes_on_with_the_study_of_the_same_scans(succeed, refused) -> None:
+    options = ["tune", "ror", *DATA, "--storage", "study.db"]
     for trials in ("3", "6", "6"):
-        out = tmp_path / f"{trials}.yaml"
-        assert run_derain("tune", "ror", *options, "--trials", trials, "--out", out).code == 0
-    other = run_derain("tune", "ror", *options, "--scans", "1", "--out", tmp_path / "no.yaml")
-    assert other.code == 2
-    assert (
-        "holds a study of ror on other scans, labels or candidates. Name another --storage."
-        in other.err
-    )
-    assert not (tmp_path / "no.yaml").exists()
+        succeed(*options, "--trials", trials, "--out", BEST)
+    line = refused(*options, "--scans", "1", "--out", "no.yaml")
+    assert "holds a study of ror on other scans, labels or candidates" in line
+    assert not Path("no.yaml").exists()
 
 
-def test_the_scans_are_drawn_by_the_seed(
-    run_derain, data: list[str | Path], tmp_path: Path
-) -> None:
-    def tuned(name: str, seed: int) -> dict:
-        out = tmp_path / name
-        options = ["--scans", "1", "--trials", "1", "--seed", seed, "--out", out]
-        assert run_derain("tune", "dror", *data, *map(str, options)).code == 0
-        return yaml.safe_load(out.read_text()), out.read_text().splitlines()[1]
+def test_the_scans_are_drawn_by_the_seed(succeed) -> None:
+    def tuned(seed: int) -> str:
+        options = ["--scans", "1", "--trials", "1", "--seed", str(seed)]
+        succeed("tune", "dsor", *DATA, *options, "--out", BEST)
+        return BEST.read_text().split("\n", 1)[1]  # but for the command
 
-    assert tuned("a.yaml", 1) == tuned("b.yaml", 1)
-    assert len({tuned(f"{seed}.yaml", seed)[1] for seed in range(1, 5)}) > 1
+    assert tuned(1) == tuned(1)
+    assert len({tuned(seed) for seed in range(1, 5)}) > 1
 
 
-@pytest.mark.parametrize(
-    ("method", "reason"),
-    [
-        ("absent.onnx", "absent.onnx: no such file"),
-        ("dzor", "dzor: no such file. Did you mean dsor?"),
-    ],
-)
-def test_a_method_that_is_not_there_is_refused(
-    refused, data: list[str | Path], tmp_path: Path, method: str, reason: str
-) -> None:
-    assert reason in refused("tune", method, *data, "--out", tmp_path / "out.yaml")
+def test_a_slip_of_the_pen_is_known(refused) -> None:
+    assert "dzor: no such file. Did you mean dsor?" in refused("tune", "dzor", *DATA, "--out", BEST)
 
 
-def test_scans_without_rain_are_refused(refused, tmp_path: Path, write_labelled) -> None:
-    write_labelled(tmp_path / "a.bin", tmp_path / "a.label", rain=111)
-    data = ["--data", tmp_path / "a.bin", "--card", "wads", "--out", tmp_path / "out.yaml"]
-    assert "no point of these scans is falling-snow" in refused("tune", "dsor", *data)
-    assert not (tmp_path / "out.yaml").exists()
+def test_scans_without_rain_are_refused(refused, write_labelled) -> None:
+    write_labelled(Path("a.bin"), Path("a.label"), rain=111)
+    line = refused("tune", "dsor", "--data", "a.bin", "--card", "wads", "--out", BEST)
+    assert "no point of these scans is falling-snow" in line
+    assert not BEST.exists()
 
 
-def test_tuning_on_real_snow_finds_better_parameters(succeed, shared: Path, tmp_path: Path) -> None:
-    scan = shared / "data/wads/sample.bin"
-    options = ["--data", scan, "--card", "wads", "--trials", "40", "--out", tmp_path / "best.yaml"]
-    outcome = succeed("tune", "dsor", *options)
+def test_tuning_on_real_snow_finds_better_parameters(succeed, shared: Path) -> None:
+    data = ["--data", shared / "data/wads/sample.bin", "--card", "wads"]
+    outcome = succeed("tune", "dsor", *data, "--trials", "20", "--out", BEST)
     words = outcome.out.splitlines()[0].split()
     tuned, default = float(words[2]), float(words[8])
     assert default == pytest.approx(0.626, abs=0.003)
     assert tuned > default
 
 
-def test_what_cannot_be_written_is_refused_before_any_work(
-    refused, data: list[str | Path], tmp_path: Path
-) -> None:
-    storage = tmp_path / "study.db"
-    out = tmp_path / "velodyne/0.bin/no.yaml"
-    line = refused("tune", "dsor", *data, "--storage", storage, "--out", out)
+def test_what_cannot_be_written_is_refused_before_any_work(refused) -> None:
+    out = "velodyne/0.bin/no.yaml"
+    line = refused("tune", "dsor", *DATA, "--storage", "study.db", "--out", out)
     assert "no.yaml: cannot be written" in line
-    assert not storage.exists()
+    assert not Path("study.db").exists()

@@ -32,54 +32,41 @@ def recording(tmp_path: Path) -> Path:
 
 
 def test_what_is_kept_and_removed_is_what_run_says(
-    run_derain, succeed, recording: Path, tmp_path: Path, onnx_model: Path
+    succeed, recording: Path, tmp_path: Path, onnx_model: Path
 ) -> None:
     out = tmp_path / "out.rrd"
     methods = {"net": str(onnx_model), "dror": "dror", "persistence": "persistence"}
     given = [f"{title}={name}" for title, name in methods.items()]
     poses = ["--poses", "standing"]
     outcome = succeed("view", recording, "--methods", *given, *poses, "--rerun", out)
+    first, last = outcome.out.splitlines()
+    assert "4 scans" in first
+    assert "net, dror, persistence" in first
+    assert f"{out}: {out.stat().st_size / 1e6:,.1f} MB" in last
     found = ReadBack(out)
     assert found.blueprints == 1
     scans = [read_scan(recording / f"{number:03}.bin") for number in range(SCANS)]
     points = found.points("/sensor/scan/points")
     assert list(points) == list(range(SCANS))
-    for number, scan in enumerate(scans):
-        np.testing.assert_array_equal(points[number], scan.xyz[scan.valid])
     for title, name in methods.items():
-        assert run_derain("run", name, recording, "--out", tmp_path / title, *poses).code == 0
+        succeed("run", name, recording, "--out", tmp_path / title, *poses)
         kept = found.points(f"/sensor/methods/{title}/kept")
         removed = found.points(f"/sensor/methods/{title}/removed")
         shares = found.numbers(f"/share/methods/{title}")
         for number, scan in enumerate(scans):
             rain = read_labels(tmp_path / title / f"{number:03}.label", len(scan)) == 1
+            np.testing.assert_array_equal(points[number], scan.xyz[scan.valid])
             np.testing.assert_array_equal(removed[number], scan.xyz[rain])
             np.testing.assert_array_equal(kept[number], scan.xyz[scan.valid & ~rain])
             assert shares[number] == pytest.approx(100 * rain.sum() / scan.valid.sum())
-    first, last = outcome.out.splitlines()
-    assert "4 scans" in first
-    assert "net, dror, persistence" in first
-    assert f"{out}: {out.stat().st_size / 1e6:,.1f} MB" in last
-
-
-def test_probabilities_are_those_of_the_model_where_rain_is_not_ruled_out(
-    run_derain, recording: Path, tmp_path: Path, onnx_model: Path
-) -> None:
-    out = tmp_path / "out.rrd"
-    options = ["--methods", f"net={onnx_model}", "dror", "--rerun", out]
-    assert run_derain("view", recording, *options).code == 0
-    found = ReadBack(out)
     for number, shown in found.points("/sensor/methods/net/probability").items():
-        scan = read_scan(recording / f"{number:03}.bin")
-        probable = Derainer(onnx_model).probability(scan) >= 0.01
-        np.testing.assert_array_equal(shown, scan.xyz[probable])
+        probable = Derainer(onnx_model).probability(scans[number]) >= 0.01
+        np.testing.assert_array_equal(shown, scans[number].xyz[probable])
     # A filter says yes or no: there is nothing to shade.
     assert not found.points("/sensor/methods/dror/probability")
 
 
-def test_truth_colours_what_methods_do(
-    run_derain, succeed, recording: Path, tmp_path: Path
-) -> None:
+def test_truth_colours_what_methods_do(succeed, recording: Path, tmp_path: Path) -> None:
     card = tmp_path / "card.yaml"
     card.write_text("{name: ours, classes: {0: a, 110: b, 9: c}, rain: [110], unknown: [9]}")
     labels = np.repeat([9, 0, 110], [100, 170, 30])
@@ -87,9 +74,8 @@ def test_truth_colours_what_methods_do(
     write_labels(recording.parent / "labels/001.label", np.full(300, 9))
     (recording.parent / "labels/002.label").unlink()
     out = tmp_path / "out.rrd"
-    succeed(
-        "view", recording, "--card", card, "--methods", "dror", "--frames", "0:3", "--rerun", out
-    )
+    options = ["--card", card, "--methods", "dror", "--frames", "0:3"]
+    succeed("view", recording, *options, "--rerun", out)
     found = ReadBack(out)
     scan = read_scan(recording / "000.bin")
     told = np.flatnonzero(scan.valid & (labels != 0))
@@ -100,7 +86,7 @@ def test_truth_colours_what_methods_do(
     assert found.numbers("/share/scan/truth_not_known")[0] == pytest.approx(100 * 99 / 299)
     # The scan without labels does not show those of the one before.
     assert found.cleared("/sensor/scan/truth") == {2}
-    run_derain("run", "dror", recording, "--out", tmp_path / "dror")
+    succeed("run", "dror", recording, "--out", tmp_path / "dror")
     called = read_labels(tmp_path / "dror/000.label", 300) == 1
     rain = np.where(labels == 9, called, labels == 110)
     outcome_of = np.select([rain & called, rain, called], [1, 2, 3], default=0) + CLASS_KEPT
@@ -134,31 +120,26 @@ def test_without_labels_there_is_no_truth(succeed, recording: Path, tmp_path: Pa
 
 
 def test_some_scans_are_shown_and_a_method_of_several_scans_sees_all(
-    run_derain, recording: Path, tmp_path: Path
+    succeed, recording: Path, tmp_path: Path
 ) -> None:
     whole, some = tmp_path / "whole.rrd", tmp_path / "some.rrd"
-    options = ["--poses", "standing", "--methods", "persistence", "dror", "--rerun"]
-    run_derain("view", recording, *options, whole)
-    assert run_derain("view", recording, "--every", "2", "--frames", "1:", *options, some).code == 0
-    of_all, of_some = ReadBack(whole), ReadBack(some)
-    assert list(of_some.points("/sensor/scan/points")) == [1, 3]
-    for title in ("persistence", "dror"):
-        removed = of_some.points(f"/sensor/methods/{title}/removed")
-        assert list(removed) == [1, 3]
-        for number, points in removed.items():
-            expected = of_all.points(f"/sensor/methods/{title}/removed")[number]
-            np.testing.assert_array_equal(points, expected)
+    options = ["--poses", "standing", "--methods", "persistence"]
+    succeed("view", recording, *options, "--rerun", whole)
+    succeed("view", recording, *options, "--every", "2", "--frames", "1:", "--rerun", some)
+    entity = "/sensor/methods/persistence/removed"
+    of_all, of_some = (ReadBack(file).points(entity) for file in (whole, some))
+    assert list(of_some) == [1, 3]
+    for number, points in of_some.items():
+        np.testing.assert_array_equal(points, of_all[number])
 
 
-def test_scans_lie_where_and_when_they_were_taken(
-    run_derain, recording: Path, tmp_path: Path
-) -> None:
+def test_scans_lie_where_and_when_they_were_taken(succeed, recording: Path, tmp_path: Path) -> None:
     poses = np.tile(np.eye(4)[:3], (SCANS, 1, 1))
     poses[:, 0, 3] = 4_000_000 + np.arange(SCANS)  # as maps count, where float32 knows no metres
     np.savetxt(recording.parent / "poses.txt", poses.reshape(SCANS, 12))
     np.savetxt(recording.parent / "times.txt", 1e9 + 0.1 * np.arange(SCANS))
     out = tmp_path / "out.rrd"
-    assert run_derain("view", recording, "--methods", "dror", "--rerun", out).code == 0
+    succeed("view", recording, "--methods", "dror", "--rerun", out)
     found = ReadBack(out)
     moved = found.values("/sensor", "Transform3D:translation")
     assert {n: value[0] for n, value in moved.items()} == {n: [n, 0, 0] for n in range(SCANS)}
@@ -220,23 +201,20 @@ def test_without_rerun_it_is_said_what_installs_it(
 
 
 def test_a_file_that_is_there_stays_until_the_new_one_is_whole(
-    run_derain, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run_derain, succeed, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out.rrd"
     out.write_bytes(b"as it was")
-    usual = Derainer.push
 
-    def interrupted(self: Derainer, frame, stopwatch=None):
-        if frame.key == "002":
-            raise KeyboardInterrupt
-        return usual(self, frame, stopwatch)
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
         patch.setattr(Derainer, "push", interrupted)
         assert run_derain("view", recording, "--rerun", out).code == 130
     assert out.read_bytes() == b"as it was"
     assert [file.name for file in tmp_path.iterdir() if file.is_file()] == ["out.rrd"]
-    assert run_derain("view", recording, "--rerun", out).code == 0
+    succeed("view", recording, "--rerun", out)
     assert len(ReadBack(out).points("/sensor/methods/default/kept")) == SCANS
 
 

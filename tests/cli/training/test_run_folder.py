@@ -11,11 +11,6 @@ resource = pytest.importorskip("resource", reason="the system has no limits on f
 SHORT = ("--trainer.max_epochs", "1")
 
 
-@pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
 @pytest.fixture
 def full_disk() -> Iterator[None]:
     """No file may grow beyond 50,000 bytes: what a log needs, and no checkpoint."""
@@ -26,17 +21,13 @@ def full_disk() -> Iterator[None]:
 
 
 def test_a_full_disk_is_one_line_and_leaves_the_earlier_checkpoint(
-    run_derain, wads: list[str], checkpoint: Path, request: pytest.FixtureRequest
+    last_line, wads: list[str], checkpoint: Path, request: pytest.FixtureRequest
 ) -> None:
     earlier = Path("saved/best.ckpt")
     earlier.parent.mkdir()
     earlier.write_bytes(checkpoint.read_bytes())
     request.getfixturevalue("full_disk")
-    outcome = run_derain("fit", *wads, *SHORT, "--checkpoint.dirpath", "saved")
-    assert outcome.code == 2
-    assert "Traceback" not in outcome.err
-    line = outcome.err.splitlines()[-1]
-    assert line.startswith("derain: ")
+    line = last_line("fit", *wads, *SHORT, "--checkpoint.dirpath", "saved")
     assert "saved/best.ckpt: cannot be written (File too large). Choose a folder" in line
     assert earlier.read_bytes() == checkpoint.read_bytes()
     assert list(earlier.parent.iterdir()) == [earlier]
@@ -44,22 +35,19 @@ def test_a_full_disk_is_one_line_and_leaves_the_earlier_checkpoint(
 
 @pytest.mark.parametrize("folder", ["file/below", "/proc/derain"])
 def test_a_log_folder_that_cannot_be_written_is_one_line(
-    run_derain, wads: list[str], folder: str
+    last_line, wads: list[str], folder: str
 ) -> None:
     Path("file").touch()
-    outcome = run_derain("fit", *wads, *SHORT, "--trainer.logger.save_dir", folder)
-    assert outcome.code == 2
-    assert "Traceback" not in outcome.err
-    line = outcome.err.splitlines()[-1]
-    assert line.startswith(f"derain: {folder if folder.startswith('/') else Path.cwd() / folder}")
+    line = last_line("fit", *wads, *SHORT, "--trainer.logger.save_dir", folder)
+    assert line.startswith(str(Path.cwd() / folder))
     assert "cannot be written (" in line
     assert "--trainer.logger.save_dir" in line
 
 
 def test_the_configuration_of_a_run_is_written_whole(
-    run_derain, wads: list[str], checkpoint: Path
+    succeed, wads: list[str], checkpoint: Path
 ) -> None:
-    assert run_derain("validate", *wads, "--ckpt_path", checkpoint).code == 0
+    succeed("validate", *wads, "--ckpt_path", checkpoint)
     written = Path("runs/outdet_wads/version_0/config.yaml")
     found = yaml.safe_load(written.read_text())
     assert found["data"]["init_args"]["root"] == wads[wads.index("--data.root") + 1]

@@ -2,7 +2,6 @@
 
 import json
 import shlex
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +11,8 @@ import torch
 import yaml
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from derain.errors import InputError
 from derain.models.checkpoint import load_model
 from derain.workflows.configurations import packaged_configs, with_packaged_configs
-
-
-@pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 @pytest.mark.parametrize("written", [["--config", "{}"], ["-c", "{}"], ["--config={}"]])
@@ -32,17 +25,15 @@ def test_a_packaged_configuration_is_found_by_name(written: list[str]) -> None:
 
 
 def test_a_file_of_the_name_of_a_packaged_configuration_goes_first() -> None:
-    Path("outdet_wads.yaml").touch()
+    Path("outdet_wads.yaml").write_text("seed_everything: 1")
     arguments = ["fit", "--config", "outdet_wads.yaml"]
     assert with_packaged_configs(arguments) == arguments
 
 
 def test_an_unknown_configuration_is_one_line_with_the_known_ones(refused) -> None:
-    line = refused("fit", "--config", "outdet_mars.yaml", "--data.root", "MARS")
+    line = refused("fit", "--config=outdet_mars.yaml", "--data.root", "MARS")
     assert line.startswith("derain: outdet_mars.yaml: no such configuration. Packaged are ")
     assert all(name in line for name in packaged_configs())
-    with pytest.raises(InputError, match="no such configuration"):
-        with_packaged_configs(["fit", "--config=outdet_mars.yaml"])
 
 
 @pytest.fixture
@@ -60,7 +51,6 @@ def bad_checkpoints(checkpoint: Path) -> None:
     ("command", "path", "reason"),
     [
         ("fit", "https://example.org/outdet.ckpt", "is an address. Download it and give the file."),
-        ("test", "s3://bucket/outdet.ckpt", "is an address. Download it and give the file."),
         ("fit", "none.ckpt", "no such file"),
         ("fit", "cut.ckpt", "damaged"),
         ("test", "weights.ckpt", "not a checkpoint of derain"),
@@ -90,13 +80,10 @@ def test_a_checkpoint_chooses_no_module_to_import(
 
 
 def test_a_training_that_diverges_is_one_line_and_leaves_no_checkpoint_of_it(
-    run_derain, wads: list[str]
+    last_line, wads: list[str]
 ) -> None:
     too_fast = ["--trainer.max_epochs", "3", "--model.learning_rate", "1e30"]
-    outcome = run_derain("fit", *wads, *too_fast)
-    assert outcome.code == 2
-    line = outcome.err.splitlines()[-1]
-    assert line.startswith("derain: ")
+    line = last_line("fit", *wads, *too_fast)
     assert "not finite" in line
     assert "learning" in line
     for path in Path("runs").rglob("*.ckpt"):
@@ -110,45 +97,19 @@ def test_no_training_goes_on_from_weights_alone(refused, wads: list[str], checkp
     assert not Path("runs").exists()
 
 
-@pytest.mark.parametrize("command", ["test", "predict"])
-def test_a_model_without_training_is_not_measured(
-    run_derain, wads: list[str], command: str
-) -> None:
-    outcome = run_derain(command, *wads)
-    assert outcome.code == 2
-    assert "Give a checkpoint: --ckpt_path." in outcome.err.splitlines()[-1]
+def test_a_model_without_training_is_not_measured(last_line, wads: list[str]) -> None:
+    assert "Give a checkpoint: --ckpt_path." in last_line("test", *wads)
 
 
-SPOILS: dict[str, tuple[Callable[[Path], None], str]] = {
-    "unknown ids": (
-        lambda path: np.full(300, 77, "<u4").tofile(path),
-        "ids [77] are no classes of WADS. Name them in the data card.",
-    ),
-    "another length": (
-        lambda path: np.zeros(299, "<u4").tofile(path),
-        "holds 299 labels of 4 bytes for a scan of 300 points. Give the label file that belongs",
-    ),
-    "missing": (lambda path: path.unlink(), "its labels are not at"),
-}
-
-
-@pytest.mark.parametrize(
-    ("spoil", "workers"), [("unknown ids", "0"), ("another length", "0"), ("missing", "1")]
-)
 def test_labels_that_cannot_be_used_are_named_with_the_remedy(
-    run_derain, wads: list[str], checkpoint: Path, tmp_path: Path, spoil: str, workers: str
+    last_line, wads: list[str], checkpoint: Path, tmp_path: Path
 ) -> None:
-    change, reason = SPOILS[spoil]
     label = tmp_path / "WADS/sequences/02/labels/0.label"
-    change(label)
-    options = ["--ckpt_path", checkpoint, "--data.loading.workers", workers]
-    outcome = run_derain("test", *wads, *options)
-    assert outcome.code == 2
-    assert "Traceback" not in outcome.err
-    line = outcome.err.splitlines()[-1]
-    assert line.startswith("derain: ")
+    np.full(300, 77, "<u4").tofile(label)
+    options = ["--ckpt_path", checkpoint, "--data.loading.workers", "1"]
+    line = last_line("test", *wads, *options)
     assert str(label) in line
-    assert reason in line
+    assert "ids [77] are no classes of WADS. Name them in the data card." in line
 
 
 @pytest.mark.parametrize(
@@ -159,63 +120,46 @@ def test_labels_that_cannot_be_used_are_named_with_the_remedy(
     ],
 )
 def test_data_that_cannot_be_used_is_named_with_the_remedy(
-    run_derain, options: list[str], reason: str
+    last_line, options: list[str], reason: str
 ) -> None:
     quiet = ["--trainer.enable_progress_bar", "false", "--data.loading.workers", "0"]
-    outcome = run_derain("fit", "--config", *options, *quiet)
-    assert outcome.code == 2
-    assert "Traceback" not in outcome.err
-    assert outcome.err.splitlines()[-1].startswith("derain: ")
-    assert reason in outcome.err.splitlines()[-1]
-
-
-def test_predictions_need_no_labels(
-    run_derain, wads: list[str], checkpoint: Path, tmp_path: Path
-) -> None:
-    for label in tmp_path.rglob("*.label"):
-        label.unlink()
-    options = ["--ckpt_path", checkpoint, "--predictions.folder", "found"]
-    assert run_derain("predict", *wads, *options).code == 0
-    assert np.fromfile("found/0.label", "<u4").shape == (300,)
+    assert reason in last_line("fit", "--config", *options, *quiet)
 
 
 def test_intensities_of_another_unit_are_warned_of_and_scaled(
-    run_derain, wads: list[str], checkpoint: Path, tmp_path: Path
+    succeed, wads: list[str], checkpoint: Path, tmp_path: Path
 ) -> None:
     predict = ["predict", *wads, "--ckpt_path", checkpoint, "--predictions.folder"]
-    assert not scan_warnings(run_derain(*predict, "whole"))
+    assert not scan_warnings(succeed(*predict, "whole"))
     for scan in tmp_path.rglob("*.bin"):
         points = np.fromfile(scan, np.float32).reshape(-1, 4)
         (points / np.array([1, 1, 1, 256], np.float32)).tofile(scan)
-    (warning,) = scan_warnings(run_derain(*predict, "small"))
+    (warning,) = scan_warnings(succeed(*predict, "small"))
     scan = tmp_path / "WADS/sequences/02/velodyne/0.bin"
     assert warning.startswith(f"derain: warning: {scan}: mean intensity 0.")
     assert "see --data.loading.intensity_scale" in warning
     scaled = ["--data.loading.intensity_scale", "256"]
-    assert not scan_warnings(run_derain(*predict, "scaled", *scaled))
+    assert not scan_warnings(succeed(*predict, "scaled", *scaled))
     whole, small, again = (
         np.fromfile(f"{folder}/0.label", "<u4") for folder in ("whole", "small", "scaled")
     )
     np.testing.assert_array_equal(again, whole)
     assert (small != whole).any()
-    (warning,) = scan_warnings(run_derain("fit", *wads, "--trainer.fast_dev_run", "true"))
+    (warning,) = scan_warnings(succeed("fit", *wads, "--trainer.fast_dev_run", "true"))
     assert "sequences/00/velodyne/0.bin: mean intensity 0." in warning
 
 
 def scan_warnings(outcome: Any) -> list[str]:
     """What was said of scans before the first batch."""
-    assert outcome.code == 0, outcome.err
     return [line for line in outcome.err.splitlines() if line.startswith("derain: warning: ")]
 
 
 def test_predictions_that_cannot_be_written_are_reported(
-    run_derain, wads: list[str], checkpoint: Path
+    last_line, wads: list[str], checkpoint: Path
 ) -> None:
     Path("file").touch()
     options = ["--ckpt_path", checkpoint, "--predictions.folder", "file/below"]
-    outcome = run_derain("predict", *wads, *options)
-    assert outcome.code == 2
-    assert "file/below/0.label: cannot be written" in outcome.err.splitlines()[-1]
+    assert "file/below/0.label: cannot be written" in last_line("predict", *wads, *options)
 
 
 def test_training_goes_on_from_a_checkpoint_and_keeps_what_was_best_before(
@@ -237,47 +181,17 @@ def test_training_goes_on_from_a_checkpoint_and_keeps_what_was_best_before(
     assert load_model(second / "last.ckpt").spec.data == "WADS"
 
 
-def test_a_data_set_of_any_layout_is_trained_on_with_a_card_alone(
-    run_derain, write_labelled: Callable[..., None]
-) -> None:
-    for name in ("monday", "tuesday"):
-        folder = Path("drives/recordings") / name
-        write_labelled(folder / "ouster/0.bin", folder / "truth/0.label", rain=7)
-    Path("card.yaml").write_text(
-        "name: drives\nclasses: {0: other, 7: spray}\nrain: [7]\n"
-        "layout: {sequences: recordings, scans: ouster, labels: truth}\n"
-        "split: {train: [monday], validation: [tuesday], test: [tuesday]}\n"
-    )
-    options = [
-        *("--model", "OutDet", "--data", "Sequences"),
-        *("--data.root", "drives", "--data.card", "card.yaml"),
-        *("--trainer.max_epochs", "1", "--trainer.enable_progress_bar", "false"),
-        *("--panels.scans", "0", "--errors.pictures", "0"),
-    ]
-    assert run_derain("fit", *options).code == 0
-    (last,) = Path().rglob("last.ckpt")
-    spec = load_model(last).spec
-    assert (spec.data, spec.rain, spec.training) == ("drives", (7,), {"sequences": ("monday",)})
-    assert run_derain("predict", *options, "--ckpt_path", last).code == 0
-    assert [path.name for path in Path("predictions").iterdir()] == ["0.label"]
-
-
 SCALARS = {"test/iou", "test/f1", "test/precision", "test/recall", "test/average_precision"}
 
 
-def test_a_test_is_logged_into_the_folder_of_its_training_or_where_it_is_told_to(
-    run_derain, succeed, wads: list[str], checkpoint: Path, caplog: pytest.LogCaptureFixture
+def test_a_test_is_logged_into_the_folder_of_its_training(
+    succeed, wads: list[str], caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level("INFO", "lightning.pytorch.utilities.rank_zero"):
-        trained = run_derain("fit", *wads, "--trainer.max_epochs", "2")
-    assert trained.code == 0
+        trained = succeed("fit", *wads, "--trainer.max_epochs", "2")
     run = Path("runs/outdet_wads/version_0")
     best = run / "checkpoints/best.ckpt"
     kept = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-    elsewhere = ["--trainer.logger.save_dir", "tests"]
-    assert run_derain("test", *wads, *elsewhere, "--ckpt_path", best).code == 0
-    assert Path("tests/outdet_wads/version_0/test.json").is_file()
-    assert not (run / "test.json").exists()
     outcome = succeed("test", *wads, "--errors.pictures", "1", "--ckpt_path", best)
     assert [path.name for path in run.parent.iterdir()] == ["version_0"]
     assert all(path.read_bytes() == content for path, content in kept.items())
@@ -294,11 +208,6 @@ def test_a_test_is_logged_into_the_folder_of_its_training_or_where_it_is_told_to
     assert set(events.Tags()["images"]) == {"test: errors by class and range", "test: threshold"}
     assert "test/text_summary" in events.Tags()["tensors"]
 
-    # A checkpoint that lies in no run has a folder of its own for its test, which trains nothing.
-    assert run_derain("test", *wads, "--ckpt_path", checkpoint).code == 0
-    assert Path("runs/outdet_wads/version_1/test.json").is_file()
-    assert not Path("runs/outdet_wads/version_1/checkpoints").exists()
-
     # Nothing but derain reports on a run.
     printed = trained.out + trained.err + outcome.out + outcome.err
     assert "Trainable params" not in printed
@@ -306,3 +215,21 @@ def test_a_test_is_logged_into_the_folder_of_its_training_or_where_it_is_told_to
     assert outcome.out.count("pooled over points") == 1
     assert "max_epochs=2" in caplog.text  # what Lightning reports of itself does come through
     assert "Tip" not in caplog.text
+
+
+def test_a_test_is_logged_where_it_is_told_to_or_into_a_folder_of_its_own(
+    succeed, wads: list[str], checkpoint: Path
+) -> None:
+    of_a_run = Path("runs/mine/version_7/checkpoints/best.ckpt")
+    of_a_run.parent.mkdir(parents=True)
+    of_a_run.write_bytes(checkpoint.read_bytes())
+    (of_a_run.parent.parent / "config.yaml").touch()
+    succeed("test", *wads, "--trainer.logger.save_dir", "tests", "--ckpt_path", of_a_run)
+    assert [path.parent for path in Path().rglob("test.json")] == [
+        Path("tests/outdet_wads/version_0")
+    ]
+    # A checkpoint that lies in no run trains nothing either.
+    succeed("test", *wads, "--ckpt_path", checkpoint)
+    own = Path("runs/outdet_wads/version_0")
+    assert (own / "test.json").is_file()
+    assert not (own / "checkpoints").exists()

@@ -21,14 +21,11 @@ precipitation: {snow: {weight: 1, crowding: [0.1, 0.3]}}
 
 
 @pytest.mark.usefixtures("one_block")
-def test_worlds_are_made_trained_on_and_exported(
-    run_derain, succeed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_worlds_are_made_trained_on_and_exported(succeed, monkeypatch: pytest.MonkeyPatch) -> None:
     try:
         import_open3d()
     except InputError as error:
         pytest.skip(str(error))
-    monkeypatch.chdir(tmp_path)
     Path("small.yaml").write_text(WORLD, "utf-8")
     options = [
         *("--data.root", "worlds", "--data.workers", 1, "--data.loading.workers", 0),
@@ -45,6 +42,6 @@ def test_worlds_are_made_trained_on_and_exported(
     # The whole proof has tests of its own.
     monkeypatch.setattr(onnx_file, "hard_cases", lambda: [("scene", Scan.of(scene(100)))])
     timed_on = ["--scan", "scan.bin", "--repeats", "1"]
-    assert run_derain("export", checkpoint, "--out", "model.onnx", *timed_on).code == 0
+    succeed("export", checkpoint, "--out", "model.onnx", *timed_on)
     succeed("run", "model.onnx", "scan.bin", "--out", "out")
     assert len(np.fromfile("out/scan.label", np.uint32)) == 500
