@@ -31,7 +31,12 @@ SHELL = ("bash", "console")
 SHOWN = ("text", "cpp", "toml", "json")
 
 BY_PAGE = {page: snippets(page) for page in PAGES}
-WITH_SNIPPETS = [page for page, blocks in BY_PAGE.items() if blocks]
+
+# Those with the most commands first: what takes long is not left to the end.
+WITH_SNIPPETS = sorted(
+    (page for page, blocks in BY_PAGE.items() if blocks),
+    key=lambda page: -sum(len(block.commands) for block in BY_PAGE[page]),
+)
 NOT_RUN = [block for blocks in BY_PAGE.values() for block in blocks if block.not_run]
 
 # Times, counts and checksums are of one machine.

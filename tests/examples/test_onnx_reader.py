@@ -60,14 +60,9 @@ def test_of_neighbours_it_makes_what_derain_makes(
     assert 0 < agree(reader, default_model(), hard_points()).mean() < 0.9
 
 
-def test_of_images_it_makes_what_derain_makes(reader: ModuleType, image_onnx: Path) -> None:
-    for points in SCANS.values():
-        agree(reader, image_onnx, points)
-
-
 @pytest.mark.parametrize("way_back", BACK_PROJECTIONS)
 @pytest.mark.parametrize("azimuth", [(-180.0, 180.0), (-60.0, 75.0)], ids=["circle", "sector"])
-def test_it_carries_scores_of_pixels_back_in_every_way(
+def test_of_images_it_makes_what_derain_makes_whichever_way_scores_come_back(
     reader: ModuleType,
     salsanext_onnx: Path,
     tmp_path: Path,
@@ -81,7 +76,8 @@ def test_it_carries_scores_of_pixels_back_in_every_way(
     for bounds in (None, candidates):
         changed = replace(spec, view=view, candidates=bounds)
         (tmp_path / "changed.onnx").write_bytes(with_metadata(proto, {"spec": changed.as_dict()}))
-        agree(reader, tmp_path / "changed.onnx", np.concatenate([hard_points(), scene(800)]))
+        for points in (*SCANS.values(), scene(800)):
+            agree(reader, tmp_path / "changed.onnx", points)
 
 
 @pytest.mark.parametrize(

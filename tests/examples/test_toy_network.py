@@ -1,8 +1,6 @@
 """A network in one file outside derain does all that derain's own networks do."""
 
 import json
-import os
-import subprocess
 import sys
 from collections.abc import Iterator
 from importlib import import_module
@@ -26,8 +24,6 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 RAIN = 110  # falling snow, in WADS
 DROPS = np.arange(300) >= 270
-
-COMMAND = "import sys; from derain.cli.main import main; sys.exit(main(sys.argv[1:]))"
 
 
 @pytest.fixture(scope="module")
@@ -139,18 +135,3 @@ def test_without_the_package_that_brings_it_its_checkpoint_is_refused(
     assert (outcome.code, outcome.out) == (2, "")
     assert outcome.err.startswith(f"derain: {checkpoint}: a checkpoint of 'toy', a network that no")
     assert "entry points `derain.networks`" in outcome.err
-
-
-def test_a_package_that_is_installed_brings_it(checkpoint: Path, tmp_path: Path) -> None:
-    package = tmp_path / "toy-1.0.dist-info"
-    package.mkdir()
-    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: toy\nVersion: 1.0\n")
-    (package / "entry_points.txt").write_text("[derain.networks]\ntoy = toy_network\n")
-    finished = subprocess.run(
-        [sys.executable, "-c", COMMAND, "info", str(checkpoint), "--json"],
-        env={**os.environ, "PYTHONPATH": f"{EXAMPLES}{os.pathsep}{tmp_path}"},
-        capture_output=True,
-        text=True,
-    )
-    assert finished.returncode == 0, finished.stderr
-    assert json.loads(finished.stdout)["spec"]["network"] == "toy"
