@@ -11,8 +11,7 @@ from derain.datamodules.labelled import card_of, labelled_scans, rain_rates
 from derain.datamodules.scan_data import Loading, ScanData
 from derain.default import DEFAULT
 from derain.errors import InputError
-from derain.evaluation.counts import table_of
-from derain.evaluation.range_bands import RANGE_EDGES, band_names, band_of
+from derain.evaluation.counts import RANGE_EDGES, band_names, band_of, table_of
 from derain.export.bench.bench import Bench, Effort, run_bench
 from derain.export.bench.bench_entries import bench_entries
 from derain.export.bench.labelled_frames import LabelledFrames

@@ -22,7 +22,7 @@ from derain.export.tuning import (
 )
 from derain.files.atomic import replacing
 from derain.filters import filter_from
-from derain.filters.parameters import CANDIDATES
+from derain.filters.derainer import CANDIDATES
 from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.training_record import training_overlap
@@ -129,7 +129,7 @@ def tune_model_on(name: str, data: ScanData, frames: Sequence[Frame], threads: i
 def write_parameters(
     path: Path, method: str, parameters: Mapping[str, Any], *comments: str
 ) -> None:
-    """Writes parameters as :func:`derain.filters.read_parameters` reads them.
+    """Writes parameters as :func:`derain.export.methods.read_parameters` reads them.
 
     Args:
         path: The YAML file.
