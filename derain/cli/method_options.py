@@ -185,8 +185,8 @@ def method_and_scans(first: str, others: list[Path]) -> tuple[str, list[Path]]:
         raise InputError(
             first, "no such file", f"{method_hint(first)}, and scans after it; or scans alone."
         )
-    may_be_scans = folder or in_bag or scan_suffix(path) in FORMATS
-    if not named and (not others or may_be_scans):
+    # Formats come last: to look a suffix up may import what other packages bring.
+    if not named and (not others or folder or in_bag or scan_suffix(path) in FORMATS):
         return DEFAULT, [path, *others]
     if others:
         return first, others

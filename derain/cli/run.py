@@ -1,4 +1,4 @@
-r"""Cleans scans with an exported model or a filter.
+"""Cleans scans with an exported model or a filter.
 
 Writes <stem>.label (1 = rain, one per row of the input) and the scan without its rain, in the
 format of the input with all its fields. With --weather, --fail-at, --dry or --json it measures the

@@ -1,7 +1,6 @@
 """The folder that the snippets of a page are run in: what they take for granted."""
 
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,12 +8,9 @@ import numpy as np
 
 from benchmarks.recorded_bags import Ros, drive, table_of, write_bag
 from derain.cards.card import load_card
+from derain.cli.main import main
 from derain.evaluation.hard_cases import scene
 from derain.files.labels import read_labels, semantic, write_labels
-from derain.simulation.campaign import Campaign, partition
-from derain.simulation.dataset import simulate_track
-from derain.simulation.drive import Drive
-from derain.simulation.sensor_file import load_sensor
 
 if TYPE_CHECKING:
     from derain.models.outdet import OutDet
@@ -25,21 +21,13 @@ KEPT = Path(__file__).resolve().parents[1] / "export" / "kept"
 # Ids of rain and of the rest: of the simulation, of WADS, and of a card that a page makes.
 SIMULATED_RAIN, FALLING_SNOW, ROAD = 3, 110, 40
 
-# Half a second through a street in the rain, 7,000 points a scan.
-SENSOR = replace(load_sensor("spinning_16"), columns=600)
-DRIVE = Campaign(
-    *partition(1),
-    scans=5,
-    rain_rates=(25.0,),
-    sensor=SENSOR,
-    layout="street",
-    drive=Drive(speed=6.0),
-)
+# Two seconds, 20,000 points a scan.
+DRIVE = "--layout street --speed 6 --sensor spinning_16 --rain 25 --sequences 1 --scans 5"
 
 
 def write_drive(folder: Path) -> None:
-    """Simulates that drive, and records it in a bag as well."""
-    simulate_track(folder, DRIVE, workers=1)
+    """Simulates a short drive through a street in the rain, and records it in a bag as well."""
+    assert main(["simulate", "--out", str(folder), *DRIVE.split(), "--workers", "1"]) == 0
     clouds = [np.fromfile(scan, np.float32).reshape(-1, 4) for scan in _scans(folder)]
     columns = ("x", "y", "z", "intensity")
     tables = [table_of(dict(zip(columns, cloud.T, strict=True))) for cloud in clouds]
