@@ -65,33 +65,28 @@ def lay_out_facility(generator: Generator) -> Track:
     """
     half_width = generator.uniform(3.4, 3.8)
     # Materials have a generator of their own, so that a seed's places stay where they are.
-    (material_generator,) = generator.spawn(1)
+    (materials,) = generator.spawn(1)
     surfaces = [
-        *(_paved(part, material_generator) for part in road_and_ground(half_width, generator)),
+        *(_paved(part, materials) for part in road_and_ground(half_width, generator)),
         *_road_users(half_width, generator),
         *objects.sprinklers(MASTS, half_width + 0.7, generator),
-        *_verges(half_width, generator, material_generator),
-        *_horizon(half_width, generator, material_generator),
+        *_verges(half_width, generator, materials),
+        *_horizon(half_width, generator, materials),
     ]
     heading = np.radians(generator.uniform(-2, 2))
     return on_slope(surfaces, 0, heading, generator.uniform(-0.01, 0.01, 2))
 
 
-def _paved(surface: Surface, material_generator: Generator) -> Surface:
+def _paved(surface: Surface, materials: Generator) -> Surface:
     span = ASPHALT_REFLECTIVITY if surface.label is TrackClass.ROAD else GROUND
-    return replace(surface, reflectivity=material_generator.uniform(*span), roughness=ROUGHNESS)
+    return replace(surface, reflectivity=materials.uniform(*span), roughness=ROUGHNESS)
 
 
 def _foliage(
-    radii: tuple[float, float, float],
-    height: float,
-    generator: Generator,
-    material_generator: Generator,
+    radii: tuple[float, float, float], height: float, generator: Generator, materials: Generator
 ) -> Surface:
     foliage = objects.foliage(radii, height, generator)
-    return replace(
-        foliage, reflectivity=material_generator.uniform(*LEAVES, len(foliage.triangles))
-    )
+    return replace(foliage, reflectivity=materials.uniform(*LEAVES, len(foliage.triangles)))
 
 
 def _road_users(half_width: float, generator: Generator) -> Iterator[Surface]:
@@ -104,26 +99,22 @@ def _road_users(half_width: float, generator: Generator) -> Iterator[Surface]:
         yield make(generator).placed(x, generator.uniform(1.2 - half_width, half_width - 1.2))
 
 
-def _verges(
-    half_width: float, generator: Generator, material_generator: Generator
-) -> Iterator[Surface]:
+def _verges(half_width: float, generator: Generator, materials: Generator) -> Iterator[Surface]:
     for side in (-1, 1):
         for _ in range(generator.integers(10, 20)):
             radii = generator.uniform(0.3, 1.2, 3)
             x, y = generator.uniform(5, 40), side * (half_width + generator.uniform(2, 12))
-            yield _foliage(tuple(radii), 0.7 * radii[2], generator, material_generator).placed(x, y)
+            yield _foliage(tuple(radii), 0.7 * radii[2], generator, materials).placed(x, y)
         for x in np.arange(5.0, 100, 5):
             yield objects.pole(generator).placed(x, side * (half_width + 14))
 
 
-def _horizon(
-    half_width: float, generator: Generator, material_generator: Generator
-) -> Iterator[Surface]:
+def _horizon(half_width: float, generator: Generator, materials: Generator) -> Iterator[Surface]:
     for side in (-1, 1):
         for x in np.arange(30.0, 110, 10):
             y, crown = side * (half_width + generator.uniform(15, 40)), generator.uniform(1.5, 3)
             yield objects.trunk(generator).placed(x, y)
-            tree = _foliage((crown, crown, crown), 2 + crown, generator, material_generator)
+            tree = _foliage((crown, crown, crown), 2 + crown, generator, materials)
             yield tree.placed(x, y)
     for y in (-25, 25):
         yield objects.building(generator).placed(generator.uniform(85, 110), y)

@@ -4,7 +4,7 @@ Reflectivities are modelling choices for a near-infrared LiDAR, drawn per object
 everyday objects.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,6 +42,21 @@ class Surface:
         return replace(self, triangles=self.triangles + np.array([x, y, z]))
 
 
+# Something made at the origin, of one surface or of several.
+Make = Callable[[Generator], Surface | Iterable[Surface]]
+
+# Makers and the shares that they have in what is chosen.
+Options = Iterable[tuple[Make, float]]
+
+# Made piece by piece along a line, by the length of a piece in metres.
+Piece = Callable[[float, Generator], Surface | Iterable[Surface]]
+
+
+def of_size(make: Callable[..., Surface | Iterable[Surface]], *sizes: Span) -> Make:
+    """Makes things whose sizes, in metres, are each uniform between two values."""
+    return lambda generator: make(*(generator.uniform(*size) for size in sizes), generator)
+
+
 def of_material(
     parts: Sequence[Triangles],
     reflectivity: Span,
@@ -70,8 +85,7 @@ def spotted(
 
 def asphalt(x: tuple[float, float], y: tuple[float, float], generator: Generator) -> Surface:
     """A patch of road, from dry asphalt to a film of water that mirrors most of the light away."""
-    reflectivity = log_uniform((0.01, 0.2), generator)
-    return Surface(shapes.rectangle(x, y, 0), TrackClass.ROAD, reflectivity)
+    return of_material([shapes.rectangle(x, y, 0)], (0.01, 0.2), generator, TrackClass.ROAD)
 
 
 def ground(x: tuple[float, float], y: tuple[float, float], generator: Generator) -> Surface:
@@ -87,22 +101,18 @@ def car(generator: Generator) -> Surface:
     profile = np.array([[-0.48, bonnet], [0.22, bonnet], [0.05, roof], [-0.4, roof]])
     cabin = shapes.prism(profile * (length, 1), -0.42 * width, 0.42 * width)
     body = shapes.box(length, width, 0.25, bonnet)
-    return Surface(
-        np.concatenate([body, shapes.on_its_side(cabin)]),
-        TrackClass.CAR,
-        generator.uniform(0.02, 0.6),
-    )
+    whole = np.concatenate([body, shapes.on_its_side(cabin)])
+    return Surface(whole, TrackClass.CAR, generator.uniform(0.02, 0.6))
 
 
 def pedestrian(generator: Generator) -> Surface:
     """A standing child or adult."""
     height = generator.uniform(1.1, 1.9)
-    legs = [shapes.placed(shapes.cylinder(0.08, 0, 0.48 * height), 0, y) for y in (-0.1, 0.1)]
+    legs = [shapes.cylinder(0.08, 0, 0.48 * height, at=(0, y)) for y in (-0.1, 0.1)]
     torso = shapes.cylinder(0.2, 0.48 * height, 0.84 * height)
     head = shapes.cylinder(0.1, 0.86 * height, height)
-    return Surface(
-        np.concatenate([*legs, torso, head]), TrackClass.PEDESTRIAN, generator.uniform(0.03, 0.5)
-    )
+    whole = np.concatenate([*legs, torso, head])
+    return Surface(whole, TrackClass.PEDESTRIAN, generator.uniform(0.03, 0.5))
 
 
 def bike(generator: Generator) -> Surface:
@@ -111,9 +121,8 @@ def bike(generator: Generator) -> Surface:
     wheels = [shapes.placed(wheel, x, 0) for x in (-0.52, 0.52)]
     frame = shapes.box(0.9, 0.05, 0.5, 0.62)
     rider = [shapes.cylinder(0.17, 0.8, 1.5), shapes.cylinder(0.1, 1.52, 1.75)]
-    return Surface(
-        np.concatenate([*wheels, frame, *rider]), TrackClass.BIKE, generator.uniform(0.03, 0.5)
-    )
+    whole = np.concatenate([*wheels, frame, *rider])
+    return Surface(whole, TrackClass.BIKE, generator.uniform(0.03, 0.5))
 
 
 def target(generator: Generator) -> Surface:
@@ -121,20 +130,18 @@ def target(generator: Generator) -> Surface:
     width, bottom = generator.uniform(0.5, 1.2), generator.uniform(0.3, 1.0)
     plate = shapes.box(0.03, width, bottom, bottom + width)
     stand = shapes.cylinder(0.03, 0, bottom)
-    return Surface(
-        np.concatenate([plate, stand]), TrackClass.TARGET, generator.choice([0.05, 0.1, 0.5, 0.9])
-    )
+    whole = np.concatenate([plate, stand])
+    return Surface(whole, TrackClass.TARGET, generator.choice([0.05, 0.1, 0.5, 0.9]))
 
 
 def sprinkler(generator: Generator) -> Surface:
     """A mast with an arm towards the side −y."""
     height, arm = generator.uniform(3.0, 5.0), generator.uniform(1.0, 2.5)
     mast = shapes.cylinder(generator.uniform(0.04, 0.1), 0, height)
-    pipe = shapes.placed(shapes.box(0.06, arm, height - 0.06, height), 0, -arm / 2)
+    pipe = shapes.box(0.06, arm, height - 0.06, height, at=(0, -arm / 2))
     foot = shapes.box(0.6, 0.6, 0, 0.25)
-    return Surface(
-        np.concatenate([mast, pipe, foot]), TrackClass.SPRINKLER, generator.uniform(0.05, 0.5)
-    )
+    whole = np.concatenate([mast, pipe, foot])
+    return Surface(whole, TrackClass.SPRINKLER, generator.uniform(0.05, 0.5))
 
 
 def sprinklers(places: Floats, aside: float, generator: Generator) -> Iterator[Surface]:
@@ -194,8 +201,5 @@ def foliage(radii: tuple[float, float, float], height: float, generator: Generat
     surface_area = radii[0] * radii[1] + radii[1] * radii[2] + radii[2] * radii[0]
     count = int(generator.uniform(30, 250) * surface_area)
     leaves = shapes.leaves(shapes.inside_ellipsoid(count, radii, generator), 0.02, generator)
-    return Surface(
-        shapes.raised(leaves, height),
-        TrackClass.BACKGROUND,
-        log_uniforms((0.003, 0.4), count, generator),
-    )
+    reflectivity = log_uniforms((0.003, 0.4), count, generator)
+    return Surface(shapes.raised(leaves, height), TrackClass.BACKGROUND, reflectivity)

@@ -1,5 +1,6 @@
 """Shapes of triangles: float64 arrays of shape (T, 3, 3), T triangles of 3 corners in metres."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,9 @@ from numpy.typing import NDArray
 from derain.simulation.arrays import Floats
 
 Triangles = Floats
+
+# x, y and z, metres.
+Point = tuple[float, float, float]
 
 
 def rectangle(x: tuple[float, float], y: tuple[float, float], height: float) -> Triangles:
@@ -39,16 +43,26 @@ def prism(outline: Floats, bottom: float, top: float) -> Triangles:
     return np.concatenate(sides + ends)
 
 
-def box(length: float, width: float, bottom: float, top: float) -> Triangles:
-    """A box about the z axis: length along x, width along y."""
+def box(
+    length: float,
+    width: float,
+    bottom: float,
+    top: float,
+    at: tuple[float, float] = (0.0, 0.0),
+    heading: float = 0.0,
+) -> Triangles:
+    """A box about an upright axis at an x and a y, its length along x or a heading in radians."""
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (length / 2, width / 2)
-    return prism(corners, bottom, top)
+    return placed(prism(corners, bottom, top), *at, heading)
 
 
-def cylinder(radius: float, bottom: float, top: float) -> Triangles:
-    """A twelve-sided cylinder about the z axis."""
+def cylinder(
+    radius: float, bottom: float, top: float, at: tuple[float, float] = (0.0, 0.0)
+) -> Triangles:
+    """A twelve-sided cylinder about an upright axis at an x and a y."""
     angle = np.arange(12) * (2 * np.pi / 12)
-    return prism(radius * np.column_stack([np.cos(angle), np.sin(angle)]), bottom, top)
+    outline = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    return placed(prism(outline, bottom, top), *at)
 
 
 def on_its_side(triangles: Triangles) -> Triangles:
@@ -106,6 +120,11 @@ def sheet(corners: Floats) -> Triangles:
     return quads(corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:])
 
 
+def upright_grid(x: Floats, z: Floats, y: float = 0.0) -> Floats:
+    """Corners of a sheet in a plane upright along x, (M, N, 3), from (M,) x and (N,) z, metres."""
+    return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)[:, 0]
+
+
 def quads(first: Floats, second: Floats, third: Floats, fourth: Floats) -> Triangles:
     """Quadrangles by their corners in order, float64 (..., 3) each: two triangles for each."""
     halves = np.stack([first, second, third, first, third, fourth], axis=-2)
@@ -131,6 +150,14 @@ def rods(
     lower, upper = starts[:, None] + ring, ends[:, None] + taper * ring
     following = (np.arange(sides) + 1) % sides
     return quads(lower, lower[:, following], upper[:, following], upper)
+
+
+def bars(
+    ends: Iterable[tuple[Point, Point]], radius: float, sides: int = 4, taper: float = 1.0
+) -> Triangles:
+    """Rods of one thickness from point to point; arguments as for :func:`rods`."""
+    both = np.array(list(ends), np.float64)
+    return rods(both[:, 0], both[:, 1], radius, taper, sides)
 
 
 def blades(starts: Floats, ends: Floats, width: Floats | float, generator: Generator) -> Triangles:

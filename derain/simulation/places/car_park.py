@@ -7,12 +7,10 @@ from numpy.random import Generator
 
 from derain.simulation import objects
 from derain.simulation.arrays import Floats, Ints
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Options, Piece, Surface
 from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
 from derain.simulation.places.crowd import ragged_things
-from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.standing import (
-    Piece,
+from derain.simulation.places.placing import (
     assemble,
     choose,
     free_places,
@@ -44,12 +42,14 @@ def lay_out_car_park(generator: Generator) -> Track:
         *_people(aside, generator),
         *_between(aside, winter, generator),
         *_edge(winter, generator),
-        *ragged_things(
-            generator, lambda x, y: np.hypot(x, y) > 12, count=(3, 10), leafy=not winter
-        ),
+        *ragged_things(generator, _far_off, count=(3, 10), leafy=not winter),
     ]
-    uneven = Relief.draw(generator.uniform(0.01, 0.12), generator)
+    uneven = relief.Relief.draw(generator.uniform(0.01, 0.12), generator)
     return assemble(_ground(winter, generator), standing, uneven, generator)
+
+
+def _far_off(x: float, y: float) -> bool:
+    return bool(np.hypot(x, y) > 12)
 
 
 def _ground(winter: bool, generator: Generator) -> Iterator[Surface]:
@@ -59,7 +59,7 @@ def _ground(winter: bool, generator: Generator) -> Iterator[Surface]:
     def kind_at(x: Floats, y: Floats) -> Ints:
         return np.where(np.maximum(np.abs(x), np.abs(y)) < HALF_SIZE, 0, 1)
 
-    yield from ground_mesh([surface, beyond], kind_at, generator)
+    yield from relief.ground_mesh([surface, beyond], kind_at, generator)
 
 
 def _rows(aside: float, generator: Generator) -> Iterator[Surface]:
@@ -94,23 +94,22 @@ def _people(aside: float, generator: Generator) -> Iterator[Surface]:
 
 def _between(aside: float, winter: bool, generator: Generator) -> Iterator[Surface]:
     """What stands along the lane and where lots meet."""
-    small = choose(
-        [(frames.trolley, 2), (frames.bollard, 2), (frames.thin_pole, 2), (_sapling, 1)],
-        (8, 25),
-        generator,
-    )
+    kinds: Options = [
+        (frames.trolley, 2),
+        (frames.bollard, 2),
+        (frames.thin_pole, 2),
+        (_sapling, 1),
+    ]
+    small = shuffled(choose(kinds, (8, 25), generator), generator)
 
     def at_its_edge(x: float, y: float) -> bool:
         return abs(x) < HALF_SIZE and abs(abs(y - aside) - LANE / 2 - 0.3) < 0.5
 
-    yield from scatter(
-        shuffled(small, generator),
-        free_places(len(small), (2.2, 35), 0.5, generator, at_its_edge),
-        generator,
-    )
+    places = free_places(len(small), (2.2, 35), 0.5, generator, at_its_edge)
+    yield from scatter(small, places, generator)
     for x in np.arange(-HALF_SIZE, HALF_SIZE, generator.uniform(10, 20)):
         y = aside + LANE / 2 + LOT_LENGTH + 0.15
-        yield from place(plants.tree(winter, generator), float(x), y)
+        yield from place(plants.tree(winter, generator), x, y)
     if winter:
         bank = heaps.bank(generator.uniform(4, 12), generator, snow=True)
         yield bank.placed(generator.uniform(3, 20), aside - LANE / 2 - 1)
@@ -133,12 +132,12 @@ def _nets(length: float, generator: Generator) -> Surface:
 
 def _brushes(length: float, generator: Generator) -> Iterator[Surface]:
     for x in np.arange(0, length, 1.0):
-        yield from place(plants.brushwood(generator.uniform(0.8, 2), generator), float(x), 0)
+        yield from place(plants.brushwood(generator.uniform(0.8, 2), generator), x, 0)
 
 
 def _sapling(generator: Generator) -> Iterable[Surface]:
     """A sapling tied to its stake."""
     yield frames.thin_pole(generator)
-    crown = generator.uniform(0.2, 0.6, 3)
-    leaves = plants.bush((crown[0], crown[1], crown[2]), generator)
+    length, width, height = generator.uniform(0.2, 0.6, 3)
+    leaves = plants.bush((length, width, height), generator)
     yield leaves.moved(0.1, 0, generator.uniform(0.8, 1.8))

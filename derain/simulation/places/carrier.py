@@ -15,9 +15,8 @@ from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface
-from derain.simulation.places.frames import Point, bars
 from derain.simulation.places.specks import PAINT, mirrored
-from derain.simulation.shapes import Triangles
+from derain.simulation.shapes import Point, Triangles, bars
 
 # Of how many specks a part is seen that returns nothing else.
 SPECKS_OF_A_CARRIER = (1.0, 100.0)
@@ -56,10 +55,8 @@ def lay_out_carrier(generator: Generator, mounting_height: float) -> Iterator[Su
     heading = generator.choice([0.0, generator.normal(0, 0.1), generator.uniform(-np.pi, np.pi)])
     painted = generator.choice(PAINTED)
     for part in carrier(generator, mounting_height):
-        turned = shapes.placed(part, 0, 0, heading)
-        yield from _finished(
-            shapes.raised(turned, mounting_height), mounting_height, painted, generator
-        )
+        standing = shapes.raised(shapes.placed(part, 0, 0, heading), mounting_height)
+        yield from _finished(standing, mounting_height, painted, generator)
 
 
 def _finished(
@@ -88,8 +85,8 @@ def _car(generator: Generator, mounting_height: float) -> Parts:
     yield _vaulted((front + slope, front + slope + 1.1), 1.15 * half, sill, generator)
     yield _between((rear, half, -drop - 0.03), (rear - 0.5, 1.1 * half, sill))
     for side in (-1, 1):
-        mirror = shapes.box(0.15, 0.25, sill, sill + generator.uniform(0.12, 0.2))
-        yield shapes.placed(mirror, front + 0.3, side * (half + 0.3))
+        top, at = sill + generator.uniform(0.12, 0.2), (front + 0.3, side * (half + 0.3))
+        yield shapes.box(0.15, 0.25, sill, top, at)
     yield from _rack((rear, front), half, -drop, generator)
     yield from _antenna(rear + 0.1, -drop, generator)
     yield from _equipment((0.25, 1.6), -drop, generator)
@@ -102,12 +99,12 @@ def _lorry(generator: Generator, mounting_height: float) -> Parts:
     yield _vaulted((rear, front), half, -drop, generator)
     top = generator.uniform(-0.1, 0.9)
     if rear < -0.6:
-        yield shapes.placed(shapes.box(0.4, 2 * half, -drop - 1, top), rear - 0.3, 0)
+        yield shapes.box(0.4, 2 * half, -drop - 1, top, at=(rear - 0.3, 0))
     for side in (-1, 1):
         y = side * (half + generator.uniform(0.1, 0.4))
-        yield shapes.placed(shapes.box(0.12, 0.3, -drop - 0.8, -drop - 0.2), front + 0.3, y)
+        yield shapes.box(0.12, 0.3, -drop - 0.8, -drop - 0.2, at=(front + 0.3, y))
         yield bars([((front, side * half, -drop - 0.1), (front + 0.3, y, -drop - 0.2))], 0.02)
-        yield shapes.placed(shapes.cylinder(0.06, -drop, -drop + 0.15), front - 0.1, side * 0.8)
+        yield shapes.cylinder(0.06, -drop, -drop + 0.15, at=(front - 0.1, side * 0.8))
     yield from _rack((rear, front), half, -drop, generator)
     yield from _antenna(front - 0.2, -drop, generator)
     yield from _equipment((0.25, 2.0), -drop, generator)
@@ -123,39 +120,33 @@ def _robot(generator: Generator, mounting_height: float) -> Parts:
     for x in (-half_length, half_length):
         for y in (-half_width, half_width):
             if generator.random() < 0.6:
-                post = shapes.cylinder(generator.uniform(0.006, 0.025), -drop, head)
-                yield shapes.placed(post, 0.95 * x, 0.95 * y)
+                radius = generator.uniform(0.006, 0.025)
+                yield shapes.cylinder(radius, -drop, head, at=(0.95 * x, 0.95 * y))
     if generator.random() < 0.3:
         yield shapes.box(2 * half_length, 2 * half_width, 0.25, 0.27)
     for y in (-half_width, half_width):
-        yield shapes.placed(shapes.box(1.2 * half_length, 0.1, -drop - 0.2, -drop), 0, 1.2 * y)
+        yield shapes.box(1.2 * half_length, 0.1, -drop - 0.2, -drop, at=(0, 1.2 * y))
     yield from _equipment((0.2, max(half_length, 0.4)), -drop, generator)
 
 
 def _tripod(generator: Generator, mounting_height: float) -> Parts:
     """Three legs, what hangs between them, and somebody behind or a hand that holds the sensor."""
-    foot = 0.05 - mounting_height
+    floor = -mounting_height
     spread, radius = generator.uniform(0.25, 0.7), generator.uniform(0.01, 0.025)
     for angle in generator.uniform(0, 2 * np.pi) + np.arange(3) * (2 * np.pi / 3):
         x, y = spread * np.cos(angle), spread * np.sin(angle)
-        yield bars(
-            [((0.05 * x, 0.05 * y, -0.2), (float(x), float(y), min(foot, -0.25)))], radius, 6
-        )
+        leg = (0.05 * x, 0.05 * y, -0.2), (x, y, min(0.05 - mounting_height, -0.25))
+        yield bars([leg], radius, 6)
     for _ in range(generator.integers(0, 3)):
         yield _loop((0.2, 0.5), -0.3, generator)
     if generator.random() < 0.7:
         behind, height = generator.uniform(0.35, 1.5), generator.uniform(1.5, 1.95)
         angle = np.pi + generator.normal(0, 0.4)
         x, y = behind * np.cos(angle), behind * np.sin(angle)
-        floor = -mounting_height
         for low, high, wide in ((0.0, 0.48, 0.12), (0.45, 0.84, 0.17), (0.86, 1.0, 0.1)):
-            part = shapes.cylinder(wide, floor + low * height, floor + high * height)
-            yield shapes.placed(part, float(x), float(y))
+            yield shapes.cylinder(wide, floor + low * height, floor + high * height, at=(x, y))
         if behind < 0.8:
-            arm = (
-                (float(x), float(y), floor + 0.78 * height),
-                (float(0.25 * x), float(0.25 * y), -0.2),
-            )
+            arm = (x, y, floor + 0.78 * height), (0.25 * x, 0.25 * y, -0.2)
             yield bars([arm], 0.04, 6)
     yield from _equipment((0.2, 0.8), -0.35, generator)
 
@@ -164,9 +155,8 @@ def _mast(generator: Generator, mounting_height: float) -> Parts:
     """A pole under the sensor or beside it, brackets, cables, the rim of a housing."""
     aside = generator.choice([0.0, generator.uniform(0.25, 0.6)])
     top = -0.2 if aside == 0 else generator.uniform(-0.2, 1.0)
-    pole = shapes.cylinder(generator.uniform(0.03, 0.1), -mounting_height, top)
-    yield shapes.placed(pole, -aside, 0)
-    yield shapes.placed(shapes.box(0.3 + aside, 0.06, -0.24, -0.2), -aside / 2, 0)
+    yield shapes.cylinder(generator.uniform(0.03, 0.1), -mounting_height, top, at=(-aside, 0))
+    yield shapes.box(0.3 + aside, 0.06, -0.24, -0.2, at=(-aside / 2, 0))
     yield from _equipment((0.25, 1.2), -0.3, generator)
 
 
@@ -201,15 +191,13 @@ def _equipment(distance: Span, floor: float, generator: Generator) -> Parts:
         angle, away = generator.uniform(-np.pi, np.pi), log_uniform(distance, generator)
         size = generator.uniform(0.02, 0.3) * min(1.0, away)
         top = max(floor + 0.03, generator.uniform(floor, 0.3 * away))
-        shape = generator.integers(3)
-        if shape == 0:
-            thing = shapes.box(size, size, floor, top)
-        elif shape == 1:
-            thing = shapes.cylinder(0.4 * size, floor, top)
-        else:
-            thing = shapes.box(0.01, size, max(floor, top - 0.1), top)
+        things = [
+            shapes.box(size, size, floor, top),
+            shapes.cylinder(0.4 * size, floor, top),
+            shapes.box(0.01, size, max(floor, top - 0.1), top),
+        ]
         x, y = (away + size) * np.cos(angle), (away + size) * np.sin(angle)
-        yield shapes.placed(thing, float(x), float(y), angle)
+        yield shapes.placed(things[generator.integers(3)], x, y, angle)
     for _ in range(generator.integers(0, 3)):
         yield _loop((max(distance[0], 0.2), distance[1]), floor, generator)
     if generator.random() < 0.4:

@@ -11,8 +11,7 @@ from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, people, plants, relief, threads, vehicles, walls
 from derain.simulation.places.crowd import ragged_things, users
-from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.standing import (
+from derain.simulation.places.placing import (
     assemble,
     choose,
     free_places,
@@ -45,6 +44,10 @@ class Section:
         right, left = generator.uniform(2, 9, 2)
         return cls(kerbs, (kerbs[0] - right, kerbs[1] + left))
 
+    def on_the_road(self, x: float, y: float) -> bool:
+        """Whether a place is between the parked cars."""
+        return self.kerbs[0] + 2.5 < y < self.kerbs[1] - 2.5
+
     def on_a_pavement(self, x: float, y: float) -> bool:
         """Whether a place is between a kerb and the houses."""
         right = self.fronts[0] + 0.6 < y < self.kerbs[0] - 0.2
@@ -62,18 +65,13 @@ def lay_out_city(generator: Generator) -> Track:
     standing = [
         *_houses(section, generator),
         *_parked(section, generator),
-        *users(
-            generator,
-            lambda x, y: section.kerbs[0] + 2.5 < y < section.kerbs[1] - 2.5,
-            walkers=(2, 8),
-            cars=(1, 5),
-        ),
+        *users(generator, section.on_the_road, walkers=(2, 8), cars=(1, 5)),
         *_people(section, generator),
         *_furniture(section, winter, generator),
         *_works(section, generator),
         *ragged_things(generator, section.on_a_pavement, count=(2, 12), leafy=not winter),
     ]
-    uneven = Relief.draw(generator.uniform(0.01, 0.1), generator)
+    uneven = relief.Relief.draw(generator.uniform(0.01, 0.1), generator)
     ground = _ground(section, generator)
     return assemble(ground, standing, uneven, generator, _cables(section, generator))
 
@@ -81,7 +79,7 @@ def lay_out_city(generator: Generator) -> Track:
 def _ground(section: Section, generator: Generator) -> Iterator[Surface]:
     surface = relief.COBBLES if generator.random() < 0.25 else relief.ASPHALT
     right, left = section.kerbs
-    return ground_mesh(
+    return relief.ground_mesh(
         [surface, relief.PAVING], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
     )
 
@@ -121,9 +119,8 @@ def _furniture(section: Section, winter: bool, generator: Generator) -> Iterator
             tree = plants.tree(winter, generator)
             yield from place(tree, x, kerb + side * generator.uniform(0.5, 1))
         makes = choose([(frames.thin_pole, 3), (frames.bollard, 2)], 40, generator)
-        for make, x in zip(
-            shuffled(makes, generator), along(*CITY_SIGHT, (1, 7), generator), strict=False
-        ):
+        mixed, places = shuffled(makes, generator), along(*CITY_SIGHT, (1, 7), generator)
+        for make, x in zip(mixed, places, strict=False):
             yield from place(make(generator), x, kerb + side * 0.35)
         if generator.random() < 0.4:
             begin = generator.uniform(2, 20)
@@ -148,8 +145,8 @@ def _cables(section: Section, generator: Generator) -> Iterator[Surface]:
     if generator.random() < 0.6:
         height = generator.uniform(5, 7)
         for x in along(*CITY_SIGHT, (12, 30), generator):
-            ends = [np.array([x, y, height + 0.5]) for y in section.fronts]
-            yield threads.cable(ends[0], ends[1], 0.4, (0.006, 0.02), generator)
+            start, end = (np.array([x, y, height + 0.5]) for y in section.fronts)
+            yield threads.cable(start, end, 0.4, (0.006, 0.02), generator)
         for y in generator.uniform(-2, 4, generator.integers(0, 3)):
-            ends = [np.array([x, y, height]) for x in CITY_SIGHT]
-            yield threads.cable(ends[0], ends[1], 0.3, (0.008, 0.02), generator)
+            start, end = (np.array([x, y, height]) for x in CITY_SIGHT)
+            yield threads.cable(start, end, 0.3, (0.008, 0.02), generator)

@@ -12,8 +12,7 @@ from derain.simulation.drawing import along
 from derain.simulation.objects import Surface
 from derain.simulation.places import frames, heaps, plants, relief, threads
 from derain.simulation.places.crowd import ragged_things, users
-from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.standing import Line, assemble, line_up, place
+from derain.simulation.places.placing import Line, assemble, line_up, place
 from derain.simulation.track import Track
 
 # How far what is beside the road goes on behind the sensor and ahead of it, metres.
@@ -37,6 +36,10 @@ class Road:
     def beside(self, side: int, outwards: float) -> Line:
         """The line so many metres outwards from its left (1) or right edge."""
         return lambda x: self.aside + self.bend * x**2 + side * (self.half_width + outwards)
+
+    def beside_it(self, x: float, y: float) -> bool:
+        """Whether a place is beside the road."""
+        return bool(self.outside(x, y) > 0.5)
 
     def outside(self, x: Floats | float, y: Floats | float) -> Floats:
         """How far places are from the road, metres; less than 0 on it."""
@@ -62,9 +65,9 @@ def lay_out_country(generator: Generator) -> Track:
         *(thing for side in (-1, 1) for thing in _boundary(road, side, winter, snowy, generator)),
         *_trees(road, winter, generator),
         *_cables(road, generator),
-        *ragged_things(generator, lambda x, y: bool(road.outside(x, y) > 0.5), leafy=not winter),
+        *ragged_things(generator, road.beside_it, count=(10, 30), leafy=not winter),
     ]
-    uneven = Relief.draw(generator.uniform(0.05, 0.5), generator)
+    uneven = relief.Relief.draw(generator.uniform(0.05, 0.5), generator)
     return assemble(_ground(road, snowy, generator), standing, uneven, generator)
 
 
@@ -80,7 +83,7 @@ def _ground(road: Road, snowy: bool, generator: Generator) -> Iterator[Surface]:
         field = np.where(y > road.aside + road.bend * x**2, 2, 3)
         return np.where(outside < 0, 0, np.where(outside < broad, 1, field))
 
-    yield from ground_mesh([surface, verge, *beyond], kind_at, generator)
+    yield from relief.ground_mesh([surface, verge, *beyond], kind_at, generator)
 
 
 def _verges(road: Road, generator: Generator) -> Iterator[Surface]:
@@ -114,7 +117,7 @@ def _boundary(
 def _bare_hedge(length: float, generator: Generator) -> Iterator[Surface]:
     height = generator.uniform(0.8, 2.5)
     for x in np.arange(0, length, 0.6):
-        yield from place(plants.brushwood(height, generator), float(x), 0)
+        yield from place(plants.brushwood(height, generator), x, 0)
 
 
 def _trees(road: Road, winter: bool, generator: Generator) -> Iterator[Surface]:

@@ -1,6 +1,6 @@
 """Open-work: gates, railings, scaffolds, lattice masts, guard rails, trolleys, thin poles."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.random import Generator
@@ -8,17 +8,9 @@ from numpy.random import Generator
 from derain.simulation import shapes
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface, of_material
-from derain.simulation.shapes import Triangles
+from derain.simulation.shapes import Point, Triangles, bars
 
 FRAME_REFLECTIVITY = (0.03, 0.7)
-
-Point = tuple[float, float, float]
-
-
-def bars(ends: Iterable[tuple[Point, Point]], radius: float, sides: int = 4) -> Triangles:
-    """Bars of one thickness from place to place, metres."""
-    both = np.array(list(ends), np.float64)
-    return shapes.rods(both[:, 0], both[:, 1], radius, sides=sides)
 
 
 def thin_pole(generator: Generator) -> Surface:
@@ -27,9 +19,8 @@ def thin_pole(generator: Generator) -> Surface:
     foot, lean = (0.0, 0.0, 0.0), generator.normal(0, 0.03, 2) * height
     parts = [bars([(foot, (lean[0], lean[1], height))], radius, sides=6)]
     if generator.random() < 0.3:
-        side = generator.uniform(0.2, 0.8)
-        plate = shapes.box(0.02, side, height - side, height)
-        parts.append(shapes.placed(plate, lean[0], lean[1], generator.uniform(0, np.pi)))
+        side, heading = generator.uniform(0.2, 0.8), generator.uniform(0, np.pi)
+        parts.append(shapes.box(0.02, side, height - side, height, (lean[0], lean[1]), heading))
     return made(parts, generator)
 
 
@@ -55,12 +46,11 @@ def scaffold(length: float, generator: Generator) -> Iterator[Surface]:
         z = level * storey
         tubes += [((0, y, z + up), (x[-1], y, z + up)) for y in (0, depth) for up in (0, 1)]
         tubes += [((at, 0, z), (at, depth, z)) for at in x]
-        tubes += [
-            ((at, 0, z - storey), (at + step, 0, z)) for at in x[:-1] if generator.random() < 0.4
-        ]
+        braced = [at for at in x[:-1] if generator.random() < 0.4]
+        tubes += [((at, 0, z - storey), (at + step, 0, z)) for at in braced]
     yield made([bars(tubes, radius)], generator)
     boards = [
-        shapes.placed(shapes.box(x[-1], depth, z, z + 0.05), x[-1] / 2, depth / 2)
+        shapes.box(x[-1], depth, z, z + 0.05, at=(x[-1] / 2, depth / 2))
         for z in storey * np.arange(1, storeys + 1)
         if generator.random() < 0.8
     ]
@@ -92,13 +82,8 @@ def guard_rail(length: float, generator: Generator) -> Iterator[Surface]:
     """A steel guard rail along x, from x = 0 on: a band on posts."""
     profile = np.array([[0, 0.45], [0.05, 0.52], [0, 0.6], [0.05, 0.68], [0, 0.75]])
     x = np.linspace(0, length, max(2, int(length / 4)))
-    band = np.stack(
-        [
-            np.column_stack([x, np.full_like(x, y), np.full_like(x, z)])
-            + generator.normal(0, 0.01, (len(x), 3))
-            for y, z in profile
-        ]
-    )
+    level = np.stack([np.column_stack(np.broadcast_arrays(x, y, z)) for y, z in profile])
+    band = level + generator.normal(0, 0.01, level.shape)
     posts = [((at, 0.08, 0), (at, 0.08, 0.7)) for at in np.arange(0, length, 2.0)]
     yield made([shapes.sheet(band), bars(posts, 0.05)], generator)
 
@@ -109,9 +94,8 @@ def trolley(generator: Generator) -> Surface:
     radius, half = log_uniform((0.003, 0.01), generator), width / 2
     wires = [((x, y, low), (x, y, high)) for x in np.arange(0, length, 0.12) for y in (-half, half)]
     wires += [((x, -half, low), (x, half, low)) for x in np.arange(0, length, 0.12)]
-    wires += [
-        ((0, y, z), (length, y, z)) for y in (-half, half) for z in np.arange(low, high, 0.13)
-    ]
+    heights = np.arange(low, high, 0.13)
+    wires += [((0, y, z), (length, y, z)) for y in (-half, half) for z in heights]
     frame: list[tuple[Point, Point]] = [((0, y, 0.1), (length, y, 0.15)) for y in (-half, half)]
     frame += [((0, y, 0.1), (-0.15, y, 1.0)) for y in (-half, half)]
     frame += [((-0.15, -half, 1.0), (-0.15, half, 1.0))]
@@ -120,9 +104,8 @@ def trolley(generator: Generator) -> Surface:
 
 def bollard(generator: Generator) -> Surface:
     """A bollard, a cone's height or a man's waist."""
-    return made(
-        [shapes.cylinder(generator.uniform(0.03, 0.12), 0, generator.uniform(0.4, 1.1))], generator
-    )
+    radius, height = generator.uniform(0.03, 0.12), generator.uniform(0.4, 1.1)
+    return made([shapes.cylinder(radius, 0, height)], generator)
 
 
 def made(parts: list[Triangles], generator: Generator) -> Surface:

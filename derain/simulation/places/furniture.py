@@ -9,8 +9,8 @@ from derain.simulation import shapes
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places import plants, threads
-from derain.simulation.places.frames import Point, bars, made
-from derain.simulation.shapes import Triangles
+from derain.simulation.places.frames import made
+from derain.simulation.shapes import Point, Triangles, bars
 
 
 def table(generator: Generator) -> Iterator[Surface]:
@@ -40,15 +40,13 @@ def chair(generator: Generator) -> Surface:
     parts = [shapes.box(2 * half, 2 * half, seat - 0.04, seat)]
     if generator.random() < 0.5:
         corners = [(i * half, j * half) for i in (-1, 1) for j in (-1, 1)]
-        rods: list[tuple[Point, Point]] = [
-            ((x, y, 0), (0.9 * x, 0.9 * y, seat)) for x, y in corners
-        ]
+        rods = [((x, y, 0.0), (0.9 * x, 0.9 * y, seat)) for x, y in corners]
     else:
         angle = np.arange(5) * 0.4 * np.pi
         rods = [((0, 0, 0.12), (0.32 * np.cos(a), 0.32 * np.sin(a), 0.05)) for a in angle]
         rods.append(((0, 0, 0.1), (0, 0, seat)))
     if generator.random() < 0.5:
-        parts.append(shapes.placed(shapes.box(0.03, 2 * half, seat + 0.1, back), -half, 0))
+        parts.append(shapes.box(0.03, 2 * half, seat + 0.1, back, at=(-half, 0)))
     else:
         rods += [((-half, y, seat), (-half - 0.06, y, back)) for y in np.linspace(-half, half, 4)]
     return made([*parts, bars(rods, radius)], generator)
@@ -70,9 +68,8 @@ def shelf(generator: Generator) -> Iterator[Surface]:
             width, height = (log_uniform((0.02, 0.4), generator), generator.uniform(0.05, 0.27))
             deep = generator.uniform(0.3, 1) * depth
             if generator.random() < full:
-                thing = shapes.box(width, deep, z, z + height)
-                y = generator.normal(0, 0.1 * depth)
-                yield made([shapes.placed(thing, x + width / 2, y)], generator)
+                at = x + width / 2, generator.normal(0, 0.1 * depth)
+                yield made([shapes.box(width, deep, z, z + height, at)], generator)
             x += width + generator.choice([0.0, 0.01, 0.1])
 
 
@@ -108,8 +105,7 @@ def machine(generator: Generator) -> Iterator[Surface]:
     for _ in range(generator.integers(1, 4)):
         height = generator.uniform(0.2, 0.7)
         x, y = generator.normal(0, 0.08, 2)
-        block = shapes.box(length, width, top, top + height)
-        yield made([shapes.placed(block, x, y)], generator)
+        yield made([shapes.box(length, width, top, top + height, at=(x, y))], generator)
         top += height
         length, width = length * generator.uniform(0.5, 1), width * generator.uniform(0.5, 1)
     for _ in range(generator.integers(0, 5)):

@@ -8,22 +8,18 @@ from numpy.random import Generator
 
 from derain.simulation import shapes
 from derain.simulation.drawing import log_uniform
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Make, Options, Piece, Surface, of_size
 from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
-from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.shell import Walls
-from derain.simulation.places.standing import (
-    Make,
-    Piece,
+from derain.simulation.places.placing import (
     assemble,
     choose,
     free_places,
     line_up,
-    of_size,
     place,
     scatter,
     shuffled,
 )
+from derain.simulation.places.shell import Walls
 from derain.simulation.track import Track
 
 # What is above the sensor is higher than this, metres: sensors on a car's roof fit in.
@@ -52,8 +48,10 @@ def lay_out_garage(generator: Generator) -> Track:
         *_cages(hall, generator),
         *_under_the_ceiling(hall, generator),
     ]
-    floor = ground_mesh([relief.CONCRETE], lambda x, y: np.zeros(np.shape(x), np.int64), generator)
-    uneven = Relief.draw(generator.uniform(0.003, 0.03), generator)
+    floor = relief.ground_mesh(
+        [relief.CONCRETE], lambda x, y: np.zeros(np.shape(x), np.int64), generator
+    )
+    uneven = relief.Relief.draw(generator.uniform(0.003, 0.03), generator)
     return assemble(floor, standing, uneven, generator, [_ceiling(hall, generator)])
 
 
@@ -70,18 +68,18 @@ def _under_the_ceiling(hall: Walls, generator: Generator) -> Iterator[Surface]:
         radius, drop = log_uniform((0.008, 0.12), generator), generator.uniform(0.06, 0.35)
         if generator.random() < 0.5:
             y = generator.uniform(*hall.y)
-            ends = [((hall.x[0], y, top - drop), (hall.x[1], y, top - drop))]
+            ends = (hall.x[0], y, top - drop), (hall.x[1], y, top - drop)
         else:
             x = generator.uniform(*hall.x)
-            ends = [((x, hall.y[0], top - drop), (x, hall.y[1], top - drop))]
-        yield frames.made([frames.bars(ends, radius, sides=6)], generator)
+            ends = (x, hall.y[0], top - drop), (x, hall.y[1], top - drop)
+        yield frames.made([shapes.bars([ends], radius, sides=6)], generator)
     for _ in range(generator.integers(3, 15)):
-        x, y = generator.uniform(*hall.x), generator.uniform(*hall.y)
-        lamp = shapes.box(1.2, 0.12, top - 0.2, top - 0.12)
-        yield frames.made([shapes.placed(lamp, x, y, generator.uniform(0, np.pi))], generator)
+        at = generator.uniform(*hall.x), generator.uniform(*hall.y)
+        heading = generator.uniform(0, np.pi)
+        lamp = shapes.box(1.2, 0.12, top - 0.2, top - 0.12, at, heading)
+        yield frames.made([lamp], generator)
     for _ in range(generator.integers(0, 8)):
-        x, y = generator.uniform(*hall.x), generator.uniform(*hall.y)
-        start = np.array([x, y, top])
+        start = np.array([generator.uniform(*hall.x), generator.uniform(*hall.y), top])
         end = start + generator.uniform((-2, -2, 0), (2, 2, 0))
         yield threads.cable(start, end, generator.uniform(0.1, 0.9), (0.004, 0.03), generator)
 
@@ -90,14 +88,13 @@ def _pillars(hall: Walls, generator: Generator) -> Iterator[Surface]:
     bay = generator.uniform(4.5, 8)
     side, rounded = generator.uniform(0.25, 0.7), generator.random() < 0.3
     shift = generator.uniform(0, bay, 2)
-    for x, y in product(
-        np.arange(hall.x[0] + shift[0], hall.x[1], bay),
-        np.arange(hall.y[0] + shift[1], hall.y[1], bay),
-    ):
-        if np.hypot(x, y) > 2.6:
-            box = shapes.box(side, side, 0, hall.height)
-            pillar = shapes.cylinder(side / 2, 0, hall.height) if rounded else box
-            yield frames.made([shapes.placed(pillar, float(x), float(y))], generator)
+    along = np.arange(hall.x[0] + shift[0], hall.x[1], bay)
+    across = np.arange(hall.y[0] + shift[1], hall.y[1], bay)
+    for at in product(along, across):
+        if np.hypot(*at) > 2.6:
+            box = shapes.box(side, side, 0, hall.height, at)
+            pillar = shapes.cylinder(side / 2, 0, hall.height, at) if rounded else box
+            yield frames.made([pillar], generator)
 
 
 def _walls(hall: Walls, generator: Generator) -> Iterator[Surface]:
@@ -120,13 +117,13 @@ def _parked(hall: Walls, generator: Generator) -> Iterator[Surface]:
         for x in np.arange(hall.x[0] + 2, hall.x[1] - 2, 2.7):
             if generator.random() < full and np.hypot(x, y) > 4.3:
                 heading = nose * np.pi / 2 + generator.normal(0, 0.04)
-                yield from place(vehicles.glazed_car(generator), float(x), float(y), heading)
+                yield from place(vehicles.glazed_car(generator), x, y, heading)
 
 
 def _about(hall: Walls, generator: Generator) -> Iterator[Surface]:
     """People and small things on the floor."""
     makes: list[Make] = [people.person] * int(generator.integers(3, 11))
-    small: list[tuple[Make, float]] = [
+    small: Options = [
         (people.cyclist, 1),
         (frames.trolley, 2),
         (frames.bollard, 1),

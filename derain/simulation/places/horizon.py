@@ -11,6 +11,7 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform, log_uniforms
 from derain.simulation.objects import Surface, of_material
 from derain.simulation.places import frames, threads
+from derain.simulation.places.placing import place
 from derain.simulation.shapes import Triangles
 
 # Where things stand, and where the hills begin and end, metres.
@@ -55,10 +56,8 @@ def lay_out_horizon(generator: Generator) -> Iterator[Surface]:
         for _ in range(generator.integers(0, most + 1)):
             away = log_uniform(HORIZON, generator)
             azimuth = generator.uniform(-np.pi, np.pi)
-            for surface in make(away, generator):
-                yield surface.placed(
-                    float(away * np.cos(azimuth)), float(away * np.sin(azimuth)), float(azimuth)
-                )
+            x, y = away * np.cos(azimuth), away * np.sin(azimuth)
+            yield from place(make(away, generator), x, y, azimuth)
 
 
 def _hills(generator: Generator) -> Surface:
@@ -89,7 +88,7 @@ def _row_of_trees(away: float, generator: Generator) -> Iterator[Surface]:
         if generator.random() > gaps:
             x = generator.normal(0, depth) + turned * y
             if away + x > HORIZON[0]:
-                parts.append(shapes.placed(_crown(250, generator), float(x), float(y)))
+                parts.append(shapes.placed(_crown(250, generator), x, y))
     if parts:
         yield _plant(np.concatenate(parts), generator)
 
@@ -103,13 +102,10 @@ def _scrub(away: float, generator: Generator) -> Iterator[Surface]:
     """Bushes and stalks by the dozen, each seen by a beam or none."""
     count = int(log_uniform((10, 300), generator))
     spread = generator.uniform((1, 3), (4, 20)) / 2
-    places = np.column_stack(
-        [generator.normal(0, spread, (count, 2)), generator.uniform(-2, 2.5, count)]
-    )
+    level, up = generator.normal(0, spread, (count, 2)), generator.uniform(-2, 2.5, count)
+    places = np.clip(np.column_stack([level, up]), -40, 40) + np.array([45, 0, 0])
     size = log_uniform((0.03, 0.3), generator)
-    yield _plant(
-        shapes.leaves(np.clip(places, -40, 40) + np.array([45, 0, 0]), size, generator), generator
-    )
+    yield _plant(shapes.leaves(places, size, generator), generator)
 
 
 def _crown(most: int, generator: Generator) -> Triangles:
@@ -122,10 +118,9 @@ def _crown(most: int, generator: Generator) -> Triangles:
     own = clumps[generator.integers(len(clumps), size=count)]
     centres += generator.choice([0.0, 0.4, 0.8]) * (own - centres)
     leaves = shapes.leaves(centres, log_uniform(FAR_LEAF, generator), generator)
-    stem = shapes.rods(
-        np.array([[0.0, 0.0, -DEPTH]]), np.array([[0.0, 0.0, height - radii[2]]]), 0.02 * height
-    )
-    return np.concatenate([shapes.raised(leaves, height - radii[2]), stem])
+    middle = height - radii[2]
+    stem = shapes.bars([((0, 0, -DEPTH), (0, 0, middle))], 0.02 * height, sides=3)
+    return np.concatenate([shapes.raised(leaves, middle), stem])
 
 
 def _building(away: float, generator: Generator) -> Iterator[Surface]:
@@ -133,17 +128,18 @@ def _building(away: float, generator: Generator) -> Iterator[Surface]:
     for _ in range(generator.integers(1, 4)):
         length, width = generator.uniform(6, 25, 2)
         top = log_uniform((3, 25), generator)
-        block = shapes.box(length, width, -DEPTH, top)
-        x, y = generator.uniform(0, 12) + 16, generator.uniform(-15, 15)
+        at = generator.uniform(0, 12) + 16, generator.uniform(-15, 15)
         heading = generator.uniform(-np.pi, np.pi)
-        yield of_material([shapes.placed(block, x, y, heading)], HORIZON_REFLECTIVITY, generator)
+        block = shapes.box(length, width, -DEPTH, top, at, heading)
+        yield of_material([block], HORIZON_REFLECTIVITY, generator)
         rods = [
             ((a, b, top), (a, b, top + generator.uniform(0.5, 4)))
             for a, b in generator.uniform(-3, 3, (generator.integers(0, 5), 2))
         ]
         if rods:
-            thin = frames.bars(rods, log_uniform((0.01, 0.3), generator))
-            yield of_material([shapes.placed(thin, x, y, heading)], HORIZON_REFLECTIVITY, generator)
+            thin = shapes.bars(rods, log_uniform((0.01, 0.3), generator))
+            aerials = shapes.placed(thin, *at, heading)
+            yield of_material([aerials], HORIZON_REFLECTIVITY, generator)
 
 
 def _poles(away: float, generator: Generator) -> Iterator[Surface]:
@@ -155,7 +151,7 @@ def _poles(away: float, generator: Generator) -> Iterator[Surface]:
     x = np.maximum(ahead * y, HORIZON[0] - away)
     rods = [((a, b, -DEPTH), (a, b, height)) for a, b in zip(x, y, strict=True)]
     rods += [((a, b, height), (a, b + 1.5, height + 0.2)) for a, b in zip(x, y, strict=True)]
-    yield of_material([frames.bars(rods, radius, 6)], HORIZON_REFLECTIVITY, generator)
+    yield of_material([shapes.bars(rods, radius, 6)], HORIZON_REFLECTIVITY, generator)
     if generator.random() < 0.5:
         heads = np.column_stack([x, y, np.full(count, height)])
         for start, end in itertools.pairwise(heads):
@@ -169,7 +165,7 @@ def _pylons(away: float, generator: Generator) -> Iterator[Surface]:
     for y in (-apart / 2, apart / 2):
         yield frames.lattice((0, y, -DEPTH), (0, y, height), generator.uniform(0.6, 2), generator)
         arm = [((-4.0, y, height - 3), (4.0, y, height - 3))]
-        yield of_material([frames.bars(arm, 0.15)], HORIZON_REFLECTIVITY, generator)
+        yield of_material([shapes.bars(arm, 0.15)], HORIZON_REFLECTIVITY, generator)
         heads.append([(x, y, height - 3) for x in (-4.0, 0.0, 4.0)])
     for start, end in zip(*np.array(heads), strict=True):
         yield threads.cable(start, end, 0.03 * apart, (0.015, 0.08), generator)
@@ -178,10 +174,9 @@ def _pylons(away: float, generator: Generator) -> Iterator[Surface]:
 def _sign(away: float, generator: Generator) -> Iterator[Surface]:
     """A retroreflecting sign, plate or marker post, towards the sensor or turned from it."""
     side, top = log_uniform((0.08, 3), generator), log_uniform((0.6, 7), generator)
-    plate = shapes.box(0.03, side, top - side, top)
-    turned = shapes.placed(plate, 0, 0, generator.normal(0, 0.6))
-    yield Surface(turned, TrackClass.BACKGROUND, generator.uniform(*RETROREFLECTIVE))
-    post = frames.bars([((0.05, 0, -DEPTH), (0.05, 0, top))], 0.04)
+    plate = shapes.box(0.03, side, top - side, top, heading=generator.normal(0, 0.6))
+    yield Surface(plate, TrackClass.BACKGROUND, generator.uniform(*RETROREFLECTIVE))
+    post = shapes.bars([((0.05, 0, -DEPTH), (0.05, 0, top))], 0.04)
     yield of_material([post], HORIZON_REFLECTIVITY, generator)
 
 
@@ -195,10 +190,8 @@ def _glint(away: float, generator: Generator) -> Iterator[Surface]:
 def _vehicle(away: float, generator: Generator) -> Iterator[Surface]:
     """A car or a lorry, of which some beams meet the lamps or the edges of the roof."""
     length, width, height = [(4.4, 1.8, 1.5), (10.0, 2.5, 3.6)][int(generator.random() < 0.3)]
-    body = shapes.box(length, width, -1.0, height)
-    heading = generator.uniform(-np.pi, np.pi)
-    turned = shapes.placed(body, 0, 0, heading)
-    yield of_material([turned], (0.02, 0.6), generator, TrackClass.CAR)
+    body = shapes.box(length, width, -1.0, height, heading=generator.uniform(-np.pi, np.pi))
+    yield of_material([body], (0.02, 0.6), generator, TrackClass.CAR)
 
 
 def _plant(triangles: Triangles, generator: Generator) -> Surface:

@@ -7,19 +7,10 @@ from numpy.random import Generator
 
 from derain.simulation import objects, shapes
 from derain.simulation.drawing import along
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Make, Piece, Surface
 from derain.simulation.places import frames, heaps, people, plants, relief, threads, vehicles, walls
 from derain.simulation.places.crowd import ragged_things
-from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.standing import (
-    Make,
-    Piece,
-    assemble,
-    free_places,
-    line_up,
-    place,
-    scatter,
-)
+from derain.simulation.places.placing import assemble, free_places, line_up, place, scatter
 from derain.simulation.track import Track
 
 MOTORWAY_SIGHT = (-80.0, 115.0)
@@ -46,14 +37,14 @@ def lay_out_motorway(generator: Generator) -> Track:
         *_embankments((right - 3, other + 3), generator),
         *ragged_things(generator, lambda x, y: not right - 1 < y < other + 1.5, count=(5, 15)),
     ]
-    uneven = Relief.draw(generator.uniform(0.02, 0.15), generator)
+    uneven = relief.Relief.draw(generator.uniform(0.02, 0.15), generator)
     over = _gantries((right - 1, other + 1), generator)
     return assemble(_ground(right, other, generator), standing, uneven, generator, over)
 
 
 def _ground(right: float, left: float, generator: Generator) -> Iterator[Surface]:
     verge = [relief.MEADOW, relief.GRAVEL, relief.SNOW][generator.choice(3, p=[0.6, 0.25, 0.15])]
-    return ground_mesh(
+    return relief.ground_mesh(
         [relief.ASPHALT, verge], lambda x, y: np.where((y > right) & (y < left), 0, 1), generator
     )
 
@@ -112,13 +103,13 @@ def _gantries(edges: tuple[float, float], generator: Generator) -> Iterator[Surf
         for y in (right, left):
             yield frames.lattice((x, y, 0), (x, y, height + 0.4), 0.5, generator)
         for y in generator.uniform(right + 2, left - 2, generator.integers(1, 4)):
-            plate = shapes.raised(shapes.box(0.1, generator.uniform(1.5, 3.5), 0, 2), height - 1)
-            yield frames.made([shapes.placed(plate, x - 0.6, float(y))], generator)
+            plate = shapes.box(0.1, generator.uniform(1.5, 3.5), 0, 2, at=(x - 0.6, y))
+            yield frames.made([shapes.raised(plate, height - 1)], generator)
     if generator.random() < 0.5:
         x, height = generator.uniform(5, 60), generator.uniform(9, 16)
         for lift in range(generator.integers(1, 5)):
-            ends = [np.array([x + 2 * lift, y, height + 0.6 * lift]) for y in (-60.0, 60.0)]
-            yield threads.cable(ends[0], ends[1], generator.uniform(1, 3), (0.02, 0.06), generator)
+            start, end = (np.array([x + 2 * lift, y, height + 0.6 * lift]) for y in (-60.0, 60.0))
+            yield threads.cable(start, end, generator.uniform(1, 3), (0.02, 0.06), generator)
 
 
 def _embankments(edges: tuple[float, float], generator: Generator) -> Iterator[Surface]:
@@ -139,7 +130,8 @@ def _embankments(edges: tuple[float, float], generator: Generator) -> Iterator[S
 def _noise_wall(length: float, generator: Generator) -> Iterator[Surface]:
     height = generator.uniform(2, 5)
     yield walls.rough_wall(length, height, generator)
-    yield frames.made([frames.bars([((0, -0.1, 0), (0, -0.1, height + 0.1))], 0.12)], generator)
+    post = (0, -0.1, 0), (0, -0.1, height + 0.1)
+    yield frames.made([shapes.bars([post], 0.12)], generator)
 
 
 # What makes a piece of an embankment, how much farther out it stands and how long a piece is,

@@ -1,6 +1,6 @@
 """People as a sensor meets them: striding, with arms and what they carry, children, cyclists."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.random import Generator
@@ -9,7 +9,7 @@ from derain.simulation import shapes
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface
-from derain.simulation.shapes import Triangles
+from derain.simulation.shapes import Point, Triangles, bars
 
 # Of cloth, which in the near infrared is anything from black to white.
 PERSON_REFLECTIVITY = (0.03, 0.7)
@@ -44,7 +44,7 @@ def cyclist(generator: Generator) -> Surface:
         parts.append(_limbs(rider, 0.07))
         parts.append(_limbs([((-0.2, 0, 0.9), (0.12, 0, 1.45))], 0.16))
         parts.append(_limbs([((0.1, y, 1.4), (0.4, y, 1.02)) for y in (-0.18, 0.18)], 0.045))
-        parts.append(shapes.placed(shapes.cylinder(0.1, 1.52, 1.76), 0.18, 0))
+        parts.append(shapes.cylinder(0.1, 1.52, 1.76, at=(0.18, 0)))
     return _clothed(parts, TrackClass.BIKE, generator)
 
 
@@ -69,26 +69,21 @@ def _body(height: float, generator: Generator) -> Triangles:
 
 def _bag(height: float, generator: Generator) -> Triangles:
     bottom = generator.uniform(0.15, 0.3) * height
-    bag = shapes.box(0.3, 0.1, bottom, bottom + 0.35)
-    return shapes.placed(bag, 0, -0.15 * height)
+    return shapes.box(0.3, 0.1, bottom, bottom + 0.35, at=(0, -0.15 * height))
 
 
 def _umbrella(height: float, generator: Generator) -> Triangles:
     radius, top = generator.uniform(0.35, 0.6), height + generator.uniform(0.1, 0.3)
     angle, out = np.linspace(0, 2 * np.pi, 9), np.linspace(0, 1, 4)[:, None]
-    dome = np.stack(
-        np.broadcast_arrays(
-            0.2 + radius * out * np.cos(angle), radius * out * np.sin(angle), top - 0.25 * out**2
-        ),
-        axis=-1,
-    )
+    x, y = 0.2 + radius * out * np.cos(angle), radius * out * np.sin(angle)
+    dome = np.stack(np.broadcast_arrays(x, y, top - 0.25 * out**2), axis=-1)
     stick = _limbs([((0.2, 0, 0.6 * height), (0.2, 0, top))], 0.01)
     return np.concatenate([shapes.sheet(dome), stick])
 
 
 def _pushchair(height: float, generator: Generator) -> Triangles:
     ahead = generator.uniform(0.5, 0.7)
-    seat = shapes.placed(shapes.box(0.5, 0.4, 0.35, 0.7), ahead + 0.25, 0)
+    seat = shapes.box(0.5, 0.4, 0.35, 0.7, at=(ahead + 0.25, 0))
     tubes = [((ahead - 0.35, y, 1.0), (ahead + 0.5, y, 0.1)) for y in (-0.22, 0.22)]
     tubes += [((ahead, y, 0.1), (ahead + 0.2, y, 0.7)) for y in (-0.22, 0.22)]
     return np.concatenate([seat, _limbs(tubes, 0.015)])
@@ -105,11 +100,8 @@ def _stick(height: float, generator: Generator) -> Triangles:
 def _dog(height: float, generator: Generator) -> Triangles:
     size, x = generator.uniform(0.25, 0.7), generator.uniform(0.6, 1.5)
     body = [((x, 0, 0.75 * size), (x + size, 0, 0.75 * size))]
-    legs = [
-        ((x + a * size, b * size, 0.7 * size), (x + a * size, b * size, 0))
-        for a in (0, 1)
-        for b in (-0.12, 0.12)
-    ]
+    feet = [(x + a * size, b * size) for a in (0, 1) for b in (-0.12, 0.12)]
+    legs = [((a, b, 0.7 * size), (a, b, 0.0)) for a, b in feet]
     head = [((x + size, 0, 0.8 * size), (x + 1.35 * size, 0, size))]
     leash = [((0.1, 0.15, 0.5 * height), (x + size, 0, 0.85 * size))]
     parts = (body, 0.16 * size), (legs, 0.05 * size), (head, 0.1 * size), (leash, 0.006)
@@ -124,20 +116,16 @@ def _wheel(x: float, generator: Generator) -> Triangles:
     angle = np.linspace(0, 2 * np.pi, 17)
     rim = np.column_stack([x + 0.34 * np.cos(angle), 0 * angle, 0.34 + 0.34 * np.sin(angle)])
     hub = np.broadcast_to((x, 0.0, 0.34), (len(angle), 3))
-    width = log_uniform((0.002, 0.006), generator)
-    return np.concatenate(
-        [shapes.rods(rim[:-1], rim[1:], 0.02), shapes.rods(hub[:-1], rim[:-1], width)]
-    )
+    spokes = shapes.rods(hub[:-1], rim[:-1], log_uniform((0.002, 0.006), generator))
+    return np.concatenate([shapes.rods(rim[:-1], rim[1:], 0.02), spokes])
 
 
-def _limbs(ends: Sequence[tuple[tuple[float, ...], tuple[float, ...]]], radius: float) -> Triangles:
-    both = np.array(ends, np.float64)
-    return shapes.rods(both[:, 0], both[:, 1], radius, taper=0.75, sides=6)
+def _limbs(ends: Iterable[tuple[Point, Point]], radius: float) -> Triangles:
+    return bars(ends, radius, sides=6, taper=0.75)
 
 
 def _clothed(parts: list[Triangles], label: TrackClass, generator: Generator) -> Surface:
     """Every part of a reflectivity of its own."""
-    reflectivity = [
-        np.full(len(part), log_uniform(PERSON_REFLECTIVITY, generator)) for part in parts
-    ]
-    return Surface(np.concatenate(parts), label, np.concatenate(reflectivity))
+    shine = [log_uniform(PERSON_REFLECTIVITY, generator) for _ in parts]
+    reflectivity = np.repeat(shine, [len(part) for part in parts])
+    return Surface(np.concatenate(parts), label, reflectivity)

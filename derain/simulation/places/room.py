@@ -10,12 +10,12 @@ from derain.simulation import shapes
 from derain.simulation.arrays import Bools
 from derain.simulation.classes import TrackClass
 from derain.simulation.drawing import log_uniform
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Make, Options, Surface, of_size
 from derain.simulation.places import furniture, people, plants, threads
-from derain.simulation.places.frames import bars, made, railing
+from derain.simulation.places.frames import made, railing
+from derain.simulation.places.placing import choose, free_places, place, scatter
 from derain.simulation.places.shell import Walls, shell
 from derain.simulation.places.specks import mirrored
-from derain.simulation.places.standing import Make, choose, free_places, of_size, place, scatter
 from derain.simulation.track import Track
 
 # Sensors that stand in a room are so high above its floor, metres.
@@ -89,15 +89,15 @@ def _below_the_ceiling(room: Walls, generator: Generator) -> Iterator[Surface]:
         drop = generator.uniform(0.02, 0.35 * room.height)
         bottom = room.height - drop
         length, width = generator.uniform(0.1, 1.5), generator.uniform(0.06, 0.3)
-        lamp = shapes.placed(shapes.box(length, width, bottom, bottom + 0.06), x, y)
-        wires = [
-            ((x + a * length, y, bottom), (x + a * length, y, room.height)) for a in (-0.4, 0.4)
-        ]
-        yield made([lamp, bars(wires, 0.004)], generator)
+        lamp = shapes.box(length, width, bottom, bottom + 0.06, at=(x, y))
+        ends = x - 0.4 * length, x + 0.4 * length
+        wires = [((end, y, bottom), (end, y, room.height)) for end in ends]
+        yield made([lamp, shapes.bars(wires, 0.004)], generator)
     for _ in range(generator.integers(0, 4)):
         y, z = generator.uniform(*room.y), room.height - generator.uniform(0.08, 0.5)
         radius = log_uniform((0.01, 0.15), generator)
-        yield made([bars([((room.x[0], y, z), (room.x[1], y, z))], radius, 6)], generator)
+        pipe = (room.x[0], y, z), (room.x[1], y, z)
+        yield made([shapes.bars([pipe], radius, sides=6)], generator)
     for _ in range(generator.integers(0, 5)):
         start = np.array([generator.uniform(*room.x), generator.uniform(*room.y), room.height])
         end = start + generator.normal(0, (0.5, 0.5, 0.0))
@@ -107,7 +107,7 @@ def _below_the_ceiling(room: Walls, generator: Generator) -> Iterator[Surface]:
 
 def _furniture(room: Walls, generator: Generator) -> Iterator[Surface]:
     """Furniture, the more the larger the room, from bare to cluttered."""
-    options: list[tuple[Make, float]] = [
+    options: Options = [
         (furniture.table, 4),
         (furniture.chair, 6),
         (furniture.shelf, 3),
@@ -145,10 +145,10 @@ def _along_a_corridor(room: Walls, generator: Generator) -> Iterator[Surface]:
     for at in np.arange(ends[0] + 0.5, ends[1] - 1, generator.uniform(2, 5)):
         side = sides[int(generator.integers(2))]
         ajar = generator.uniform(-0.2, 0.6)
-        door = shapes.placed(shapes.box(0.9, 0.04, 0.01, 2.0), 0.45, 0, ajar)
-        handle = shapes.placed(shapes.box(0.12, 0.03, 1.0, 1.03), 0.8, 0.06)
+        door = shapes.box(0.9, 0.04, 0.01, 2.0, at=(0.45, 0), heading=ajar)
+        handle = shapes.box(0.12, 0.03, 1.0, 1.03, at=(0.8, 0.06))
         x, y, heading = (at, side, 0.0) if lengthwise else (side, at, np.pi / 2)
-        yield from place(made([door, handle], generator), float(x), float(y), heading)
+        yield from place(made([door, handle], generator), x, y, heading)
     makes: list[Make] = [furniture.chair, furniture.rubbish, furniture.pot_plant, furniture.shelf]
     count = int(generator.integers(0, 8))
     chosen = choose([(make, 1) for make in makes], count, generator)
@@ -163,8 +163,8 @@ def _stairs(room: Walls, generator: Generator) -> Iterator[Surface]:
         steps = []
         for number in range(12):
             top = level + (number + 1) * rise
-            step = shapes.box(tread, width, top - (rise if closed else 0.05), top)
-            steps.append(shapes.placed(step, tread * number, 0))
+            under = top - (rise if closed else 0.05)
+            steps.append(shapes.box(tread, width, under, top, at=(tread * number, 0)))
         rail = railing(12 * tread, generator)
         parts = [made(steps, generator)]
         for y in (-width / 2, width / 2):

@@ -11,9 +11,9 @@ from derain.simulation import shapes
 from derain.simulation.drawing import Span, log_uniform
 from derain.simulation.objects import Surface
 from derain.simulation.places import threads, walls
-from derain.simulation.places.frames import Point, bars, made
-from derain.simulation.places.standing import place
-from derain.simulation.places.walls import pane
+from derain.simulation.places.frames import made
+from derain.simulation.places.placing import place
+from derain.simulation.shapes import Point, bars
 
 FLOOR = (0.03, 0.6)
 
@@ -130,13 +130,12 @@ def _panes(
     x = np.linspace((length - wide) / 2, (length + wide) / 2, 2 + int(wide / 1.4))
     for left, right in pairwise(x):
         corners = np.array([(left, 0, low), (right, 0, low), (right, 0, high), (left, 0, high)])
-        yield made([pane(corners, generator)], generator)
+        yield made([walls.pane(corners, generator)], generator)
         yield made([bars([((left, 0, low), (left, 0, high))], 0.03)], generator)
         if generator.random() < 0.2:
             slats = np.arange(low + generator.uniform(0, high - low - 0.2), high, 0.06)
-            yield made(
-                [bars([((left, 0.06, z), (right, 0.06, z)) for z in slats], 0.01)], generator
-            )
+            ends = [((left, 0.06, z), (right, 0.06, z)) for z in slats]
+            yield made([bars(ends, 0.01)], generator)
 
 
 def _on_the_wall(length: float, height: float, generator: Generator) -> Iterator[Surface]:
@@ -144,7 +143,7 @@ def _on_the_wall(length: float, height: float, generator: Generator) -> Iterator
     for _ in range(generator.integers(0, 4)):
         x, z = generator.uniform(0, length), generator.uniform(0.8, 2.0)
         side, deep = generator.uniform(0.1, 0.9), generator.uniform(0.01, 0.15)
-        yield made([shapes.placed(shapes.box(side, deep, z, z + 0.6 * side), x, 0.05)], generator)
+        yield made([shapes.box(side, deep, z, z + 0.6 * side, at=(x, 0.05))], generator)
     if generator.random() < 0.5:
         x = generator.uniform(0, length)
         radius = log_uniform((0.008, 0.06), generator)
@@ -153,7 +152,6 @@ def _on_the_wall(length: float, height: float, generator: Generator) -> Iterator
         ribs = generator.uniform(0, length - 1) + np.arange(0, 1, 0.07)
         yield made([bars([((a, 0.1, 0.15), (a, 0.1, 0.75)) for a in ribs], 0.02)], generator)
     for _ in range(generator.integers(0, 3)):
-        ends = np.column_stack(
-            [generator.uniform(0, length, 2), (0.05, 0.05), generator.uniform(0.1, 2.2, 2)]
-        )
-        yield threads.cable(ends[0], ends[1], generator.uniform(0, 0.3), (0.004, 0.02), generator)
+        along, up = generator.uniform(0, length, 2), generator.uniform(0.1, 2.2, 2)
+        start, end = np.column_stack([along, (0.05, 0.05), up])
+        yield threads.cable(start, end, generator.uniform(0, 0.3), (0.004, 0.02), generator)

@@ -28,7 +28,7 @@ def net(length: float, height: float, generator: Generator) -> Surface:
     """
     mesh = max(log_uniform((0.05, 0.4), generator), np.sqrt(length * height / 2500))
     x, z = np.arange(0, length, mesh), np.arange(0, height, mesh)
-    knots = np.stack([*np.meshgrid(x, 0.0, z, indexing="ij")], axis=-1)[:, 0]
+    knots = shapes.upright_grid(x, z)
     billow = generator.uniform(0, 0.3) * np.sin(np.pi * knots[..., 2] / height)
     knots[..., 1] += billow * np.sin(generator.uniform(0.3, 2) * knots[..., 0])
     knots += generator.normal(0, 0.12 * mesh, knots.shape)

@@ -9,9 +9,8 @@ from derain.simulation import shapes
 from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
 from derain.simulation.objects import Surface, of_material
-from derain.simulation.places.frames import bars
 from derain.simulation.places.walls import pane
-from derain.simulation.shapes import Triangles
+from derain.simulation.shapes import Triangles, bars
 
 BODYWORK = (0.02, 0.7)
 CAR_GLASS = (0.01, 0.15)
@@ -29,8 +28,8 @@ def glazed_car(generator: Generator) -> Iterator[Surface]:
     pillars = shapes.rods(cabin[0], cabin[1], 0.04, sides=4)
     top = shapes.sheet(np.stack([cabin[1][[0, 1]], cabin[1][[3, 2]]]))
     mirrors = [
-        shapes.placed(shapes.box(0.08, 0.2, sill, sill + 0.16), 0.2 * length, side * (width / 2))
-        for side in (-1, 1)
+        shapes.box(0.08, 0.2, sill, sill + 0.16, at=(0.2 * length, y))
+        for y in (-width / 2, width / 2)
     ]
     antenna = bars([((-0.2 * length, 0, roof), (-0.3 * length, 0, roof + 0.4))], 0.005)
     painted = [body, pillars, top, *mirrors, antenna]
@@ -43,8 +42,8 @@ def glazed_car(generator: Generator) -> Iterator[Surface]:
 def lorry(generator: Generator) -> Iterator[Surface]:
     """A lorry along x: a cab with windows, a box with a wavy tarpaulin, an open chassis."""
     length, width, top = generator.uniform(5, 13), 2.5, generator.uniform(2.8, 4.0)
-    cab = shapes.placed(shapes.box(1.8, 2.4, 0.5, 1.6), length / 2 + 1.1, 0)
-    roof = shapes.placed(shapes.box(1.8, 2.4, 2.5, 2.6), length / 2 + 1.1, 0)
+    cab = shapes.box(1.8, 2.4, 0.5, 1.6, at=(length / 2 + 1.1, 0))
+    roof = shapes.box(1.8, 2.4, 2.5, 2.6, at=(length / 2 + 1.1, 0))
     foot = np.array([[-0.9, -1.2, 1.6], [0.9, -1.2, 1.6], [0.9, 1.2, 1.6], [-0.9, 1.2, 1.6]])
     foot += (length / 2 + 1.1, 0, 0)
     head = shapes.raised(foot, 0.9)
@@ -52,9 +51,7 @@ def lorry(generator: Generator) -> Iterator[Surface]:
     yield of_material([cab, roof, pillars], BODYWORK, generator, TrackClass.CAR)
     yield of_material(_panes((foot, head), generator), CAR_GLASS, generator, TrackClass.CAR)
     sides = [_tarpaulin(length, y, top, generator) for y in (-width / 2, width / 2)]
-    ends = [
-        shapes.placed(shapes.box(0.05, width, 1.1, top), x, 0) for x in (-length / 2, length / 2)
-    ]
+    ends = [shapes.box(0.05, width, 1.1, top, at=(x, 0)) for x in (-length / 2, length / 2)]
     bed = shapes.box(length, width, 1.0, 1.15)
     lid = shapes.box(length, width, top, top + 0.03)
     yield of_material([*sides, *ends, bed, lid], BODYWORK, generator, TrackClass.CAR)
@@ -89,12 +86,11 @@ def _seats(length: float, width: float, sill: float, generator: Generator) -> Tr
     parts = []
     for x in (0.02 * length, -0.2 * length):
         for y in (-0.22 * width, 0.22 * width):
-            parts.append(shapes.placed(shapes.box(0.1, 0.45, 0.5, sill + 0.05), x, y))
-            parts.append(shapes.placed(shapes.box(0.07, 0.2, sill + 0.1, sill + 0.28), x, y))
+            parts.append(shapes.box(0.1, 0.45, 0.5, sill + 0.05, at=(x, y)))
+            parts.append(shapes.box(0.07, 0.2, sill + 0.1, sill + 0.28, at=(x, y)))
             if generator.random() < 0.25:
-                parts.append(shapes.placed(shapes.cylinder(0.17, 0.5, sill + 0.12), x + 0.2, y))
-                head = shapes.cylinder(0.09, sill + 0.15, sill + 0.38)
-                parts.append(shapes.placed(head, x + 0.2, y))
+                parts.append(shapes.cylinder(0.17, 0.5, sill + 0.12, at=(x + 0.2, y)))
+                parts.append(shapes.cylinder(0.09, sill + 0.15, sill + 0.38, at=(x + 0.2, y)))
     x, y = 0.14 * length, 0.22 * width
     parts.append(bars([((x, y - 0.18, sill), (x, y + 0.18, sill + 0.02))], 0.02))
     return np.concatenate(parts)
@@ -109,6 +105,6 @@ def _wheels(axle: float, width: float, radius: float = 0.32) -> Triangles:
 def _tarpaulin(length: float, y: float, top: float, generator: Generator) -> Triangles:
     x = np.linspace(-length / 2, length / 2, int(length / 0.15))
     z = np.linspace(1.15, top, 6)
-    corners = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)[:, 0]
+    corners = shapes.upright_grid(x, z, y)
     corners[..., 1] += generator.uniform(0, 0.04) * np.sin(generator.uniform(2, 12) * x)[:, None]
     return shapes.sheet(corners)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.random import Generator
@@ -10,9 +11,9 @@ from derain.simulation import shapes
 from derain.simulation.arrays import Floats
 from derain.simulation.drawing import log_uniform
 from derain.simulation.objects import Surface, of_material, spotted
-from derain.simulation.places.frames import bars, railing
+from derain.simulation.places.frames import railing
 from derain.simulation.places.threads import cable
-from derain.simulation.shapes import Triangles
+from derain.simulation.shapes import Triangles, bars
 
 GLASS_CELL = 0.04
 MOST_CELLS = 900
@@ -62,7 +63,7 @@ def rough_wall(length: float, height: float, generator: Generator, cell: float =
     """
     x = np.linspace(0, length, 2 + int(length / cell))
     z = np.linspace(0, height, 2 + int(height / cell))
-    corners = np.stack(np.meshgrid(x, 0.0, z, indexing="ij"), axis=-1)[:, 0]
+    corners = shapes.upright_grid(x, z)
     bumps = log_uniform((0.001, 0.05), generator)
     corners[..., 1] += bumps * generator.normal(size=corners.shape[:2])
     return spotted(shapes.sheet(corners), STONE, 0.15, generator)
@@ -97,16 +98,12 @@ def facade(length: float, generator: Generator) -> Iterator[Surface]:
     solid = (np.abs(along) > wide / 2) | (up < 0) | (up > high)
     assert not isinstance(wall.reflectivity, float)
     yield Surface(wall.triangles[solid], wall.label, wall.reflectivity[solid])
-    behind = _box((0, length), (1.5, 4), (0, height))  # the far walls of the rooms
+    behind = shapes.box(length, 2.5, 0, height, at=(length / 2, 2.75))  # the rooms' far walls
     yield of_material([behind], STONE, generator)
-    corners = [
-        (bay * (column + 0.5), storey * level + sill)
-        for column in range(columns)
-        for level in range(storeys)
-    ]
     panes, frames = [], []
     recess = generator.uniform(0.02, 0.25)
-    for x, z in corners:
+    for column, level in product(range(columns), range(storeys)):
+        x, z = bay * (column + 0.5), storey * level + sill
         left, right, top = x - wide / 2, x + wide / 2, z + high
         square = [(left, recess, z), (right, recess, z), (right, recess, top), (left, recess, top)]
         panes.append(pane(np.array(square), generator))
@@ -125,7 +122,7 @@ def _on_the_wall(
     yield of_material([bars(pipes, 0.05)], STONE, generator)
     if height > storey + 1 and generator.random() < 0.5:
         x, out = generator.uniform(0, 0.5 * length), 1.2
-        slab = _box((x, x + 3), (-out, 0), (storey - 0.15, storey))
+        slab = shapes.box(3, out, storey - 0.15, storey, at=(x + 1.5, -out / 2))
         rail = railing(3, generator)
         lifted = shapes.raised(shapes.placed(rail.triangles, x, -out), storey)
         yield of_material([slab, lifted], STONE, generator)
@@ -135,16 +132,7 @@ def _on_the_wall(
         leaves = generator.uniform((0, -0.3, 0), (0.4 * length, 0, 0.8 * height), (2500, 3))
         ivy = shapes.leaves(leaves, generator.uniform(0.015, 0.05), generator)
         yield of_material([ivy], STONE, generator)
-    aerial = [((0.5 * length, 1, height), (0.5 * length, 1, height + 2))]
-    aerial += [
-        ((0.5 * length - 0.4, 1, z), (0.5 * length + 0.4, 1, z))
-        for z in height + np.arange(1, 2, 0.25)
-    ]
+    middle, rods = 0.5 * length, height + np.arange(1, 2, 0.25)
+    aerial = [((middle, 1, height), (middle, 1, height + 2))]
+    aerial += [((middle - 0.4, 1, z), (middle + 0.4, 1, z)) for z in rods]
     yield of_material([bars(aerial, 0.012)], STONE, generator)
-
-
-def _box(
-    x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]
-) -> shapes.Triangles:
-    box = shapes.box(x[1] - x[0], y[1] - y[0], *z)
-    return shapes.placed(box, sum(x) / 2, sum(y) / 2)

@@ -6,18 +6,14 @@ import numpy as np
 from numpy.random import Generator
 
 from derain.simulation.arrays import Floats, Ints
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Piece, Surface, of_size
 from derain.simulation.places import frames, heaps, plants, relief, threads, walls
 from derain.simulation.places.crowd import ragged_things, users
-from derain.simulation.places.relief import Relief, ground_mesh
-from derain.simulation.places.standing import (
-    AXIS_CLEARANCE,
-    Piece,
-    anywhere,
+from derain.simulation.places.placing import (
+    CLEARANCE,
     assemble,
     free_places,
     line_up,
-    of_size,
     place,
     scatter,
     shuffled,
@@ -38,28 +34,27 @@ def lay_out_yard(generator: Generator) -> Track:
         *_heaps(winter, generator),
         *_lines(winter, generator),
         *_grass(generator),
-        *ragged_things(generator, anywhere, count=(25, 60), leafy=not winter),
+        *ragged_things(generator, count=(25, 60), leafy=not winter),
     ]
-    uneven = Relief.draw(generator.uniform(0.05, 0.4), generator)
+    uneven = relief.Relief.draw(generator.uniform(0.05, 0.4), generator)
     return assemble(_ground(winter, generator), standing, uneven, generator, _cables(generator))
 
 
 def _ground(winter: bool, generator: Generator) -> Iterator[Surface]:
     kinds = [relief.GRAVEL, relief.TRACK, relief.SNOW if winter else relief.MEADOW, relief.FIELD]
     chosen = [kinds[which] for which in generator.permutation(len(kinds))[:2]]
-    patches = Relief.draw(1, generator)
+    patches = relief.Relief.draw(1, generator)
 
     def kind_at(x: Floats, y: Floats) -> Ints:
         return (patches(x, y) > 0).astype(np.int64)
 
-    yield from ground_mesh(chosen, kind_at, generator)
+    yield from relief.ground_mesh(chosen, kind_at, generator)
 
 
 def _heaps(winter: bool, generator: Generator) -> Iterator[Surface]:
     def mound(generator: Generator) -> Surface:
-        return heaps.bank(
-            generator.uniform(2, 8), generator, snow=winter and generator.random() < 0.7
-        )
+        length = generator.uniform(2, 8)
+        return heaps.bank(length, generator, snow=winter and generator.random() < 0.7)
 
     makes = [mound] * 4 + [of_size(heaps.rubble, (0.5, 2.5))] * 6 + [heaps.logs] * 3
     places = free_places(int(generator.integers(4, 14)), (4, 40), 3, generator)
@@ -90,7 +85,7 @@ def _lines(winter: bool, generator: Generator) -> Iterator[Surface]:
 def _grass(generator: Generator) -> Iterator[Surface]:
     for _ in range(generator.integers(1, 4)):
         count = int(generator.integers(100, 900))
-        distance = AXIS_CLEARANCE + generator.exponential(generator.uniform(3, 9), count)
+        distance = CLEARANCE + generator.exponential(generator.uniform(3, 9), count)
         angle = generator.uniform(0, 2 * np.pi, count)
         places = distance[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
         yield plants.grass(places, generator)

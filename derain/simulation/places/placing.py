@@ -10,18 +10,12 @@ from numpy.random import Generator
 from derain.simulation import shapes
 from derain.simulation.arrays import Floats
 from derain.simulation.drawing import Span, log_uniform
-from derain.simulation.objects import Surface
+from derain.simulation.objects import Make, Options, Piece, Surface
 from derain.simulation.places.relief import Relief
 from derain.simulation.track import Track
 
 # Whether something may stand at an x and a y.
 Allowed = Callable[[float, float], bool]
-
-# Something made at the origin, of one surface or of several.
-Make = Callable[[Generator], Surface | Iterable[Surface]]
-
-# Made piece by piece along a line, by the length of a piece in metres.
-Piece = Callable[[float, Generator], Surface | Iterable[Surface]]
 
 # Fewest, and one more than the most.
 Counts = tuple[int, int]
@@ -30,7 +24,7 @@ Counts = tuple[int, int]
 Line = Callable[[Floats], Floats]
 
 # What stands in a place is farther from the sensor's axis, metres. Only the ground reaches it.
-AXIS_CLEARANCE = 1.6
+CLEARANCE = 1.6
 
 # Half of the things are within so many degrees of straight ahead, where every sensor looks.
 AHEAD = 55.0
@@ -61,7 +55,7 @@ def free_places(
             distance = log_uniform(distances, generator)
             limit = AHEAD if number % 2 else 180.0
             azimuth = np.radians(generator.uniform(-limit, limit))
-            x, y = float(distance * np.cos(azimuth)), float(distance * np.sin(azimuth))
+            x, y = distance * np.cos(azimuth), distance * np.sin(azimuth)
             if allowed(x, y) and all(np.hypot(x - a, y - b) > apart for a, b in taken):
                 taken.append((x, y))
                 break
@@ -81,11 +75,6 @@ def scatter(
     for make, (x, y) in zip(makes, places, strict=False):
         heading = generator.uniform(-np.pi, np.pi)
         yield from place(make(generator), x, y, heading)
-
-
-def of_size(make: Callable[..., Surface | Iterable[Surface]], *sizes: Span) -> Make:
-    """Makes things whose sizes, in metres, are each uniform between two values."""
-    return lambda generator: make(*(generator.uniform(*size) for size in sizes), generator)
 
 
 def shuffled(makes: Iterable[Make], generator: Generator) -> list[Make]:
@@ -119,14 +108,12 @@ def line_up(
     y = line(ends) if callable(line) else np.full(len(ends), float(line))
     for (before, after), (left, right) in zip(pairwise(ends), pairwise(y), strict=True):
         if generator.random() >= gaps:
-            length = float(np.hypot(after - before, right - left))
-            heading = float(np.arctan2(right - left, after - before))
-            yield from place(make(length, generator), float(before), float(left), heading)
+            length = np.hypot(after - before, right - left)
+            heading = np.arctan2(right - left, after - before)
+            yield from place(make(length, generator), before, left, heading)
 
 
-def choose(
-    options: Iterable[tuple[Make, float]], count: int | Counts, generator: Generator
-) -> list[Make]:
+def choose(options: Options, count: int | Counts, generator: Generator) -> list[Make]:
     """So many of several makers of things, each with the probability of its share in the sum.
 
     Args:
@@ -176,8 +163,8 @@ def _cleared(track: Track) -> Track:
     """A track without those of its triangles that are too near to the sensor's axis."""
     level = track.triangles[..., :2]
     lowest, greatest = level.min(axis=1), level.max(axis=1)
-    about = ((lowest < AXIS_CLEARANCE) & (greatest > -AXIS_CLEARANCE)).all(axis=1)
+    about = ((lowest < CLEARANCE) & (greatest > -CLEARANCE)).all(axis=1)
     far = ~about
     x, y = shapes.nearest_to_axis(track.triangles[about])
-    far[about] = np.hypot(x, y) > AXIS_CLEARANCE
+    far[about] = np.hypot(x, y) > CLEARANCE
     return Track(track.triangles[far], track.reflectivity[far], track.label[far])
