@@ -13,7 +13,7 @@ import shutil
 import sys
 from collections.abc import Generator, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -44,17 +44,7 @@ def ensure_track(root: Path, campaign: SplitSequences, workers: int = 1) -> None
     Raises:
         InputError: As :func:`simulate_track`.
     """
-    campaign = campaign.resolved()  # reports a wrong file first
-    with _alone(root):
-        there = read_manifest(root)
-        if there and not there.get("keep") and not _describes(there, campaign):
-            with _writing(root):
-                # The manifest goes last. Without it the folder would be taken for somebody else's,
-                # should this run be killed in between; the sequences may then be gone already.
-                if (root / SEQUENCES).exists():
-                    shutil.rmtree(root / SEQUENCES)
-                (root / MANIFEST).unlink()
-        _simulate(root, campaign, workers, keep=False)
+    _simulate(root, campaign, workers, keep=False)
 
 
 def simulate_track(root: Path, campaign: SplitSequences, workers: int = 1) -> None:
@@ -69,9 +59,7 @@ def simulate_track(root: Path, campaign: SplitSequences, workers: int = 1) -> No
         InputError: The folder holds something else or cannot be written, or Open3D cannot be
             imported. What was complete by then stays, and nothing half-written.
     """
-    campaign = campaign.resolved()  # reports a wrong file first
-    with _alone(root):
-        _simulate(root, campaign, workers, keep=True)
+    _simulate(root, campaign, workers, keep=True)
 
 
 def _simulate(root: Path, campaign: SplitSequences, workers: int, *, keep: bool) -> None:
@@ -83,21 +71,37 @@ def _simulate(root: Path, campaign: SplitSequences, workers: int, *, keep: bool)
         workers: Processes that share the work.
         keep: Whether the data set is a person's; otherwise :func:`ensure_track` may replace it.
     """
-    there = read_manifest(root)
-    _refuse_others(root, there, campaign)
-    if "files" in there and all((root / SEQUENCES / name).is_dir() for name in campaign.names):
-        return
-    import_open3d()  # raises where it is missing, before anything is written
+    campaign = campaign.resolved()  # reports a wrong file first
     description = {**campaign.description, "keep": keep}
-    files: dict[str, str] = {}
-    with _writing(root):
-        # The manifest comes first: a folder with content but without one is refused.
-        write_manifest(root, description)
-        (root / SEQUENCES).mkdir(exist_ok=True)
-        with closing(_complete_sequences(root, campaign, workers)) as complete:
-            for written in complete:
-                files |= written
-        write_manifest(root, {**description, "files": files})
+    with _alone(root):
+        if not keep:
+            _remove_another(root, campaign)
+        there = read_manifest(root)
+        _refuse_others(root, there, campaign)
+        if "files" in there and all((root / SEQUENCES / name).is_dir() for name in campaign.names):
+            return
+        import_open3d()  # raises where it is missing, before anything is written
+        files: dict[str, str] = {}
+        with _writing(root):
+            # The manifest comes first: a folder with content but without one is refused.
+            write_manifest(root, description)
+            (root / SEQUENCES).mkdir(exist_ok=True)
+            with closing(_complete_sequences(root, campaign, workers)) as complete:
+                for written in complete:
+                    files |= written
+            write_manifest(root, {**description, "files": files})
+
+
+def _remove_another(root: Path, campaign: SplitSequences) -> None:
+    """Removes the data set of another campaign, unless it is a person's."""
+    there = read_manifest(root)
+    if there and not there.get("keep") and not _describes(there, campaign):
+        with _writing(root):
+            # The manifest goes last. Without it the folder would be taken for somebody else's,
+            # should this run be killed in between; the sequences may then be gone already.
+            if (root / SEQUENCES).exists():
+                shutil.rmtree(root / SEQUENCES)
+            (root / MANIFEST).unlink()
 
 
 @contextmanager
@@ -107,29 +111,15 @@ def _alone(root: Path) -> Iterator[None]:
         raise InputError(root, "is not a folder", "Name a new or empty folder.")
     with _writing(root):
         root.mkdir(parents=True, exist_ok=True)
-    folder = _locked(root)
-    try:
+    with ExitStack() as held:
+        with suppress(OSError):  # without locks two runs on one folder do not wait for each other
+            folder = os.open(root, os.O_RDONLY)
+            held.callback(os.close, folder)
+            if not lock(folder, wait=False):
+                print(f"derain: waits for another run that simulates in {root}", file=sys.stderr)
+                lock(folder, wait=True)
         remove_abandoned(root)
         yield
-    finally:
-        if folder is not None:
-            os.close(folder)
-
-
-def _locked(root: Path) -> int | None:
-    """Locks the folder, after waiting for whoever holds it, and returns its file descriptor.
-
-    None where folders cannot be opened: there two runs on one folder do not wait for each other.
-    """
-    try:
-        folder = os.open(root, os.O_RDONLY)
-    except OSError:
-        return None  # Windows opens no folders
-    with suppress(OSError):
-        if not lock(folder, wait=False):
-            print(f"derain: waits for another run that simulates in {root}", file=sys.stderr)
-            lock(folder, wait=True)
-    return folder
 
 
 @contextmanager
@@ -138,11 +128,8 @@ def _writing(root: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise InputError(
-            root,
-            f"cannot be written ({error.strerror or error})",
-            "Choose a folder that is writable and has room.",
-        ) from error
+        reason = f"cannot be written ({error.strerror or error})"
+        raise InputError(root, reason, "Choose a folder that is writable and has room.") from error
 
 
 def _describes(manifest: Mapping[str, Any], campaign: SplitSequences) -> bool:
@@ -151,15 +138,11 @@ def _describes(manifest: Mapping[str, Any], campaign: SplitSequences) -> bool:
 
 def _refuse_others(root: Path, there: Mapping[str, Any], campaign: SplitSequences) -> None:
     if there and not _describes(there, campaign):
-        raise InputError(
-            root,
-            "holds a simulated data set of other parameters or of another version of derain",
-            "Name another folder, or delete this one.",
-        )
+        reason = "holds a simulated data set of other parameters or of another version of derain"
+        raise InputError(root, reason, "Name another folder, or delete this one.")
     if not there and any(root.iterdir()):
-        raise InputError(
-            root, "holds something other than a simulated data set", "Name a new or empty folder."
-        )
+        reason = "holds something other than a simulated data set"
+        raise InputError(root, reason, "Name a new or empty folder.")
 
 
 def _complete_sequences(
@@ -167,9 +150,8 @@ def _complete_sequences(
 ) -> Generator[dict[str, str], None, None]:
     """Checksums of every sequence, made where it is missing, in ascending order."""
     complete = partial(_complete_sequence, root, campaign)
-    progress = partial(
-        tqdm, total=len(campaign.names), desc="simulating", unit="sequence", disable=None
-    )
+    count = len(campaign.names)
+    progress = partial(tqdm, total=count, desc="simulating", unit="sequence", disable=None)
     if workers == 1:
         yield from progress(map(complete, campaign.names))
         return
@@ -177,9 +159,8 @@ def _complete_sequences(
         with worker_pool(workers) as pool:
             yield from progress(pool.map(complete, campaign.names))
     except BrokenProcessPool as error:
-        raise InputError(
-            root, "a worker was killed, perhaps for want of memory", "Try again with fewer workers."
-        ) from error
+        reason = "a worker was killed, perhaps for want of memory"
+        raise InputError(root, reason, "Try again with fewer workers.") from error
     finally:
         for name in campaign.names:  # a worker that was killed leaves what it had begun
             shutil.rmtree(_unfinished(root, name), ignore_errors=True)

@@ -48,14 +48,15 @@ def read_manifest(root: Path) -> dict[str, Any]:
     if not isinstance(content, dict) or content.get("made_by") != MAKER:
         return {}
     values = document.members()
-    for key, check in (
-        ("split", _split),
-        (RAIN_RATE, rates_of_sequences),
-        ("files", _checksums),
-        ("keep", Entry.truth),
-    ):
+    parsers = {
+        "split": lambda parts: parts.record(dict.fromkeys(SPLIT_PARTS, Entry.texts), SPLIT_PARTS),
+        RAIN_RATE: rates_of_sequences,
+        "files": lambda files: files.each(Entry.text),
+        "keep": Entry.truth,
+    }
+    for key, read in parsers.items():
         if key in values:
-            check(values[key])
+            read(values[key])
     return content
 
 
@@ -75,7 +76,7 @@ def rates_of_sequences(entry: Entry) -> dict[str, float]:
     Raises:
         InputError: Anything else, or a rate that no rain has.
     """
-    return {name: rate.within(0, HARDEST_RAIN) for name, rate in entry.members().items()}
+    return entry.each(lambda rate: rate.within(0, HARDEST_RAIN))
 
 
 def write_manifest(root: Path, content: Mapping[str, Any]) -> None:
@@ -95,12 +96,3 @@ def checksums(folder: Path, root: Path) -> dict[str, str]:
         for file in sorted(folder.rglob("*"))
         if file.is_file()
     }
-
-
-def _split(entry: Entry) -> None:
-    entry.record(dict.fromkeys(SPLIT_PARTS, Entry.texts), required=SPLIT_PARTS)
-
-
-def _checksums(entry: Entry) -> None:
-    for checksum in entry.members().values():
-        checksum.text()

@@ -10,45 +10,27 @@ from derain.files.documents import shown
 from derain.simulation.campaign import Campaign
 from derain.simulation.manifest import MAKER, read_manifest, write_manifest
 
-CHECKSUM = 64 * "0"
-
 
 def test_a_manifest_comes_back(tmp_path: Path) -> None:
-    content = {**Campaign().description, "keep": True, "files": {"sequences/000/a.bin": CHECKSUM}}
+    files = {f"sequences/{n // 500:03d}/velodyne/{n:06d}.bin": 64 * "0" for n in range(20_000)}
+    content = {**Campaign().description, "keep": True, "files": files}
     write_manifest(tmp_path, content)
     assert read_manifest(tmp_path) == content
-
-
-def test_a_manifest_of_a_large_data_set_comes_back(tmp_path: Path) -> None:
-    files = {f"sequences/{n // 500:03d}/velodyne/{n:06d}.bin": CHECKSUM for n in range(20_000)}
-    write_manifest(tmp_path, {"made_by": MAKER, "files": files})
-    assert read_manifest(tmp_path)["files"] == files
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        "",
-        "{",
-        "[]",
-        "5",
-        "null",
+        *("", "{", "[]", "null", "[" * 100_000, "\xff"),
         '{"made_by": "somebody else", "split": 5}',
-        '{"made_by": ["derain.simulation"]}',
-        "[" * 100_000,
         '{"made_by": "derain.simulation", "campaign": ' + f"{40 * '['}{40 * ']'}}}",
-        "\xff",
     ],
     ids=shown,
 )
 def test_what_derain_did_not_write_is_no_manifest_of_its(tmp_path: Path, text: str) -> None:
+    assert read_manifest(tmp_path) == {}
     (tmp_path / "manifest.json").write_text(text, "latin-1")
     assert read_manifest(tmp_path) == {}
-
-
-def test_a_folder_without_a_manifest_has_an_empty_one(tmp_path: Path) -> None:
-    assert read_manifest(tmp_path) == {}
-    assert read_manifest(tmp_path / "none") == {}
 
 
 @pytest.mark.parametrize(
@@ -60,7 +42,6 @@ def test_a_folder_without_a_manifest_has_an_empty_one(tmp_path: Path) -> None:
         ("split", {"train": [[]], "validation": [], "test": []}, "split.train[0]"),
         ("rain_rate_mm_h", [10], "rain_rate_mm_h"),
         ("rain_rate_mm_h", {"000": [10]}, "rain_rate_mm_h.000"),
-        ("rain_rate_mm_h", {"000": float("nan")}, "rain_rate_mm_h.000"),
         ("rain_rate_mm_h", {"000": -1}, "rain_rate_mm_h.000"),
         ("rain_rate_mm_h", {"000": 10**400}, "rain_rate_mm_h.000"),
         ("files", None, "files"),
