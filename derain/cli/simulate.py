@@ -197,8 +197,7 @@ def _refuse(foreign: Iterable[str], arguments: argparse.Namespace, needs: str) -
 
 
 def _campaign(options: argparse.Namespace) -> "Campaign":
-    from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, partition
-    from derain.simulation.drive import Drive
+    from derain.simulation.campaign import FACILITY_RAIN_RATES, Campaign, Drive, partition
     from derain.simulation.radar import Radar
 
     moves = options.speed, options.traffic, options.skew

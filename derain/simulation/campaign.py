@@ -13,7 +13,6 @@ from derain import __version__
 from derain.errors import InputError
 from derain.files.documents import shown
 from derain.simulation.arrays import Floats
-from derain.simulation.drive import Drive
 from derain.simulation.layouts import LAYOUTS
 from derain.simulation.manifest import MAKER, RAIN_RATE, SPLIT_PARTS
 from derain.simulation.radar import Radar
@@ -34,6 +33,61 @@ MOST = 100_000
 # out 28 and 29 of 143.
 # Source: data_cfg.yaml of the SalsaNext model published with REHEARSE-3D.
 HELD_OUT = 0.2
+
+# Fastest vehicle, m/s: 216 km/h.
+FASTEST = 60.0
+
+# Most things that move. A street has room for 25 or more within sight of a sensor that stands.
+MOST_TRAFFIC = 20
+
+# Longest drive, metres: its street has one and a half million triangles and is laid out in 10 s.
+LONGEST = 2000.0
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive along a street, or a stand in it while others move.
+
+    Attributes:
+        speed: Speed of the sensor along the street, m/s; 0 stands.
+        traffic: How many cars and pedestrians move, each at a speed of its own.
+        skew: Whether every beam sees the scene as it is when that beam is sent, so that a scan is
+            skewed by what moves while it is taken; else all of a scan is seen as it is when the
+            scan begins, as after a perfect correction.
+
+    Raises:
+        InputError: A speed or a number that is impossible, or skew where nothing moves.
+    """
+
+    speed: float = 0.0
+    traffic: int = 0
+    skew: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.speed <= FASTEST:
+            reason = f"{shown(self.speed)} m/s is impossible"
+            raise InputError("speed", reason, f"Give 0 (stands) to {FASTEST:g}.")
+        if not 0 <= self.traffic <= MOST_TRAFFIC:
+            reason = f"{shown(self.traffic)} is impossible"
+            raise InputError("traffic", reason, f"Give 0 to {MOST_TRAFFIC}.")
+        if self.skew and not (self.speed or self.traffic):
+            reason = "there is none where nothing moves"
+            raise InputError("skew", reason, "Give a speed or traffic.")
+
+    def length(self, duration: float) -> float:
+        """Length of the drive in metres.
+
+        Args:
+            duration: How long it takes, seconds.
+
+        Raises:
+            InputError: Too long a drive.
+        """
+        length = self.speed * duration
+        if length > LONGEST:
+            reason = f"{length:,.0f} m of street are more than {LONGEST:,.0f}"
+            raise InputError("drive", reason, "Simulate more sequences of fewer scans.")
+        return length
 
 
 class SplitSequences(ABC):

@@ -1,5 +1,6 @@
-"""The scene of a sequence, and what a sensor sees of it in each scan."""
+"""The scene of a sequence: its weather, and what a sensor sees of it in each scan."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
@@ -11,15 +12,69 @@ from numpy.random import Generator
 from derain.simulation.arrays import Floats
 from derain.simulation.campaign import Campaign
 from derain.simulation.classes import packed
-from derain.simulation.drive import Course
 from derain.simulation.layouts import LAYOUTS
+from derain.simulation.marshall_palmer import INTERCEPT, extinction, slope
 from derain.simulation.objects import Surface
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
 from derain.simulation.sensor import Returns, Sensor
 from derain.simulation.street import Street, lay_out_street
 from derain.simulation.track import Track
-from derain.simulation.traffic import MovingThing, draw_traffic
-from derain.simulation.weather import Weather, draw_wind
+from derain.simulation.traffic import Course, MovingThing, draw_traffic
+
+# Optical depth at which a black object cannot be told from the horizon: −ln 0.02.
+# Source: Koschmieder 1924, with his contrast threshold of 2 %.
+VISIBLE_OPTICAL_DEPTH = 3.912
+
+# Half of the water of Marshall and Palmer's rain is in drops larger than this over Λ, the slope.
+# Source: Ulbrich 1983, "Natural variations in the analytical form of the raindrop size
+# distribution", for the exponential one.
+MEDIAN_VOLUME_DIAMETER = 3.67
+
+# Strongest mean wind along each axis, m/s, a modelling choice: a light breeze, for in more the
+# facility's rain would not come down on its track.
+STRONGEST_WIND = 2.0
+
+
+@dataclass(frozen=True)
+class Weather:
+    """What a weather station and a disdrometer would measure; units are in the names.
+
+    The drop spectrum N(D) = intercept · exp(−slope · D), the median diameter by volume and the
+    visibility are those of the nominal rate. Clear air has an infinite slope, drops of no diameter,
+    and no end to its visibility (``inf``). The wind's direction is where it blows to, from x
+    (ahead) towards y (left).
+    """
+
+    rain_rate_mm_h: float
+    rain_rate_at_sensor_mm_h: float
+    drop_intercept_per_m3_mm: float
+    drop_slope_per_mm: float
+    median_volume_diameter_mm: float
+    wind_speed_m_s: float
+    wind_direction_deg: float
+    visibility_m: float
+
+    @classmethod
+    def of(cls, nominal: float, at_sensor: float, wind: tuple[float, float]) -> Self:
+        """The record of some rain.
+
+        Args:
+            nominal: Rain rate asked for, mm/h.
+            at_sensor: Rain rate at the sensor's place, mm/h.
+            wind: Velocity towards x (ahead) and y (left), m/s.
+        """
+        steepness = float(slope(nominal))
+        visibility = VISIBLE_OPTICAL_DEPTH / float(extinction(nominal)) if nominal else math.inf
+        return cls(
+            rain_rate_mm_h=nominal,
+            rain_rate_at_sensor_mm_h=at_sensor,
+            drop_intercept_per_m3_mm=INTERCEPT,
+            drop_slope_per_mm=steepness,
+            median_volume_diameter_mm=MEDIAN_VOLUME_DIAMETER / steepness,
+            wind_speed_m_s=math.hypot(*wind),
+            wind_direction_deg=math.degrees(math.atan2(wind[1], wind[0])),
+            visibility_m=visibility,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,3 +175,9 @@ def _nearer(first: Returns, second: Returns) -> Returns:
     rows = np.arange(len(first.beam))
     nearer = second.range < first.range
     return Returns.joined([first, second]).take(rows + len(rows) * nearer)
+
+
+def draw_wind(generator: Generator) -> tuple[float, float]:
+    """Draws a wind: its velocity towards x (ahead) and y (left), m/s."""
+    ahead, left = generator.uniform(-STRONGEST_WIND, STRONGEST_WIND, 2)
+    return float(ahead), float(left)
