@@ -29,7 +29,7 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.facility import lay_out_facility
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import SprinkledRain, UniformRain
-from derain.simulation.sensor_file import load_sensor
+from derain.simulation.sensor import load_sensor
 
 RATES = (0.0, 10.0, 25.0, 50.0)
 KINDS = len(TrackClass)

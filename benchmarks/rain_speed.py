@@ -19,7 +19,7 @@ from turns import milliseconds_in_turns
 from derain.simulation.layout import lay_out_track
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import RainField, SprinkledRain, UniformRain
-from derain.simulation.sensor_file import load_sensor
+from derain.simulation.sensor import load_sensor
 
 RAIN: dict[str, RainField] = {
     "even rain, 50 mm/h": UniformRain(50),

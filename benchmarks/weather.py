@@ -31,7 +31,7 @@ from derain.simulation.classes import TrackClass
 from derain.simulation.dataset import simulate_track
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.recorded import rain_on_scan
-from derain.simulation.sensor_file import load_sensor
+from derain.simulation.sensor import load_sensor
 from derain.system.memory import keep_freed_memory
 from derain.weather.alarm import Alarm, Threshold
 from derain.weather.scan_weather import RANGE_BANDS, ScanWeather

@@ -24,8 +24,7 @@ from derain.simulation.layouts import LAYOUTS
 from derain.simulation.rain import rain_on_beams
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.returns import Returns
-from derain.simulation.sensor import Sensor
-from derain.simulation.sensor_file import load_sensor
+from derain.simulation.sensor import Sensor, load_sensor
 from derain.weather.scan_weather import ScanWeather
 from derain.weather.visibility import visibility_of
 

@@ -27,8 +27,7 @@ from derain.simulation.campaign import Campaign
 from derain.simulation.drawn_sensor import draw_sensor
 from derain.simulation.manifest import MANIFEST, rates_of_sequences, read_manifest
 from derain.simulation.returns import Returns
-from derain.simulation.sensor import Sensor
-from derain.simulation.sensor_file import load_sensor, packaged_sensors
+from derain.simulation.sensor import Sensor, load_sensor, packaged_sensors
 from derain.simulation.spans import SensorSpans
 
 SCENE = """

@@ -228,7 +228,7 @@ def _rain_on_scans(arguments: argparse.Namespace) -> int:
         from derain.pictures.scan_pictures import before_after_figure, save
     from derain.simulation.rain_field import UniformRain
     from derain.simulation.recorded import rain_on_scan
-    from derain.simulation.sensor_file import load_sensor
+    from derain.simulation.sensor import load_sensor
 
     if not arguments.rain or len(arguments.rain) > 1:
         raise InputError("--rain", "it rains on scans at one rate", "Give one, e.g. --rain 25.")

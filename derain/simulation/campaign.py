@@ -17,8 +17,7 @@ from derain.simulation.layouts import LAYOUTS
 from derain.simulation.manifest import MAKER, RAIN_RATE, SPLIT_PARTS
 from derain.simulation.radar import Radar
 from derain.simulation.rain_field import UniformRain
-from derain.simulation.sensor import SELDOM_STATED, Sensor
-from derain.simulation.sensor_file import load_sensor
+from derain.simulation.sensor import SELDOM_STATED, Sensor, load_sensor
 
 # Two of five sequences are clean, as are 39 % of REHEARSE-3D's. How often each rain rate occurs in
 # it is not published. The first sequence has rain, because it may be the only one to train on.

@@ -4,17 +4,15 @@ Every return keeps its label, so that none becomes rain or ceases to be; a point
 surfaces gets the label of the nearer one.
 """
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
 
-from derain.errors import InputError
-from derain.files.documents import shown
 from derain.simulation.arrays import Bools, Floats, Ints
 from derain.simulation.classes import TrackClass, unpacked
 from derain.simulation.returns import Returns
+from derain.simulation.settings import Settings
 
 # Parts of a scan that are lost together: sensors send a scan in 75 (Ouster) to 180 (Velodyne)
 # packets, of which a network drops some in a row.
@@ -25,7 +23,7 @@ SMALLEST_GAP = 0.3
 
 
 @dataclass(frozen=True)
-class Defects:
+class Defects(Settings):
     """What is wrong with the scans of a sensor; the default is nothing.
 
     Attributes:
@@ -55,11 +53,8 @@ class Defects:
     copies: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            metres = name in ("merging", "range_step")
-            if not (0 <= value < math.inf if metres else 0 <= value <= 1):
-                remedy = "Give metres, 0 or more." if metres else "Give a share of 0 to 1."
-                raise InputError(f"defects: {name}", f"{shown(value)} is impossible", remedy)
+        shares = ("dropped", "dropped_rows", "dropped_sectors", "mixed", "copies")
+        self._refuse_impossible("defects", {name: 0 <= getattr(self, name) <= 1 for name in shares})
 
     def at_borders(
         self, returns: Returns, columns: int, *, dual: bool, generator: Generator

@@ -1,4 +1,6 @@
-"""Random numbers between two bounds."""
+"""Random numbers between two bounds, and names by their weights."""
+
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.random import Generator
@@ -36,3 +38,9 @@ def along(begin: float, end: float, spacing: Span, generator: Generator) -> list
         places.append(place)
         place += generator.uniform(*spacing)
     return places
+
+
+def draw_name(weights: Mapping[str, float], generator: Generator) -> str:
+    """Draws a name by weights, which need not add up to 1."""
+    share = np.array(list(weights.values())) / sum(weights.values())
+    return str(generator.choice(list(weights), p=share))

@@ -1,6 +1,7 @@
 """Draws sensors, so that a network that learns from their scans has met any."""
 
 import math
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,13 @@ from numpy.random import Generator
 
 from derain.simulation.arrays import Floats
 from derain.simulation.defects import Defects
+from derain.simulation.drawing import draw_name
 from derain.simulation.sensor import Sensor
-from derain.simulation.spans import DefectSpans, SensorSpans, draw, draw_kind
+from derain.simulation.spans import DefectSpans, SensorSpans, draw
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
+
+# The numbers of any sensor, drawn from the spans of their names.
+NUMBERS = [one.name for one in fields(Sensor) if one.type is float]
 
 # Defects that only some sensors have.
 DEFECTS = ("dropped", "dropped_rows", "dropped_sectors", "mixed", "range_step", "copies")
@@ -34,12 +39,12 @@ def draw_sensor(spans: SensorSpans, generator: Generator) -> Sensor:
         InputError: The spans allow for what no sensor can be, and it was drawn.
     """
     patterns = {"spinning": _spinning, "front": _front, "rosette": _rosette}
-    pattern = patterns[draw_kind(spans.kinds, generator)](spans, generator)
+    pattern = patterns[draw_name(spans.kinds, generator)](spans, generator)
     roll, pitch = (draw(spans, "tilt", generator) * generator.choice([-1, 1]) for _ in range(2))
     if generator.random() < spans.head_down:
         pitch += draw(spans, "head_down_pitch", generator)
-    returns: Any = draw_kind(spans.returns, generator)
-    drawn: dict[str, Any] = {name: draw(spans, name, generator) for name in DRAWN_EVENLY}
+    returns: Any = draw_name(spans.returns, generator)
+    drawn: dict[str, Any] = {name: draw(spans, name, generator) for name in NUMBERS}
     return Sensor(
         **pattern,
         **drawn,
@@ -67,14 +72,6 @@ def draw_defects(spans: DefectSpans, generator: Generator, *, dual: bool) -> Def
         **{name: value for name, value in values.items() if has[name]},
         merging=draw(spans, "merging", generator),
     )
-
-
-# Attributes of any sensor that are drawn from the span of their name.
-DRAWN_EVENLY = (
-    *("minimum_range", "maximum_range", "aperture", "beam_divergence", "detection_threshold"),
-    *("range_noise", "range_noise_growth", "weak_range_noise", "encoder_noise"),
-    *("intensity_noise", "mounting_height", "frame_rate"),
-)
 
 
 def _spinning(spans: SensorSpans, generator: Generator) -> dict[str, Any]:

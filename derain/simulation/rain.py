@@ -8,7 +8,6 @@ from numpy.random import Generator
 
 from derain.simulation.arrays import Columns, Floats, Ints
 from derain.simulation.classes import TrackClass
-from derain.simulation.detection import detected_surfaces, reported
 from derain.simulation.marshall_palmer import (
     LARGEST_DROP,
     draw_diameters,
@@ -175,9 +174,9 @@ def rain_on_beams(
         where the last return is not the strongest.
     """
     transmission = Transmission(rain, sensor.maximum_range)
-    solid = detected_surfaces(clear, transmission(beams, clear.range), sensor)
+    solid = sensor.detected(clear, transmission(beams, clear.range))
     drops = _visible_drops(clear.range, beams, rain, sensor, transmission, generator)
-    return reported(Returns.joined([solid, drops]), sensor.returns)
+    return sensor.reported(Returns.joined([solid, drops]))
 
 
 def _visible_drops(

@@ -1,20 +1,23 @@
-"""A scanning LiDAR: where its beams point, what it can detect, and how it measures."""
+"""A scanning LiDAR: where its beams point, and how it measures; packaged ones, as YAML files."""
 
 import math
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.random import Generator
 
-from derain.errors import InputError
-from derain.files.documents import shown
+from derain.files.documents import Entry
 from derain.files.extrinsics import Extrinsics
+from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
 from derain.simulation.arrays import Floats, Ints
+from derain.simulation.classes import TrackClass
 from derain.simulation.defects import Defects
 from derain.simulation.returns import Returns as Returns
 from derain.simulation.scan_pattern import rosette, unit_vectors
+from derain.simulation.settings import Settings
 from derain.views.spherical_grid import FULL_CIRCLE
 
 FULL_SCALE_INTENSITY = 255.0
@@ -44,7 +47,7 @@ Pattern = Literal["grid", "rosette"]
 
 
 @dataclass(frozen=True)
-class Sensor:
+class Sensor(Settings):
     """A scanning LiDAR.
 
     The defaults are modelling choices. The field of view resembles an automotive MEMS LiDAR's, on
@@ -135,13 +138,8 @@ class Sensor:
             "encoder_noise": 0 <= self.encoder_noise < FULL_CIRCLE,
             "returns": self.returns in get_args(ReturnMode),
             "frame_rate": 0 < self.frame_rate < math.inf,
-            "defects": True,  # which check themselves
         }
-        for name, value in vars(self).items():
-            if name not in possible:
-                possible[name] = 0 <= value < math.inf
-            if not possible[name]:
-                raise InputError(f"sensor: {name}", f"{shown(value)} is impossible", "Correct it.")
+        self._refuse_impossible("sensor", possible)
 
     def beams(self) -> Floats:
         """Unit vectors along the beams, float64 (rows · columns, 3), frame of the level sensor.
@@ -196,6 +194,48 @@ class Sensor:
         """Volume of a beam's cone between two distances in metres, in cubic metres."""
         widths = self.beam_width(far) ** 3 - self.beam_width(near) ** 3
         return math.pi / 12 / self.beam_spread * widths
+
+    def detected(self, clear: Returns, transmission: Floats) -> Returns:
+        """What the sensor would see of the surfaces if there were no particles in front of them.
+
+        Args:
+            clear: What each beam would return through clear air to a perfect detector.
+            transmission: Share of the light that survives the way there and back, float64 (N,).
+        """
+        reflectivity = clear.reflectivity * transmission
+        strong = reflectivity >= self.detection_threshold * clear.range**2
+        seen = strong & (clear.range >= self.minimum_range)
+        return Returns(
+            np.where(seen, clear.range, self.maximum_range),
+            np.where(seen, reflectivity, 0),
+            np.where(seen, clear.label, TrackClass.BACKGROUND),
+            clear.beam,
+        )
+
+    def reported(self, candidates: Returns) -> Returns:
+        """What the sensor reports of all that it could detect.
+
+        Args:
+            candidates: At least one row for every beam; of a beam that nothing returned one without
+                reflectivity. In any order.
+
+        Returns:
+            One row for each beam, in their order; of a sensor with dual returns a second one where
+            the last return is not the strongest.
+        """
+        # A surface ends its beam: where it is seen, it is the last return.
+        distance = np.where(candidates.returned, candidates.range, 0)
+        match self.returns:
+            case "strongest":
+                chosen = _greatest(candidates.power, candidates.beam)
+            case "last":
+                chosen = _greatest(distance, candidates.beam)
+            case "dual":
+                strongest = _greatest(candidates.power, candidates.beam)
+                last = _greatest(distance, candidates.beam)
+                both = np.stack([strongest, last], axis=1)
+                chosen = both[np.stack([np.ones_like(last, bool), last != strongest], axis=1)]
+        return candidates.take(chosen)
 
     def measure(self, returns: Returns, generator: Generator) -> Scan:
         """Turns the returns into a scan, with the noise of the measurement.
@@ -257,3 +297,29 @@ class Sensor:
         offset = generator.normal(0, DARK_NOISE, len(reflectivity))
         intensity = FULL_SCALE_INTENSITY * reflectivity * gain + offset
         return np.clip(intensity, 0, FULL_SCALE_INTENSITY)
+
+
+def _greatest(value: Floats, beam: Ints) -> Ints:
+    """Row of the greatest value of every beam, int64 (N,), where each of N beams has one."""
+    ascending = np.argsort(value, kind="stable")
+    row = np.empty(beam.max(initial=-1) + 1, np.int64)
+    row[beam[ascending]] = ascending  # of several rows the last assigned stays
+    return row
+
+
+def packaged_sensors() -> dict[str, Path]:
+    """Files of the sensors that come with derain, by name."""
+    return packaged("derain.simulation", "sensors")
+
+
+def load_sensor(name: str | Path) -> Sensor:
+    """Reads a sensor.
+
+    Args:
+        name: Name of a packaged sensor, or a YAML file with attributes of :class:`Sensor`; those
+            that it leaves out have their defaults.
+
+    Raises:
+        InputError: No such sensor, or a file that does not describe one.
+    """
+    return Sensor.of(Entry.of_yaml(packaged_or_own(name, packaged_sensors(), "sensor")))

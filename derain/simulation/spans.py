@@ -3,40 +3,28 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self, get_args, get_type_hints
+from typing import ClassVar, get_args
 
-import numpy as np
 from numpy.random import Generator
 
-from derain.errors import InputError
-from derain.files.documents import Entry, shown
 from derain.simulation.drawing import Span, log_uniform
-from derain.simulation.sensor import ReturnMode
-from derain.simulation.sensor_file import PARSERS, read_fields
+from derain.simulation.sensor import MOST_BEAMS, ReturnMode
+from derain.simulation.settings import Settings, weights_of
 
 # Sensors of today have at most 256.
 MOST_ROWS = 4096
 
-# Kinds of drawn sensors.
-SENSOR_KINDS = ("spinning", "front", "rosette")
-
-
-class ReadableSpans:
-    """Spans that can be read from a document."""
-
-    @classmethod
-    def of(cls, entry: Entry) -> Self:
-        """Reads what a document states; the rest is as by default.
-
-        Raises:
-            InputError: Another key, or a value of another kind or that is impossible.
-        """
-        hints = get_type_hints(cls)
-        return read_fields(cls, entry, {name: _PARSERS[hint] for name, hint in hints.items()})
+# Spans that are log-uniform.
+LOGARITHMIC_SPANS = frozenset(
+    {
+        *("azimuth_step", "front_step", "rosette_beams", "prism_turns", "range_noise"),
+        *("minimum_range", "maximum_range", "detection_threshold", "beam_divergence"),
+    }
+)
 
 
 @dataclass(frozen=True)
-class DefectSpans(ReadableSpans):
+class DefectSpans(Settings):
     """What the defects of sensors are drawn from; shares are drawn evenly.
 
     Attributes:
@@ -62,14 +50,12 @@ class DefectSpans(ReadableSpans):
     copies: Span = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        _check_spans(self, "defect spans")
-        for name in ("none", "each"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise _impossible("defect spans", self, name, "Give a share of 0 to 1.")
+        shares = {"none": 0 <= self.none <= 1, "each": 0 <= self.each <= 1}
+        self._refuse_impossible("defect spans", shares)
 
 
 @dataclass(frozen=True)
-class SensorSpans(ReadableSpans):
+class SensorSpans(Settings):
     """What sensors are drawn from. The defaults span the sensors of today.
 
     Angles are in degrees, distances in metres. Spans of a decade or more are
@@ -150,36 +136,30 @@ class SensorSpans(ReadableSpans):
     beam_divergence: Span = (1e-3, 4e-3)
     frame_rate: Span = (5.0, 20.0)
     defects: DefectSpans = field(default_factory=DefectSpans)
+    READ_BY: ClassVar = {
+        "kinds": weights_of("spinning", "front", "rosette"),
+        "returns": weights_of(*get_args(ReturnMode)),
+    }
 
     def __post_init__(self) -> None:
-        subject = "sensor spans"
-        _check_spans(self, subject)
+        possible = {
+            "spinning_rows": _are_rows(self.spinning_rows),
+            "front_rows": _are_rows(self.front_rows),
+            "most_beams": 1 <= self.most_beams <= MOST_BEAMS,
+            "uneven": 0 <= self.uneven <= 1,
+            "head_down": 0 <= self.head_down <= 1,
+        }
         for name in LOGARITHMIC_SPANS:
-            if getattr(self, name)[0] <= 0:
-                raise _impossible(subject, self, name, "Give two numbers above 0.")
-        for name in ("spinning_rows", "front_rows"):
-            if not getattr(self, name) or min(getattr(self, name)) < 2:
-                raise _impossible(subject, self, name, "Give numbers from 2 on.")
-        for name in ("uneven", "head_down"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise _impossible(subject, self, name, "Give a share of 0 to 1.")
-        for name, known in (("kinds", SENSOR_KINDS), ("returns", get_args(ReturnMode))):
-            weights = getattr(self, name)
-            positive = all(weight >= 0 for weight in weights.values()) and any(weights.values())
-            if not positive or not weights.keys() <= set(known):
-                raise _impossible(subject, self, name, f"Give weights of {', '.join(known)}.")
+            low, high = getattr(self, name)
+            possible[name] = 0 < low <= high < math.inf
+        self._refuse_impossible("sensor spans", possible)
 
 
-# Spans that are log-uniform.
-LOGARITHMIC_SPANS = frozenset(
-    {
-        *("azimuth_step", "front_step", "rosette_beams", "prism_turns", "range_noise"),
-        *("minimum_range", "maximum_range", "detection_threshold", "beam_divergence"),
-    }
-)
+def _are_rows(rows: tuple[int, ...]) -> bool:
+    return bool(rows) and all(2 <= count <= MOST_ROWS for count in rows)
 
 
-def draw(spans: Any, name: str, generator: Generator) -> float:
+def draw(spans: DefectSpans | SensorSpans, name: str, generator: Generator) -> float:
     """Draws a value from a span.
 
     Args:
@@ -191,31 +171,3 @@ def draw(spans: Any, name: str, generator: Generator) -> float:
     if name in LOGARITHMIC_SPANS:
         return log_uniform(span, generator)
     return float(generator.uniform(*span))
-
-
-def draw_kind(weights: Mapping[str, float], generator: Generator) -> str:
-    """Draws a name by weights, which need not add up to 1."""
-    share = np.array(list(weights.values())) / sum(weights.values())
-    return str(generator.choice(list(weights), p=share))
-
-
-def _check_spans(spans: Any, subject: str) -> None:
-    for name, kind in get_type_hints(type(spans)).items():
-        if kind == Span:
-            low, high = getattr(spans, name)
-            if not (low <= high and math.isfinite(high - low)):
-                raise _impossible(subject, spans, name, "Give two numbers, the lower one first.")
-
-
-def _impossible(subject: str, spans: Any, name: str, remedy: str) -> InputError:
-    return InputError(f"{subject}: {name}", f"{shown(getattr(spans, name))} is impossible", remedy)
-
-
-# What reads a property, by its type.
-_PARSERS = PARSERS | {
-    tuple[int, ...]: lambda entry: tuple(item.whole(2, MOST_ROWS) for item in entry.items()),
-    Mapping[str, float]: lambda entry: {
-        name: one.number() for name, one in entry.members().items()
-    },
-    DefectSpans: DefectSpans.of,
-}

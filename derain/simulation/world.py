@@ -1,11 +1,10 @@
 """The training world: what scans are drawn from, and a data set of single scans drawn from one."""
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import yaml
@@ -15,22 +14,22 @@ from derain.cards.card import load_card
 from derain.errors import InputError
 from derain.files import write_scan
 from derain.files.atomic import replacing
-from derain.files.documents import Entry, shown
+from derain.files.documents import Entry
 from derain.files.labels import write_labels
 from derain.files.packaged import packaged, packaged_or_own
 from derain.scan import Scan
 from derain.simulation.campaign import SplitSequences
 from derain.simulation.classes import TrackClass, unpacked
+from derain.simulation.drawing import draw_name
 from derain.simulation.drawn_sensor import draw_sensor
-from derain.simulation.flying.kinds import PrecipitationSpans, draw_precipitation
 from derain.simulation.flying.meeting import meet
-from derain.simulation.flying.precipitation import Precipitation
+from derain.simulation.flying.precipitation import PrecipitationSpans
 from derain.simulation.layouts import INDOORS, LAYOUTS
 from derain.simulation.places.carrier import lay_out_carrier
 from derain.simulation.places.horizon import lay_out_horizon
 from derain.simulation.sensor import Sensor
-from derain.simulation.sensor_file import read_fields
-from derain.simulation.spans import SensorSpans, draw_kind
+from derain.simulation.settings import Settings, weights_of
+from derain.simulation.spans import SensorSpans
 from derain.simulation.track import Track
 
 # What the folders of a sequence are called.
@@ -48,7 +47,7 @@ MOST_TRIES = 100
 
 
 @dataclass(frozen=True)
-class World:
+class World(Settings):
     """The distributions that scans are drawn from.
 
     Attributes:
@@ -67,58 +66,11 @@ class World:
     carrier: float = 1.0
     sensors: SensorSpans = field(default_factory=SensorSpans)
     precipitation: PrecipitationSpans = field(default_factory=PrecipitationSpans)
+    READ_BY: ClassVar = {"places": weights_of(*LAYOUTS)}
 
     def __post_init__(self) -> None:
-        for place, weight in self.places.items():
-            if not 0 <= weight < math.inf:
-                reason = f"{shown(weight)} is no weight"
-                raise InputError(f"world: places: {place}", reason, "Give 0 or more.")
-        if not any(self.places.values()):
-            raise InputError("world: places", "no place has a weight", "Give one place a weight.")
-        for name in ("horizon", "carrier"):
-            share = getattr(self, name)
-            if not 0 <= share <= 1:
-                reason = f"{shown(share)} is no share"
-                raise InputError(f"world: {name}", reason, "Give a share of 0 to 1.")
-
-    @classmethod
-    def of(cls, entry: Entry) -> Self:
-        """Reads what a document states; the rest is as by default.
-
-        Raises:
-            InputError: Another key, or a value of another kind or that is impossible.
-        """
-        parsers = {
-            "places": lambda part: dict(part.record(dict.fromkeys(LAYOUTS, Entry.number))),
-            "horizon": lambda part: part.within(0, 1),
-            "carrier": lambda part: part.within(0, 1),
-            "sensors": SensorSpans.of,
-            "precipitation": PrecipitationSpans.of,
-        }
-        return read_fields(cls, entry, parsers)
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnScan:
-    """A scan of a world.
-
-    Attributes:
-        scan: Its points, intensities in 0..255, and labels, which are TrackClass.
-        place: Name of the layout.
-        sensor: The sensor that took it.
-        precipitation: What flew in it.
-    """
-
-    scan: Scan
-    place: str
-    sensor: Sensor
-    precipitation: Precipitation
-
-    @property
-    def description(self) -> dict[str, Any]:
-        """What was drawn, in primitives."""
-        sensor, precipitation = asdict(self.sensor), asdict(self.precipitation)
-        return {"place": self.place, "sensor": sensor, "precipitation": precipitation}
+        shares = {"horizon": 0 <= self.horizon <= 1, "carrier": 0 <= self.carrier <= 1}
+        self._refuse_impossible("world", shares)
 
 
 def packaged_worlds() -> dict[str, Path]:
@@ -138,36 +90,36 @@ def load_world(name: str | Path) -> World:
     return World.of(Entry.of_yaml(packaged_or_own(name, packaged_worlds(), "world")))
 
 
-def draw_scan(world: World, generator: Generator) -> DrawnScan:
+def draw_scan(world: World, generator: Generator) -> tuple[Scan, dict[str, Any]]:
     """Draws a place, a sensor and the weather, and takes a scan.
 
     Args:
         world: What is drawn from.
         generator: Random generator.
 
+    Returns:
+        The scan, intensities in 0..255, labels TrackClass; and what was drawn, in primitives:
+        ``place``, the name of the layout, and the attributes of ``sensor`` and ``precipitation``.
+
     Raises:
         InputError: A world of which hardly a scan holds anything but rain, or Open3D cannot be
             imported.
     """
     for _ in range(MOST_TRIES):
-        drawn = _drawn(world, generator)
-        kind = drawn.scan.label
-        assert kind is not None  # a simulated scan is labelled
-        if len(kind) >= SMALLEST_SCAN and (kind == TrackClass.RAIN).mean() <= LARGEST_SHARE_OF_RAIN:
-            return drawn
+        sensor = draw_sensor(world.sensors, generator)
+        place = draw_name(world.places, generator)
+        track = _lay_out(place, world, sensor, generator)
+        precipitation = world.precipitation.draw(generator)
+        detected = meet(track.cast(sensor), sensor.beams(), precipitation, sensor, generator)
+        scan = sensor.measure(detected, generator)
+        rain = scan.label == TrackClass.RAIN
+        if len(scan) >= SMALLEST_SCAN and np.mean(rain) <= LARGEST_SHARE_OF_RAIN:
+            drawn = {"sensor": asdict(sensor), "precipitation": asdict(precipitation)}
+            return scan, {"place": place, **drawn}
     raise InputError("world", "its scans are empty or nothing but rain", "Draw less rain.")
 
 
-def _drawn(world: World, generator: Generator) -> DrawnScan:
-    sensor = draw_sensor(world.sensors, generator)
-    place = draw_kind(world.places, generator)
-    track = _laid_out(place, world, sensor, generator)
-    precipitation = draw_precipitation(world.precipitation, generator)
-    detected = meet(track.cast(sensor), sensor.beams(), precipitation, sensor, generator)
-    return DrawnScan(sensor.measure(detected, generator), place, sensor, precipitation)
-
-
-def _laid_out(place: str, world: World, sensor: Sensor, generator: Generator) -> Track:
+def _lay_out(place: str, world: World, sensor: Sensor, generator: Generator) -> Track:
     track = LAYOUTS[place](generator)
     if place not in INDOORS and generator.random() < world.horizon:
         track = track.with_surfaces(lay_out_horizon(generator))
@@ -227,10 +179,10 @@ class WorldCampaign(SplitSequences):
         """
         assert isinstance(self.world, World)  # after resolved()
         seed = np.random.SeedSequence(self.seed, spawn_key=(int(name),))
-        drawn = draw_scan(self.world, np.random.default_rng(seed))
-        assert drawn.scan.label is not None
-        write_scan(folder / FOLDERS.scans / f"{STEM}.bin", drawn.scan)
-        write_labels(folder / FOLDERS.labels / f"{STEM}.label", *unpacked(drawn.scan.label))
+        scan, drawn = draw_scan(self.world, np.random.default_rng(seed))
+        assert scan.label is not None  # a simulated scan is labelled
+        write_scan(folder / FOLDERS.scans / f"{STEM}.bin", scan)
+        write_labels(folder / FOLDERS.labels / f"{STEM}.label", *unpacked(scan.label))
         with replacing(folder / DRAWN_WORLDS) as temporary:
-            described = json.loads(json.dumps(drawn.description))
+            described = json.loads(json.dumps(drawn))
             temporary.write_text(yaml.safe_dump(described, sort_keys=False), "utf-8")

@@ -16,7 +16,7 @@ from derain.files.labels import instance, read_labels, semantic
 from derain.simulation.campaign import Campaign, Drive
 from derain.simulation.classes import TrackClass
 from derain.simulation.radar import Radar
-from derain.simulation.sensor_file import load_sensor
+from derain.simulation.sensor import load_sensor
 from derain.simulation.sequence import write_sequence
 from derain.sources.folders import named_frames
 

@@ -10,7 +10,7 @@ from derain.scan import Scan
 from derain.simulation.classes import TrackClass
 from derain.simulation.rain_field import UniformRain
 from derain.simulation.recorded import rain_on_scan
-from derain.simulation.sensor_file import load_sensor
+from derain.simulation.sensor import load_sensor
 from derain.weather.rays import BIN, RAY_SECTORS
 from derain.weather.scan_weather import RANGE_BANDS, ScanWeather, dry_reach
 from derain.weather.visibility import NOT_KNOWN

@@ -1,126 +1,22 @@
-"""Beams on their way through particles: those they meet, and the surfaces they still detect."""
-
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Self
+"""Beams on their way through all that flies: what the sensor still reports of each."""
 
 import numpy as np
 from numpy.random import Generator
 
-from derain.simulation.arrays import Columns, Floats, Ints
+from derain.simulation.arrays import Floats
 from derain.simulation.classes import TrackClass
-from derain.simulation.detection import detected_surfaces, reported
-from derain.simulation.flying.beam_tree import covered_share
-from derain.simulation.flying.gusts import Gusts
-from derain.simulation.flying.haze import draw_haze
-from derain.simulation.flying.particles import OpenBeams, Stretch, draw_particles
+from derain.simulation.flying.encounters import Encounters, Population, encounter
+from derain.simulation.flying.optics import Optics, Sizes, Slices
+from derain.simulation.flying.particles import OpenBeams, Stretch
 from derain.simulation.flying.precipitation import Precipitation
-from derain.simulation.flying.regions import Air, GroundLayer, Region, draw_plumes
-from derain.simulation.flying.sizes import Optics, Sizes, Slices, nearest_seen
+from derain.simulation.flying.regions import GroundLayer, Gusts, draw_plumes
 from derain.simulation.sensor import Returns, Sensor
-
-# A particle leaves at least so much of the light, a modelling choice: a little goes around it.
-LEAST_LEFT = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Population:
-    """Particles of a kind.
-
-    Attributes:
-        number: Particles per cubic metre where they are densest, m⁻³.
-        sizes: Their diameters.
-        region: Where they fly.
-    """
-
-    number: float
-    sizes: Sizes
-    region: Region
-
-
-@dataclass(frozen=True, eq=False)
-class Encounters(Columns):
-    """Particles in beams, by beam and then by distance.
-
-    Attributes:
-        beam: Row of the beam, int64 (M,), ascending.
-        range: Distance of the particle's front, float64 (M,), metres.
-        covered: Share of the beam that it covers, float64 (M,), in 0..1.
-        brightness: Apparent reflectivity of a particle that covers a whole beam, float64 (M,).
-    """
-
-    beam: Ints
-    range: Floats
-    covered: Floats
-    brightness: Floats
-
-    @classmethod
-    def none(cls) -> Self:
-        """Clear air."""
-        return cls(np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0))
-
-    def ordered(self) -> Self:
-        """The same by beam, and then by distance."""
-        return self.take(np.lexsort((self.range, self.beam)))
-
-    @property
-    def reflectivity(self) -> Floats:
-        """Apparent reflectivity behind the nearer particles of the beam, float64 (M,)."""
-        # Sums up to a particle, less those of the beams before its own.
-        loss = np.cumsum(self._loss) - self._loss
-        first = np.searchsorted(self.beam, self.beam)
-        return self.brightness * self.covered * np.exp(loss - loss[first])
-
-    def transmission(self, beams: int) -> Floats:
-        """Share of the light of each beam that passes all of its particles, float64 (beams,)."""
-        return np.exp(np.bincount(self.beam, self._loss, minlength=beams))
-
-    @property
-    def _loss(self) -> Floats:
-        """Logarithm of what a particle leaves on the way there and back, float64 (M,)."""
-        return np.asarray(2 * np.log(np.maximum(1 - self.covered, LEAST_LEFT)))
-
-
-def encounter(
-    populations: Sequence[Population], beams: OpenBeams, flicker: float, generator: Generator
-) -> Encounters:
-    """Draws what the beams meet of all that flies.
-
-    Args:
-        populations: What flies.
-        beams: The beams.
-        flicker: By what share the reflectivity of single particles falls short at most.
-        generator: Random generator.
-    """
-    met = [
-        _encounters_with(population, beams, flicker, generator)
-        for population in populations
-        if population.number and len(beams.directions)
-    ]
-    return Encounters.joined([Encounters.none(), *met]).ordered()
-
-
-def _encounters_with(
-    population: Population, beams: OpenBeams, flicker: float, generator: Generator
-) -> Encounters:
-    stretch = population.region.stretch(beams.directions, beams.stretch)
-    particles, meetings = draw_particles(
-        population.number, population.sizes, stretch, beams, generator
-    )
-    # The density is uneven: of the densest, its share stays.
-    there = generator.random(len(particles.diameter)) < population.region.density(particles.place)
-    brightness = beams.optics.brightness * (1 - flicker * generator.random(len(there)))
-    meetings = meetings.take(there[meetings.particle])
-    particle = meetings.particle
-    diameter, centre = particles.diameter[particle], particles.range[particle]
-    covered = covered_share(beams.optics.width(centre), diameter, meetings.offset)
-    # A beam is returned from somewhere between the particle's front and its middle.
-    front = centre - diameter / 2 * generator.random(len(particle))
-    return Encounters(meetings.beam, front, covered, brightness[particle])
-
 
 # Spray has a mean diameter of .5 mm and at most 3, modelling choices: it is torn from rain.
 SPRAY = Sizes.gamma(0.5, 1, 3.0)
+
+# Shortest wave of the patches of haze over the view, radians; the longest is four times it.
+PATCH = 0.15
 
 
 def meet(
@@ -150,8 +46,9 @@ def meet(
         What the sensor detects, one row for each beam, what flies labelled RAIN; of a sensor with
         dual returns a second row where the last return is not the strongest.
     """
-    falling = uncrowded(precipitation, sensor)
-    sizes = _sizes(precipitation)
+    optics = Optics.of(precipitation, sensor)
+    sizes = Sizes.gamma(precipitation.diameter, precipitation.shape, precipitation.largest)
+    falling = uncrowded(precipitation, optics, sizes)
     gusts = Gusts(
         precipitation.gust_form,
         precipitation.gust_length,
@@ -159,50 +56,38 @@ def meet(
         precipitation.gust_seed,
     )
     extinction = falling * gusts.mean * sizes.extinction
-    layer = GroundLayer(-sensor.mounting_height, precipitation.drift_height, gusts)
-    seen = clear, beams, -sensor.mounting_height
-    plumes = draw_plumes(*seen, precipitation.plumes, precipitation.plume_length, generator)
-    met = encounter(
-        [
-            Population(falling, sizes, Air(gusts)),
-            Population(falling * precipitation.drift, sizes, layer),
-            *(Population(precipitation.plume_number, SPRAY, plume) for plume in plumes),
-        ],
-        _open_beams(clear, beams, precipitation, sensor),
-        precipitation.flicker,
-        generator,
+    ground = -sensor.mounting_height
+    layer = GroundLayer(ground, precipitation.drift_height, gusts)
+    plumes = draw_plumes(
+        clear, beams, ground, precipitation.plumes, precipitation.plume_length, generator
     )
+    populations = [
+        Population(falling, sizes, gusts),
+        Population(falling * precipitation.drift, sizes, layer),
+        *(Population(precipitation.plume_number, SPRAY, plume) for plume in plumes),
+    ]
+    stretch = Stretch(np.full(len(beams), optics.nearest), clear.range)
+    open_beams = OpenBeams(beams, stretch, optics)
+    met = encounter(populations, open_beams, precipitation.flicker, generator)
     transmission = met.transmission(len(beams)) * np.exp(-2 * extinction * clear.range)
     candidates = [
-        detected_surfaces(clear, transmission, sensor),
+        sensor.detected(clear, transmission),
         _detected_particles(met, extinction, clear, precipitation, sensor, generator),
-        draw_haze(clear, beams, precipitation, sensor, generator),
+        draw_haze(clear, beams, precipitation, optics, generator),
     ]
-    return reported(Returns.joined(candidates), sensor.returns)
+    return sensor.reported(Returns.joined(candidates))
 
 
-def uncrowded(precipitation: Precipitation, sensor: Sensor) -> float:
+def uncrowded(precipitation: Precipitation, optics: Optics, sizes: Sizes) -> float:
     """Falling particles per cubic metre, so few that no more than the crowding meet an open beam.
 
     Args:
         precipitation: What falls.
-        sensor: Whose beams they are.
+        optics: What the sensor sees of it.
+        sizes: Diameters of the particles.
     """
-    optics, sizes = Optics.of(precipitation, sensor), _sizes(precipitation)
-    slices = Slices(nearest_seen(precipitation, sensor), optics, sizes)
-    met = float(slices.met.sum())
+    met = float(Slices(optics.nearest, optics, sizes).met.sum())
     return min(precipitation.number, precipitation.crowding / met if met else precipitation.number)
-
-
-def _sizes(precipitation: Precipitation) -> Sizes:
-    return Sizes.gamma(precipitation.diameter, precipitation.shape, precipitation.largest)
-
-
-def _open_beams(
-    clear: Returns, beams: Floats, precipitation: Precipitation, sensor: Sensor
-) -> OpenBeams:
-    near = np.full(len(beams), nearest_seen(precipitation, sensor))
-    return OpenBeams(beams, Stretch(near, clear.range), Optics.of(precipitation, sensor))
 
 
 def _detected_particles(
@@ -229,4 +114,46 @@ def _detected_particles(
         np.minimum(reflectivity * (measured / distance) ** 2, 1),
         np.full(len(beam), int(TrackClass.RAIN)),
         beam,
+    )
+
+
+def draw_haze(
+    clear: Returns,
+    beams: Floats,
+    precipitation: Precipitation,
+    optics: Optics,
+    generator: Generator,
+) -> Returns:
+    """Draws what a haze returns: of a share of the beams, exponentially distributed in distance.
+
+    The distance to the first of many weak scatterers in an even medium is exponential. Where there
+    are patches, the share of a beam follows a smooth random field over the view, whose mean is the
+    share asked for. The power of a return over the threshold is log-uniform. All of it
+    is a modelling choice; what would lie behind the surface that ends the beam is left out.
+
+    Args:
+        clear: What each beam would return through clear air.
+        beams: Unit vectors along them, float64 (N, 3), sensor frame.
+        precipitation: What flies, the haze in it.
+        optics: What the sensor sees of it.
+        generator: Random generator.
+    """
+    share = np.full(len(beams), precipitation.haze)
+    if precipitation.haze_patches and len(beams):
+        field = Gusts("gusts", PATCH, precipitation.haze_patches, precipitation.gust_seed + 1)
+        patches = field.density(beams)
+        share *= patches / max(patches.mean(), 1e-9)
+    lit = np.flatnonzero(generator.random(len(beams)) < share)
+    depth = generator.exponential(precipitation.haze_depth, len(lit))
+    distance = optics.nearest + depth
+    ratio = precipitation.haze_strength ** generator.random(len(lit))
+    in_front = distance < np.minimum(clear.range[lit], optics.farthest)
+    lit, distance = lit[in_front], distance[in_front]
+    power = optics.threshold * ratio[in_front]
+    return Returns(
+        distance,
+        # Upwards, so that no return falls short of the threshold by rounding.
+        np.minimum(power * distance**2 * (1 + 1e-9), 1),
+        np.full(len(lit), int(TrackClass.RAIN)),
+        lit,
     )

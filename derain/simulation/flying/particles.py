@@ -2,46 +2,24 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 
 from derain.simulation.arrays import Bools, Columns, Floats, Ints
-from derain.simulation.flying.beam_tree import BeamTree, Meetings
-from derain.simulation.flying.sizes import Optics, Sizes, Slices
+from derain.simulation.flying.optics import Optics, Sizes, Slices
+from derain.system.cores import sleeping_threads
 
+with sleeping_threads():
+    import small_gicp
 
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """The part of each beam where particles of some kind may be.
+# Beams looked up around every particle at first; where all of them meet it, more are.
+FIRST_LOOK = 6
+GROWTH = 5
 
-    Attributes:
-        near: Where it begins, float64 (N,), metres.
-        far: Where it ends, float64 (N,), metres; before ``near`` where the beam has none.
-    """
-
-    near: Floats
-    far: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class OpenBeams:
-    """Beams in front of the surfaces that end them.
-
-    Attributes:
-        directions: Unit vectors along them, float64 (N, 3), sensor frame.
-        stretch: From the minimum range to the surfaces.
-        optics: What the sensor sees of particles in them.
-    """
-
-    directions: Floats
-    stretch: Stretch
-    optics: Optics
-
-    @cached_property
-    def tree(self) -> BeamTree:
-        """The same beams, to be found by direction."""
-        return BeamTree(self.directions)
+# Pairs of a particle and a beam that are looked at in one go: 64 MB of them.
+PAIRS_AT_ONCE = 2**22
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +38,92 @@ class Particles(Columns):
     def range(self) -> Floats:
         """Distance from the sensor, float64 (P,), metres."""
         return np.asarray(np.linalg.norm(self.place, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Meetings(Columns):
+    """Which particle is met by which beam; a particle and a beam may each be in several.
+
+    Attributes:
+        particle: Row of the particle, int64 (M,).
+        beam: Row of the beam, int64 (M,).
+        offset: Distance of the particle's centre from the beam's axis, float64 (M,), metres.
+    """
+
+    particle: Ints
+    beam: Ints
+    offset: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """The part of each beam where particles of some kind may be.
+
+    Attributes:
+        near: Where it begins, float64 (N,), metres.
+        far: Where it ends, float64 (N,), metres; before ``near`` where the beam has none.
+    """
+
+    near: Floats
+    far: Floats
+
+    def holds(self, beam: Ints, distance: Floats) -> Bools:
+        """Whether places on beams, by their distances in metres, are on it, bool (M,)."""
+        return np.asarray((self.near[beam] <= distance) & (distance <= self.far[beam]))
+
+
+@dataclass(frozen=True, eq=False)
+class OpenBeams:
+    """Beams in front of the surfaces that end them, to be found by their direction.
+
+    Attributes:
+        directions: Unit vectors along them, float64 (N, 3), sensor frame.
+        stretch: From the minimum range to the surfaces.
+        optics: What the sensor sees of particles in them.
+    """
+
+    directions: Floats
+    stretch: Stretch
+    optics: Optics
+
+    def meetings(self, particles: Particles) -> Meetings:
+        """Finds the beams that touch particles, none of them at the origin.
+
+        Returns:
+            In order of the particles; the distances are chords, which for the small angles between
+            neighbouring beams are the distances from the axes.
+        """
+        within = (self.optics.width(particles.range) + particles.diameter) / 2
+        found = [Meetings(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))]
+        rows, count = np.arange(len(within)), FIRST_LOOK
+        while len(rows):
+            count = min(count, len(self.directions))
+            more = []
+            for part in np.array_split(rows, 1 + len(rows) * count // PAIRS_AT_ONCE):
+                offset, beam = self._nearest(particles.place[part], count)
+                close = offset < within[part, None]
+                whole = ~close[:, -1] | (count == len(self.directions))
+                row, column = np.nonzero(close & whole[:, None])
+                found.append(Meetings(part[row], beam[row, column], offset[row, column]))
+                more.append(part[~whole])
+            rows, count = np.concatenate(more), GROWTH * count
+        meetings = Meetings.joined(found)
+        return meetings.take(np.argsort(meetings.particle, kind="stable"))
+
+    def nearest(self, place: Floats) -> Ints:
+        """The beam whose axis passes each place nearest, int64 (P,); places float64 (P, 3)."""
+        return self._nearest(place, 1)[1][:, 0]
+
+    def _nearest(self, place: Floats, count: int) -> tuple[Floats, Ints]:
+        """Offsets and rows of the nearest beams, nearest first, float64 and int64 (P, count)."""
+        far = np.linalg.norm(place, axis=1, keepdims=True)
+        # One thread, so that beams at the same distance come in the same order every time.
+        beam, squared = self._tree.batch_knn_search(place / far, count, num_threads=1)
+        return np.sqrt(squared) * far, beam.astype(np.int64)
+
+    @cached_property
+    def _tree(self) -> Any:
+        return small_gicp.KdTree(np.ascontiguousarray(self.directions), num_threads=1)
 
 
 def draw_particles(
@@ -84,39 +148,28 @@ def draw_particles(
     """
     drawn, drawn_for = _drawn_beam_by_beam(number, sizes, stretch, beams, generator)
     particles = drawn.take(_by_nearest(drawn, drawn_for, stretch, beams))
-    meetings = _meetings(particles, beams)
-    return particles, meetings.take(_inside(beams.stretch, meetings, particles.range))
+    meetings = beams.meetings(particles)
+    ahead = beams.stretch.holds(meetings.beam, particles.range[meetings.particle])
+    return particles, meetings.take(ahead)
 
 
 def _by_nearest(drawn: Particles, drawn_for: Ints, stretch: Stretch, beams: OpenBeams) -> Bools:
     """Which particles were drawn for the nearest of the beams that they could be drawn for."""
     if not len(drawn_for):
         return np.empty(0, np.bool_)
-    distance, nearest = drawn.range, beams.tree.nearest(drawn.place)
+    nearest = beams.nearest(drawn.place)
     kept = nearest == drawn_for
     # Where the nearest of all could not draw it, such as behind a surface, another one counts.
-    ended = (distance < stretch.near[nearest]) | (distance > stretch.far[nearest])
-    unsettled = np.flatnonzero(ended & ~kept)
+    unsettled = np.flatnonzero(~stretch.holds(nearest, drawn.range) & ~kept)
     rest = drawn.take(unsettled)
-    meetings = _meetings(rest, beams)
-    meetings = meetings.take(_inside(stretch, meetings, rest.range))
+    meetings = beams.meetings(rest)
+    meetings = meetings.take(stretch.holds(meetings.beam, rest.range[meetings.particle]))
     # From the farthest to the nearest: of several beams the last assigned stays.
     outwards = np.argsort(-meetings.offset, kind="stable")
     best = drawn_for[unsettled].copy()
     best[meetings.particle[outwards]] = meetings.beam[outwards]
     kept[unsettled] = best == drawn_for[unsettled]
     return np.asarray(kept)
-
-
-def _meetings(particles: Particles, beams: OpenBeams) -> Meetings:
-    within = (beams.optics.width(particles.range) + particles.diameter) / 2
-    return beams.tree.meetings(particles.place, within)
-
-
-def _inside(stretch: Stretch, meetings: Meetings, distance: Floats) -> Bools:
-    """Which meetings are on the stretch of their beam, bool (M,)."""
-    at = distance[meetings.particle]
-    return np.asarray((stretch.near[meetings.beam] <= at) & (at <= stretch.far[meetings.beam]))
 
 
 def _drawn_beam_by_beam(
@@ -140,12 +193,8 @@ def _drawn_beam_by_beam(
     # Uniform in the disc of the slice's far end, of which the beam has less where it is narrower.
     offset = np.sqrt(generator.random(len(rows))) * (np.concatenate(bound) + size) / 2
     turn = generator.uniform(0, 2 * np.pi, len(rows))
-    inside = (
-        (offset < (optics.width(along) + size) / 2)
-        & (stretch.near[rows] <= along)
-        & (along <= stretch.far[rows])
-        & (size >= optics.smallest_visible(along))
-    )
+    inside = (offset < (optics.width(along) + size) / 2) & stretch.holds(rows, along)
+    inside &= size >= optics.smallest_visible(along)
     rows = rows[inside]
     axis = beams.directions[rows]
     across = _across(axis, turn[inside]) * offset[inside, None]

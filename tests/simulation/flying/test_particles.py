@@ -1,15 +1,15 @@
-"""Particles in beams against volumes."""
+"""Particles in beams against volumes, and the beams that meet them against all of the beams."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from derain.simulation.arrays import Floats
-from derain.simulation.flying.particles import OpenBeams, Stretch, draw_particles
+from derain.simulation.flying import particles as particles_module
+from derain.simulation.flying.optics import Optics, Sizes
+from derain.simulation.flying.particles import OpenBeams, Particles, Stretch, draw_particles
 from derain.simulation.flying.precipitation import Precipitation
-from derain.simulation.flying.sizes import Optics, Sizes, Slices
 from derain.simulation.sensor import Sensor
 
 # It sees everything within 12 m.
@@ -29,20 +29,43 @@ def open_beams(directions: Floats, far: Floats | float = 12.0) -> OpenBeams:
     return OpenBeams(directions, Stretch(near, np.broadcast_to(far, near.shape)), OPTICS)
 
 
-def tube(far: float) -> float:
-    """Volume in which a beam meets a particle, averaged over the sizes, cubic metres."""
-    distance = np.linspace(SENSOR.minimum_range, far, 20_001)
-    width = OPTICS.width(distance)
-    area = np.pi / 4 * (width**2 + 2 * width * SIZES.moment(1) + SIZES.moment(2))
-    return float(np.trapezoid(area, distance))
+def tube(far: float, diameter: Floats) -> Floats:
+    """Volume in which a beam meets particles of some diameters, cubic metres."""
+    distance = np.linspace(SENSOR.minimum_range, far, 2001)
+    area = np.pi / 4 * (OPTICS.width(distance) + diameter[:, None]) ** 2
+    return np.trapezoid(area, distance, axis=1)
+
+
+def mean_tube(far: float) -> float:
+    return float((SIZES.share * tube(far, SIZES.diameter)).sum())
+
+
+def test_meetings_are_those_found_by_looking_at_every_beam(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(particles_module, "PAIRS_AT_ONCE", 50)
+    generator = np.random.default_rng(1)
+    far = generator.uniform(0.3, 30, 80)
+    place = TOGETHER[generator.integers(len(TOGETHER), size=80)] * far[:, None]
+    place += generator.normal(0, 0.01, place.shape)
+    drawn = Particles(place, generator.choice([0.001, 0.01, 0.1, 2.0], 80))
+
+    beams = open_beams(TOGETHER)
+    meetings = beams.meetings(drawn)
+    chord = np.linalg.norm(place[:, None] / drawn.range[:, None, None] - TOGETHER, axis=2)
+    offset = chord * drawn.range[:, None]
+    met = np.argwhere(offset < (OPTICS.width(drawn.range) + drawn.diameter)[:, None] / 2)
+    assert len(met) > 1200  # some meet all of the beams, some meet few
+    found = np.stack([meetings.particle, meetings.beam], axis=1)
+    assert sorted(map(tuple, found)) == sorted(map(tuple, met))
+    assert (np.diff(meetings.particle) >= 0).all()
+    assert np.allclose(meetings.offset, offset[meetings.particle, meetings.beam], atol=1e-9)
+    assert (beams.nearest(place) == offset.argmin(axis=1)).all()
 
 
 def test_particles_of_a_lone_beam_are_poisson_with_the_volume_around_it() -> None:
-    number = 2.0 / tube(12.0)
+    number, generator = 2.0 / mean_tube(12.0), np.random.default_rng(1)
+    beams = open_beams(APART)
     counts = []
-    generator = np.random.default_rng(1)
     for _ in range(5):
-        beams = open_beams(APART)
         _, meetings = draw_particles(number, SIZES, beams.stretch, beams, generator)
         counts.append(np.bincount(meetings.beam, minlength=len(APART)))
     count = np.concatenate(counts)
@@ -51,22 +74,16 @@ def test_particles_of_a_lone_beam_are_poisson_with_the_volume_around_it() -> Non
 
 
 def test_distances_and_sizes_follow_the_volume_of_each() -> None:
-    beams = open_beams(APART)
-    particles, meetings = draw_particles(
-        100.0 / tube(12.0), SIZES, beams.stretch, beams, np.random.default_rng(2)
-    )
-    count = len(meetings.beam)
-    nearer = np.count_nonzero(particles.range < 6)
-    share = tube(6.0) / tube(12.0)
-    assert nearer / count == pytest.approx(share, abs=4 * math.sqrt(share * (1 - share) / count))
+    number, beams = 100.0 / mean_tube(12.0), open_beams(APART)
+    particles, _ = draw_particles(number, SIZES, beams.stretch, beams, np.random.default_rng(2))
+    volume = SIZES.share * tube(12.0, SIZES.diameter)
     large = SIZES.diameter >= 4e-3
-    volume = [
-        np.trapezoid(np.pi / 4 * (OPTICS.width(at := np.linspace(1, 12, 2001)) + one) ** 2, at)
-        for one in SIZES.diameter
-    ]
-    share = float((SIZES.share * volume)[large].sum() / (SIZES.share * volume).sum())
-    drawn = np.count_nonzero(particles.diameter >= 4e-3) / count
-    assert drawn == pytest.approx(share, abs=4 * math.sqrt(share * (1 - share) / count))
+    for found, share in (
+        (particles.range < 6, mean_tube(6.0) / volume.sum()),
+        (particles.diameter >= 4e-3, volume[large].sum() / volume.sum()),
+    ):
+        error = math.sqrt(share * (1 - share) / len(found))
+        assert found.mean() == pytest.approx(share, abs=4 * error)
 
 
 @pytest.mark.parametrize("shadow", [False, True])
@@ -78,10 +95,9 @@ def test_beams_that_overlap_share_the_particles_of_the_space_that_they_fill(shad
     low, high = np.array([0.9, -0.15, -0.1]), np.array([12.1, 0.15, 0.1])
     number, box = 3e4, float(np.prod(high - low))
     place = generator.uniform(low, high, (generator.poisson(number * box), 3))
-    diameter = generator.choice(SIZES.diameter, len(place), p=SIZES.share)
-    range_ = np.linalg.norm(place, axis=1)
-    met = beams.tree.meetings(place, (OPTICS.width(range_) + diameter) / 2)
-    at = range_[met.particle]
+    tried = Particles(place, generator.choice(SIZES.diameter, len(place), p=SIZES.share))
+    met = beams.meetings(tried)
+    at = tried.range[met.particle]
     met = met.take((at >= 1) & (at <= far[met.beam]))
     particles, meetings = draw_particles(number, SIZES, beams.stretch, beams, generator)
 
@@ -91,27 +107,6 @@ def test_beams_that_overlap_share_the_particles_of_the_space_that_they_fill(shad
     ratio = len(met.beam) / expected
     assert ratio > 2
     assert len(meetings.beam) / len(particles.diameter) == pytest.approx(ratio, rel=0.1)
-
-
-def test_the_same_beam_many_times_has_the_particles_of_one() -> None:
-    one, many = open_beams(APART[:1]), open_beams(np.repeat(APART[:1], 7, axis=0))
-    number = 4000.0 / tube(12.0)
-    alone, _ = draw_particles(number, SIZES, one.stretch, one, np.random.default_rng(4))
-    shared, meetings = draw_particles(number, SIZES, many.stretch, many, np.random.default_rng(5))
-    assert len(shared.diameter) == pytest.approx(len(alone.diameter), abs=4 * math.sqrt(8000))
-    assert len(meetings.beam) == 7 * len(shared.diameter)
-
-
-def test_slices_count_what_would_be_seen_in_the_middle_of_a_beam() -> None:
-    sensor = replace(SENSOR, detection_threshold=4e-6, maximum_range=60.0)
-    optics = Optics.of(Precipitation(reflectivity=0.5), sensor)
-    distance = np.linspace(1, 60, 20_001)
-    width = optics.width(distance)[:, None]
-    visible = SIZES.diameter >= optics.smallest_visible(distance)[:, None]
-    area = visible * np.pi / 4 * (width + SIZES.diameter) ** 2
-    exact = np.trapezoid((area * SIZES.share).sum(axis=1), distance)
-    # The slices are as wide as at their far end.
-    assert exact < Slices(1.0, optics, SIZES).met.sum() < 1.6 * exact
 
 
 def test_beams_that_end_at_once_meet_nothing() -> None:

@@ -6,20 +6,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from derain.simulation.classes import TrackClass, packed
-from derain.simulation.flying.gusts import Gusts
 from derain.simulation.flying.particles import Stretch
-from derain.simulation.flying.regions import Air, GroundLayer, Plume, Region, draw_plumes
+from derain.simulation.flying.precipitation import UNEVEN, GustForm
+from derain.simulation.flying.regions import GroundLayer, Gusts, Plume, Region, draw_plumes
 from derain.simulation.sensor import Returns, Sensor
 
 EVEN = Gusts("even", 1, 1, 0)
 BEAMS = Sensor(columns=90, rows=31, azimuth=(-180, 180), inclination=(-60, 60)).beams()
 STRETCH = Stretch(np.full(len(BEAMS), 1.0), np.full(len(BEAMS), 40.0))
 PLUME = Plume(np.array([6.0, 2.0, -1.7]), np.array([-1.0, 0.0, 0.0]), 5.0)
+PLACES = np.random.default_rng(2).uniform(-60, 60, (10_000, 3))
 
 
 @pytest.mark.parametrize(
     "region",
-    [Air(EVEN), GroundLayer(-1.7, 0.1, EVEN), GroundLayer(-1.7, 0.8, EVEN), PLUME],
+    [EVEN, GroundLayer(-1.7, 0.1, EVEN), GroundLayer(-1.7, 0.8, EVEN), PLUME],
     ids=["air", "low", "high", "plume"],
 )
 def test_a_beam_is_in_the_region_on_no_more_than_its_stretch(region: Region) -> None:
@@ -33,6 +34,30 @@ def test_a_beam_is_in_the_region_on_no_more_than_its_stretch(region: Region) -> 
     # What of a layer is above its top is almost nothing, and is left out.
     assert density[~inside].max(initial=0) < 0.02
     assert density[inside].max() > 0.3
+
+
+@pytest.mark.parametrize("form", UNEVEN)
+@pytest.mark.parametrize("contrast", [0.5, 2.0])
+def test_the_mean_over_many_fields_is_that_of_gaussian_ones(
+    form: GustForm, contrast: float
+) -> None:
+    fields = [Gusts(form, 2.0, contrast, seed).density(PLACES[:1000]) for seed in range(40)]
+    assert np.min(fields) >= 0
+    assert np.max(fields) <= 1
+    assert np.mean(fields) == pytest.approx(Gusts(form, 2.0, contrast, 0).mean, rel=0.1)
+
+
+@pytest.mark.parametrize("form", UNEVEN)
+@pytest.mark.parametrize("length", [0.5, 8.0])
+def test_the_density_is_alike_within_the_length_and_not_far_beyond(
+    form: GustForm, length: float
+) -> None:
+    here, near, far = (
+        Gusts(form, length, 1.0, 5).density(PLACES + np.array([shift * length, 0, 0]))
+        for shift in (0, 0.05, 40)
+    )
+    assert np.corrcoef(here, near)[0, 1] > 0.9
+    assert np.corrcoef(here, far)[0, 1] < 0.5
 
 
 def test_drifting_snow_thins_out_with_height() -> None:

@@ -74,7 +74,8 @@ class Optics:
         spread: Width that it gains with distance, metres per metre.
         brightness: Reflectivity of the brightest particles times the gain.
         threshold: Weakest power that counts as a return, m⁻².
-        farthest: Distance beyond which no particle is reported, metres.
+        nearest: Distance within which no particle is reported, metres.
+        farthest: Distance beyond which none is, metres.
 
     Source: Kilic et al. 2021, "Lidar Light Scattering Augmentation (LISA)", for the share.
     """
@@ -83,6 +84,7 @@ class Optics:
     spread: float
     brightness: float
     threshold: float
+    nearest: float
     farthest: float
 
     @classmethod
@@ -99,8 +101,10 @@ class Optics:
         if reach:
             covered = min(1e-3 * precipitation.diameter / (aperture + spread * reach), 1) ** 2
             brightness = sensor.detection_threshold * reach**2 / covered
+        nearest = max(precipitation.nearest, sensor.minimum_range)
         farthest = min(precipitation.cut_off, sensor.maximum_range)
-        return cls(aperture, spread, brightness, sensor.detection_threshold, farthest)
+        threshold = sensor.detection_threshold
+        return cls(aperture, spread, brightness, threshold, nearest, farthest)
 
     def width(self, range: Floats) -> Floats:
         """Width of a beam at distances in metres, in metres."""
@@ -115,11 +119,6 @@ class Optics:
         return np.where(
             (needed <= 1) & (range <= self.farthest), self.width(range) * needed, math.inf
         )
-
-
-def nearest_seen(precipitation: Precipitation, sensor: Sensor) -> float:
-    """Distance within which the sensor reports no particle, metres."""
-    return max(precipitation.nearest, sensor.minimum_range)
 
 
 # Slices that the beams are cut into, evenly spaced on a logarithmic scale.
