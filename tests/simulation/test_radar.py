@@ -1,12 +1,10 @@
 """The radar against closed forms: echoes, false alarms, detections, and rain hardly seen."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.special import spherical_jn, spherical_yn
 
@@ -85,7 +83,7 @@ def backscatter_efficiency(size: float, index: complex) -> float:
     return float(abs(total) ** 2 / size**2)
 
 
-@pytest.mark.parametrize("rate", [10, 25, 50])
+@pytest.mark.parametrize("rate", [10, 50])
 def test_rain_scatters_back_as_by_mies_theory(rate: float) -> None:
     wavelength, water = 299.79 / 77, 3.67 + 2.16j  # mm; at 20 degrees, Liebe et al. 1991
     diameter = np.linspace(0.02, 8, 400)
@@ -106,17 +104,13 @@ def test_the_echo_of_a_plate_is_in_proportion_to_its_area_at_any_distance() -> N
 
 
 def test_a_car_returns_more_than_a_bike_and_a_bike_more_than_a_pedestrian() -> None:
-    def mean_dbsm(make: Callable[[Generator], Surface]) -> float:
-        echoes = [
-            surface_echoes(Track.of([make(np.random.default_rng(seed)).placed(20, 0)]), Radar())[0]
-            for seed in range(3)
-        ]
-        return float(10 * np.log10(np.mean([echo.sum() for echo in echoes])))
-
-    car, bike = mean_dbsm(objects.car), mean_dbsm(objects.bike)
-    assert 5 < car < 15
-    assert -9 < bike < 1
-    assert -12 < mean_dbsm(objects.pedestrian) < bike
+    strengths = []
+    for make in (objects.pedestrian, objects.bike, objects.car):
+        things = [make(np.random.default_rng(seed)).placed(20, 0) for seed in range(3)]
+        echoes = [surface_echoes(Track.of([thing]), Radar())[0].sum() for thing in things]
+        strengths.append(10 * np.log10(np.mean(echoes)))
+    assert strengths == sorted(strengths)
+    assert strengths == pytest.approx([-9, -3, 10], abs=5)
 
 
 def test_an_echo_lies_in_the_cell_that_its_surface_lies_in() -> None:
@@ -185,13 +179,9 @@ def test_positions_are_off_by_a_share_of_the_cell() -> None:
     x, y = away * math.cos(azimuth[2]), away * math.sin(azimuth[2])
     scans = frames(Track.of([plate(x, 0.3, y, height)]), radar, 300)
     points = np.concatenate([scan.xyz[scan.label == TrackClass.TARGET] for scan in scans])
-    measured = np.stack(
-        [
-            np.arcsin(points[:, 2] / np.linalg.norm(points, axis=1)),
-            np.arctan2(points[:, 1], points[:, 0]),
-            np.linalg.norm(points, axis=1),
-        ]
-    )
+    range_ = np.linalg.norm(points, axis=1)
+    azimuths = np.arctan2(points[:, 1], points[:, 0])
+    measured = np.stack([np.arcsin(points[:, 2] / range_), azimuths, range_])
     centre = np.array([inclination[1], azimuth[2], distance[60]])
     error = (measured - centre[:, None]) / np.array(radar.cell)[:, None]
     assert len(points) > 200
@@ -215,30 +205,21 @@ def test_the_scene_stands_and_the_rain_falls() -> None:
     assert offset == pytest.approx(0, abs=0.1)
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_a_frame_of_a_street_has_hundreds_of_detections_and_hardly_any_rain(seed: int) -> None:
-    track = lay_out_track(np.random.default_rng(seed))
-    scans = frames(track, Radar(), 20, SprinkledRain(50))
-    dry = frames(track, Radar(), 20)
-    for scan in [*scans, *dry]:
-        assert 100 < len(scan) < 500
-    assert 0 < (labels(scans) == TrackClass.RAIN).mean() < 0.01
-    assert len(labels(scans)) > 0.9 * len(labels(dry))
-    assert not (labels(dry) == TrackClass.RAIN).any()
-    assert {TrackClass.BACKGROUND, TrackClass.CAR} < set(labels(scans))
-
-
-def test_a_frame_has_named_columns_and_follows_from_its_seed() -> None:
+def test_a_frame_of_a_street_has_hundreds_of_detections_and_hardly_any_rain() -> None:
     track = lay_out_track(np.random.default_rng(0))
-    mean = mean_echoes(track, HEAVY, Radar())
-    one, same = (detect(mean, Radar(), np.random.default_rng(7)) for _ in range(2))
-    other = detect(mean, Radar(), np.random.default_rng(8))
-    assert {name: values.dtype for name, values in one.fields.items()} == dict.fromkeys(
-        ["x", "y", "z", "doppler", "rcs"], np.dtype(np.float32)
-    )
-    np.testing.assert_array_equal(np.stack([one.fields[axis] for axis in "xyz"], axis=1), one.xyz)
-    assert (one.label.dtype, one.valid.all()) == (np.int64, True)
-    for name in one.fields:
-        np.testing.assert_array_equal(one.fields[name], same.fields[name])
-    assert len(one) != len(other) or not np.array_equal(one.xyz, other.xyz)
-    assert np.isfinite(one.fields["rcs"]).all()
+    rainy, dry = frames(track, Radar(), 15, SprinkledRain(50)), frames(track, Radar(), 15)
+    for scan in [*rainy, *dry]:
+        assert 100 < len(scan) < 500
+        assert scan.valid.all()
+        assert {name: values.dtype for name, values in scan.fields.items()} == dict.fromkeys(
+            ["x", "y", "z", "doppler", "rcs"], np.dtype(np.float32)
+        )
+        assert np.array_equal(np.stack([scan.fields[axis] for axis in "xyz"], axis=1), scan.xyz)
+        assert np.isfinite(scan.fields["rcs"]).all()
+    assert 0 < (labels(rainy) == TrackClass.RAIN).mean() < 0.01
+    assert len(labels(rainy)) > 0.9 * len(labels(dry))
+    assert not (labels(dry) == TrackClass.RAIN).any()
+    assert {TrackClass.BACKGROUND, TrackClass.CAR} < set(labels(rainy))
+    again = frames(track, Radar(), 1)[0]
+    assert np.array_equal(again.xyz, dry[0].xyz)
+    assert not np.array_equal(dry[1].xyz[:100], dry[0].xyz[:100])

@@ -23,9 +23,11 @@ def in_the_way(surface: Surface) -> np.ndarray:
     return corners[(corners[:, 2] > LOWEST) & (corners[:, 2] < HIGHEST)]
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 def test_nothing_stands_in_the_lanes_and_in_the_side_streets(seed: int) -> None:
     street, surfaces = drawn(seed)
+    there = {surface.label for surface in surfaces}
+    assert there == set(TrackClass) - {TrackClass.RAIN, TrackClass.SPRINKLER, TrackClass.TARGET}
     corners = np.concatenate([in_the_way(surface) for surface in surfaces])
     assert np.abs(corners[:, 1] - street.axis).min() > street.lane
     for middle in street.junctions:
@@ -43,17 +45,3 @@ def test_things_stand_on_both_sides_all_along_the_drive_and_the_sight(length: fl
             assert ((near[:, 0] > begin) & (near[:, 0] < begin + 30)).any()
     assert corners[:, 0].min() < -SIGHT + 20
     assert corners[:, 0].max() > length + SIGHT - 20
-
-
-def test_the_next_side_street_is_ahead_of_the_last_scan() -> None:
-    for seed in range(10):
-        street = Street.draw(26, np.random.default_rng(seed))
-        assert list(street.junctions) == sorted(street.junctions)
-        ahead = min(middle for middle in street.junctions if middle > 26)
-        assert 36 < ahead < 55
-
-
-def test_a_street_has_what_streets_have_and_no_sprinklers() -> None:
-    _, surfaces = drawn(0)
-    there = {surface.label for surface in surfaces}
-    assert there == set(TrackClass) - {TrackClass.RAIN, TrackClass.SPRINKLER, TrackClass.TARGET}
