@@ -10,13 +10,21 @@ from derain.errors import InputError
 from derain.files.documents import Entry, shown
 from derain.scan import LARGEST_ID, Scan
 from derain.views.candidates import Candidates, bounded_channels, candidates_at
-from derain.views.channels import MOST_CHANNELS, channel_of
+from derain.views.channels import MOST_CHANNELS
 from derain.views.one_viewpoint import viewpoint_issues
 from derain.views.registry import VIEWS
-from derain.views.scan_issues import ScanIssue, intensity_unlike_training, missing_channels
+from derain.views.scan_issues import (
+    ScanIssue,
+    intensity_unlike_training,
+    missing_channels,
+    missing_intensity,
+)
 from derain.views.view import View
 
 SCHEMA = 1
+
+# A channel of derain 0.2, the place of a return in its ray, which gained nothing.
+GONE = "dual_return"
 
 
 @dataclass(frozen=True)
@@ -82,9 +90,10 @@ class Spec:
             _refuse_contradictions(spec, entry)
             _view_of(entry.members()["view"], spec)
         except InputError as error:
-            raise InputError(
-                source, f"{error.subject}: {error.reason}", "Upgrade derain, or export it again."
-            ) from error
+            remedy = "Upgrade derain, or export it again."
+            if GONE in error.reason:
+                remedy = f"Train it again without {GONE}."
+            raise InputError(source, f"{error.subject}: {error.reason}", remedy) from error
         return spec
 
     @property
@@ -97,9 +106,14 @@ class Spec:
         """Unit of the training data's intensity."""
         return dict(zip(self.channels, self.units, strict=True)).get("intensity", "not used")
 
+    @property
+    def weighs_intensity(self) -> bool:
+        """Whether intensities matter to the network, as a channel or by how its view ranks them."""
+        return "intensity" in self.channels or VIEWS[self.view["kind"]].WEIGHS_INTENSITY
+
     def missing_channels(self, scan: Scan) -> dict[str, float]:
         """Channels that a scan has not got, and the means that stand in for them, by name."""
-        return {name: mean for name, mean in self.means.items() if channel_of(scan, name) is None}
+        return {name: mean for name, mean in self.means.items() if scan.channel(name) is None}
 
     def issues(self, scan: Scan) -> Iterator[ScanIssue]:
         """What is odd about a scan for the network, before it is judged.
@@ -112,6 +126,8 @@ class Spec:
         yield from intensity_unlike_training(
             scan, self.mean_intensity, self.intensity_unit, self.data
         )
+        if self.weighs_intensity and "intensity" not in self.channels:
+            yield from missing_intensity(scan, "rain is found by geometry alone, and less of it")
 
     def make_view(self, threads: int = 0) -> View:
         """The view that the network sees a scan through.
@@ -166,7 +182,10 @@ def _refuse_contradictions(spec: Spec, entry: Entry) -> None:
 def _channels(entry: Entry) -> tuple[str, ...]:
     if len(entry.items()) > MOST_CHANNELS:
         raise entry.fault(f"more than {MOST_CHANNELS} channels", "Name fewer.")
-    return entry.texts()
+    channels = entry.texts()
+    if GONE in channels:
+        raise entry.fault(f"the channel {GONE} is no longer computed", "Train it without.")
+    return channels
 
 
 def _classes(entry: Entry) -> dict[int, str]:

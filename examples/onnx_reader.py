@@ -29,6 +29,13 @@ STEPS = sorted(
 )
 VOTERS, CUTOFF = 5, 1.0
 
+# Of the isolated view: the same constants as the contract's.
+SAMPLED, STEP_NEIGHBOURS, FINEST_STEP, USUAL_STEP, NEAREST_POINT = 8192, 3, 1e-4, 0.1, 0.05
+AROUND, HALF_AT, MOST_CROWDED = 8, 2.0, 5.0
+RANGE_RESOLUTION, SAME_RAY = 0.05, 4e-4
+RANKS = 32
+SHELL_EDGES = np.square(np.geomspace(1, 60, 12)[1:-1]).astype(np.float32)
+
 
 class Model:
     """A model that ``derain export`` wrote.
@@ -44,12 +51,16 @@ class Model:
         self.spec: Spec = known["spec"]
         if not is_as_exported(Path(path).read_bytes(), known):
             raise SystemExit(f"{path}: its checksum differs or is missing")
-        unknown = {"dual_return", "intensity_rank"} & {*self.spec["channels"]}
-        if self.spec.get("schema", 1) > 1 or unknown or self.spec["view"].get("merged"):
+        views = {
+            "neighbours": self._by_neighbours,
+            "range": self._by_image,
+            "isolated_points": self._of_isolated,
+        }
+        kind = self.spec["view"]["kind"]
+        gone = "dual_return" in self.spec["channels"]
+        if self.spec.get("schema", 1) > 1 or kind not in views or gone:
             raise SystemExit(f"{path}: its Spec asks for what this reader does not know")
-        self.judge = {"neighbours": self._by_neighbours, "range": self._by_image}[
-            self.spec["view"]["kind"]
-        ]
+        self.judge = views[kind]
 
     def rain(self, points: Points) -> NDArray[np.bool_]:
         """True for rain, bool (N,), in the order of the points."""
@@ -62,6 +73,12 @@ class Model:
         if "candidates" in inputs:
             scored = inputs["neighbours"][: len(inputs["candidates"]), 0]
         of_points[scored] = self._probability(inputs)
+        return of_points[inverse]
+
+    def _of_isolated(self, points: Points) -> NDArray[np.float32]:
+        inputs, inverse = isolated_view(points, self.spec)
+        of_points = np.zeros(len(inputs["points"]) + 1, np.float32)  # the last for invalid rows
+        of_points[inputs["neighbours"][:, 0]] = self._probability(inputs)
         return of_points[inverse]
 
     def _by_image(self, points: Points) -> NDArray[np.float32]:
@@ -147,13 +164,9 @@ def candidate_rows(points: Points, spec: Spec) -> NDArray[np.bool_]:
 
 def neighbour_view(points: Points, spec: Spec) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
     """The inputs of a point network, and the point of each row, -1 for invalid rows."""
-    rows = along_the_curve(points, np.flatnonzero(valid_rows(points)))
-    elsewhere = np.ones(len(rows), bool)
-    elsewhere[1:] = (points[rows[1:], :3] != points[rows[:-1], :3]).any(axis=1)
-    first, inverse = rows[elsewhere], np.full(len(points), -1)
-    inverse[rows] = np.cumsum(elsewhere) - 1
-    k = spec["view"]["neighbours"]
-    neighbours, distances = nearest(points[first, :3].astype(np.float64), first, k)
+    first, inverse = distinct_points(points)
+    every, k = np.arange(len(first)), spec["view"]["neighbours"]
+    neighbours, distances = nearest(points, first, every, k)
     inputs: dict[str, NDArray[Any]] = {
         "points": channels(points, first, spec),
         "neighbours": neighbours,
@@ -162,6 +175,16 @@ def neighbour_view(points: Points, spec: Spec) -> tuple[dict[str, NDArray[Any]],
     if spec.get("candidates"):
         inputs |= around_candidates(candidate_rows(points, spec)[first], neighbours, distances)
     return inputs, inverse
+
+
+def distinct_points(points: Points) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows of the distinct positions along the curve, and of each row its position's number."""
+    rows = along_the_curve(points, np.flatnonzero(valid_rows(points)))
+    elsewhere = np.ones(len(rows), bool)
+    elsewhere[1:] = (points[rows[1:], :3] != points[rows[:-1], :3]).any(axis=1)
+    first, inverse = rows[elsewhere], np.full(len(points), -1)
+    inverse[rows] = np.cumsum(elsewhere) - 1
+    return first, inverse
 
 
 def along_the_curve(points: Points, rows: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -181,15 +204,16 @@ def along_the_curve(points: Points, rows: NDArray[np.int64]) -> NDArray[np.int64
 
 
 def nearest(
-    xyz: NDArray[np.float64], rank: NDArray[np.int64], k: int
+    points: Points, first: NDArray[np.int64], some: NDArray[np.int64], k: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Of every point the k nearest, itself first; of equally near ones, lower ranks first."""
-    neighbours = np.empty((len(xyz), k), np.int64)
-    squared = np.empty((len(xyz), k))
-    for number, place in enumerate(xyz):
+    """Of some of the points the k nearest, itself first; of equally near ones, lower rows first."""
+    xyz = points[first, :3].astype(np.float64)
+    neighbours = np.empty((len(some), k), np.int64)
+    squared = np.empty((len(some), k))
+    for number, place in enumerate(xyz[some]):
         away = ((xyz - place) ** 2).T
         every = away[0] + away[1] + away[2]
-        order = np.lexsort((rank, every))[:k]
+        order = np.lexsort((first, every))[:k]
         order = np.append(order, np.repeat(order[-1], k - len(order)))  # fewer points than k
         neighbours[number], squared[number] = order, every[order]
     return neighbours, np.sqrt(squared.astype(np.float32))
@@ -209,6 +233,103 @@ def around_candidates(
         "distances": distances[needed],
         "candidates": place[neighbours[own]],
     }
+
+
+def isolated_view(points: Points, spec: Spec) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    """The inputs of a network of isolated points; the point of each row, -1 for invalid rows."""
+    first, inverse = distinct_points(points)
+    step, doubled = sampled(points, first)
+    if doubled:
+        first, inverse = merged(points, first, inverse)
+        step, _ = sampled(points, first)
+    xyz = points[first, :3]
+    isolated = np.flatnonzero(crowding(xyz, step) <= MOST_CROWDED)
+    neighbours, distances = nearest(points, first, isolated, spec["view"]["neighbours"])
+    x, y, z = xyz.T
+    shell = np.searchsorted(SHELL_EDGES, x * x + y * y + z * z, side="right")
+    cell = shell * RANKS + intensity_ranks(points)[first]
+    counts = np.bincount(cell, minlength=(len(SHELL_EDGES) + 1) * RANKS)
+    inputs = {
+        "points": xyz,
+        "cell": cell,
+        "distances": distances,
+        "neighbours": neighbours,
+        "step": np.float32([step]),
+        "counts": counts.reshape(1, -1, RANKS).astype(np.float32),
+    }
+    return inputs, inverse
+
+
+def sampled(points: Points, first: NDArray[np.int64]) -> tuple[float, bool]:
+    """The angle between beams, radians, and whether returns are written more than once."""
+    some = np.unique(np.arange(SAMPLED) * len(first) // SAMPLED)[: len(first)]
+    neighbours, distances = nearest(points, first, some, 1 + STEP_NEIGHBOURS)
+    xyz = points[first, :3].astype(np.float64)
+    doubled = bool(one_return(xyz, neighbours, distances).any())
+    if len(first) <= STEP_NEIGHBOURS:
+        return USUAL_STEP, doubled
+    length = np.sqrt((xyz * xyz).sum(axis=1))
+    directions = xyz / np.maximum(length, NEAREST_POINT)[:, None]
+    apart = directions[neighbours[:, 1:]] - directions[neighbours[:, :1]]
+    widest = (apart * apart).sum(axis=2).max(axis=1)
+    return max(float(np.sqrt(np.median(widest))), FINEST_STEP), doubled
+
+
+def one_return(
+    xyz: NDArray[np.float64], neighbours: NDArray[np.int64], distances: NDArray[np.float32]
+) -> NDArray[np.bool_]:
+    """Which neighbours are one return with the point itself, bool (Q, k - 1)."""
+    length = np.linalg.norm(xyz, axis=1)
+    own, others = length[neighbours[:, :1]], length[neighbours[:, 1:]]
+    apart, farther = distances[:, 1:].astype(np.float64), others - own
+    near = (apart <= 2 * RANGE_RESOLUTION) & (np.abs(farther) <= RANGE_RESOLUTION)
+    aside = apart * apart - farther * farther
+    one: NDArray[np.bool_] = near & (aside <= SAME_RAY * SAME_RAY * own * others)
+    return one & (neighbours[:, 1:] != neighbours[:, :1])
+
+
+def merged(
+    points: Points, first: NDArray[np.int64], inverse: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The same with one point for each return: the one of the lowest row."""
+    neighbours, distances = nearest(points, first, np.arange(len(first)), 1 + STEP_NEIGHBOURS)
+    own, place = np.nonzero(one_return(points[first, :3].astype(np.float64), neighbours, distances))
+    other, lowest = neighbours[own, place + 1], first.copy()
+    np.minimum.at(lowest, own, first[other])
+    np.minimum.at(lowest, other, first[own])
+    number = np.full(len(points), -1)
+    number[first] = np.arange(len(first))
+    keeper = number[lowest]
+    while (keeper[keeper] != keeper).any():
+        keeper = keeper[keeper]
+    kept = np.flatnonzero(keeper == np.arange(len(first)))
+    return first[kept], np.append(np.searchsorted(kept, keeper), -1)[inverse]
+
+
+def crowding(xyz: Points, step: float) -> NDArray[np.float32]:
+    """How many points are near each one along the curve, the nearer the more, float32 (M,)."""
+    x, y, z = xyz.T
+    squared = np.maximum(x * x + y * y + z * z, np.float32(NEAREST_POINT**2))
+    per_half = 1 / (squared * np.float32((HALF_AT * step) ** 2))
+    result = np.zeros(len(xyz), np.float32)
+    for apart in range(1, min(AROUND, len(xyz) - 1) + 1):
+        x, y, z = (xyz[apart:] - xyz[:-apart]).T
+        distance = x * x + y * y + z * z
+        result[:-apart] += 1 / (1 + distance * per_half[:-apart])
+        result[apart:] += 1 / (1 + distance * per_half[apart:])
+    return result
+
+
+def intensity_ranks(points: Points) -> NDArray[np.int64]:
+    """Ranks of intensities, in which each level counts by the root of its points, int64 (N,)."""
+    intensity = channel(points, "intensity")
+    if intensity is None:
+        return np.zeros(len(points), np.int64)
+    levels, numbers = np.unique(intensity[valid_rows(points)], return_counts=True)
+    darker = np.append(0, np.cumsum(np.sqrt(numbers)))
+    steps = np.arange(1, RANKS) / RANKS * darker[-1]
+    edges = np.append(levels, np.float32(np.inf))[np.searchsorted(darker[:-1], steps)]
+    return np.searchsorted(edges, intensity, side="right")
 
 
 def range_view(

@@ -111,6 +111,7 @@ NAN, HUGE = float("nan"), 10**400
         *(({"threshold": wrong}, "threshold") for wrong in (NAN, -0.1, 1.1, "0.5", None, HUGE)),
         *(({"channels": wrong}, "channels") for wrong in ("xyzi", [1, 2, 3, 4], ["x"] * 4)),
         ({"channels": ["x"] * (MOST_CHANNELS + 1)}, "more than 64 channels"),
+        ({"channels": ["x", "y", "z", "dual_return"]}, "dual_return is no longer computed"),
         ({"channels": [], "units": [], "mean": [], "std": []}, "channels .* are none"),
         *(({name: [*SPEC.as_dict()[name]][:-1]}, "differ in number") for name in MEANS_OF),
         *(({"rule": wrong}, "rule") for wrong in (None, [1], {"residual": "a"}, {"a": HUGE})),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from derain.files.documents import Entry
 from derain.scan import Scan
-from derain.views.channels import MOST_CHANNELS, channel_of
+from derain.views.channels import MOST_CHANNELS
 
 # Bounds are compared as float32, as which a larger number would be infinite.
 LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
@@ -20,7 +20,7 @@ class Bound:
     """What a channel of rain is at least, and at most.
 
     Attributes:
-        channel: Its name, as :func:`channel_of` takes it.
+        channel: Its name, as :meth:`Scan.channel` takes it.
         least: Smallest value of rain, in the channel's unit; None where there is no such bound.
         most: Largest value of rain.
     """
@@ -78,7 +78,7 @@ class Candidates:
         """
         candidate = np.ones(len(scan), bool)
         for bound in self.bounds:
-            values = channel_of(scan, bound.channel)
+            values = scan.channel(bound.channel)
             if values is not None:
                 candidate &= bound.holds(values)
         return candidate

@@ -36,9 +36,10 @@ def merged_points(
         Of each return the point of the lowest row, int64 (R,), in the order of the points; and the
         return that each point is, as a row of the former, int64 (M,).
     """
-    own, other = _of_one_return(xyz, neighbours, distances)
-    if not len(own):
-        return np.arange(len(rows)), np.arange(len(rows))
+    own, place_of_other = np.nonzero(
+        are_one_return(xyz, np.arange(len(xyz)), neighbours, distances)
+    )
+    other = neighbours[own, place_of_other + 1]
     by_row = np.argsort(rows)
     place = np.empty_like(by_row)
     place[by_row] = np.arange(len(rows))
@@ -52,18 +53,38 @@ def merged_points(
     return kept, np.searchsorted(kept, keeper)
 
 
-def _of_one_return(
-    xyz: NDArray[np.float32], neighbours: NDArray[np.int64], distances: NDArray[np.float32]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of points and neighbours that are one return, each int64 (P,)."""
-    ranges = np.linalg.norm(xyz.astype(np.float64), axis=1)
-    point, place = np.nonzero(distances[:, 1:] <= 2 * RANGE_RESOLUTION)
-    other, apart = neighbours[point, place + 1], distances[point, place + 1].astype(np.float64)
-    own, others = ranges[point], ranges[other]
+def are_one_return(
+    xyz: NDArray[np.float32],
+    points: NDArray[np.int64],
+    neighbours: NDArray[np.int64],
+    distances: NDArray[np.float32],
+) -> NDArray[np.bool_]:
+    """Which neighbours of some points are one return with them.
+
+    Args:
+        xyz: Distinct positions in the sensor's frame, float32 (M, 3), metres.
+        points: Rows of Q of them, int64 (Q,).
+        neighbours: Of each of these itself and its nearest neighbours, int64 (Q, k).
+        distances: How far those are, float32 (Q, k), metres.
+
+    Returns:
+        bool (Q, k - 1), of the neighbours.
+    """
+    same = distances[:, 1:] <= 2 * RANGE_RESOLUTION
+    row, place = np.nonzero(same)
+    point, other = points[row], neighbours[row, place + 1]
+    apart = distances[row, place + 1].astype(np.float64)
+    own, others = (_ranges(xyz.take(rows, axis=0)) for rows in (point, other))
     farther = others - own
     # The square of a chord is that of the difference of ranges, and 2 r r' (1 - cos) of the angle.
-    same = (np.abs(farther) <= RANGE_RESOLUTION) & (
-        apart * apart - farther * farther <= SAME_RAY * SAME_RAY * own * others
+    same[row, place] = (
+        (np.abs(farther) <= RANGE_RESOLUTION)
+        & (apart * apart - farther * farther <= SAME_RAY * SAME_RAY * own * others)
+        & (point != other)  # the farthest point found fills up where there are few
     )
-    same &= point != other  # the farthest point found fills up where there are few
-    return point[same], other[same]
+    return same
+
+
+def _ranges(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
+    ranges: NDArray[np.float64] = np.linalg.norm(xyz.astype(np.float64), axis=1)
+    return ranges

@@ -12,7 +12,6 @@ from derain.files.documents import Entry
 from derain.scan import Scan
 from derain.views.candidates import Candidates
 from derain.views.channels import filled_values
-from derain.views.merged_points import merged_points
 from derain.views.morton import distinct_rows
 from derain.views.neighbour_search import NeighbourSearch
 from derain.views.registry import VIEWS
@@ -102,7 +101,7 @@ class Neighbourhoods(ViewedScan):
         """What gives every row the score of its point, and 0 where that has none."""
         if self.candidates is None:
             return partial(_to_rows, self.inverse)
-        return partial(_of_candidates_to_rows, self.inverse, self._of_candidates, len(self.points))
+        return partial(of_points_to_rows, self.inverse, self._of_candidates, len(self.points))
 
     @staticmethod
     def pack(seen: Sequence["Neighbourhoods"]) -> dict[str, NDArray[Any]]:
@@ -139,12 +138,10 @@ class NeighbourView(View):
 
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
-        channels: What the network sees of a point, in order, as :func:`channel_of` names it.
+        channels: What the network sees of a point, in order, as :meth:`Scan.channel` names it.
         fill_value: What stands in for a value that a scan lacks, by channel; 0 if not named.
         threads: Threads of the search; 0 takes every core this process may use.
         candidates: Which points are scored; None for all.
-        merged: Whether points on one ray, no farther apart than a sensor's range resolution, are
-            one point, as those at one position always are. Not together with candidates.
     """
 
     neighbours: int = 9
@@ -152,7 +149,6 @@ class NeighbourView(View):
     fill_value: Mapping[str, float] = field(default_factory=dict)
     threads: int = 0
     candidates: Candidates | None = None
-    merged: bool = False
 
     @classmethod
     def of(
@@ -164,20 +160,14 @@ class NeighbourView(View):
             InputError: Something that does not describe it.
         """
         found = entry.record(
-            {
-                "kind": Entry.text,
-                "neighbours": lambda e: e.whole(1, MOST_NETWORK_NEIGHBOURS),
-                "merged": Entry.truth,
-            },
+            {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NETWORK_NEIGHBOURS)},
             required=("neighbours",),
         )
-        merged = found.get("merged", False)
-        return cls(found["neighbours"], channels, fill_value, threads, merged=merged)
+        return cls(found["neighbours"], channels, fill_value, threads)
 
     def as_dict(self) -> dict[str, Any]:
-        """Its part of a Spec: ``kind`` and ``neighbours``, and ``merged`` where points are."""
-        merged = {"merged": True} if self.merged else {}
-        return {"kind": self.NAME, "neighbours": self.neighbours, **merged}
+        """Its part of a Spec: ``kind`` and ``neighbours``."""
+        return {"kind": self.NAME, "neighbours": self.neighbours}
 
     @property
     def azimuth(self) -> tuple[float, float]:
@@ -185,21 +175,13 @@ class NeighbourView(View):
         return ALL_AROUND
 
     def with_candidates(self, candidates: Candidates) -> Self:
-        """The same view, that scores candidates alone.
-
-        Raises:
-            InputError: A view that merges points.
-        """
-        if self.merged:
-            super().with_candidates(candidates)  # which refuses them
+        """The same view, that scores candidates alone."""
         return replace(self, candidates=candidates)
 
     def __call__(self, scan: Scan) -> Neighbourhoods:
         """Views a scan."""
         first, inverse = distinct_rows(scan)
         search = NeighbourSearch(scan.xyz.take(first, axis=0), rank=first, threads=self.threads)
-        if self.merged:
-            return self._of_merged(scan, first, inverse, search)
         points = filled_values(scan, first, self.channels, self.fill_value)
         if self.candidates is None:
             neighbours, distances = search(self.neighbours)
@@ -207,28 +189,6 @@ class NeighbourView(View):
         candidate = self.candidates.among(scan)[first]
         neighbours, distances, candidates = _around(search, candidate, self.neighbours)
         return Neighbourhoods(points, neighbours, distances, first, inverse, candidates)
-
-    def _of_merged(
-        self,
-        scan: Scan,
-        first: NDArray[np.int64],
-        inverse: NDArray[np.int64],
-        search: NeighbourSearch,
-    ) -> Neighbourhoods:
-        """Neighbourhoods of a scan in which points of one return are one point.
-
-        They are found among the neighbours, so that a scan without any costs no second search.
-        """
-        neighbours, distances = search(self.neighbours)
-        xyz = scan.xyz.take(first, axis=0)
-        kept, point = merged_points(xyz, first, neighbours, distances)
-        if len(kept) < len(first):
-            first = first[kept]
-            inverse = np.append(point, -1)[inverse]
-            search = NeighbourSearch(xyz.take(kept, axis=0), rank=first, threads=self.threads)
-            neighbours, distances = search(self.neighbours)
-        points = filled_values(scan, first, self.channels, self.fill_value)
-        return Neighbourhoods(points, neighbours, distances, first, inverse)
 
 
 def _around(
@@ -268,12 +228,23 @@ def _to_rows(inverse: NDArray[np.int64], score: NDArray[np.float32]) -> NDArray[
     return result
 
 
-def _of_candidates_to_rows(
+def of_points_to_rows(
     inverse: NDArray[np.int64],
     candidates: NDArray[np.int64],
     points: int,
     score: NDArray[np.float32],
 ) -> NDArray[np.float32]:
+    """Gives each row of a scan the score of its point.
+
+    Args:
+        inverse: Point of each row, int64 (N,); -1 for rows at none.
+        candidates: The points that are scored, int64 (J,).
+        points: M, the number of points.
+        score: float32 (J,).
+
+    Returns:
+        float32 (N,); 0 for rows at no point, or at one that is not scored.
+    """
     # The last place is for rows at no point, whose number is -1.
     of_points = np.zeros(points + 1, np.float32)
     of_points[candidates] = score

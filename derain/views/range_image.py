@@ -143,7 +143,7 @@ class RangeView(View):
 
     Args:
         grid: Rows and columns of the image.
-        channels: What a pixel holds, in order, as :func:`channel_of` names it.
+        channels: What a pixel holds, in order, as :meth:`Scan.channel` names it.
         back_projection: Name of the back-projection, by which points that lost their pixel get a
             score: ``nearest range``, ``copy`` or ``vote``. A Spec has it under the key
                 ``back_projection``.

@@ -69,11 +69,18 @@ def missing_channels(scan: Scan, fill_value: Mapping[str, float], data: str) -> 
         yield ScanIssue(lack, f"{detail}: the mean of {data}, {mean:.3g}, stands in")
 
 
-def missing_intensity(scan: Scan) -> Iterator[ScanIssue]:
-    """Whether a scan lacks the intensity without which a method finds nothing."""
+def missing_intensity(
+    scan: Scan, consequence: str = "nothing can be found without"
+) -> Iterator[ScanIssue]:
+    """Whether a scan lacks the intensity that a method needs.
+
+    Args:
+        scan: The scan.
+        consequence: What that means for the method.
+    """
     if scan.measured_intensity is None and scan.valid.any():
         lack, detail = _lack(scan)
-        yield ScanIssue(lack, f"{detail}: nothing can be found without")
+        yield ScanIssue(lack, f"{detail}: {consequence}")
 
 
 def intensity_unlike_training(scan: Scan, mean: float, unit: str, data: str) -> Iterator[ScanIssue]:

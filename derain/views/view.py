@@ -91,9 +91,11 @@ class View(ABC):
 
     Attributes:
         NAME: Its name in a Spec; the decorator sets it.
+        WEIGHS_INTENSITY: Whether it shows how bright points are, whatever the channels.
     """
 
     NAME: ClassVar[str]
+    WEIGHS_INTENSITY: ClassVar[bool] = False
 
     @classmethod
     @abstractmethod
@@ -104,7 +106,7 @@ class View(ABC):
 
         Args:
             entry: What stands under ``view`` in a Spec.
-            channels: What the network sees of a point, in order, as :func:`channel_of` names it.
+            channels: What the network sees of a point, in order, as :meth:`Scan.channel` names it.
             fill_value: What stands in for a value that a scan lacks, by channel.
             threads: Threads that it may use; 0 takes every core this process may use.
 

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from derain.errors import InputError
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from derain.scan import Scan
@@ -49,11 +50,20 @@ class PlacedScan:
         time: Seconds; None where it is not known.
         pose: Takes the sensor's frame to that of the world, float64 (4, 4), metres; None where it
             is not known.
+        stretch: Scans of one number have poses in one world, with none in doubt between them.
     """
 
     scan: "Scan"
     time: float | None = None
     pose: "NDArray[np.float64] | None" = None
+    stretch: int = 0
+
+    def to(self, other: "PlacedScan") -> "NDArray[np.float64] | None":
+        """Takes the frame of this scan to that of another, float64 (4, 4); None if not known."""
+        if self.pose is None or other.pose is None or self.stretch != other.stretch:
+            return None
+        transform: NDArray[np.float64] = np.linalg.inv(other.pose) @ self.pose
+        return transform
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "isolated_points.hpp"
 #include "neighbour_view.hpp"
 #include "network.hpp"
 #include "range_view.hpp"
@@ -29,6 +30,7 @@ class Derainer {
   // The probability of rain of each row of a scan.
   std::vector<float> probability(const Scan& scan, Times& times) {
     if (spec().range) return judged(scan, times, range_view);
+    if (spec().isolated) return judged(scan, times, isolated_points);
     return judged(scan, times, neighbour_view);
   }
 

@@ -23,6 +23,25 @@ inline bool are_one_return(double range, double other_range, double apart) {
          apart * apart - farther * farther <= kSameRay * kSameRay * range * other_range;
 }
 
+// Whether any point is one return with a neighbour of it; the point itself comes first.
+inline bool any_is_one_return(const std::vector<Position>& positions,
+                              const std::vector<std::int64_t>& neighbours,
+                              const std::vector<float>& distances, std::size_t k) {
+  const auto range_of_point = [&](std::int64_t point) {
+    const Position& p = positions[static_cast<std::size_t>(point)];
+    return std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+  };
+  for (std::size_t number = 0; number < neighbours.size(); ++number) {
+    const std::int64_t own = neighbours[number - number % k];
+    if (neighbours[number] == own || distances[number] > 2 * kRangeResolution) continue;
+    if (are_one_return(range_of_point(own), range_of_point(neighbours[number]),
+                       distances[number])) {
+      return true;
+    }
+  }
+  return false;
+}
+
 // The point that each of M points is one with: that of the lowest row among those that are one
 // return with it, and what that one is one with.
 inline std::vector<std::int64_t> keepers(const std::vector<Position>& positions,

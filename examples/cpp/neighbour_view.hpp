@@ -11,7 +11,6 @@
 #include "candidates.hpp"
 #include "inputs.hpp"
 #include "kd_tree.hpp"
-#include "merged_points.hpp"
 #include "parallel.hpp"
 #include "scan.hpp"
 #include "spec.hpp"
@@ -100,8 +99,9 @@ inline std::vector<CodedRow> coded_rows(const Scan& scan, const std::vector<bool
   return rows;
 }
 
-// The valid rows, those at one position side by side, the lowest first. The order matters: the
-// model that comes with derain takes every n-th point along it for a fair sample of the scan.
+// The valid rows, those at one position side by side, the lowest first. The order matters: what is
+// near a point is judged by what is near it along the curve, and every n-th point along it is a fair
+// sample of the scan.
 inline std::vector<CodedRow> along_the_curve(const Scan& scan, const std::vector<bool>& valid) {
   std::vector<CodedRow> rows = coded_rows(scan, valid);
   std::sort(rows.begin(), rows.end(), [&](const CodedRow& one, const CodedRow& other) {
@@ -113,15 +113,15 @@ inline std::vector<CodedRow> along_the_curve(const Scan& scan, const std::vector
   return rows;
 }
 
-// Finds which rows are at one position, and the first of them.
-inline void find_points(const Scan& scan, const std::vector<bool>& valid, NeighbourView& view) {
-  view.inverse.assign(scan.size(), -1);
+// Finds which rows are at one position: the first of each, and the position of every row.
+inline void find_points(const Scan& scan, const std::vector<bool>& valid,
+                        std::vector<std::int64_t>& first, std::vector<std::int64_t>& inverse) {
+  inverse.assign(scan.size(), -1);
   const float* before = nullptr;
   for (const auto& [code, row] : along_the_curve(scan, valid)) {
     const float* here = scan.row(static_cast<std::size_t>(row));
-    if (before == nullptr || !std::equal(here, here + 3, before)) view.first.push_back(row);
-    view.inverse[static_cast<std::size_t>(row)] =
-        static_cast<std::int64_t>(view.first.size()) - 1;
+    if (before == nullptr || !std::equal(here, here + 3, before)) first.push_back(row);
+    inverse[static_cast<std::size_t>(row)] = static_cast<std::int64_t>(first.size()) - 1;
     before = here;
   }
 }
@@ -136,28 +136,37 @@ inline void fill_points(const Scan& scan, const std::vector<bool>& valid, const 
                });
 }
 
-// Neighbourhoods of some points, behind those that the view has already.
-inline void add_neighbourhoods(const Scan& scan, const KdTree& tree,
-                               const std::vector<std::int64_t>& queries, unsigned threads,
-                               NeighbourView& view) {
-  const std::size_t begin = view.neighbours.size();
-  view.neighbours.resize(begin + queries.size() * view.k);
-  view.distances.resize(begin + queries.size() * view.k);
+// Neighbourhoods of k of some points, behind those that there are already.
+inline void add_neighbourhoods(const Scan& scan, const std::vector<std::int64_t>& first,
+                               const KdTree& tree, const std::vector<std::int64_t>& queries,
+                               std::size_t k, unsigned threads,
+                               std::vector<std::int64_t>& neighbours,
+                               std::vector<float>& distances) {
+  const std::size_t begin = neighbours.size();
+  neighbours.resize(begin + queries.size() * k);
+  distances.resize(begin + queries.size() * k);
   in_parts(queries.size(), threads, [&](std::size_t from, std::size_t to) {
     std::vector<Neighbour> found;
     for (std::size_t query = from; query < to; ++query) {
       const auto point = static_cast<std::size_t>(queries[query]);
-      const float* row = scan.row(static_cast<std::size_t>(view.first[point]));
-      tree.nearest({row[0], row[1], row[2]}, view.k, found);
-      for (std::size_t place = 0; place < view.k; ++place) {
+      const float* row = scan.row(static_cast<std::size_t>(first[point]));
+      tree.nearest({row[0], row[1], row[2]}, k, found);
+      for (std::size_t place = 0; place < k; ++place) {
         // Where there are fewer points than k, the farthest fills up.
         const Neighbour& neighbour = found[std::min(place, found.size() - 1)];
-        const std::size_t at = begin + query * view.k + place;
-        view.neighbours[at] = neighbour.point;
-        view.distances[at] = std::sqrt(static_cast<float>(neighbour.squared));
+        const std::size_t at = begin + query * k + place;
+        neighbours[at] = neighbour.point;
+        distances[at] = std::sqrt(static_cast<float>(neighbour.squared));
       }
     }
   });
+}
+
+inline void add_neighbourhoods(const Scan& scan, const KdTree& tree,
+                               const std::vector<std::int64_t>& queries, unsigned threads,
+                               NeighbourView& view) {
+  add_neighbourhoods(scan, view.first, tree, queries, view.k, threads, view.neighbours,
+                     view.distances);
 }
 
 inline std::vector<std::int64_t> numbers_where(const std::vector<bool>& wanted) {
@@ -191,46 +200,15 @@ inline void add_around_candidates(const Scan& scan, const KdTree& tree,
   add_neighbourhoods(scan, tree, others, threads, view);
 }
 
-}  // namespace detail
-
-namespace detail {
-
-inline std::vector<Position> positions_of(const Scan& scan, const NeighbourView& view) {
+inline std::vector<Position> positions_of(const Scan& scan,
+                                          const std::vector<std::int64_t>& rows) {
   std::vector<Position> positions;
-  positions.reserve(view.first.size());
-  for (const std::int64_t first : view.first) {
-    const float* row = scan.row(static_cast<std::size_t>(first));
+  positions.reserve(rows.size());
+  for (const std::int64_t number : rows) {
+    const float* row = scan.row(static_cast<std::size_t>(number));
     positions.push_back({row[0], row[1], row[2]});
   }
   return positions;
-}
-
-// All points with their neighbourhoods.
-inline void add_all(const Scan& scan, unsigned threads, NeighbourView& view) {
-  const KdTree tree(positions_of(scan, view), view.first, threads);
-  add_neighbourhoods(scan, tree, numbers_where(std::vector<bool>(view.first.size(), true)),
-                     threads, view);
-}
-
-// Makes one point of those that are one return; whether there were any.
-inline bool merge_points(const Scan& scan, NeighbourView& view) {
-  const std::vector<std::int64_t> keeper =
-      keepers(positions_of(scan, view), view.first, view.neighbours, view.distances, view.k);
-  std::vector<std::int64_t> first;
-  std::vector<std::int64_t> place(keeper.size(), -1);
-  for (std::size_t point = 0; point < keeper.size(); ++point) {
-    if (keeper[point] != static_cast<std::int64_t>(point)) continue;
-    place[point] = static_cast<std::int64_t>(first.size());
-    first.push_back(view.first[point]);
-  }
-  if (first.size() == view.first.size()) return false;
-  for (std::int64_t& point : view.inverse) {
-    if (point >= 0) point = place[static_cast<std::size_t>(keeper[static_cast<std::size_t>(point)])];
-  }
-  view.first = std::move(first);
-  view.neighbours.clear();
-  view.distances.clear();
-  return true;
 }
 
 }  // namespace detail
@@ -240,9 +218,9 @@ inline NeighbourView neighbour_view(const Scan& scan, const Spec& spec, unsigned
   NeighbourView view;
   view.k = spec.neighbours;
   const std::vector<bool> valid = valid_rows(scan);
-  detail::find_points(scan, valid, view);
+  detail::find_points(scan, valid, view.first, view.inverse);
+  const KdTree tree(detail::positions_of(scan, view.first), view.first, threads);
   if (spec.candidates) {
-    const KdTree tree(detail::positions_of(scan, view), view.first, threads);
     const std::vector<bool> rows = candidate_rows(scan, valid, spec);
     std::vector<bool> candidate;
     for (const std::int64_t first : view.first) {
@@ -250,8 +228,8 @@ inline NeighbourView neighbour_view(const Scan& scan, const Spec& spec, unsigned
     }
     detail::add_around_candidates(scan, tree, candidate, threads, view);
   } else {
-    detail::add_all(scan, threads, view);
-    if (spec.merged && detail::merge_points(scan, view)) detail::add_all(scan, threads, view);
+    const std::vector<bool> all(view.first.size(), true);
+    detail::add_neighbourhoods(scan, tree, detail::numbers_where(all), threads, view);
   }
   detail::fill_points(scan, valid, spec, view);
   return view;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "errors.hpp"
+#include "spec.hpp"
 
 namespace derain {
 
@@ -23,9 +24,6 @@ constexpr float kSentinel = -1.0F;
 
 // Where all of so many points have one intensity, it was filled in and not measured.
 constexpr std::size_t kFewestAlike = 100;
-
-// Steps in which intensities are ranked.
-constexpr int kIntensityRanks = 32;
 
 constexpr std::size_t kColumns = 4;
 
@@ -101,9 +99,11 @@ inline float range_of(const float* row) {
   return static_cast<float>(std::sqrt(x * x + y * y + z * z));
 }
 
-// How bright each row is among the valid ones, from 0 to 1 in steps: every intensity that occurs
-// counts by the root of how often it does.
-inline std::vector<float> intensity_rank(const Scan& scan, const std::vector<bool>& valid) {
+// How bright each row is among the valid ones, from 0 on: every intensity that occurs counts by the
+// root of how often it does. All 0 where intensity was not measured.
+inline std::vector<std::int64_t> intensity_ranks(const Scan& scan, const std::vector<bool>& valid) {
+  std::vector<std::int64_t> ranks(scan.size(), 0);
+  if (!has_measured_intensity(scan, valid)) return ranks;
   std::vector<float> ascending;
   for (std::size_t row = 0; row < scan.size(); ++row) {
     if (valid[row]) ascending.push_back(scan.row(row)[3]);
@@ -124,10 +124,8 @@ inline std::vector<float> intensity_rank(const Scan& scan, const std::vector<boo
     const auto level = static_cast<std::size_t>(first - darker.cbegin());
     edges.push_back(level < levels.size() ? levels[level] : INFINITY);
   }
-  std::vector<float> ranks(scan.size());
   for (std::size_t row = 0; row < scan.size(); ++row) {
-    const auto edge = std::upper_bound(edges.cbegin(), edges.cend(), scan.row(row)[3]);
-    ranks[row] = static_cast<float>(edge - edges.cbegin()) / (kIntensityRanks - 1);
+    ranks[row] = std::upper_bound(edges.cbegin(), edges.cend(), scan.row(row)[3]) - edges.cbegin();
   }
   return ranks;
 }
@@ -137,10 +135,6 @@ inline std::optional<std::vector<float>> channel_of(const Scan& scan,
                                                     const std::vector<bool>& valid,
                                                     const std::string& name) {
   static const std::vector<std::string> columns = {"x", "y", "z", "intensity"};
-  if (name == "intensity_rank") {
-    if (!has_measured_intensity(scan, valid)) return std::nullopt;
-    return intensity_rank(scan, valid);
-  }
   const auto column = std::find(columns.begin(), columns.end(), name) - columns.begin();
   const bool is_column = column < static_cast<std::ptrdiff_t>(kColumns);
   if (!is_column && name != "range") return std::nullopt;

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "isolated_points.hpp"
 #include "neighbour_view.hpp"
 #include "range_view.hpp"
 
@@ -32,6 +33,14 @@ void write_inputs(const std::filesystem::path& out, const std::vector<derain::In
   for (const derain::Input& input : inputs) {
     write(out / input.type.name, static_cast<const char*>(input.numbers), input.bytes);
   }
+}
+
+// What a network takes of points of the scan, and the way back to its rows.
+template <typename View>
+void write_points(const std::filesystem::path& out, View view) {
+  write_inputs(out, view.inputs());
+  write(out / "first", view.first.data(), view.first.size());
+  write(out / "inverse", view.inverse.data(), view.inverse.size());
 }
 
 }  // namespace
@@ -53,11 +62,10 @@ int main(int count, char** arguments) {
       write_inputs(out, view.inputs());
       write(out / "pixel", view.pixel.data(), view.pixel.size());
       write(out / "winner", view.winner.data(), view.winner.size());
+    } else if (spec.isolated) {
+      write_points(out, derain::isolated_points(scan, spec, 2));
     } else {
-      derain::NeighbourView view = derain::neighbour_view(scan, spec, 2);
-      write_inputs(out, view.inputs());
-      write(out / "first", view.first.data(), view.first.size());
-      write(out / "inverse", view.inverse.data(), view.inverse.size());
+      write_points(out, derain::neighbour_view(scan, spec, 2));
     }
   } catch (const std::exception& error) {
     std::cerr << "show_view: " << error.what() << '\n';

@@ -18,6 +18,10 @@ namespace derain {
 constexpr double kSchema = 1;
 constexpr double kMostNeighbours = 64;
 
+// Shells around the sensor, and steps of intensity, in which points are counted.
+constexpr std::int64_t kShells = 11;
+constexpr std::int64_t kIntensityRanks = 32;
+
 // What a channel of a point that may be rain is at least, and at most.
 struct Bound {
   std::string channel;
@@ -36,7 +40,7 @@ struct RangeSpec {
 struct Spec {
   std::string network;
   std::size_t neighbours = 0;         // k of the neighbour view, the point itself included
-  bool merged = false;                // whether points that are one return are one point
+  bool isolated = false;              // whether the view is that of isolated points
   std::optional<RangeSpec> range;     // the range view, where the network has that one
   std::vector<std::string> channels;  // what the network sees of a point, in order
   std::vector<float> mean;            // stands in for what a scan lacks, by channel
@@ -98,9 +102,9 @@ inline RangeSpec range_spec_of(const Json& view) {
 
 inline void read_view(const Json& view, Spec& spec) {
   const std::string kind = member(view, "kind", Json::Kind::text).text;
-  if (kind == "neighbours") {
+  if (kind == "neighbours" || kind == "isolated_points") {
     spec.neighbours = neighbours_of(view);
-    spec.merged = view["merged"].is(Json::Kind::boolean) && view["merged"].number != 0;
+    spec.isolated = kind == "isolated_points";
   } else if (kind == "range") {
     spec.range = range_spec_of(view);
   } else {
@@ -128,10 +132,7 @@ inline Spec spec_of(const Json& content) {
   read_view(member(content, "view", Json::Kind::object), spec);
   for (const Json& item : member(content, "channels", Json::Kind::array).items) {
     spec.channels.push_back(item.text);
-    // It is made from both returns of a ray, which this program does not pair.
-    if (item.text == "dual_return") {
-      throw Unknown("it sees 'dual_return', which this program cannot make of a scan");
-    }
+    if (item.text == "dual_return") throw Unknown("it sees 'dual_return', which derain 0.2 made");
   }
   for (const Json& item : member(content, "mean", Json::Kind::array).items) {
     spec.mean.push_back(static_cast<float>(item.number));
@@ -181,6 +182,14 @@ inline std::vector<InputType> inputs_of(const Spec& spec) {
             {"valid", Element::truth, {1, 1, height, width}}};
   }
   const auto k = static_cast<std::int64_t>(spec.neighbours);
+  if (spec.isolated) {
+    return {{"points", Element::real, {kVarying, 3}},
+            {"cell", Element::whole, {kVarying}},
+            {"distances", Element::real, {kVarying, k}},
+            {"neighbours", Element::whole, {kVarying, k}},
+            {"step", Element::real, {1}},
+            {"counts", Element::real, {1, kShells, kIntensityRanks}}};
+  }
   std::vector<InputType> inputs = {{"points", Element::real, {kVarying, channels}},
                                    {"distances", Element::real, {kVarying, k}},
                                    {"neighbours", Element::whole, {kVarying, k}}};

@@ -39,8 +39,7 @@ class OutDet(SupervisedModule, Published):
     Args:
         neighbours: k, the size of a neighbourhood, the point itself included.
         channels: What it sees of a point besides distances: ``x``, ``y``, ``z``, ``range``,
-            ``intensity``, ``radar``, ``dual_return``, or other columns of the scans, such as
-            ``doppler``.
+            ``intensity``, ``radar``, or other columns of the scans, such as ``doppler``.
         learning_rate: Of Adam.
         weight_decay: Of Adam.
         milestones: Epochs after which the learning rate falls.

@@ -65,7 +65,7 @@ class SalsaNextModule(SupervisedModule):
         back_projection: Name of the back-projection, by which points that lost their pixel to a
             nearer one get a score: ``nearest range``, ``copy`` or ``vote``.
         channels: What it sees of a point: ``range``, ``x``, ``y``, ``z``, ``intensity``, ``radar``,
-            ``dual_return``, or other columns of the scans, such as ``doppler``.
+            or other columns of the scans, such as ``doppler``.
         width: Channels of the first layers, 32 as published; all others are multiples of it.
         dropout: Share of feature maps dropped in training.
         learning_rate: Of stochastic gradient descent, after the warm-up.

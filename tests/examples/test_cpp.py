@@ -16,6 +16,7 @@ from derain.export.runtime import METADATA_KEY, Derainer
 from derain.scan import Scan
 from derain.spec import Spec
 from derain.views.candidates import Bound, Candidates
+from derain.views.isolated_points import IsolatedPoints
 from derain.views.neighbours import Neighbourhoods
 from derain.views.range_image import RangeImage
 from derain.views.view import ViewedScan
@@ -56,9 +57,8 @@ def specs() -> dict[str, Spec]:
     return {
         "circle": image(-180.0, 180.0),
         "sector": image(-20.0, 190.0),
-        "cues": replace(
-            wide(outdet, "x", "y", "z", "intensity_rank"),
-            view={"kind": "neighbours", "neighbours": 9, "merged": True},
+        "isolated points": replace(
+            wide(outdet, "x", "y", "z"), view={"kind": "isolated_points", "neighbours": 9}
         ),
         "default": default,
         "intensity": outdet,
@@ -80,7 +80,7 @@ def same_view(folder: Path, view: ViewedScan) -> None:
     if isinstance(view, RangeImage):
         way_back = {"pixel": view.pixel, "winner": view.winner}
     else:
-        assert isinstance(view, Neighbourhoods)
+        assert isinstance(view, Neighbourhoods | IsolatedPoints)
         way_back = {"first": view.first, "inverse": view.inverse}
     expected = {**view.inputs(), **way_back}
     assert {path.name for path in folder.iterdir()} == set(expected)
@@ -93,7 +93,7 @@ def same_view(folder: Path, view: ViewedScan) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("cues", "default", "intensity", "candidates", "other channels"),
+        *("isolated points", "default", "intensity", "candidates", "other channels"),
         *("one neighbour", "many neighbours", "circle", "sector"),
     ],
 )
@@ -132,7 +132,6 @@ def test_and_so_it_is_for_a_real_scan(
         ({"view": {**IMAGE, "grid": {**GRID, "edges": [1, 2]}}}, "its grid is none that there can"),
         ({"view": {"kind": "neighbours", "neighbours": 1e9}}, "its neighbourhoods are of no"),
         ({"channels": ["x"]}, "its channels and their means differ in number"),
-        ({"channels": ["x", "y", "dual_return"]}, "it sees 'dual_return', which this"),
         ({"network": None}, "its Spec has no proper 'network'"),
     ],
 )

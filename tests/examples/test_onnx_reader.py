@@ -83,11 +83,10 @@ def test_of_images_it_makes_what_derain_makes_whichever_way_scores_come_back(
 @pytest.mark.parametrize(
     "change",
     [
-        {"channels": ("x", "y", "intensity_rank")},
         {"channels": ("x", "y", "dual_return")},
-        {"view": {"kind": "neighbours", "neighbours": 9, "merged": True}},
+        {"view": {"kind": "voxels"}},
     ],
-    ids=["ranks", "returns", "merged points"],
+    ids=["a former channel", "another view"],
 )
 def test_what_it_does_not_know_is_refused(
     reader: ModuleType, tmp_path: Path, change: dict[str, Any]

@@ -21,9 +21,6 @@ from derain.export.proof import FINITE, FLOAT32, INT8, THREADS, Case, Proof, pro
 from derain.export.runtime import Derainer
 from derain.models.outdet import OutDet
 from derain.scan import Scan
-from derain.views.channels import DUAL_RETURN, channel_of
-
-from ..two_returns import Recording
 
 SCENE = [("scene", Scan.of(scene()))]
 
@@ -259,17 +256,15 @@ def test_a_model_is_taken_back_to_its_device(
     assert moved == [device]
 
 
-EXTRA = {"radar": (0.1, 0.3), "doppler": (-2.0, 3.0), DUAL_RETURN: (0.1, 0.5)}
+EXTRA = {"radar": (0.1, 0.3), "doppler": (-2.0, 3.0)}
 
 
 def recorded(seed: int) -> Scan:
-    """A scan of a sensor of two returns, with a radar's columns, of which some are not known."""
-    recording, generator = Recording(seed, share=0.2, step=3.0), np.random.default_rng(seed)
-    columns = {name: generator.normal(*EXTRA[name], len(recording.ray)) for name in EXTRA}
+    """A scan with a radar's columns, of which some are not known."""
+    generator, points = np.random.default_rng(seed), scene(1000, seed)
+    columns = {name: generator.normal(*EXTRA[name], len(points)) for name in EXTRA}
     columns["doppler"][::3] = np.nan
-    del columns[DUAL_RETURN]  # follows from the places of the points
-    scan = Scan.of(np.column_stack([recording.xyz, recording.ray % 200]))
-    return replace(scan, fields=columns)
+    return replace(Scan.of(points), fields=columns)
 
 
 @pytest.mark.usefixtures("one_block")
@@ -283,16 +278,11 @@ def test_further_channels_are_seen_and_proved_and_missing_ones_are_their_mean(
     export(model, tmp_path / "model.onnx")
     derainer, scan = Derainer(tmp_path / "model.onnx", 1), recorded(7)
     assert derainer.view.neighbours == 3
-    assert derainer.spec.units[-3:] == ("0 or 1", "m/s", "-1, 0 or 1")
-    seen = derainer.view(scan)
-    np.testing.assert_array_equal(seen.points[:, -1], channel_of(scan, DUAL_RETURN)[seen.first])
+    assert derainer.spec.units[-2:] == ("0 or 1", "m/s")
     means = {name: np.full(len(scan), mean) for name, (mean, _) in EXTRA.items()}
     absent, filled = (derainer.probability(replace(scan, fields=f)) for f in ({}, means))
-    dual = {DUAL_RETURN: channel_of(scan, DUAL_RETURN)}
-    with_mean = derainer.probability(replace(scan, fields={**means, **dual}))
-    np.testing.assert_array_equal(absent, with_mean)
+    np.testing.assert_array_equal(absent, filled)
     assert (derainer.probability(scan) != absent).mean() > 0.1
-    assert (absent != filled).mean() > 0.1
     # A proof looks at them as well.
     graph = onnx.load(tmp_path / "model.onnx")
     monkeypatch.setattr(onnx_file, "_traced", lambda *_: graph)

@@ -1,7 +1,5 @@
 """Channels: values where a scan has them, and one stand-in where it has not."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,19 +10,13 @@ from numpy.typing import NDArray
 from derain.evaluation.hard_cases import hard_cases
 from derain.scan import Scan
 from derain.views.channels import (
-    DUAL_RETURN,
-    INTENSITY_RANK,
-    INTENSITY_RANKS,
     USUAL_CHANNELS,
     channel_image,
-    channel_of,
     channel_values,
     extra_channels,
     filled_values,
     with_columns,
 )
-
-from ..two_returns import Recording
 
 HARD_CASES = dict(hard_cases(largest=3000))
 EVERYTHING = (*USUAL_CHANNELS, "radar", "doppler")
@@ -104,64 +96,3 @@ def test_an_image_of_all_valid_points_holds_what_they_measure(scan: Scan) -> Non
     filled = filled_values(scan, np.flatnonzero(scan.valid), EVERYTHING, {"intensity": 9.0}).T
     np.testing.assert_array_equal(image[:, scan.valid], filled)
     assert not image[:, ~scan.valid].any()
-
-
-def test_the_place_of_a_return_in_its_ray_is_a_channel() -> None:
-    recording = Recording(0)
-    _, nearer, farther = recording.truth()
-    expected = nearer.astype(np.float32) - farther.astype(np.float32)
-    assert set(expected) == {-1, 0, 1}
-    scan = Scan.of(recording.xyz)
-    np.testing.assert_array_equal(channel_of(scan, DUAL_RETURN), expected)
-    rows = np.arange(len(scan))
-    np.testing.assert_array_equal(channel_values(scan, rows, [DUAL_RETURN])[0], expected)
-    np.testing.assert_array_equal(filled_values(scan, rows, [DUAL_RETURN], {})[:, 0], expected)
-    np.testing.assert_array_equal(channel_image(scan, rows, [DUAL_RETURN], {})[0], expected)
-
-
-def test_a_scan_of_single_returns_has_no_place_of_them() -> None:
-    scan = Scan.of(Recording(0, share=0).xyz)
-    assert channel_of(scan, DUAL_RETURN) is None
-    assert filled_values(scan, np.arange(5), [DUAL_RETURN], {DUAL_RETURN: 0.25}).max() == 0.25
-    assert with_columns(scan, [DUAL_RETURN]).fields == {}
-
-
-def test_places_of_returns_stay_with_them_when_points_are_taken_out_or_turned() -> None:
-    scan = Scan.of(Recording(0).xyz)
-    kept = with_columns(scan, [DUAL_RETURN])
-    rows = np.random.default_rng(0).permutation(len(scan))[:100]
-    part = replace(kept.take(rows), xyz=np.ones((100, 3), np.float32))
-    expected = channel_of(scan, DUAL_RETURN)
-    assert expected is not None
-    np.testing.assert_array_equal(channel_of(part, DUAL_RETURN), expected[rows])
-
-
-@given(
-    hnp.arrays(np.uint8, st.integers(100, 300)).filter(lambda column: len(np.unique(column)) > 1),
-    st.sampled_from([1 / 255, 1.0, 257.0]),
-)
-def test_ranks_of_intensity_keep_its_order_in_whatever_unit(
-    column: NDArray[np.uint8], gain: float
-) -> None:
-    xyz = np.ones((len(column), 3), np.float32)
-    rank = channel_of(Scan(xyz, intensity=column.astype(np.float32)), INTENSITY_RANK)
-    scaled = channel_of(Scan(xyz, intensity=(column * gain).astype(np.float32)), INTENSITY_RANK)
-    np.testing.assert_array_equal(rank, scaled)
-    order = np.argsort(column, kind="stable")
-    assert (np.diff(rank[order]) >= 0).all()
-    assert rank[order[0]] == 0
-    steps = rank * (INTENSITY_RANKS - 1)
-    np.testing.assert_allclose(steps, np.round(steps), atol=1e-5)
-
-
-def test_ranks_tell_intensities_apart_where_most_points_share_one() -> None:
-    intensity = np.repeat(np.arange(20, dtype=np.float32), [8000] + [100] * 19)
-    scan = Scan(np.ones((len(intensity), 3), np.float32), intensity=intensity)
-    rank = channel_of(scan, INTENSITY_RANK)
-    assert len(np.unique(rank)) > 12
-
-
-def test_without_measured_intensities_there_are_no_ranks() -> None:
-    xyz = np.ones((200, 3), np.float32)
-    assert channel_of(Scan(xyz), INTENSITY_RANK) is None
-    assert channel_of(Scan(xyz, intensity=np.zeros(200, np.float32)), INTENSITY_RANK) is None

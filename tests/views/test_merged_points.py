@@ -6,15 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from derain.errors import InputError
-from derain.evaluation.hard_cases import hard_cases, scene
-from derain.scan import Scan
-from derain.views.candidates import Bound, Candidates
-from derain.views.merged_points import RANGE_RESOLUTION, SAME_RAY, merged_points
+from derain.views.merged_points import RANGE_RESOLUTION, SAME_RAY, are_one_return, merged_points
 from derain.views.neighbour_search import NeighbourSearch
-from derain.views.neighbours import NeighbourView
-
-VIEW = NeighbourView(9, ("x", "y", "z"), merged=True)
 
 
 def rays(azimuths: int = 60, inclinations: int = 8) -> NDArray[np.float64]:
@@ -59,32 +52,9 @@ def test_neighbouring_rays_stay_apart() -> None:
     assert len(merged(arc)[0]) == 200
 
 
-def test_a_view_gives_every_row_the_score_of_its_return() -> None:
-    points = scene(2000)
-    xyz = points[:, :3].astype(np.float64)
-    behind = xyz * (1 + 0.004 / np.linalg.norm(xyz, axis=1, keepdims=True))
-    once = VIEW(Scan.of(points))
-    twice = VIEW(Scan.of(np.concatenate([xyz, behind]).astype(np.float32)))
-    assert twice.size <= once.size
-    score = np.arange(twice.size, dtype=np.float32)
-    first, second = twice.back(score).reshape(2, -1)
-    np.testing.assert_array_equal(first, second)
-
-
-def test_without_copies_it_is_the_view_that_merges_nothing() -> None:
-    scan = Scan.of((7 * rays()).astype(np.float32))
-    own, other = VIEW(scan), NeighbourView(9, ("x", "y", "z"))(scan)
-    for name, array in own.inputs().items():
-        np.testing.assert_array_equal(array, other.inputs()[name])
-
-
-@pytest.mark.parametrize(("name", "scan"), list(hard_cases(2000)))
-def test_hard_scans_are_viewed(name: str, scan: Scan) -> None:
-    seen = VIEW(scan)
-    assert (seen.judged == scan.valid).all()
-    assert all(np.isfinite(array).all() for array in seen.inputs().values())
-
-
-def test_candidates_are_refused() -> None:
-    with pytest.raises(InputError, match="cannot leave points out"):
-        VIEW.with_candidates(Candidates((Bound("range", most=10.0),)))
+def test_of_some_points_it_is_found_which_neighbours_are_one_return_with_them() -> None:
+    xyz = np.concatenate([10 * rays(), 10.01 * rays()]).astype(np.float32)
+    some = np.array([3, 17])
+    neighbours, distances = NeighbourSearch(xyz)(4, some)
+    one = are_one_return(xyz, some, neighbours, distances)
+    np.testing.assert_array_equal(one, neighbours[:, 1:] == some[:, None] + len(rays()))

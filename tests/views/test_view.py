@@ -13,6 +13,7 @@ from derain.evaluation.hard_cases import scene
 from derain.files.documents import Entry
 from derain.scan import Scan
 from derain.spec import Spec
+from derain.views.isolated_points import CHANNELS, IsolatedPointView
 from derain.views.neighbours import Neighbourhoods, NeighbourView
 from derain.views.range_image import RangeView
 from derain.views.registry import VIEWS
@@ -20,7 +21,11 @@ from derain.views.spherical_grid import ALL_AROUND, grid_of
 from derain.views.view import View
 from derain.views.window import PlacedScan, Window, WindowOfScans
 
-OURS = {"neighbours": NeighbourView(5), "range": RangeView(grid_of("wads", "test"))}
+OURS = {
+    "isolated_points": IsolatedPointView(5),
+    "neighbours": NeighbourView(5),
+    "range": RangeView(grid_of("wads", "test")),
+}
 
 
 def test_derain_has_these_views_and_each_knows_its_name() -> None:
@@ -33,7 +38,10 @@ def test_a_view_reads_back_what_it_says_of_itself(view: View) -> None:
     channels, fill_value = ("z", "range"), {"z": 1.5}
     entry = Entry("model", "view", view.as_dict())
     assert entry.value["kind"] == view.NAME
-    expected = replace(view, channels=channels, fill_value=fill_value)
+    if isinstance(view, IsolatedPointView):
+        channels, expected = CHANNELS, replace(view, threads=3)
+    else:
+        expected = replace(view, channels=channels, fill_value=fill_value)
     if isinstance(view, NeighbourView):
         expected = replace(expected, threads=3)
     assert type(view).of(entry, channels, fill_value, threads=3) == expected

@@ -1,0 +1,33 @@
+"""How bright points are among those of their scan: the same in whatever unit intensities are."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.scan import Scan
+
+# Steps in which intensities are ranked.
+INTENSITY_RANKS = 32
+
+
+def intensity_rank(scan: Scan) -> NDArray[np.int64]:
+    """Ranks of the points of a scan by their intensity.
+
+    Every intensity that occurs counts by the root of how often it does: where most of the points
+    share one, such as 0, the others are still told apart.
+
+    Args:
+        scan: The scan.
+
+    Returns:
+        From 0, the darkest, to INTENSITY_RANKS - 1, int64 (N,); all 0 where intensity was not
+        measured.
+    """
+    intensity = scan.measured_intensity
+    if intensity is None:
+        return np.zeros(len(scan), np.int64)
+    levels, points = np.unique(intensity[scan.valid], return_counts=True)
+    darker = np.append(0, np.cumsum(np.sqrt(points)))  # than each level, and than none
+    steps = np.arange(1, INTENSITY_RANKS) / INTENSITY_RANKS * darker[-1]
+    first_level = np.searchsorted(darker[:-1], steps)
+    edges = np.append(levels, np.float32(np.inf))[first_level]
+    return np.searchsorted(edges, intensity, side="right")

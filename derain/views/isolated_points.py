@@ -1,0 +1,232 @@
+"""The view of isolated points: those of a scan that may be rain, each with its neighbours.
+
+Most points of a scan are crowded by others, and no rain. They are recognised by what lies near them
+along a Morton curve, before any search; a network judges the others alone, and they are what it
+takes its time for.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from derain.files.documents import Entry
+from derain.scan import Scan
+from derain.views.beams import SAMPLED, STEP_NEIGHBOURS, beam_step, crowding
+from derain.views.intensity_rank import INTENSITY_RANKS, intensity_rank
+from derain.views.merged_points import are_one_return, merged_points
+from derain.views.morton import distinct_rows
+from derain.views.neighbour_search import NeighbourSearch
+from derain.views.neighbours import MOST_NETWORK_NEIGHBOURS, of_points_to_rows
+from derain.views.registry import VIEWS
+from derain.views.spherical_grid import ALL_AROUND
+from derain.views.view import BackProjection, View, ViewedScan
+
+# A point is isolated if no more than this crowds it, see :func:`derain.views.beams.crowding`. A
+# third of a scan is, and 99 % of simulated rain and snow; what is left out has others all around.
+# Source: modelling choice, on simulated worlds.
+MOST_CROWDED = 5.0
+
+# What the view takes of a point besides the rank of its intensity.
+CHANNELS = ("x", "y", "z")
+
+# Shells around the sensor in which points are counted: equal steps of the logarithm of range
+# between these, metres. What is nearer is in the first, what is farther in the last.
+# Source: modelling choice.
+SHELLS, NEAREST, FARTHEST = 11, 1.0, 60.0
+_ALL_EDGES = np.geomspace(NEAREST, FARTHEST, SHELLS + 1)
+SHELL_EDGES = _ALL_EDGES[1:-1]
+SHELL_MIDDLES = np.sqrt(_ALL_EDGES[1:] * _ALL_EDGES[:-1])
+
+
+@dataclass(frozen=True, eq=False)
+class IsolatedPoints(ViewedScan):
+    """One or more scans as a network sees them that judges isolated points alone.
+
+    The M points are the distinct returns of the scan, along a Morton curve: of several rows at one
+    position, or of one return that is written more than once, the network sees the first, and all
+    are given its score. Of those, S are isolated; the others are no rain.
+
+    Attributes:
+        points: x, y, z in metres, in the sensor's frame, float32 (M, 3).
+        cell: Shell and rank of intensity of each point, ``shell * INTENSITY_RANKS + rank``, int64
+            (M,).
+        neighbours: Of each isolated point itself, then its nearest neighbours in ascending
+            distance, as rows of ``points``, int64 (S, k).
+        distances: Their distances in metres, float32 (S, k).
+        step: The angle between neighbouring beams of each scan, radians, float32 (B,).
+        counts: Points of each scan by shell and rank of intensity, float32 (B, SHELLS,
+            INTENSITY_RANKS).
+        first: Row of the scan that each point was taken from, int64 (M,).
+        inverse: Point of each row of the scan, int64 (N,); -1 for invalid rows.
+    """
+
+    points: NDArray[np.float32]
+    cell: NDArray[np.int64]
+    neighbours: NDArray[np.int64]
+    distances: NDArray[np.float32]
+    step: NDArray[np.float32]
+    counts: NDArray[np.float32]
+    first: NDArray[np.int64]
+    inverse: NDArray[np.int64]
+
+    @property
+    def varying(self) -> Mapping[str, str]:
+        """The inputs that are longer in some scans than in others, and what is on them."""
+        of_points, of_isolated = ("points", "cell"), ("distances", "neighbours")
+        return dict.fromkeys(of_points, "points") | dict.fromkeys(of_isolated, "isolated")
+
+    @property
+    def size(self) -> int:
+        """S, the number of isolated points."""
+        return len(self.neighbours)
+
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """True for valid rows of the scan, bool (N,); not rain where they are crowded."""
+        return self.inverse >= 0
+
+    def inputs(self) -> dict[str, NDArray[Any]]:
+        """The network's inputs, in its order."""
+        names = ("points", "cell", "distances", "neighbours", "step", "counts")
+        return {name: getattr(self, name) for name in names}
+
+    def target(self, rain: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """What the network is to say of each isolated point.
+
+        Args:
+            rain: Truth for every row of the scan, bool (N,).
+
+        Returns:
+            1 for rain, 0 for everything else, int64 (S,).
+        """
+        return rain[self.first[self._isolated]].astype(np.int64)
+
+    def back_projection(self) -> BackProjection:
+        """What gives every row the score of its point, and 0 where that is crowded."""
+        return partial(of_points_to_rows, self.inverse, self._isolated, len(self.points))
+
+    @staticmethod
+    def pack(seen: Sequence["IsolatedPoints"]) -> dict[str, NDArray[Any]]:
+        """Inputs of several scans as one cloud, each scan's neighbours staying its own."""
+        inputs = [one.inputs() for one in seen]
+        before = np.cumsum([0, *(len(one["points"]) for one in inputs)])
+        for one, points in zip(inputs, before, strict=False):
+            one["neighbours"] = one["neighbours"] + points
+        return {name: np.concatenate([one[name] for one in inputs]) for name in inputs[0]}
+
+    @property
+    def _isolated(self) -> NDArray[np.int64]:
+        """Each isolated point as a row of ``points``, int64 (S,)."""
+        return self.neighbours[:, 0]
+
+
+@VIEWS.add("isolated_points")
+@dataclass(frozen=True)
+class IsolatedPointView(View):
+    """How a scan becomes its isolated points; the same in training and in deployment.
+
+    Args:
+        neighbours: k, the size of a neighbourhood, the point itself included.
+        threads: Threads of the search; 0 takes every core this process may use.
+    """
+
+    WEIGHS_INTENSITY: ClassVar[bool] = True
+
+    neighbours: int = 9
+    threads: int = 0
+
+    @classmethod
+    def of(
+        cls, entry: Entry, channels: tuple[str, ...], fill_value: Mapping[str, float], threads: int
+    ) -> Self:
+        """The view that a Spec describes by its ``kind`` and its ``neighbours``.
+
+        Raises:
+            InputError: Something that does not describe it.
+        """
+        found = entry.record(
+            {"kind": Entry.text, "neighbours": lambda e: e.whole(1, MOST_NETWORK_NEIGHBOURS)},
+            required=("neighbours",),
+        )
+        if channels != CHANNELS:
+            raise entry.fault(f"its channels are not {', '.join(CHANNELS)}", "Export it again.")
+        return cls(found["neighbours"], threads)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Its part of a Spec: ``kind`` and ``neighbours``."""
+        return {"kind": self.NAME, "neighbours": self.neighbours}
+
+    @property
+    def azimuth(self) -> tuple[float, float]:
+        """What it sees: everything around."""
+        return ALL_AROUND
+
+    def __call__(self, scan: Scan) -> IsolatedPoints:
+        """Views a scan."""
+        first, inverse, search, step = self._returns(scan)
+        xyz = scan.xyz.take(first, axis=0)
+        isolated = np.flatnonzero(crowding(xyz, step) <= MOST_CROWDED)
+        neighbours, distances = search(self.neighbours, isolated)
+        cell = _cells(xyz, intensity_rank(scan)[first])
+        counts = np.bincount(cell, minlength=SHELLS * INTENSITY_RANKS).astype(np.float32)
+        return IsolatedPoints(
+            xyz,
+            cell,
+            neighbours,
+            distances,
+            np.array([step], np.float32),
+            counts.reshape(1, SHELLS, INTENSITY_RANKS),
+            first,
+            inverse,
+        )
+
+    def _returns(
+        self, scan: Scan
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NeighbourSearch, float]:
+        """The distinct returns of a scan, and the step between its beams.
+
+        Returns:
+            ``first`` and ``inverse`` as of :class:`IsolatedPoints`; what finds neighbours among
+            them; and radians.
+        """
+        first, inverse = distinct_rows(scan)
+        search, step, doubled = self._searched(scan, first)
+        if doubled:
+            xyz = scan.xyz.take(first, axis=0)
+            kept, point = merged_points(xyz, first, *search(1 + STEP_NEIGHBOURS))
+            first, inverse = first[kept], np.append(point, -1)[inverse]
+            search, step, _ = self._searched(scan, first)
+        return first, inverse, search, step
+
+    def _searched(
+        self, scan: Scan, first: NDArray[np.int64]
+    ) -> tuple[NeighbourSearch, float, bool]:
+        """What finds neighbours, the step, and whether some returns are written more than once.
+
+        The latter two are those of a sample: where none of thousands is written twice, the few that
+        may be make no difference.
+        """
+        xyz = scan.xyz.take(first, axis=0)
+        search = NeighbourSearch(xyz, rank=first, threads=self.threads)
+        some = np.unique(np.arange(SAMPLED) * len(first) // SAMPLED)[: len(first)]
+        neighbours, distances = search(1 + STEP_NEIGHBOURS, some)
+        doubled = are_one_return(xyz, some, neighbours, distances).any()
+        return search, beam_step(xyz, some, neighbours), bool(doubled)
+
+
+def _cells(xyz: NDArray[np.float32], rank: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Shell and rank of each point together, int64 (M,).
+
+    Args:
+        xyz: Positions in the sensor's frame, float32 (M, 3), metres.
+        rank: Ranks of their intensities, int64 (M,).
+    """
+    x, y, z = np.ascontiguousarray(xyz.T)
+    squared = x * x + y * y + z * z
+    shell = np.searchsorted(np.square(SHELL_EDGES).astype(np.float32), squared, side="right")
+    cell: NDArray[np.int64] = shell * INTENSITY_RANKS + rank
+    return cell

@@ -1,0 +1,42 @@
+"""Ranks of intensity keep its order, whatever its unit, and tell rare ones apart."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.typing import NDArray
+
+from derain.scan import Scan
+from derain.views.intensity_rank import INTENSITY_RANKS, intensity_rank
+
+
+def of_intensities(intensity: NDArray[np.float32] | None, points: int) -> Scan:
+    return Scan(np.ones((points, 3), np.float32), intensity=intensity)
+
+
+@given(
+    hnp.arrays(np.uint8, st.integers(100, 300)).filter(lambda column: len(np.unique(column)) > 1),
+    st.sampled_from([1 / 255, 1.0, 257.0]),
+)
+def test_ranks_keep_the_order_of_intensities_in_whatever_unit(
+    column: NDArray[np.uint8], gain: float
+) -> None:
+    intensity = column.astype(np.float32)
+    rank = intensity_rank(of_intensities(intensity, len(column)))
+    scaled = intensity_rank(of_intensities(intensity * np.float32(gain), len(column)))
+    np.testing.assert_array_equal(rank, scaled)
+    in_order = rank[np.argsort(column, kind="stable")]
+    assert (np.diff(in_order) >= 0).all()
+    assert in_order[0] == 0
+    assert in_order[-1] < INTENSITY_RANKS
+
+
+def test_intensities_are_told_apart_where_most_points_share_one() -> None:
+    intensity = np.repeat(np.arange(20, dtype=np.float32), [8000] + [100] * 19)
+    rank = intensity_rank(of_intensities(intensity, len(intensity)))
+    assert len(np.unique(rank)) > 12
+
+
+def test_without_measured_intensities_all_have_one_rank() -> None:
+    for intensity in (None, np.full(200, 7, np.float32)):
+        assert not intensity_rank(of_intensities(intensity, 200)).any()
