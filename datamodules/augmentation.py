@@ -1,21 +1,21 @@
 """Random changes of training scans."""
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from derain.datamodules.brightness_changes import with_other_brightness
+from derain.datamodules.user_changes import changed_as_by_users, in_sector
 from derain.scan import Scan
 from derain.views.spherical_grid import ALL_AROUND, FULL_CIRCLE
-
-# Levels that intensities are cut to, where they are.
-FEW_LEVELS = 7
 
 
 @dataclass(frozen=True)
 class Augmentation:
-    """Random rotation about the sensor's vertical axis, mirroring, jitter, and dropped points.
+    """Random changes of a scan: of where its points are, which there are, and how bright.
 
     The published recipe jitters by 0.1 *after* normalisation, which is 2.6 m in x and 0.16 m in z
     on WADS, and leaves the neighbours' distances those of the still cloud. Here the jitter is in
@@ -35,8 +35,10 @@ class Augmentation:
         sector_probability: Share of scans of which only a sector is kept, so that a batch of as
             many points holds more scans.
         sector: Width of the sector, degrees.
-        brightness_probability: Share of scans whose intensities are made all alike, inverted, or
-            cut to a few levels: on another sensor, brightness means something else.
+        brightness_probability: Share of scans that are given other intensities, see
+            :func:`~derain.datamodules.brightness_changes.with_other_brightness`.
+        user_probability: Share of scans that are changed as users change theirs, see
+            :func:`~derain.datamodules.user_changes.changed_as_by_users`.
 
     Source: sporsho/3D_OutDet, dataset/_point_cloud_dataset.py, for rotation, jitter and their 0.5;
         TiagoCortinhal/SalsaNext for mirroring and dropping.
@@ -51,28 +53,36 @@ class Augmentation:
     sector_probability: float = 0.0
     sector: float = 90.0
     brightness_probability: float = 0.0
+    user_probability: float = 0.0
 
     @property
     def changes_anything(self) -> bool:
         """Whether any scan is changed."""
         of_points = self.jitter_probability, self.dropping_probability, self.sector_probability
-        return max(*of_points, self.brightness_probability) > 0 or self.moves_the_sensor
+        other = self.brightness_probability, self.user_probability
+        return max(*of_points, *other) > 0 or self.moves_the_sensor
 
     @property
     def moves_the_sensor(self) -> bool:
         """Whether it turns or mirrors whole scans, each in its own way."""
-        return max(self.rotation_probability, self.mirror_probability) > 0
+        moving = self.rotation_probability, self.mirror_probability, self.user_probability
+        return max(moving) > 0
 
     def __call__(
-        self, scan: Scan, generator: np.random.Generator, azimuth: tuple[float, float] = ALL_AROUND
+        self,
+        scan: Scan,
+        generator: np.random.Generator,
+        azimuth: tuple[float, float] = ALL_AROUND,
+        rain: Collection[int] = (),
     ) -> Scan:
-        """Returns a changed copy; points keep their order and labels.
+        """Returns a changed copy, in which points that are left keep their labels.
 
         Args:
             scan: The scan.
             generator: Draws the changes.
             azimuth: The network's field of view: right and left bound, degrees counter-clockwise
                 from x.
+            rain: Labels of rain, whose intensities may be changed by themselves.
         """
         right, left = azimuth
         sees_all_around = left - right == FULL_CIRCLE
@@ -88,46 +98,20 @@ class Augmentation:
         xyz[valid] = moved
         changed = replace(scan, xyz=xyz)
         if self.brightness_probability and generator.random() < self.brightness_probability:
-            changed = _other_brightness(changed, generator)
+            is_rain = np.zeros(len(scan), bool)
+            if scan.label is not None:
+                is_rain = np.isin(scan.label, list(rain))
+            changed = with_other_brightness(changed, is_rain & scan.valid, generator)
         if generator.random() < self.dropping_probability:
             share = generator.uniform(0, self.dropping)
             changed = changed.take(generator.random(len(scan)) >= share)
+        if not changed.valid.any():
+            return changed
         if self.sector_probability and generator.random() < self.sector_probability:
-            return _sector(changed, self.sector, generator)
+            changed = changed.take(in_sector(changed, self.sector, generator))
+        if self.user_probability and generator.random() < self.user_probability:
+            changed = changed_as_by_users(changed.take(changed.valid), generator)
         return changed
-
-
-def _other_brightness(scan: Scan, generator: np.random.Generator) -> Scan:
-    """The scan with intensities that are alike, inverted, or of a few levels."""
-    if scan.intensity is None:
-        return scan
-    change = generator.integers(3)
-    known = scan.intensity[scan.valid]
-    if change == 0 or not len(known):
-        intensity = np.zeros_like(scan.intensity)
-    elif change == 1:
-        intensity = known.max() - scan.intensity
-    else:
-        levels = np.sort(generator.choice(known, FEW_LEVELS - 1))
-        intensity = np.searchsorted(levels, scan.intensity).astype(np.float32)
-    return replace(scan, intensity=intensity)
-
-
-def _sector(scan: Scan, width: float, generator: np.random.Generator) -> Scan:
-    """A sector of a scan around one of its points, so that it is never empty.
-
-    Args:
-        scan: The scan.
-        width: Width of the sector, degrees.
-        generator: Draws the point.
-    """
-    valid = np.flatnonzero(scan.valid)
-    if not len(valid):
-        return scan
-    azimuth = np.degrees(np.arctan2(scan.xyz[:, 1], scan.xyz[:, 0]))
-    off = azimuth - azimuth[generator.choice(valid)]
-    off = (off + FULL_CIRCLE / 2) % FULL_CIRCLE - FULL_CIRCLE / 2
-    return scan.take(np.abs(off) <= width / 2)
 
 
 def _turn(angle: float) -> NDArray[np.float32]:

@@ -17,7 +17,6 @@ from derain.scan import Scan
 from derain.sources.frame import Frame
 from derain.sources.source import Frames, Source
 from derain.sources.training_record import record_of_parts
-from derain.views.channels import channel_of
 
 # A name is a folder of predictions, a group of figures in a log and the beginning of classes.
 _NAME = re.compile(r"\w[\w-]*")
@@ -173,7 +172,7 @@ class Mixture(ScanDataModule):
         for name, part in self.parts.items() if channels else ():
             scan = next(part.training_scans(1, channels, labelled=False))
             for channel in channels:
-                if channel_of(scan, channel) is None:
+                if scan.channel(channel) is None:
                     raise InputError(
                         f"part '{name}'",
                         f"{scan.name} has no {channel}, which the model is to see",

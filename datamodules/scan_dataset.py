@@ -98,7 +98,8 @@ class ScanDataset(Dataset[Sample | InputError]):
                 # A scan that is drawn once is augmented the same, whether or not others repeat.
                 drawn = (number, pick.again) if pick.again else (number,)
                 generator = generator_of(Draw.AUGMENTATION, self.seed, pick.epoch, *drawn)
-                scan = self.augmentation(scan, generator, self.view.azimuth)
+                card = self.reader.card
+                scan = self.augmentation(scan, generator, self.view.azimuth, card.rain)
                 made = self._viewed(scan, number, stopwatch)
         # A kept sample took next to no time in this epoch.
         return replace(made, measured=pick.measured, milliseconds=stopwatch.milliseconds)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from derain.datamodules.augmentation import Augmentation
 from derain.evaluation.hard_cases import hard_cases, scene
 from derain.scan import Scan
-from derain.views.channels import INTENSITY_RANK, channel_of, with_columns
 
 HARD_CASES = dict(hard_cases(largest=5000))
 TURN = Augmentation(rotation_probability=1, jitter_probability=0)
@@ -159,9 +158,14 @@ def test_other_intensities_are_alike_inverted_or_of_few_levels_and_all_else_stay
     assert seen == {"alike", "inverted", "few levels"}
 
 
-def test_ranks_of_intensity_are_of_the_points_that_are_left() -> None:
-    scan = with_columns(street(), [INTENSITY_RANK])
-    left = DROP(scan, np.random.default_rng(1))
-    anew = Scan(left.xyz, intensity=left.intensity)
-    ranks = [channel_of(one, INTENSITY_RANK) for one in (left, anew)]
-    np.testing.assert_array_equal(*ranks)
+def test_rain_alone_may_get_other_intensities() -> None:
+    scan = street()
+    rain = np.arange(0, 2000, 10)
+    change, seen = Augmentation(0, 0, brightness_probability=1), set()
+    for seed in range(20):
+        changed = change(scan, np.random.default_rng(seed), rain=rain)
+        rest = np.setdiff1d(np.arange(2000), rain)
+        if np.array_equal(changed.intensity[rest], scan.intensity[rest]):
+            ratio = np.median(changed.intensity[rain] / scan.intensity[rain])
+            seen.add("brighter" if ratio > 1 else "darker")
+    assert seen == {"brighter", "darker"}
